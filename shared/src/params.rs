@@ -1,0 +1,385 @@
+//! The model's parameters and the only road by which numbers become parameters.
+//!
+//! Holds (8) and (9), the accepted ranges and the stability bound of the local model. Whatever comes off
+//! the wire passes `ModelParams::try_new` and `ModelState::try_new` or never reaches a model.
+
+use serde::{Deserialize, Serialize};
+
+use crate::contact::Coupling;
+use crate::geometry::{BoxFootprint, Face, Pose, Twist};
+use crate::time::TICK_S;
+
+/// Acceleration of gravity g, m/s².
+pub const GRAVITY: f64 = 9.81;
+
+/// Accepted mass m, kg: below, the discrete model nears its stability bound; above, a hand cannot push.
+pub const MASS_KG: (f64, f64) = (0.05, 50.0);
+/// Accepted viscous damping b, N s/m.
+pub const DAMPING_NS_PER_M: (f64, f64) = (0.0, 200.0);
+/// Accepted Coulomb friction c, N.
+pub const FRICTION_N: (f64, f64) = (0.0, 200.0);
+/// Accepted inertia I about z, kg m²: that of 0.05 kg at a side of 2 cm to 50 kg at 2 m.
+pub const INERTIA_KG_M2: (f64, f64) = (3e-6, 34.0);
+/// Accepted friction torque e about z, N m.
+pub const FRICTION_TORQUE_NM: (f64, f64) = (0.0, 200.0);
+/// Accepted distance from the reference point to a face, m.
+pub const FACE_OFFSET_M: (f64, f64) = (0.01, 1.0);
+/// Accepted distance of the object from the world's origin, m: the workspace.
+pub const WORKSPACE_M: f64 = 5.0;
+/// Accepted orientation, rad: a thousand turns, far beyond use and far within f64's precision.
+pub const ANGLE_RAD: f64 = 6283.0;
+/// Accepted speed of the object, m/s.
+pub const SPEED_M_PER_S: f64 = 10.0;
+/// Accepted turning rate of the object, rad/s.
+pub const TURN_RATE_RAD_PER_S: f64 = 100.0;
+
+/// Margin of the stability bound: the accepted mass is this factor above the proven one.
+pub const STABILITY_MARGIN: f64 = 4.0;
+/// rho = 6 s²/l² for a contact at the face's end (s = l/2): the worst lever arm.
+pub const RHO_MAX: f64 = 1.5;
+
+/// Why numbers were not accepted as model parameters or state.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum ParamsError {
+    /// A number is NaN or infinite.
+    #[error("{name} is not a finite number")]
+    NotFinite {
+        /// Which number.
+        name: &'static str,
+    },
+    /// A number lies outside its accepted range.
+    #[error("{name} {value} is outside the accepted range {min} to {max} {unit}")]
+    OutOfRange {
+        /// Which number.
+        name: &'static str,
+        /// What it was.
+        value: f64,
+        /// Least accepted value.
+        min: f64,
+        /// Greatest accepted value.
+        max: f64,
+        /// Unit of all three.
+        unit: &'static str,
+    },
+    /// The discrete local model would be near its stability bound.
+    #[error(
+        "mass {mass} kg is below {least} kg, the least that is stable with margin at this stiffness and damping"
+    )]
+    Unstable {
+        /// The mass, kg.
+        mass: f64,
+        /// The least accepted mass for these b, k_p, k_d, kg.
+        least: f64,
+    },
+}
+
+fn in_range(
+    name: &'static str,
+    unit: &'static str,
+    value: f64,
+    (min, max): (f64, f64),
+) -> Result<(), ParamsError> {
+    if !value.is_finite() {
+        return Err(ParamsError::NotFinite { name });
+    }
+    if value < min || value > max {
+        return Err(ParamsError::OutOfRange {
+            name,
+            value,
+            min,
+            max,
+            unit,
+        });
+    }
+    Ok(())
+}
+
+/// The impedance of the box on the plane: what the estimator finds and the local model is made of.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ModelParams {
+    m: f64,
+    b: f64,
+    c: f64,
+    inertia: f64,
+    e: f64,
+}
+
+impl ModelParams {
+    /// Parameters from m (kg), b (N s/m), c (N), I (kg m²) and e (N m).
+    ///
+    /// # Errors
+    /// Names the first number that is not finite, outside its range, or, for the mass, below the
+    /// stability bound of the local model under `coupling` with [`STABILITY_MARGIN`].
+    pub fn try_new(
+        m: f64,
+        b: f64,
+        c: f64,
+        inertia: f64,
+        e: f64,
+        coupling: &Coupling,
+    ) -> Result<Self, ParamsError> {
+        in_range("mass", "kg", m, MASS_KG)?;
+        in_range("damping", "N s/m", b, DAMPING_NS_PER_M)?;
+        in_range("friction", "N", c, FRICTION_N)?;
+        in_range("inertia", "kg m^2", inertia, INERTIA_KG_M2)?;
+        in_range("friction torque", "N m", e, FRICTION_TORQUE_NM)?;
+        let least = least_stable_mass(b, coupling);
+        if m < least {
+            return Err(ParamsError::Unstable { mass: m, least });
+        }
+        Ok(Self {
+            m,
+            b,
+            c,
+            inertia,
+            e,
+        })
+    }
+
+    /// Parameters of a square of side l (m): I by (8), e by (9).
+    ///
+    /// # Errors
+    /// As [`ModelParams::try_new`].
+    pub fn of_square(
+        m: f64,
+        b: f64,
+        c: f64,
+        side: f64,
+        coupling: &Coupling,
+    ) -> Result<Self, ParamsError> {
+        Self::try_new(
+            m,
+            b,
+            c,
+            inertia_of_square(m, side),
+            friction_torque_of_square(c, side),
+            coupling,
+        )
+    }
+
+    /// The raw numbers (m, b, c, I, e) in SI units.
+    #[must_use]
+    pub fn to_array(&self) -> [f64; 5] {
+        [self.m, self.b, self.c, self.inertia, self.e]
+    }
+
+    /// Mass m, kg.
+    #[must_use]
+    pub fn m(&self) -> f64 {
+        self.m
+    }
+
+    /// Viscous damping b, N s/m.
+    #[must_use]
+    pub fn b(&self) -> f64 {
+        self.b
+    }
+
+    /// Coulomb friction force c = mu m g, N.
+    #[must_use]
+    pub fn c(&self) -> f64 {
+        self.c
+    }
+
+    /// Inertia I about z, kg m².
+    #[must_use]
+    pub fn inertia(&self) -> f64 {
+        self.inertia
+    }
+
+    /// Friction torque e about z, N m.
+    #[must_use]
+    pub fn e(&self) -> f64 {
+        self.e
+    }
+
+    /// These parameters moved towards `target`: each number becomes `own·keep + target·(1 − keep)`.
+    ///
+    /// The accepted set is convex (the stability bound is linear in m and b), so the blend of two
+    /// accepted sets is accepted.
+    #[must_use]
+    pub fn blend(&self, target: &Self, keep: f64) -> Self {
+        let keep = keep.clamp(0.0, 1.0);
+        let mix = |own: f64, other: f64| own * keep + other * (1.0 - keep);
+        Self {
+            m: mix(self.m, target.m),
+            b: mix(self.b, target.b),
+            c: mix(self.c, target.c),
+            inertia: mix(self.inertia, target.inertia),
+            e: mix(self.e, target.e),
+        }
+    }
+}
+
+/// Least mass (kg) accepted for damping b under a coupling: the bound
+/// `4 m > (1 + rho) k_p T² + 2 (b + (1 + rho) k_d) T` of the semi-implicit local model, with margin.
+#[must_use]
+pub fn least_stable_mass(b: f64, coupling: &Coupling) -> f64 {
+    let k_p = coupling.stiffness_n_per_m;
+    let k_d = coupling.damping_ns_per_m;
+    let bound =
+        (1.0 + RHO_MAX) * k_p * TICK_S * TICK_S + 2.0 * (b + (1.0 + RHO_MAX) * k_d) * TICK_S;
+    STABILITY_MARGIN * bound / 4.0
+}
+
+/// Inertia about z of a square of mass m (kg) and side l (m), kg m².
+#[must_use]
+pub fn inertia_of_square(m: f64, side: f64) -> f64 {
+    // (8)
+    m * side * side / 6.0
+}
+
+/// Friction torque about z of a square of side l (m) under uniform pressure with friction c (N), N m.
+#[must_use]
+pub fn friction_torque_of_square(c: f64, side: f64) -> f64 {
+    // (9) in closed form: e = c l (sqrt 2 + asinh 1) / 6
+    c * side * (std::f64::consts::SQRT_2 + libm::asinh(1.0)) / 6.0
+}
+
+/// All that the master needs to render the object: parameters, footprint, pose and velocity.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ModelState {
+    /// The impedance.
+    pub params: ModelParams,
+    /// One distance from the reference point to each face.
+    pub footprint: BoxFootprint,
+    /// `world_from_object`.
+    pub pose: Pose,
+    /// Velocity of the reference point and turning rate.
+    pub twist: Twist,
+}
+
+impl ModelState {
+    /// A state whose every number has been checked.
+    ///
+    /// # Errors
+    /// Names the first number that is not finite or outside its range.
+    pub fn try_new(
+        params: ModelParams,
+        footprint: BoxFootprint,
+        pose: Pose,
+        twist: Twist,
+    ) -> Result<Self, ParamsError> {
+        for face in Face::ALL {
+            in_range("face offset", "m", footprint.offset(face), FACE_OFFSET_M)?;
+        }
+        in_range(
+            "position x",
+            "m",
+            pose.position.x,
+            (-WORKSPACE_M, WORKSPACE_M),
+        )?;
+        in_range(
+            "position y",
+            "m",
+            pose.position.y,
+            (-WORKSPACE_M, WORKSPACE_M),
+        )?;
+        in_range("angle", "rad", pose.angle, (-ANGLE_RAD, ANGLE_RAD))?;
+        in_range(
+            "velocity x",
+            "m/s",
+            twist.linear.x,
+            (-SPEED_M_PER_S, SPEED_M_PER_S),
+        )?;
+        in_range(
+            "velocity y",
+            "m/s",
+            twist.linear.y,
+            (-SPEED_M_PER_S, SPEED_M_PER_S),
+        )?;
+        let rate = (-TURN_RATE_RAD_PER_S, TURN_RATE_RAD_PER_S);
+        in_range("turning rate", "rad/s", twist.angular, rate)?;
+        Ok(Self {
+            params,
+            footprint,
+            pose,
+            twist,
+        })
+    }
+
+    /// Checks numbers that came from outside: every field again, the stability bound included.
+    ///
+    /// # Errors
+    /// As [`ModelParams::try_new`] and [`ModelState::try_new`].
+    pub fn checked(&self, coupling: &Coupling) -> Result<Self, ParamsError> {
+        let [m, b, c, inertia, e] = self.params.to_array();
+        let params = ModelParams::try_new(m, b, c, inertia, e, coupling)?;
+        Self::try_new(params, self.footprint, self.pose, self.twist)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const COUPLING: Coupling = Coupling {
+        stiffness_n_per_m: 1000.0,
+        damping_ns_per_m: 10.0,
+    };
+
+    #[test]
+    fn inertia_8_and_torque_9_have_their_closed_forms() {
+        assert!((inertia_of_square(0.7, 0.36) - 0.01512).abs() < 1e-12);
+        assert!((friction_torque_of_square(1.0, 1.0) - 0.382_598).abs() < 1e-6);
+    }
+
+    #[test]
+    fn torque_9_equals_its_integral() {
+        // midpoint rule over the square, 400 x 400
+        let (c, l, n) = (2.06, 0.36, 400);
+        let h = l / f64::from(n);
+        let mut sum = 0.0;
+        for i in 0..n {
+            for j in 0..n {
+                let x = (f64::from(i) + 0.5) * h - l / 2.0;
+                let y = (f64::from(j) + 0.5) * h - l / 2.0;
+                sum += c / (l * l) * (x * x + y * y).sqrt() * h * h;
+            }
+        }
+        assert!((friction_torque_of_square(c, l) / sum - 1.0).abs() < 1e-5);
+    }
+
+    #[test]
+    fn a_model_40_cm_wide_of_a_36_cm_cube_errs_by_23_and_11_percent() {
+        assert!((inertia_of_square(0.7, 0.40) / inertia_of_square(0.7, 0.36) - 1.235).abs() < 1e-3);
+        assert!(
+            (friction_torque_of_square(2.0, 0.40) / friction_torque_of_square(2.0, 0.36) - 1.111)
+                .abs()
+                < 1e-3
+        );
+    }
+
+    #[test]
+    fn every_number_that_is_not_finite_or_out_of_range_is_named() {
+        let good = ModelParams::of_square(0.7, 3.0, 2.06, 0.36, &COUPLING);
+        assert!(good.is_ok());
+        for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, -1.0, f64::MAX] {
+            for index in 0..5 {
+                let mut a = good.unwrap().to_array();
+                a[index] = bad;
+                assert!(
+                    ModelParams::try_new(a[0], a[1], a[2], a[3], a[4], &COUPLING).is_err(),
+                    "{a:?}"
+                );
+            }
+        }
+        let error = ModelParams::of_square(0.01, 0.0, 1.0, 0.36, &COUPLING).unwrap_err();
+        assert_eq!(
+            error.to_string(),
+            "mass 0.01 is outside the accepted range 0.05 to 50 kg"
+        );
+    }
+
+    #[test]
+    fn a_mass_near_the_stability_bound_is_refused_and_blends_of_accepted_sets_are_accepted() {
+        let least = least_stable_mass(100.0, &COUPLING);
+        assert!(ModelParams::of_square(least * 0.999, 100.0, 1.0, 0.4, &COUPLING).is_err());
+        let edge = ModelParams::of_square(least * 1.000_001, 100.0, 1.0, 0.4, &COUPLING).unwrap();
+        let far = ModelParams::of_square(5.0, 0.0, 9.0, 0.4, &COUPLING).unwrap();
+        for k in 0..=10 {
+            let a = edge.blend(&far, f64::from(k) / 10.0).to_array();
+            assert!(ModelParams::try_new(a[0], a[1], a[2], a[3], a[4], &COUPLING).is_ok());
+        }
+    }
+}

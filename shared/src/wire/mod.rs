@@ -1,0 +1,3 @@
+//! The wire: messages and, beside them, how they are written and read.
+
+pub mod message;
