@@ -5,7 +5,11 @@
 //! behind the feature of that name.
 
 pub mod contact;
+pub mod correction;
+pub mod dynamics;
 pub mod geometry;
+pub mod history;
+pub mod local_model;
 pub mod params;
 pub mod rng;
 pub mod settings;

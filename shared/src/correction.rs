@@ -1,0 +1,262 @@
+//! How the local model's pose is brought to what the slave says, without a jolt and without free energy.
+//!
+//! A received pose is never set: the difference is bled in at bounded rates. Turning about the contact
+//! point and shifting along the face do no work on a frictionless contact and are free, so is motion away
+//! from the HIP; motion towards it stores energy in the coupling and is paid from a tank that holds what
+//! the model has dissipated on the ground. What the tank cannot pay is not done.
+
+use crate::contact::{Coupling, Touch};
+use crate::geometry::{Pose, Vec2, rotate};
+use crate::history::PoseChange;
+use crate::time::TICK_S;
+
+/// Fastest bled shift, m/s: well below the speed of a push, so that the hand does not notice it.
+pub const SHIFT_RATE_M_PER_S: f64 = 0.05;
+/// Fastest bled turn, rad/s.
+pub const TURN_RATE_RAD_PER_S: f64 = 1.0;
+/// Time constant of the bleed, s.
+pub const BLEED_TAU_S: f64 = 0.1;
+/// Most energy that the tank holds, J: the coupling at 1000 N/m stores this at a depth of 14 mm, deeper
+/// than any push at 8 N. What is dissipated beyond it is gone.
+pub const TANK_MAX_J: f64 = 0.1;
+
+/// Energy put aside from what the model dissipated, J.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Tank {
+    level: f64,
+}
+
+impl Tank {
+    /// What it holds, J.
+    #[must_use]
+    pub fn level_j(&self) -> f64 {
+        self.level
+    }
+
+    /// Puts in what the model has dissipated (J), up to [`TANK_MAX_J`].
+    pub fn fill(&mut self, dissipated_j: f64) {
+        self.level = (self.level + dissipated_j.max(0.0)).min(TANK_MAX_J);
+    }
+
+    /// Takes out `energy_j` if it is there and says whether it was.
+    pub fn pay(&mut self, energy_j: f64) -> bool {
+        if energy_j > self.level {
+            return false;
+        }
+        self.level -= energy_j.max(0.0);
+        true
+    }
+}
+
+/// What remains to be corrected, and what pays for it.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Correction {
+    /// Shift and turn that are still to come.
+    pub remaining: PoseChange,
+    /// Sum of all shifts and turns done since the start.
+    pub done: PoseChange,
+    /// Pays for motion towards the HIP.
+    pub tank: Tank,
+}
+
+impl Correction {
+    /// Replaces what remains by the difference of a received pose and the model's own pose at the
+    /// stamp it answers, less what has been corrected since that stamp (`done_then` is the sum then).
+    pub fn aim(&mut self, received: &Pose, own_then: &Pose, done_then: &PoseChange) {
+        let done_since = PoseChange {
+            shift: self.done.shift - done_then.shift,
+            turn: self.done.turn - done_then.turn,
+        };
+        self.remaining = PoseChange {
+            shift: received.position - own_then.position - done_since.shift,
+            turn: received.angle - own_then.angle - done_since.turn,
+        };
+    }
+
+    /// Counts a shift of the centre that was done elsewhere, so that older answers are held against it.
+    pub fn count(&mut self, shift: Vec2) {
+        self.done.shift += shift;
+    }
+
+    /// Does all that remains at once, whatever it costs. The paper's way; sound only at zero delay.
+    pub fn snap(&mut self, pose: &mut Pose) {
+        let all = self.remaining;
+        self.apply(pose, all);
+    }
+
+    /// Turns the box at once about a fixed point of the world by all of the turn that remains.
+    pub fn snap_turn(&mut self, pose: &mut Pose, pivot: Vec2) {
+        let change = turn_about(pose, pivot, self.remaining.turn);
+        self.apply(pose, change);
+    }
+
+    /// Bleeds one tick's worth of what remains into `pose`. `touch` is what the HIP touches now.
+    pub fn bleed(&mut self, pose: &mut Pose, touch: Option<&Touch>, coupling: &Coupling) {
+        let share = TICK_S / BLEED_TAU_S;
+        let most = TURN_RATE_RAD_PER_S * TICK_S;
+        let turn = (self.remaining.turn * share).clamp(-most, most);
+        let pivot = touch.map_or(pose.position, |touch| touch.proxy);
+        let turned = turn_about(pose, pivot, turn);
+        self.apply(pose, turned);
+
+        let mut shift = self.remaining.shift * share;
+        let size = shift.norm();
+        let most = SHIFT_RATE_M_PER_S * TICK_S;
+        if size > most {
+            shift *= most / size;
+        }
+        if let Some(touch) = touch {
+            // the face as it lies after the turn about the proxy
+            let inward = rotate(turn, touch.inward);
+            let penetration = touch.penetration * libm::cos(turn);
+            shift = self.affordable(shift, inward, penetration, coupling);
+        }
+        self.apply(pose, PoseChange { shift, turn: 0.0 });
+    }
+
+    /// The part of a shift that is free or that the tank pays for.
+    fn affordable(&mut self, shift: Vec2, inward: Vec2, pen: f64, coupling: &Coupling) -> Vec2 {
+        let towards = -inward.dot(&shift);
+        if towards <= 0.0 {
+            return shift;
+        }
+        let cost = coupling.energy(pen + towards) - coupling.energy(pen);
+        if self.tank.pay(cost) {
+            shift
+        } else {
+            shift + inward * towards
+        }
+    }
+
+    /// Does a change and takes it off what remains.
+    fn apply(&mut self, pose: &mut Pose, change: PoseChange) {
+        pose.position += change.shift;
+        pose.angle += change.turn;
+        self.remaining.shift -= change.shift;
+        self.remaining.turn -= change.turn;
+        self.done.shift += change.shift;
+        self.done.turn += change.turn;
+    }
+}
+
+fn turn_about(pose: &Pose, pivot: Vec2, turn: f64) -> PoseChange {
+    let arm = pose.position - pivot;
+    PoseChange {
+        shift: rotate(turn, arm) - arm,
+        turn,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::contact::GodObject;
+    use crate::geometry::BoxFootprint;
+
+    const COUPLING: Coupling = Coupling {
+        stiffness_n_per_m: 1000.0,
+        damping_ns_per_m: 10.0,
+    };
+    const HIP: Vec2 = Vec2::new(-0.198, 0.02);
+
+    fn touch(pose: &Pose) -> Option<Touch> {
+        GodObject::default().follow(&BoxFootprint::square(0.4), pose, HIP)
+    }
+
+    fn bleed(correction: &mut Correction, pose: &mut Pose, ticks: u32) {
+        for _ in 0..ticks {
+            let touch = touch(pose);
+            correction.bleed(pose, touch.as_ref(), &COUPLING);
+        }
+    }
+
+    fn aimed(shift: Vec2, turn: f64) -> Correction {
+        Correction {
+            remaining: PoseChange { shift, turn },
+            ..Correction::default()
+        }
+    }
+
+    #[test]
+    fn the_rates_are_bounded() {
+        let (mut correction, mut pose) = (aimed(Vec2::new(1.0, 0.0), -3.0), Pose::default());
+        let before = pose;
+        correction.bleed(&mut pose, None, &COUPLING);
+        assert!((pose.position - before.position).norm() <= SHIFT_RATE_M_PER_S * TICK_S + 1e-15);
+        assert!((pose.angle - before.angle).abs() <= TURN_RATE_RAD_PER_S * TICK_S + 1e-15);
+    }
+
+    #[test]
+    fn all_of_it_arrives_in_the_end() {
+        let (mut correction, mut pose) = (aimed(Vec2::new(0.003, -0.002), 0.02), Pose::default());
+        bleed(&mut correction, &mut pose, 2000);
+        assert!((pose.position - Vec2::new(0.003, -0.002)).norm() < 1e-6);
+        assert!((pose.angle - 0.02).abs() < 1e-6);
+    }
+
+    #[test]
+    fn motion_towards_the_hip_is_refused_by_an_empty_tank_and_paid_by_a_full_one() {
+        let towards = Vec2::new(-0.002, 0.001);
+        let depth = |pose: &Pose| touch(pose).unwrap().penetration;
+        let (mut correction, mut pose) = (aimed(towards, 0.0), Pose::default());
+        let start = depth(&pose);
+        bleed(&mut correction, &mut pose, 2000);
+        assert!(
+            (depth(&pose) - start).abs() < 1e-12,
+            "no energy without payment"
+        );
+        assert!(
+            (pose.position.y - 0.001).abs() < 1e-6,
+            "along the face is free"
+        );
+
+        correction.tank.fill(1.0);
+        let full = correction.tank.level_j();
+        bleed(&mut correction, &mut pose, 2000);
+        let gained = COUPLING.energy(depth(&pose)) - COUPLING.energy(start);
+        assert!(depth(&pose) > start + 0.0019);
+        assert!(
+            (full - correction.tank.level_j() - gained).abs() < 1e-12,
+            "paid to the last bit"
+        );
+    }
+
+    #[test]
+    fn turning_about_the_contact_point_stores_no_energy() {
+        let (mut correction, mut pose) = (aimed(Vec2::zeros(), 0.2), Pose::default());
+        let start = touch(&pose).unwrap().penetration;
+        for _ in 0..100 {
+            let touch = touch(&pose);
+            correction.remaining.shift = Vec2::zeros();
+            correction.bleed(&mut pose, touch.as_ref(), &COUPLING);
+        }
+        assert!(pose.angle > 0.05);
+        assert!(touch(&pose).unwrap().penetration <= start + 1e-12);
+    }
+
+    #[test]
+    fn what_was_corrected_since_the_stamp_is_not_corrected_again() {
+        let mut correction = Correction::default();
+        let (own, said) = (Pose::default(), Pose::new(0.01, 0.0, 0.1));
+        let then = correction.done;
+        correction.aim(&said, &own, &then);
+        let mut pose = own;
+        correction.snap(&mut pose);
+        // a second answer to the same old sample says the same thing again
+        correction.aim(&said, &own, &then);
+        assert!(correction.remaining.shift.norm() < 1e-15);
+        assert!(correction.remaining.turn.abs() < 1e-15);
+    }
+
+    #[test]
+    fn the_tank_is_bounded_and_never_in_debt() {
+        let mut tank = Tank::default();
+        assert!(!tank.pay(1e-9));
+        tank.fill(100.0);
+        assert_eq!(tank.level_j(), TANK_MAX_J);
+        assert!(!tank.pay(TANK_MAX_J * 1.001));
+        assert!(tank.pay(TANK_MAX_J));
+        tank.fill(-1.0);
+        assert_eq!(tank.level_j(), 0.0);
+    }
+}
