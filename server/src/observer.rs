@@ -1,0 +1,293 @@
+//! Where the object is: from touch and, where the mode uses it, from vision.
+//!
+//! In contact with a smooth tool the force is normal to the face, so its direction gives theta, and the
+//! contact point gives the face's plane; along the face nothing pushes, so the centre keeps that
+//! coordinate. Vision (slow, late, noisy) corrects what touch cannot see and teaches the distance from
+//! the centre to each face. Pure; it must never use the true pose.
+
+use mmt_shared::contact::Coupling;
+use mmt_shared::geometry::{BoxFootprint, Face, Pose, Twist, Vec2, rotate, wrap_angle};
+use mmt_shared::params::FACE_OFFSET_M;
+use mmt_shared::time::{TICK_S, Time};
+
+use crate::sensing::VisionSample;
+
+/// Force below which its direction says nothing, N: fifteen times the default sensor noise.
+const FORCE_MIN_N: f64 = 0.15;
+/// Turning acceleration that the angle filter allows for while the box is pushed, rad/s².
+const TURN_ACCELERATION: f64 = 20.0;
+/// Direction error of the force besides its noise (the face is not perfectly smooth), rad.
+const DIRECTION_FLOOR_RAD: f64 = 2e-3;
+/// Drift of the coordinate along the face while pushed, m per square root of a second.
+const SLIDE_DRIFT_M: f64 = 5e-3;
+/// Drift of a box that nobody touches, m per square root of a second.
+const REST_DRIFT_M: f64 = 1e-5;
+/// How far a box that was let go may coast, m, and turn, rad.
+const COAST: (f64, f64) = (3e-3, 0.02);
+/// A carved face lies this far behind the tool that did not touch it, m.
+const CARVE_MARGIN_M: f64 = 5e-4;
+/// Past that is kept for late vision, ticks: 256 ms.
+const PAST: usize = 256;
+
+/// What the observer assumes of its sensors and whether it learns.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ObserverConfig {
+    /// Stiffness and damping between tool and object, to find the surface under the tool.
+    pub coupling: Coupling,
+    /// Force noise, N r.m.s. per axis.
+    pub force_noise_n: f64,
+    /// Vision noise, m r.m.s. per axis.
+    pub vision_noise_m: f64,
+    /// Vision noise of the angle, rad r.m.s.
+    pub vision_noise_rad: f64,
+    /// Recommended mode: vision is used all the time and face offsets are learned. Otherwise vision
+    /// gives the first pose only, as in the paper.
+    pub learn: bool,
+}
+
+/// Touch as the observer takes it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Touching {
+    /// Face that is touched.
+    pub face: Face,
+    /// Inward unit normal, world.
+    pub inward: Vec2,
+    /// Point of the object's surface under the tool, world, m.
+    pub surface: Vec2,
+}
+
+#[derive(Clone, Copy, Debug, Default)]
+struct Past {
+    time: Time,
+    pose: Pose,
+    touching: Option<Touching>,
+}
+
+/// Follows pose, velocity and face offsets of the object.
+#[derive(Clone, Debug)]
+pub struct PoseObserver {
+    config: ObserverConfig,
+    pose: Pose,
+    twist: Twist,
+    footprint: BoxFootprint,
+    /// Vision samples that each face has been learned from, in the order of [`Face::ALL`].
+    learned: [u32; 4],
+    touching: Option<Touching>,
+    penetration: f64,
+    /// Covariance of (theta, omega): [theta², theta·omega, omega²].
+    angle_cov: [f64; 3],
+    /// Variance of the centre along the face (or, without touch, of both coordinates), m².
+    slide_var: f64,
+    past: [Past; PAST],
+    next: usize,
+}
+
+impl PoseObserver {
+    /// Starts from what vision said of pose and footprint.
+    #[must_use]
+    pub fn new(config: ObserverConfig, pose: Pose, footprint: BoxFootprint) -> Self {
+        let (shift_var, angle_var) =
+            (config.vision_noise_m.powi(2), config.vision_noise_rad.powi(2));
+        Self {
+            config,
+            pose,
+            twist: Twist::default(),
+            footprint,
+            learned: [0; 4],
+            touching: None,
+            penetration: 0.0,
+            angle_cov: [angle_var, 0.0, 0.0],
+            slide_var: shift_var,
+            past: [Past::default(); PAST],
+            next: 0,
+        }
+    }
+
+    /// Pose of the object as the last HIP sample met it.
+    #[must_use]
+    pub fn pose(&self) -> Pose {
+        self.pose
+    }
+
+    /// Velocity of the object.
+    #[must_use]
+    pub fn twist(&self) -> Twist {
+        self.twist
+    }
+
+    /// Distances from the centre to the faces, as far as known.
+    #[must_use]
+    pub fn footprint(&self) -> BoxFootprint {
+        self.footprint
+    }
+
+    /// What is touched.
+    #[must_use]
+    pub fn touching(&self) -> Option<Touching> {
+        self.touching
+    }
+
+    /// One tick: measured tool (m) and force (N) and whether the slave is in contact.
+    pub fn step(&mut self, now: Time, tool: Vec2, force: Vec2, in_contact: bool) {
+        if in_contact {
+            self.touch(tool, force);
+        } else {
+            self.let_go();
+        }
+        let past = Past { time: now, pose: self.pose, touching: self.touching };
+        if let Some(slot) = self.past.get_mut(self.next) {
+            *slot = past;
+        }
+        self.next = (self.next + 1) % PAST;
+    }
+
+    fn touch(&mut self, tool: Vec2, force: Vec2) {
+        let size = force.norm();
+        if self.touching.is_none() {
+            self.penetration = size / self.config.coupling.stiffness_n_per_m;
+        }
+        let face = self.touching.map_or_else(|| self.face_of(force), |touching| touching.face);
+        self.follow_angle(face, force, size);
+        let inward = -rotate(self.pose.angle, face.outward());
+        self.follow_penetration(force.dot(&inward));
+        let surface = tool - inward * self.penetration;
+        let before = self.pose.position;
+        let gap = inward.dot(&(surface - before)) + self.footprint.offset(face);
+        self.pose.position += inward * gap;
+        if self.touching.is_some() {
+            let velocity = (self.pose.position - before) / TICK_S;
+            // 20 ms, as long as the parameters' smoothing
+            self.twist.linear += (velocity - self.twist.linear) * (TICK_S / 0.020);
+        }
+        self.slide_var += SLIDE_DRIFT_M * SLIDE_DRIFT_M * TICK_S;
+        self.touching = Some(Touching { face, inward, surface });
+    }
+
+    fn face_of(&self, force: Vec2) -> Face {
+        let in_object = rotate(-self.pose.angle, force);
+        let mut best = (Face::East, f64::NEG_INFINITY);
+        for face in Face::ALL {
+            let along = -face.outward().dot(&in_object);
+            if along > best.1 {
+                best = (face, along);
+            }
+        }
+        best.0
+    }
+
+    /// Inverts the force law: k_d d(pen)/dt + k_p pen = f, implicit.
+    fn follow_penetration(&mut self, force: f64) {
+        let Coupling { stiffness_n_per_m: k_p, damping_ns_per_m: k_d } = self.config.coupling;
+        self.penetration = (k_d * self.penetration + force * TICK_S) / (k_d + k_p * TICK_S);
+    }
+
+    /// Constant-velocity Kalman filter of theta on the direction of the force.
+    fn follow_angle(&mut self, face: Face, force: Vec2, size: f64) {
+        self.pose.angle += self.twist.angular * TICK_S;
+        let [p, pc, q] = self.angle_cov;
+        let noise = TURN_ACCELERATION * TURN_ACCELERATION * TICK_S;
+        self.angle_cov =
+            [p + 2.0 * pc * TICK_S + q * TICK_S * TICK_S, pc + q * TICK_S, q + noise * TICK_S];
+        if size < FORCE_MIN_N {
+            return;
+        }
+        let direction = libm::atan2(-force.y, -force.x) - face.outward_angle();
+        let innovation = wrap_angle(direction - self.pose.angle);
+        let spread = self.config.force_noise_n / size;
+        self.measure_angle(innovation, spread * spread + DIRECTION_FLOOR_RAD.powi(2));
+    }
+
+    fn measure_angle(&mut self, innovation: f64, variance: f64) {
+        let [p, pc, q] = self.angle_cov;
+        let total = p + variance;
+        if total <= 0.0 {
+            return;
+        }
+        let (gain_angle, gain_rate) = (p / total, pc / total);
+        self.pose.angle += gain_angle * innovation;
+        self.twist.angular += gain_rate * innovation;
+        self.angle_cov = [p * (1.0 - gain_angle), pc * (1.0 - gain_angle), q - gain_rate * pc];
+    }
+
+    fn let_go(&mut self) {
+        if self.touching.take().is_some() {
+            self.slide_var += COAST.0 * COAST.0;
+            self.angle_cov = [self.angle_cov[0] + COAST.1 * COAST.1, 0.0, 0.0];
+            self.twist = Twist::default();
+        }
+        self.slide_var += REST_DRIFT_M * REST_DRIFT_M * TICK_S;
+    }
+
+    /// Takes in what vision saw some time ago, if this mode uses it.
+    pub fn see(&mut self, vision: &VisionSample) {
+        if !self.config.learn {
+            return;
+        }
+        let Some(then) = self.at(vision.taken) else {
+            return;
+        };
+        let gone_by = vision.pose.position - then.pose.position;
+        let turn = wrap_angle(vision.pose.angle - then.pose.angle);
+        self.measure_angle(turn, self.config.vision_noise_rad.powi(2));
+        let variance = self.config.vision_noise_m.powi(2);
+        let gain = if variance > 0.0 { self.slide_var / (self.slide_var + variance) } else { 1.0 };
+        self.slide_var *= 1.0 - gain;
+        match (then.touching, self.touching) {
+            (Some(was), Some(is)) if was.face == is.face => {
+                let along = gone_by - is.inward * is.inward.dot(&gone_by);
+                self.pose.position += along * gain;
+                self.learn_offset(was.face, was.inward.dot(&(vision.pose.position - was.surface)));
+            }
+            (None, None) => self.pose.position += gone_by * gain,
+            _ => {}
+        }
+    }
+
+    /// Running mean of a face's offset. Until a face has been learned itself, the first face's offset is
+    /// the best guess for it (a square is assumed).
+    fn learn_offset(&mut self, face: Face, offset: f64) {
+        let first = self.learned.iter().all(|count| *count == 0);
+        for (other, count) in Face::ALL.into_iter().zip(&mut self.learned) {
+            if other == face {
+                *count = count.saturating_add(1);
+                let known = self.footprint.offset(face);
+                let mean = known + (offset - known) / f64::from(*count);
+                self.footprint.set_offset(face, mean);
+            }
+        }
+        if first || self.only_one_learned() {
+            let mean = self.footprint.offset(face);
+            for (other, count) in Face::ALL.into_iter().zip(&self.learned) {
+                if *count == 0 {
+                    self.footprint.set_offset(other, mean);
+                }
+            }
+        }
+    }
+
+    fn only_one_learned(&self) -> bool {
+        self.learned.iter().filter(|count| **count > 0).count() == 1
+    }
+
+    fn at(&self, time: Time) -> Option<Past> {
+        // the newest that is not later; the ring is short and vision is slow
+        self.past.iter().filter(|past| past.time <= time && past.time > Time::ZERO).max_by_key(|past| past.time).copied()
+    }
+
+    /// Section III-A, case 1: the tool is inside the model and touches nothing. The face is where the
+    /// tool is not: it is carved back (recommended mode), or the whole box is moved away (the paper).
+    pub fn carve(&mut self, tool: Vec2, face: Face) {
+        let depth = -self.footprint.distance(face, self.pose.point_to_object(tool));
+        let depth = depth + CARVE_MARGIN_M;
+        if depth <= 0.0 {
+            return;
+        }
+        let carved = self.footprint.offset(face) - depth;
+        // a tool past the centre has not found a face: then the box is elsewhere
+        if self.config.learn && carved >= FACE_OFFSET_M.0 {
+            self.footprint.set_offset(face, carved);
+        } else {
+            self.pose.position -= rotate(self.pose.angle, face.outward()) * depth;
+        }
+    }
+}
