@@ -6,10 +6,9 @@
 
 use std::time::Duration;
 
+use mmt_shared::link_end::HEARTBEAT;
 use serde::{Deserialize, Serialize};
 
-/// The slave's heartbeat period: it sends at least this often.
-pub const HEARTBEAT: Duration = Duration::from_millis(50);
 /// Two heartbeats missed and some jitter: shown, nothing else.
 pub const LATE: Duration = Duration::from_millis(120);
 /// Five heartbeats missed: what the model was told may be old by now.

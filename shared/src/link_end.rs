@@ -1,0 +1,195 @@
+//! One end of the session's datagram link, the same on both sides: seal what goes out, open what comes in.
+//!
+//! Pure: bytes and the time are arguments, so that the lab's link and QUIC's datagrams pass through the
+//! same code. Everything is counted where it happens.
+
+use std::time::Duration;
+
+use crate::peer::{Arrival, NumbersSpent, Peer};
+use crate::time::Time;
+use crate::wire::{
+    Command, EncodeError, KindCounts, Matter, Scene, Side, Traffic, Update, decode_datagram,
+    encode_command, encode_heartbeat, encode_scene, encode_update,
+};
+
+/// Each side sends at least this often: what is needed to call a link dead within a second and to keep
+/// the round-trip time fresh, and twenty small packets a second at the most.
+pub const HEARTBEAT: Duration = Duration::from_millis(50);
+
+/// What is to be sent.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Outgoing<'a> {
+    /// The master's motion.
+    Command(&'a Command),
+    /// The slave's model.
+    Update(&'a Update),
+    /// What a viewer sees.
+    Scene(&'a Scene),
+    /// Nothing but the envelope.
+    Heartbeat,
+}
+
+/// Why nothing could be sealed.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum SealError {
+    /// The session has used up its datagram numbers.
+    #[error(transparent)]
+    Numbers(#[from] NumbersSpent),
+    /// The message breaks a rule of the wire.
+    #[error(transparent)]
+    Encode(#[from] EncodeError),
+}
+
+/// One end of the link.
+#[derive(Clone, Debug)]
+pub struct LinkEnd {
+    side: Side,
+    peer: Peer,
+    sent: KindCounts,
+    received: KindCounts,
+    malformed: u32,
+    began: Time,
+    last_sent: Time,
+}
+
+impl LinkEnd {
+    /// The end of `side`, from `now` on.
+    #[must_use]
+    pub fn new(side: Side, now: Time) -> Self {
+        Self {
+            side,
+            peer: Peer::new(),
+            sent: KindCounts::default(),
+            received: KindCounts::default(),
+            malformed: 0,
+            began: now,
+            last_sent: now,
+        }
+    }
+
+    /// Reads a datagram that arrived at `now`. None, and counted, if it does not decode, was seen before
+    /// or is too old to tell.
+    pub fn open(&mut self, now: Time, bytes: &[u8]) -> Option<Matter> {
+        let Ok(datagram) = decode_datagram(bytes, self.side.other()) else {
+            self.malformed = self.malformed.saturating_add(1);
+            return None;
+        };
+        match self.peer.handle(now, &datagram.envelope, bytes.len()) {
+            Arrival::Newest | Arrival::Reordered => {}
+            Arrival::Duplicate | Arrival::TooOld => return None,
+        }
+        let count = match datagram.matter {
+            Matter::Command(_) => &mut self.received.commands,
+            Matter::Update(_) => &mut self.received.updates,
+            Matter::Scene(_) => &mut self.received.scenes,
+            Matter::Heartbeat => &mut self.received.heartbeats,
+        };
+        *count = count.saturating_add(1);
+        Some(datagram.matter)
+    }
+
+    /// Writes a datagram to be sent at `now`; returns its length.
+    ///
+    /// # Errors
+    /// When no number is left or the message breaks a rule of the wire.
+    pub fn seal(
+        &mut self,
+        now: Time,
+        what: Outgoing<'_>,
+        out: &mut [u8],
+    ) -> Result<usize, SealError> {
+        let envelope = self.peer.stamp(now)?;
+        let (length, count) = match what {
+            Outgoing::Command(command) => {
+                (encode_command(&envelope, command, out)?, &mut self.sent.commands)
+            }
+            Outgoing::Update(update) => {
+                (encode_update(&envelope, update, out)?, &mut self.sent.updates)
+            }
+            Outgoing::Scene(scene) => {
+                (encode_scene(&envelope, scene, out)?, &mut self.sent.scenes)
+            }
+            Outgoing::Heartbeat => (encode_heartbeat(&envelope, out)?, &mut self.sent.heartbeats),
+        };
+        *count = count.saturating_add(1);
+        self.last_sent = now;
+        Ok(length)
+    }
+
+    /// When a heartbeat must go out if nothing else does before.
+    #[must_use]
+    pub fn heartbeat_due(&self) -> Time {
+        self.last_sent + HEARTBEAT
+    }
+
+    /// Time since the other side was last heard, or since the beginning.
+    #[must_use]
+    pub fn silence(&self, now: Time) -> Duration {
+        now.saturating_since(self.last_heard())
+    }
+
+    /// When the other side was last heard, or the beginning.
+    #[must_use]
+    pub fn last_heard(&self) -> Time {
+        self.peer.last_arrival().unwrap_or(self.began)
+    }
+
+    /// When this end began.
+    #[must_use]
+    pub fn began(&self) -> Time {
+        self.began
+    }
+
+    /// Round trip, loss, reordering.
+    #[must_use]
+    pub fn peer(&self) -> &Peer {
+        &self.peer
+    }
+
+    /// Messages sent and received so far; what the socket counts is not known here and 0.
+    #[must_use]
+    pub fn traffic(&self) -> Traffic {
+        Traffic {
+            sent: self.sent,
+            received: self.received,
+            duplicates: self.peer.duplicates(),
+            too_old: self.peer.too_old(),
+            malformed: self.malformed,
+            ..Traffic::default()
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::wire::DATAGRAM_MAX;
+
+    #[test]
+    fn what_one_end_seals_the_other_opens_once_and_counts() {
+        let (mut up, mut down) =
+            (LinkEnd::new(Side::Master, Time::ZERO), LinkEnd::new(Side::Slave, Time::ZERO));
+        let mut buffer = [0; DATAGRAM_MAX];
+        let now = Time::from_millis(5);
+        let length = up.seal(now, Outgoing::Heartbeat, &mut buffer).unwrap();
+        assert_eq!(down.open(now, &buffer[..length]), Some(Matter::Heartbeat));
+        assert_eq!(down.open(now, &buffer[..length]), None, "a duplicate");
+        assert_eq!(down.open(now, &buffer[..length - 1]), None, "cut short");
+        let traffic = down.traffic();
+        assert_eq!(traffic.received.heartbeats, 1);
+        assert_eq!((traffic.duplicates, traffic.malformed), (1, 1));
+        assert_eq!(up.traffic().sent.heartbeats, 1);
+        // the master's own messages do not open at the master
+        assert_eq!(up.open(now, &buffer[..length - 1]), None);
+    }
+
+    #[test]
+    fn a_heartbeat_is_due_fifty_milliseconds_after_anything_was_sent() {
+        let mut end = LinkEnd::new(Side::Slave, Time::from_millis(100));
+        assert_eq!(end.heartbeat_due(), Time::from_millis(150));
+        let mut buffer = [0; DATAGRAM_MAX];
+        end.seal(Time::from_millis(120), Outgoing::Heartbeat, &mut buffer).unwrap();
+        assert_eq!(end.heartbeat_due(), Time::from_millis(170));
+        assert_eq!(end.silence(Time::from_millis(130)), Duration::from_millis(30));
+    }
+}
