@@ -6,6 +6,7 @@
 
 pub mod contact;
 pub mod geometry;
+pub mod metrics;
 pub mod params;
 pub mod rng;
 pub mod settings;
