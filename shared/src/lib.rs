@@ -10,6 +10,7 @@ pub mod dynamics;
 pub mod geometry;
 pub mod history;
 pub mod local_model;
+pub mod metrics;
 pub mod params;
 pub mod rng;
 pub mod settings;

@@ -1,0 +1,24 @@
+//! What a run is judged by: every metric is defined here, once.
+//!
+//! Holds (13)–(15). Each file is one idea: a streaming accumulator of fixed size that is fed once per
+//! tick or event, never allocates and never becomes NaN. A metric that has no meaning in a run is absent
+//! (`None`), never 0. Formulas, units and edge cases in words: `docs/metrics.md`.
+
+mod age;
+mod contact;
+mod force;
+mod peak;
+mod pose;
+mod updates;
+
+pub use age::AgeOfInformation;
+pub use contact::ContactBreaks;
+pub use force::{F_MIN_N, ForceMetrics, ForceSummary, JND_HIGH, JND_LOW};
+pub use peak::ForcePeak;
+pub use pose::PoseError;
+pub use updates::UpdateCounts;
+
+/// `sum / n`; absent when n is 0.
+fn mean(sum: f64, n: u64) -> Option<f64> {
+    (n > 0).then(|| sum / n as f64)
+}
