@@ -1,1 +1,19 @@
-//! placeholder
+//! The emulated link of mmt: one pure state machine and the three ways to drive it.
+//!
+//! [`link::Link`] decides what becomes of a packet; it never sleeps, reads no clock and touches no
+//! socket. [`pipe::Pipe`] adds the packets in flight. The drivers: *sim* is a pipe stepped in virtual
+//! time ([`pipe::SimPath`]); *wrap* decorates a QUIC socket and *relay* stands between two hosts, both
+//! in `io` behind the feature of that name.
+
+pub mod config;
+pub mod counters;
+pub mod effect;
+pub mod link;
+pub mod pipe;
+mod quantile;
+pub mod words;
+
+pub use config::{Delay, LinkConfig, Loss, Order, Probability};
+pub use effect::{Effect, effect};
+pub use link::{Direction, DropCause, Fate, Link, LinkId, PacketMeta};
+pub use pipe::{Pipe, SimPath};
