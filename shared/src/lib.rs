@@ -7,6 +7,7 @@
 pub mod contact;
 pub mod geometry;
 pub mod params;
+pub mod recording;
 pub mod rng;
 pub mod settings;
 pub mod time;
