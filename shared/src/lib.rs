@@ -12,6 +12,7 @@ pub mod history;
 pub mod local_model;
 pub mod metrics;
 pub mod params;
+pub mod recording;
 pub mod rng;
 pub mod settings;
 pub mod time;
