@@ -6,7 +6,9 @@
 
 pub mod contact;
 pub mod geometry;
+pub mod pairing;
 pub mod params;
+pub mod peer;
 pub mod rng;
 pub mod settings;
 pub mod time;
