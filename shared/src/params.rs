@@ -3,7 +3,7 @@
 //! Holds (8) and (9), the accepted ranges and the stability bound of the local model. Whatever comes off
 //! the wire passes `ModelParams::try_new` and `ModelState::try_new` or never reaches a model.
 
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
 use crate::contact::Coupling;
 use crate::geometry::{BoxFootprint, Face, Pose, Twist};
@@ -73,7 +73,8 @@ pub enum ParamsError {
     },
 }
 
-fn in_range(
+/// Checks that `value` is finite and within `min..=max`; names it if not.
+pub(crate) fn in_range(
     name: &'static str,
     unit: &'static str,
     value: f64,
@@ -95,7 +96,9 @@ fn in_range(
 }
 
 /// The impedance of the box on the plane: what the estimator finds and the local model is made of.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+///
+/// Not `Deserialize` on purpose: numbers from outside become parameters by [`ModelParams::try_new`] only.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct ModelParams {
     m: f64,
     b: f64,
@@ -237,7 +240,7 @@ pub fn friction_torque_of_square(c: f64, side: f64) -> f64 {
 }
 
 /// All that the master needs to render the object: parameters, footprint, pose and velocity.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct ModelState {
     /// The impedance.
     pub params: ModelParams,

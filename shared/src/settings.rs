@@ -6,6 +6,16 @@
 use serde::{Deserialize, Serialize};
 
 use crate::contact::Coupling;
+use crate::params::{ParamsError, in_range};
+
+/// Accepted virtual stiffness k_p, N/m: softer is no wall to a hand, stiffer no device of this kind renders.
+pub const STIFFNESS_N_PER_M: (f64, f64) = (50.0, 10_000.0);
+/// Accepted contact damping k_d, N s/m: five times what 3000 N/m needs.
+pub const CONTACT_DAMPING_NS_PER_M: (f64, f64) = (0.0, 100.0);
+/// Accepted lambda of (4): a weight.
+pub const LAMBDA: (f64, f64) = (0.0, 1.0);
+/// Accepted tau, s: one tick to ten seconds.
+pub const TAU_S: (f64, f64) = (0.001, 10.0);
 
 /// How ground friction acts in the local model.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -56,6 +66,32 @@ pub struct ModelSettings {
     pub correction: PoseCorrection,
 }
 
+impl ModelSettings {
+    /// Checks numbers that came from outside.
+    ///
+    /// # Errors
+    /// Names the first number that is not finite or outside its accepted range.
+    pub fn checked(&self) -> Result<Self, ParamsError> {
+        let coupling = checked_coupling(&self.coupling)?;
+        match self.smoothing {
+            Smoothing::PerPacket { lambda } => in_range("lambda", "", lambda, LAMBDA)?,
+            Smoothing::InTime { tau_s } => in_range("tau", "s", tau_s, TAU_S)?,
+        }
+        Ok(Self { coupling, ..*self })
+    }
+}
+
+/// Checks a coupling that came from outside.
+///
+/// # Errors
+/// Names the number that is not finite or outside its accepted range.
+pub fn checked_coupling(coupling: &Coupling) -> Result<Coupling, ParamsError> {
+    let (k_p, k_d) = (coupling.stiffness_n_per_m, coupling.damping_ns_per_m);
+    in_range("stiffness", "N/m", k_p, STIFFNESS_N_PER_M)?;
+    in_range("contact damping", "N s/m", k_d, CONTACT_DAMPING_NS_PER_M)?;
+    Ok(*coupling)
+}
+
 /// The two bundles of choices that a run is made in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -86,6 +122,45 @@ impl Mode {
                 smoothing: Smoothing::InTime { tau_s: 0.020 },
                 correction: PoseCorrection::MatchedStamps,
             },
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const COUPLING: Coupling = Coupling {
+        stiffness_n_per_m: 1000.0,
+        damping_ns_per_m: 10.0,
+    };
+
+    #[test]
+    fn both_modes_are_accepted_at_every_accepted_stiffness() {
+        for k_p in [50.0, 1000.0, 3000.0, 10_000.0] {
+            for mode in [Mode::Paper, Mode::Recommended] {
+                let settings = mode.model_settings(Coupling::for_stiffness(k_p));
+                assert_eq!(settings.checked(), Ok(settings));
+            }
+        }
+    }
+
+    #[test]
+    fn every_number_that_is_not_finite_or_out_of_range_is_refused() {
+        let good = Mode::Recommended.model_settings(COUPLING);
+        for bad in [f64::NAN, f64::INFINITY, -1.0, f64::MAX] {
+            let mut settings = good;
+            settings.coupling.stiffness_n_per_m = bad;
+            assert!(settings.checked().is_err());
+            settings = good;
+            settings.coupling.damping_ns_per_m = bad;
+            assert!(settings.checked().is_err());
+            for smoothing in [
+                Smoothing::PerPacket { lambda: bad },
+                Smoothing::InTime { tau_s: bad },
+            ] {
+                assert!(ModelSettings { smoothing, ..good }.checked().is_err());
+            }
         }
     }
 }

@@ -5,8 +5,11 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::label::Label;
+use super::samples::SampleBlock;
 use crate::contact::Coupling;
 use crate::geometry::{Pose, Vec2};
+use crate::pairing::Token;
 use crate::params::ModelState;
 use crate::settings::ModelSettings;
 use crate::time::Time;
@@ -113,8 +116,15 @@ pub struct HipSample {
     pub force: ForceCounts,
 }
 
-/// The most samples that one command carries: 32 ms of motion, about 260 bytes.
-pub const SAMPLES_MAX: usize = 32;
+/// The master's motion since its last command.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Command {
+    /// Number of the newest update that the master has accepted, 0 before the first: the
+    /// acknowledgement that the shadow needs.
+    pub newest_update: u32,
+    /// One sample or more.
+    pub samples: SampleBlock,
+}
 
 /// Why an update was sent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -145,6 +155,12 @@ impl Cause {
         Self::EverySample,
     ];
 
+    /// Its number on the wire and its place in [`Cause::ALL`].
+    #[must_use]
+    pub const fn number(self) -> usize {
+        self as usize
+    }
+
     /// The name used in reports, files and on screens.
     #[must_use]
     pub fn name(self) -> &'static str {
@@ -160,7 +176,9 @@ impl Cause {
 }
 
 /// What an update says: the whole state at one HIP sample, so that it supersedes all earlier ones.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+///
+/// Off the wire comes a [`RawUpdate`](super::RawUpdate); only its `accept` makes one of these.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Update {
     /// Number of the update, from 1, strictly increasing.
     pub sequence: u32,
@@ -177,7 +195,7 @@ pub struct Update {
 }
 
 /// What a viewer sees of the remote scene between updates; the model never uses it.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Scene {
     /// Stamp of the HIP sample that the slave was at, by the master's clock.
     pub answers: Time,
@@ -197,33 +215,33 @@ pub enum Role {
 }
 
 /// First message on the stream, master to slave.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hello {
     /// The secret of the pairing string.
-    pub token: [u8; 32],
+    pub token: Token,
     /// What the master wants to be.
     pub role: Role,
     /// k_p and k_d of the master's device profile.
     pub coupling: Coupling,
-    /// Samples that the master puts in a command.
+    /// Samples that the master puts in a command, 1 to [`SAMPLES_MAX`](super::SAMPLES_MAX).
     pub samples_per_command: u8,
     /// Where the HIP is at the start, m.
     pub hip: Vec2,
-    /// Name and version of the program, for the other side's log; at most 64 bytes.
-    pub program: String,
+    /// Name and version of the program, for the other side's log.
+    pub program: Label,
 }
 
 /// The slave's yes.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Welcome {
-    /// How both sides run the local model.
+    /// How both sides run the local model; the coupling is the hello's.
     pub settings: ModelSettings,
     /// The state that the local model starts from.
     pub state: ModelState,
-    /// Name of the update scheme, for the screen; at most 64 bytes.
-    pub scheme: String,
-    /// Name and version of the program, for the other side's log; at most 64 bytes.
-    pub program: String,
+    /// Name of the update scheme, for the screen.
+    pub scheme: Label,
+    /// Name and version of the program, for the other side's log.
+    pub program: Label,
 }
 
 /// Why a slave said no.
@@ -248,4 +266,16 @@ pub enum Ending {
     Interrupted,
     /// An error on the sending side.
     Failed,
+}
+
+/// The last message of a side: why it ends, and what it counted.
+///
+/// The slave's carries [`SlaveTotals`](super::SlaveTotals), the master's
+/// [`MasterTotals`](super::MasterTotals), so that each can print the whole report.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Farewell<T> {
+    /// Why the sender ends.
+    pub ending: Ending,
+    /// What the sender counted.
+    pub totals: T,
 }

@@ -1,0 +1,272 @@
+//! What one side knows of the link and of the other side: numbers, loss, reordering, round trip.
+//!
+//! Used by both sides on every datagram that decodes. Pure and of fixed size: time comes as an argument.
+//! Loss is counted by the application's own numbers; what the transport declares lost is not loss.
+
+mod histogram;
+mod round_trip;
+mod window;
+
+use std::time::Duration;
+
+pub use histogram::Histogram;
+pub use round_trip::RoundTrip;
+pub use window::{Freshness, SequenceWindow, WINDOW};
+
+use crate::time::{Time, duration_nanos};
+use crate::wire::message::{Echo, Envelope};
+use window::Window;
+
+/// The last number that a datagram or an update may have. Numbers never wrap: at 2 kHz they last for
+/// 24 days, and a session that has used them up must end.
+pub const NUMBER_LAST: u32 = u32::MAX;
+
+/// All numbers of a session have been used: it must end, and a new one begin.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("the session has used up all {NUMBER_LAST} datagram numbers: end it and begin a new one")]
+pub struct NumbersSpent;
+
+/// What a datagram is to the ones before it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Arrival {
+    /// The newest so far.
+    Newest,
+    /// Older than the newest, seen for the first time: what it carries may still be news.
+    Reordered,
+    /// Seen before: drop it.
+    Duplicate,
+    /// So old that it cannot be told whether it was seen before: drop it. It stays counted as lost.
+    TooOld,
+}
+
+/// What has been counted in one direction.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Loss {
+    /// Datagrams that were numbered up to the newest one known.
+    pub expected: u32,
+    /// How many of them arrived.
+    pub received: u32,
+}
+
+impl Loss {
+    /// How many did not arrive, or not yet.
+    #[must_use]
+    pub fn lost(&self) -> u32 {
+        self.expected.saturating_sub(self.received)
+    }
+
+    /// Share that did not arrive, 0 to 1; none before the first.
+    #[must_use]
+    pub fn share(&self) -> Option<f64> {
+        let share = f64::from(self.lost()) / f64::from(self.expected);
+        (self.expected > 0).then_some(share)
+    }
+}
+
+/// The newest datagram from the other side.
+#[derive(Clone, Copy, Debug)]
+struct Newest {
+    number: u32,
+    sent: Time,
+    arrived: Time,
+}
+
+/// One side's knowledge of the other.
+#[derive(Clone, Debug)]
+pub struct Peer {
+    sent: u32,
+    window: Window,
+    newest: Option<Newest>,
+    last_arrival: Option<Time>,
+    received: u32,
+    received_bytes: u64,
+    reordered: u32,
+    duplicates: u32,
+    too_old: u32,
+    their_report: Loss,
+    bad_echoes: u32,
+    round_trip: RoundTrip,
+}
+
+impl Default for Peer {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Peer {
+    /// Nothing sent, nothing received.
+    #[must_use]
+    pub fn new() -> Self {
+        Self {
+            sent: 0,
+            window: Window::new(),
+            newest: None,
+            last_arrival: None,
+            received: 0,
+            received_bytes: 0,
+            reordered: 0,
+            duplicates: 0,
+            too_old: 0,
+            their_report: Loss::default(),
+            bad_echoes: 0,
+            round_trip: RoundTrip::new(),
+        }
+    }
+
+    /// The envelope of the next outgoing datagram: its number, `now`, and the echo.
+    ///
+    /// # Errors
+    /// After [`NUMBER_LAST`] datagrams there is no number left.
+    pub fn stamp(&mut self, now: Time) -> Result<Envelope, NumbersSpent> {
+        self.sent = self.sent.checked_add(1).ok_or(NumbersSpent)?;
+        Ok(Envelope {
+            number: self.sent,
+            sent: now,
+            echo: self.echo(now),
+        })
+    }
+
+    /// The answer to the newest datagram from the other side; none before the first.
+    #[must_use]
+    pub fn echo(&self, now: Time) -> Option<Echo> {
+        let newest = self.newest?;
+        Some(Echo {
+            number: newest.number,
+            sent: newest.sent,
+            held_ns: duration_nanos(now.saturating_since(newest.arrived)),
+            received: self.received,
+        })
+    }
+
+    /// Takes note of a datagram of `bytes` bytes that arrived at `now`.
+    pub fn handle(&mut self, now: Time, envelope: &Envelope, bytes: usize) -> Arrival {
+        let arrival = match self.window.note(envelope.number) {
+            window::Place::Ahead => Arrival::Newest,
+            window::Place::Gap => Arrival::Reordered,
+            window::Place::Taken => Arrival::Duplicate,
+            window::Place::Behind => Arrival::TooOld,
+        };
+        match arrival {
+            Arrival::Duplicate => self.duplicates = self.duplicates.saturating_add(1),
+            Arrival::TooOld => self.too_old = self.too_old.saturating_add(1),
+            Arrival::Newest | Arrival::Reordered => {
+                self.received = self.received.saturating_add(1);
+                let bytes = u64::try_from(bytes).unwrap_or(u64::MAX);
+                self.received_bytes = self.received_bytes.saturating_add(bytes);
+                self.last_arrival = self.last_arrival.max(Some(now));
+                if let Some(echo) = envelope.echo {
+                    self.handle_echo(now, &echo, arrival);
+                }
+            }
+        }
+        match arrival {
+            Arrival::Newest => {
+                self.newest = Some(Newest {
+                    number: envelope.number,
+                    sent: envelope.sent,
+                    arrived: now,
+                });
+            }
+            Arrival::Reordered => self.reordered = self.reordered.saturating_add(1),
+            Arrival::Duplicate | Arrival::TooOld => {}
+        }
+        arrival
+    }
+
+    /// Learns from an echo the round trip and the other side's count, unless it cannot be true.
+    fn handle_echo(&mut self, now: Time, echo: &Echo, arrival: Arrival) {
+        let away = now.as_nanos().checked_sub(echo.sent.as_nanos());
+        let round_trip = away.and_then(|away| away.checked_sub(echo.held_ns));
+        let possible = echo.number <= self.sent && echo.received <= echo.number;
+        let Some(round_trip) = round_trip.filter(|_| possible) else {
+            self.bad_echoes = self.bad_echoes.saturating_add(1);
+            return;
+        };
+        self.round_trip.note(now, Duration::from_nanos(round_trip));
+        if arrival == Arrival::Newest {
+            self.their_report = Loss {
+                expected: echo.number,
+                received: echo.received,
+            };
+        }
+    }
+
+    /// Number of the last datagram sent: how many have been sent.
+    #[must_use]
+    pub fn sent(&self) -> u32 {
+        self.sent
+    }
+
+    /// Number of the newest datagram received, 0 before the first.
+    #[must_use]
+    pub fn newest(&self) -> u32 {
+        self.newest.map_or(0, |newest| newest.number)
+    }
+
+    /// When a datagram last arrived, duplicates and too old ones left out: what liveness goes by.
+    #[must_use]
+    pub fn last_arrival(&self) -> Option<Time> {
+        self.last_arrival
+    }
+
+    /// Datagrams received, each once.
+    #[must_use]
+    pub fn received(&self) -> u32 {
+        self.received
+    }
+
+    /// Their bytes.
+    #[must_use]
+    pub fn received_bytes(&self) -> u64 {
+        self.received_bytes
+    }
+
+    /// Received after a newer one.
+    #[must_use]
+    pub fn reordered(&self) -> u32 {
+        self.reordered
+    }
+
+    /// Dropped as seen before.
+    #[must_use]
+    pub fn duplicates(&self) -> u32 {
+        self.duplicates
+    }
+
+    /// Dropped as more than [`WINDOW`] numbers late.
+    #[must_use]
+    pub fn too_old(&self) -> u32 {
+        self.too_old
+    }
+
+    /// Echoes that cannot be true: of a number never sent, or held for longer than it was away.
+    #[must_use]
+    pub fn bad_echoes(&self) -> u32 {
+        self.bad_echoes
+    }
+
+    /// Loss from the other side to this one. Reordering is no loss once the late ones are there.
+    #[must_use]
+    pub fn incoming(&self) -> Loss {
+        Loss {
+            expected: self.newest(),
+            received: self.received,
+        }
+    }
+
+    /// Loss from this side to the other, by the other's report.
+    #[must_use]
+    pub fn outgoing(&self) -> Loss {
+        self.their_report
+    }
+
+    /// The round trip without the time that the other side held the answer.
+    #[must_use]
+    pub fn round_trip(&self) -> &RoundTrip {
+        &self.round_trip
+    }
+}
+
+#[cfg(test)]
+mod tests;

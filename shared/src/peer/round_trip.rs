@@ -1,0 +1,100 @@
+//! Round-trip time from echo stamps: latest, least of the last seconds, quantiles over all.
+
+use std::time::Duration;
+
+use super::histogram::Histogram;
+use crate::time::Time;
+
+/// Slots of the windowed minimum, one second each.
+const SLOTS: usize = 10;
+const SLOT_NS: u64 = 1_000_000_000;
+
+/// Round-trip times without the time that the other side held the answer.
+///
+/// They are exact on this side's clock, whatever the other's does, save for drift during the hold
+/// (200 ppm of 50 ms is 10 µs).
+#[derive(Clone, Debug)]
+pub struct RoundTrip {
+    latest: Option<Duration>,
+    /// Least of each of the last seconds, with the second's number.
+    minima: [Option<(u64, Duration)>; SLOTS],
+    histogram: Histogram,
+}
+
+impl Default for RoundTrip {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl RoundTrip {
+    /// Nothing measured.
+    #[must_use]
+    pub fn new() -> Self {
+        Self {
+            latest: None,
+            minima: [None; SLOTS],
+            histogram: Histogram::new(),
+        }
+    }
+
+    pub(super) fn note(&mut self, now: Time, round_trip: Duration) {
+        self.latest = Some(round_trip);
+        self.histogram.note(round_trip);
+        let second = now.as_nanos() / SLOT_NS;
+        let slot = (second % SLOTS as u64) as usize;
+        if let Some(slot) = self.minima.get_mut(slot) {
+            let same = slot.filter(|&(of, _)| of == second);
+            let least = same.map_or(round_trip, |(_, least)| least.min(round_trip));
+            *slot = Some((second, least));
+        }
+    }
+
+    /// The last one measured.
+    #[must_use]
+    pub fn latest(&self) -> Option<Duration> {
+        self.latest
+    }
+
+    /// The least of the last 9 to 10 s; none if nothing was measured in that time.
+    #[must_use]
+    pub fn least(&self, now: Time) -> Option<Duration> {
+        let second = now.as_nanos() / SLOT_NS;
+        let recent = self.minima.iter().flatten();
+        recent
+            .filter(|&&(of, _)| second.saturating_sub(of) < SLOTS as u64)
+            .map(|&(_, least)| least)
+            .min()
+    }
+
+    /// All that have been measured.
+    #[must_use]
+    pub fn histogram(&self) -> &Histogram {
+        &self.histogram
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_least_is_remembered_for_nine_seconds_and_forgotten_after_ten() {
+        let (ms, mut round_trip) = (Duration::from_millis, RoundTrip::new());
+        let at = Time::from_millis;
+        assert_eq!(round_trip.least(at(0)), None);
+        round_trip.note(at(500), ms(20));
+        round_trip.note(at(501), ms(80));
+        assert_eq!(round_trip.latest(), Some(ms(80)));
+        assert_eq!(round_trip.least(at(501)), Some(ms(20)));
+        for s in 1..10 {
+            round_trip.note(at(s * 1000), ms(50));
+        }
+        assert_eq!(round_trip.least(at(9_999)), Some(ms(20)));
+        assert_eq!(round_trip.least(at(10_000)), Some(ms(50)));
+        round_trip.note(at(10_000), ms(60));
+        assert_eq!(round_trip.least(at(10_000)), Some(ms(50)));
+        assert_eq!(round_trip.least(at(30_000)), None, "nothing for 20 s");
+        assert_eq!(round_trip.histogram().total(), 12);
+    }
+}

@@ -1,0 +1,75 @@
+//! How any message is written and read: header, postcard body, and the checks that all share.
+//!
+//! Must never allocate, and never accept bytes that it would not have written itself.
+
+use postcard::ser_flavors::Flavor;
+use serde::{Deserialize, Serialize};
+
+use super::error::{DecodeError, EncodeError, FieldError, reason};
+use super::header::{HEADER_BYTES, Kind, header};
+
+/// A message as it lies on the wire.
+pub(super) trait Body: Serialize {
+    /// Its type.
+    const KIND: Kind;
+
+    /// The rules that its fields keep, whatever the session: checked before writing and after reading.
+    fn check(&self) -> Result<(), FieldError>;
+}
+
+/// Writes header and body to the front of `out`; returns how many bytes that took.
+pub(super) fn write<B: Body>(body: &B, out: &mut [u8]) -> Result<usize, EncodeError> {
+    let kind = B::KIND;
+    body.check()
+        .map_err(|why| EncodeError::Field { kind, why })?;
+    let length = out.len();
+    let too_small = EncodeError::BufferTooSmall { kind, length };
+    let (head, rest) = out.split_at_mut_checked(HEADER_BYTES).ok_or(too_small)?;
+    head.copy_from_slice(&header(kind));
+    let used = postcard::to_slice(body, rest).map_err(|_| too_small)?;
+    Ok(HEADER_BYTES + used.len())
+}
+
+/// Reads a body that must fill `bytes` exactly, in its one canonical form, and keep its rules.
+pub(super) fn read<'a, B: Body + Deserialize<'a>>(bytes: &'a [u8]) -> Result<B, DecodeError> {
+    let kind = B::KIND;
+    let (body, rest) =
+        postcard::take_from_bytes::<B>(bytes).map_err(|error| DecodeError::Malformed {
+            kind,
+            reason: reason(&error),
+        })?;
+    if !rest.is_empty() {
+        let extra = rest.len();
+        return Err(DecodeError::Trailing { kind, extra });
+    }
+    let left = postcard::serialize_with_flavor(&body, Compare { expected: bytes });
+    if left != Ok(0) {
+        return Err(DecodeError::NotCanonical { kind });
+    }
+    body.check()
+        .map_err(|why| DecodeError::Field { kind, why })?;
+    Ok(body)
+}
+
+/// Compares what is written with what is expected instead of storing it; yields what was not reached.
+struct Compare<'a> {
+    expected: &'a [u8],
+}
+
+impl Flavor for Compare<'_> {
+    type Output = usize;
+
+    fn try_push(&mut self, byte: u8) -> postcard::Result<()> {
+        match self.expected.split_first() {
+            Some((&expected, rest)) if expected == byte => {
+                self.expected = rest;
+                Ok(())
+            }
+            _ => Err(postcard::Error::DeserializeBadEncoding),
+        }
+    }
+
+    fn finalize(self) -> postcard::Result<usize> {
+        Ok(self.expected.len())
+    }
+}
