@@ -3,5 +3,3 @@
 //! The modules here are pure; the QUIC endpoint and the 1 kHz thread live behind the feature `io`.
 
 pub mod environment;
-
-
