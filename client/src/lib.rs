@@ -1,1 +1,3 @@
-//! placeholder
+//! The master: everything on the side of the hand.
+
+pub mod operator;

@@ -1,0 +1,3 @@
+//! Operators: what moves the HIP when no hand does.
+
+pub mod trace;

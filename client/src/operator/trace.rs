@@ -1,0 +1,352 @@
+//! A recorded tool path as an operator: where the HIP is at each moment, whatever it feels.
+//!
+//! A path comes from plain CSV or from a file of recorded pushes. It never looks at a clock and never
+//! extrapolates: before its first sample and after its last it holds them. Between samples it is linear.
+//!
+//! A recorded path was made around another object, elsewhere. [`Trace::starting_at`] carries it to where
+//! ours is, unscaled: choose the start so that the path's first motion leads into the face to be pushed.
+
+use std::time::Duration;
+
+use mmt_shared::geometry::Vec2;
+use mmt_shared::recording::{ParseError, Push, Recording};
+
+/// The first line of a tool path in CSV, exactly.
+pub const CSV_HEADER: &str = "t_s,x_m,y_m";
+/// The most samples that a path may hold: 2.8 hours at 1 kHz.
+pub const SAMPLES_MAX: usize = 10_000_000;
+/// The latest time accepted in CSV, s: a month.
+pub const TIME_MAX_S: f64 = 2.7e6;
+/// The farthest coordinate accepted in CSV, m.
+pub const COORDINATE_MAX_M: f64 = 100.0;
+/// Speed of the straight moves between recorded pushes, m/s. The recording has no path there; this is the
+/// slow end of how people move a tool to a new place.
+pub const MOVE_SPEED_M_PER_S: f64 = 0.1;
+
+/// Why a text is not a tool path.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum TraceError {
+    /// The first line is not the header.
+    #[error("line 1: the header should be exactly {CSV_HEADER:?}, found {found:?}")]
+    Header {
+        /// The first line, at most 48 characters of it.
+        found: String,
+    },
+    /// A line has the wrong number of fields.
+    #[error("line {line}: expected 3 fields ({CSV_HEADER}), found {found}")]
+    Fields {
+        /// Line, from 1.
+        line: usize,
+        /// Number of fields found.
+        found: usize,
+    },
+    /// A field is no number, not finite, or out of range.
+    #[error("line {line}: {field} should be a number from {least} to {most}, found {found:?}")]
+    Number {
+        /// Line, from 1.
+        line: usize,
+        /// The column's name.
+        field: &'static str,
+        /// The field, at most 48 characters of it.
+        found: String,
+        /// Least accepted value.
+        least: i64,
+        /// Greatest accepted value.
+        most: i64,
+    },
+    /// Time does not increase.
+    #[error("line {line}: t_s {t_s} is not later than {before} on the line before")]
+    Time {
+        /// Line, from 1.
+        line: usize,
+        /// The time, s.
+        t_s: String,
+        /// The time before it, s.
+        before: String,
+    },
+    /// There is no sample.
+    #[error("line 2: there is no sample; at least one line of {CSV_HEADER} must follow the header")]
+    Empty,
+    /// There are too many samples.
+    #[error("line {line}: more than {SAMPLES_MAX} samples; cut the path into several files")]
+    TooLong {
+        /// Line, from 1.
+        line: usize,
+    },
+    /// The text is not a recording of pushes.
+    #[error(transparent)]
+    Recording(#[from] ParseError),
+    /// The recording has no push of that number.
+    #[error("there is no push {index}: the recording holds pushes 0 to {last}")]
+    NoSuchPush {
+        /// The number asked for, from 0.
+        index: usize,
+        /// The number of the last push.
+        last: usize,
+    },
+}
+
+/// A tool path over time.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Trace {
+    /// Time since the start (s, strictly increasing from 0) and tool point in the world (m); never empty.
+    samples: Vec<(f64, Vec2)>,
+}
+
+impl Trace {
+    /// Reads a path from CSV: the header `t_s,x_m,y_m`, then one sample a line, t strictly increasing.
+    /// Time is counted from the first sample; blank lines at the end are ignored.
+    ///
+    /// # Errors
+    /// Names the first line that is wrong and why.
+    pub fn from_csv(text: &str) -> Result<Self, TraceError> {
+        let mut lines = text.trim_end().lines().enumerate();
+        let header = lines.next().map_or("", |(_, line)| line);
+        if header != CSV_HEADER {
+            return Err(TraceError::Header {
+                found: shown(header),
+            });
+        }
+        let mut samples: Vec<(f64, Vec2)> = Vec::new();
+        for (index, text) in lines {
+            let line = index + 1;
+            let (t_s, point) = csv_sample(line, text)?;
+            if let Some((before, _)) = samples.last().filter(|(before, _)| t_s <= *before) {
+                return Err(TraceError::Time {
+                    line,
+                    t_s: t_s.to_string(),
+                    before: before.to_string(),
+                });
+            }
+            if samples.len() == SAMPLES_MAX {
+                return Err(TraceError::TooLong { line });
+            }
+            samples.push((t_s, point));
+        }
+        let Some((start_s, _)) = samples.first().copied() else {
+            return Err(TraceError::Empty);
+        };
+        samples.iter_mut().for_each(|(t_s, _)| *t_s -= start_s);
+        Ok(Self { samples })
+    }
+
+    /// The finger's path in a text of recorded pushes, as [`Trace::from_recording`].
+    ///
+    /// # Errors
+    /// As [`Recording::parse`] and [`Trace::from_recording`].
+    pub fn from_cmu(text: &str, push: Option<usize>) -> Result<Self, TraceError> {
+        Self::from_recording(&Recording::parse(text)?, push)
+    }
+
+    /// The finger's path in recorded pushes: of the push of that number (from 0), or of all, joined.
+    ///
+    /// Each push keeps its own timing (about 33 samples a second at 2.7 mm/s). A joined push is preceded
+    /// by a straight move at [`MOVE_SPEED_M_PER_S`] from where the last one ended; the finger's real way
+    /// was not recorded, and the straight one may touch the object.
+    ///
+    /// # Errors
+    /// There is no push of that number.
+    pub fn from_recording(recording: &Recording, push: Option<usize>) -> Result<Self, TraceError> {
+        let pushes = match push {
+            None => recording.pushes.as_slice(),
+            Some(index) => recording
+                .pushes
+                .get(index..=index)
+                .ok_or(TraceError::NoSuchPush {
+                    index,
+                    last: recording.pushes.len().saturating_sub(1),
+                })?,
+        };
+        let mut samples = Vec::new();
+        pushes.iter().for_each(|push| append(&mut samples, push));
+        Ok(Self { samples })
+    }
+
+    /// This path carried, unturned and unscaled, to start at `start` (world, m).
+    #[must_use]
+    pub fn starting_at(mut self, start: Vec2) -> Self {
+        let shift = start - self.at(Duration::ZERO);
+        self.samples
+            .iter_mut()
+            .for_each(|(_, point)| *point += shift);
+        self
+    }
+
+    /// The tool point (world, m) at a time since the start: linear between samples, held after the last.
+    #[must_use]
+    pub fn at(&self, elapsed: Duration) -> Vec2 {
+        let t_s = elapsed.as_secs_f64();
+        let next = self
+            .samples
+            .partition_point(|(sample_s, _)| *sample_s <= t_s);
+        let before = next
+            .checked_sub(1)
+            .and_then(|index| self.samples.get(index));
+        match (before, self.samples.get(next)) {
+            (Some((from_s, from)), Some((to_s, to))) => {
+                from + (to - from) * ((t_s - from_s) / (to_s - from_s))
+            }
+            (Some((_, point)), None) | (None, Some((_, point))) => *point,
+            (None, None) => Vec2::zeros(),
+        }
+    }
+
+    /// Time from the first to the last sample.
+    #[must_use]
+    pub fn duration(&self) -> Duration {
+        let last_s = self.samples.last().map_or(0.0, |(t_s, _)| *t_s);
+        Duration::try_from_secs_f64(last_s).unwrap_or(Duration::ZERO)
+    }
+
+    /// The samples: time since the start (s, strictly increasing from 0) and tool point (world, m).
+    #[must_use]
+    pub fn samples(&self) -> &[(f64, Vec2)] {
+        &self.samples
+    }
+}
+
+fn shown(text: &str) -> String {
+    text.chars().take(48).collect()
+}
+
+fn csv_sample(line: usize, text: &str) -> Result<(f64, Vec2), TraceError> {
+    let mut fields = text.split(',');
+    let (Some(t), Some(x), Some(y), None) =
+        (fields.next(), fields.next(), fields.next(), fields.next())
+    else {
+        let found = text.split(',').count();
+        return Err(TraceError::Fields { line, found });
+    };
+    let number = |field, text: &str, limit: f64| match text.trim().parse::<f64>() {
+        // A NaN fails this comparison.
+        Ok(value) if value.abs() <= limit => Ok(value),
+        _ => Err(TraceError::Number {
+            line,
+            field,
+            found: shown(text),
+            least: -(limit as i64),
+            most: limit as i64,
+        }),
+    };
+    let t_s = number("t_s", t, TIME_MAX_S)?;
+    let x = number("x_m", x, COORDINATE_MAX_M)?;
+    let y = number("y_m", y, COORDINATE_MAX_M)?;
+    Ok((t_s, Vec2::new(x, y)))
+}
+
+/// Appends a push's finger path, after a move to its start.
+fn append(samples: &mut Vec<(f64, Vec2)>, push: &Push) {
+    let Some(first) = push.finger.first() else {
+        return;
+    };
+    let start_s = samples.last().map_or(0.0, |(last_s, last)| {
+        let way = (first.pose.position - last).norm();
+        // At least one sample period, so that time increases when the finger starts where it was.
+        last_s + (way / MOVE_SPEED_M_PER_S).max(0.03)
+    });
+    samples.extend(
+        push.finger
+            .iter()
+            .map(|sample| (start_s + (sample.t_s - first.t_s), sample.pose.position)),
+    );
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    const CSV: &str = "t_s,x_m,y_m\n1.0,0.0,0.0\n2.0,0.2,-0.4\r\n4.0,0.4,0.0\n\n";
+
+    const PUSHES: &str = "2
+0 0 0 1 0 0 0  5 0 0 1 0 0 0
+2  100 0 0  101 1 1
+3  100.00 -10 0 0 1 0 0 0  100.03 -9 0 0 1 0 0 0  100.06 -8 0 0 1 0 0 0
+5 0 0 1 0 0 0  5 5 0 1 0 0 0
+2  50 0 0  51 1 1
+2  50.00 -8 50 0 1 0 0 0  50.03 -8 51 0 1 0 0 0
+";
+
+    fn close(a: Vec2, b: Vec2) -> bool {
+        (a - b).norm() < 1e-9
+    }
+
+    #[test]
+    fn a_path_is_linear_between_samples_and_holds_at_its_ends() {
+        let trace = Trace::from_csv(CSV).unwrap();
+        let at = |millis| trace.at(Duration::from_millis(millis));
+        assert_eq!(trace.duration(), Duration::from_secs(3));
+        assert!(close(at(0), Vec2::zeros()));
+        assert!(close(at(500), Vec2::new(0.1, -0.2)));
+        assert!(close(at(1000), Vec2::new(0.2, -0.4)));
+        assert!(close(at(2000), Vec2::new(0.3, -0.2)));
+        assert!(close(at(3000), Vec2::new(0.4, 0.0)));
+        assert!(close(trace.at(Duration::MAX), Vec2::new(0.4, 0.0)));
+    }
+
+    #[test]
+    fn a_carried_path_starts_where_it_is_told_and_keeps_its_shape() {
+        let trace = Trace::from_csv(CSV).unwrap();
+        let start = Vec2::new(-0.3, 0.1);
+        let carried = trace.clone().starting_at(start);
+        for millis in (0..3500).step_by(70) {
+            let elapsed = Duration::from_millis(millis);
+            assert!(close(carried.at(elapsed) - start, trace.at(elapsed)));
+        }
+    }
+
+    #[test]
+    fn pushes_are_joined_by_moves_that_take_their_time() {
+        let trace = Trace::from_cmu(PUSHES, None).unwrap();
+        // 0.06 s of pushing, 50 mm at 0.1 m/s, 0.03 s of pushing
+        assert!((trace.duration().as_secs_f64() - 0.59).abs() < 1e-6);
+        assert!(close(trace.at(Duration::ZERO), Vec2::new(-0.010, 0.0)));
+        let halfway = trace.at(Duration::from_millis(310));
+        assert!((halfway - Vec2::new(-0.008, 0.025)).norm() < 1e-6);
+        let rising = trace.samples().windows(2).all(|pair| pair[0].0 < pair[1].0);
+        assert!(rising);
+    }
+
+    #[test]
+    fn one_push_can_be_taken_by_number_and_a_number_that_is_not_there_is_refused() {
+        let trace = Trace::from_cmu(PUSHES, Some(1)).unwrap();
+        assert!(close(trace.at(Duration::ZERO), Vec2::new(-0.008, 0.050)));
+        assert!((trace.duration().as_secs_f64() - 0.03).abs() < 1e-6);
+        let error = Trace::from_cmu(PUSHES, Some(2)).unwrap_err();
+        assert_eq!(
+            error.to_string(),
+            "there is no push 2: the recording holds pushes 0 to 1"
+        );
+        assert!(Trace::from_cmu(PUSHES, Some(usize::MAX)).is_err());
+    }
+
+    #[test]
+    fn every_wrong_line_is_refused_with_its_number_and_reason() {
+        let message = |text: &str| Trace::from_csv(text).unwrap_err().to_string();
+        assert!(message("t,x,y\n0,0,0").starts_with("line 1: the header should be exactly"));
+        assert!(message("").starts_with("line 1"));
+        assert!(message("t_s,x_m,y_m\n").starts_with("line 2: there is no sample"));
+        assert!(message("t_s,x_m,y_m\n0,0\n").starts_with("line 2: expected 3 fields"));
+        assert!(message("t_s,x_m,y_m\n0,0,0,0\n").contains("found 4"));
+        assert!(message("t_s,x_m,y_m\n0,0,0\n\n1,0,0").starts_with("line 3: expected 3 fields"));
+        for bad in ["x", "nan", "inf", "1e9", ""] {
+            let text = message(&format!("t_s,x_m,y_m\n0,0,0\n1,{bad},0\n"));
+            assert!(text.starts_with("line 3: x_m should be a number"), "{text}");
+        }
+        let text = message("t_s,x_m,y_m\n0,0,0\n1,0,0\n1,0,0\n");
+        assert_eq!(text, "line 4: t_s 1 is not later than 1 on the line before");
+        assert!(Trace::from_cmu("nonsense", None).is_err());
+    }
+
+    proptest! {
+        #[test]
+        fn no_text_makes_the_importers_panic(text in "\\PC*", lines in "([-0-9.e,]{0,12}\n){0,6}") {
+            let _ = Trace::from_csv(&text);
+            let _ = Trace::from_cmu(&text, None);
+            if let Ok(trace) = Trace::from_csv(&format!("{CSV_HEADER}\n{lines}")) {
+                let middle = trace.at(trace.duration() / 2);
+                prop_assert!(middle.x.is_finite() && middle.y.is_finite());
+            }
+        }
+    }
+}
