@@ -1,3 +1,7 @@
-//! The master: everything on the side of the hand.
+//! The master of mmt: the haptic tick around the shared local model, operators, force limits.
+//!
+//! The crate is pure; its QUIC endpoint and its haptic thread live in `io` behind the feature of that name.
 
+pub mod failsafe;
+pub mod link;
 pub mod operator;

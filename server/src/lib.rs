@@ -1,5 +1,8 @@
-//! The slave of mmt: the remote environment, what is measured of it, and the play-out of commands.
+//! The slave of mmt: remote environment, sensing, estimation, shadow and trigger.
 //!
-//! The modules here are pure; the QUIC endpoint and the 1 kHz thread live behind the feature `io`.
+//! The crate is pure; its QUIC endpoint and its 1 kHz thread live in `io` behind the feature of that
+//! name. Only `environment` names the physics engine.
 
 pub mod environment;
+pub mod link;
+pub mod pose_observer;
