@@ -1,0 +1,6 @@
+//! Who moves the HIP.
+
+pub mod hand;
+mod route;
+pub mod scripted;
+mod stroke;
