@@ -4,4 +4,11 @@
 
 pub mod failsafe;
 pub mod link;
+//! The master of mmt: devices, operators, force limits.
+//!
+//! The crate is pure; the haptic thread and the QUIC endpoint live in `io` behind the feature of that
+//! name.
+
+pub mod device;
+pub mod limiter;
 pub mod operator;

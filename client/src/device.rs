@@ -1,0 +1,275 @@
+//! Device profiles: what a haptic device can do and how its room maps to the world.
+//!
+//! k_p is per world metre. With a scale s (x_world = s x_device) the hand feels s k_p, and a device's
+//! stiffness limit applies to that. No profile may exceed its device's limits.
+
+use mmt_shared::contact::Coupling;
+use mmt_shared::geometry::Vec2;
+use serde::Serialize;
+
+use crate::limiter::Limits;
+
+/// Least accepted k_p, N/m: softer than a pillow, nothing can be pushed.
+const STIFFNESS_MIN_N_PER_M: f64 = 50.0;
+/// Accepted scale s: the paper displays with 13.
+const SCALE: (f64, f64) = (0.1, 100.0);
+
+/// A haptic device and how it is used.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct DeviceProfile {
+    name: &'static str,
+    stiffness_n_per_m: f64,
+    stiffness_max_n_per_m: f64,
+    force_max_n: f64,
+    workspace_m: f64,
+    scale: f64,
+}
+
+/// The known devices; the first is the default.
+const PROFILES: [DeviceProfile; 2] = [
+    // No device: a simulated hand. The values are those of the design study; the stiffness limit is
+    // that of the stiffest profile, the room is the world's accepted workspace.
+    DeviceProfile {
+        name: "default",
+        stiffness_n_per_m: 1000.0,
+        stiffness_max_n_per_m: 3000.0,
+        force_max_n: 8.0,
+        workspace_m: 10.0,
+        scale: 1.0,
+    },
+    // Novint Falcon: 3000 N/m, 8 N, 4 inch cube. The paper sets k_p to the device's maximum.
+    DeviceProfile {
+        name: "falcon",
+        stiffness_n_per_m: 3000.0,
+        stiffness_max_n_per_m: 3000.0,
+        force_max_n: 8.0,
+        workspace_m: 0.10,
+        scale: 1.0,
+    },
+];
+
+/// Why a profile was not accepted.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum DeviceError {
+    /// No profile has this name.
+    #[error("there is no device profile \"{name}\"; known are: {known}")]
+    Unknown {
+        /// The name asked for.
+        name: String,
+        /// All known names.
+        known: String,
+    },
+    /// The scale is out of range.
+    #[error("scale {value} is outside the accepted range {min} to {max}; change it")]
+    Scale {
+        /// The scale asked for.
+        value: f64,
+        /// Least accepted.
+        min: f64,
+        /// Greatest accepted.
+        max: f64,
+    },
+    /// The hand would feel more than the device can render, or nothing.
+    #[error(
+        "stiffness {value} N/m is outside the accepted range {min} to {max} N/m of the device \
+         \"{device}\" at scale {scale} (the hand feels scale x stiffness, at most {limit} N/m); \
+         change the stiffness or the scale"
+    )]
+    Stiffness {
+        /// Name of the device.
+        device: &'static str,
+        /// k_p asked for, N/m.
+        value: f64,
+        /// Least accepted k_p, N/m.
+        min: f64,
+        /// Greatest accepted k_p at this scale, N/m.
+        max: f64,
+        /// The device's own limit, N/m.
+        limit: f64,
+        /// The scale s.
+        scale: f64,
+    },
+}
+
+impl Default for DeviceProfile {
+    fn default() -> Self {
+        let [default, ..] = PROFILES;
+        default
+    }
+}
+
+impl DeviceProfile {
+    /// The names of all known profiles.
+    pub fn names() -> impl Iterator<Item = &'static str> {
+        PROFILES.iter().map(|profile| profile.name)
+    }
+
+    /// The profile of a name.
+    ///
+    /// # Errors
+    /// [`DeviceError::Unknown`] lists the known names.
+    pub fn by_name(name: &str) -> Result<Self, DeviceError> {
+        let found = PROFILES.into_iter().find(|profile| profile.name == name);
+        found.ok_or_else(|| DeviceError::Unknown {
+            name: name.to_owned(),
+            known: Self::names().collect::<Vec<_>>().join(", "),
+        })
+    }
+
+    /// This device used with another k_p (N/m, world metres) and scale s; `None` keeps the profile's.
+    ///
+    /// # Errors
+    /// When the scale is out of range, or s k_p above the device's stiffness limit.
+    pub fn used_with(
+        self,
+        stiffness_n_per_m: Option<f64>,
+        scale: Option<f64>,
+    ) -> Result<Self, DeviceError> {
+        let scale = scale.unwrap_or(self.scale);
+        let (min, max) = SCALE;
+        if !(min..=max).contains(&scale) {
+            return Err(DeviceError::Scale {
+                value: scale,
+                min,
+                max,
+            });
+        }
+        let value = stiffness_n_per_m.unwrap_or(self.stiffness_n_per_m);
+        let limit = self.stiffness_max_n_per_m;
+        // the ceiling of the simulated hand holds for k_p itself as well: at s < 1 the device allows
+        // more than the local model was made for
+        let max = (limit / scale).min(limit);
+        if !(STIFFNESS_MIN_N_PER_M..=max).contains(&value) {
+            return Err(DeviceError::Stiffness {
+                device: self.name,
+                value,
+                min: STIFFNESS_MIN_N_PER_M,
+                max,
+                limit,
+                scale,
+            });
+        }
+        Ok(Self {
+            stiffness_n_per_m: value,
+            scale,
+            ..self
+        })
+    }
+
+    /// Name of the profile.
+    #[must_use]
+    pub fn name(&self) -> &'static str {
+        self.name
+    }
+
+    /// k_p, N/m, world metres.
+    #[must_use]
+    pub fn stiffness_n_per_m(&self) -> f64 {
+        self.stiffness_n_per_m
+    }
+
+    /// F_max, N.
+    #[must_use]
+    pub fn force_max_n(&self) -> f64 {
+        self.force_max_n
+    }
+
+    /// Side of the cube that the device reaches, m, device metres.
+    #[must_use]
+    pub fn workspace_m(&self) -> f64 {
+        self.workspace_m
+    }
+
+    /// s: world metres per device metre.
+    #[must_use]
+    pub fn scale(&self) -> f64 {
+        self.scale
+    }
+
+    /// k_p with the damping that belongs to it.
+    #[must_use]
+    pub fn coupling(&self) -> Coupling {
+        Coupling::for_stiffness(self.stiffness_n_per_m)
+    }
+
+    /// The limits for the force on this device.
+    #[must_use]
+    pub fn limits(&self) -> Limits {
+        Limits {
+            force_max_n: self.force_max_n,
+            ..Limits::default()
+        }
+    }
+
+    /// A point of the device's room in the world, m.
+    #[must_use]
+    pub fn hip_in_world(&self, hip_in_device: Vec2) -> Vec2 {
+        hip_in_device * self.scale
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::limiter::ForceLimiter;
+
+    #[test]
+    fn every_profile_is_found_by_its_name_and_keeps_its_own_limits() {
+        for name in DeviceProfile::names() {
+            let profile = DeviceProfile::by_name(name).unwrap();
+            assert_eq!(profile.name(), name);
+            assert_eq!(profile.used_with(None, None), Ok(profile));
+            assert!(ForceLimiter::try_new(profile.limits()).is_ok());
+        }
+        assert_eq!(
+            DeviceProfile::by_name("default"),
+            Ok(DeviceProfile::default())
+        );
+        assert_eq!(
+            DeviceProfile::by_name("phantom").unwrap_err().to_string(),
+            "there is no device profile \"phantom\"; known are: default, falcon"
+        );
+    }
+
+    #[test]
+    fn the_defaults_are_1000_n_per_m_and_8_n_and_the_falcon_3000() {
+        let default = DeviceProfile::default();
+        let c = default.coupling();
+        assert_eq!((c.stiffness_n_per_m, c.damping_ns_per_m), (1000.0, 10.0));
+        assert_eq!((default.force_max_n(), default.scale()), (8.0, 1.0));
+        let falcon = DeviceProfile::by_name("falcon").unwrap();
+        let c = falcon.coupling();
+        assert_eq!((c.stiffness_n_per_m, c.damping_ns_per_m), (3000.0, 20.0));
+        assert_eq!((falcon.force_max_n(), falcon.workspace_m()), (8.0, 0.10));
+    }
+
+    #[test]
+    fn the_stiffness_limit_applies_to_what_the_hand_feels() {
+        let falcon = DeviceProfile::by_name("falcon").unwrap();
+        assert!(falcon.used_with(Some(3000.0), None).is_ok());
+        assert!(falcon.used_with(Some(3000.0_f64.next_up()), None).is_err());
+        let scaled = falcon.used_with(Some(1500.0), Some(2.0)).unwrap();
+        assert_eq!(
+            scaled.hip_in_world(Vec2::new(0.05, 0.0)),
+            Vec2::new(0.1, 0.0)
+        );
+        assert!(falcon.used_with(Some(1501.0), Some(2.0)).is_err());
+        assert!(falcon.used_with(None, Some(13.0)).is_err());
+        let error = falcon.used_with(Some(1501.0), Some(2.0)).unwrap_err();
+        assert_eq!(
+            error.to_string(),
+            "stiffness 1501 N/m is outside the accepted range 50 to 1500 N/m of the device \
+             \"falcon\" at scale 2 (the hand feels scale x stiffness, at most 3000 N/m); \
+             change the stiffness or the scale"
+        );
+    }
+
+    #[test]
+    fn numbers_that_are_not_finite_or_not_positive_are_refused() {
+        let profile = DeviceProfile::default();
+        for bad in [f64::NAN, f64::INFINITY, 0.0, -1000.0] {
+            assert!(profile.used_with(Some(bad), None).is_err());
+            assert!(profile.used_with(None, Some(bad)).is_err());
+        }
+    }
+}

@@ -1,0 +1,453 @@
+//! The scripted operator: goes round the box and pushes its faces, as a person would who looks at it.
+//!
+//! It plans on the box as it sees it (the local model, unless somebody wants to show why not), so it
+//! follows what it pushes. Between its wish and the HIP is a hand, so force moves the HIP. A run is a
+//! pure function of the configuration, the views and the forces. Its HIP must never jump, never leave
+//! the finite numbers, and never enter the box but by the face it means to push.
+
+use mmt_shared::geometry::{BoxFootprint, Face, Pose, Vec2, rotate};
+use mmt_shared::time::TICK_S;
+use serde::{Deserialize, Serialize};
+
+use super::hand::{Hand, HandConfig};
+use super::route;
+use super::stroke::Stroke;
+
+/// A push or an approach that takes longer is given up, s: the box is blocked or not there.
+const GIVE_UP_S: f64 = 10.0;
+/// A goal is reached when the wish is this near, m.
+const REACHED_M: f64 = 0.005;
+/// Rate at which a lateral error is steered out, 1/s, and the most speed for it, m/s.
+const STEER_PER_S: f64 = 8.0;
+const STEER_MAX_M_PER_S: f64 = 0.15;
+/// Share of the acceleration limit that braking ahead of a goal counts on.
+const BRAKE_SHARE: f64 = 0.6;
+/// Where the HIP starts: in front of the first face, m.
+const START_M: f64 = 0.25;
+
+/// What the scripted operator does. The defaults are those of the design study unless said otherwise.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct ScriptedConfig {
+    /// Seed of everything that is drawn. Default 1.
+    pub seed: u64,
+    /// Largest lateral offset of a push from the face's middle, m; drawn uniformly. Default 0.05.
+    pub lateral_max_m: f64,
+    /// Speed on the way round the box, m/s. Default 0.35.
+    pub travel_m_per_s: f64,
+    /// Distance in front of the face at which the approach begins, m. Default 0.05.
+    pub stand_off_m: f64,
+    /// Speed of the approach, m/s. Default 0.06.
+    pub approach_m_per_s: f64,
+    /// Length of a push from contact, m. Default 0.35.
+    pub push_m: f64,
+    /// Range of a push's mean speed, m/s; drawn uniformly. Default 0.10 to 0.22.
+    pub push_speed_m_per_s: (f64, f64),
+    /// Slow modulation of the speed, share of the mean. Default 0.30.
+    pub slow_share: f64,
+    /// Its range of frequency, Hz. Default 0.4 to 1.
+    pub slow_hz: (f64, f64),
+    /// Fast modulation of the speed, share of the mean. Default 0.12.
+    pub fast_share: f64,
+    /// Its range of frequency, Hz. Default 1.5 to 3.
+    pub fast_hz: (f64, f64),
+    /// Rest at the end of a push, s. Default 0.4.
+    pub hold_s: f64,
+    /// Distance to back off after a push, m. Default 0.12.
+    pub retract_m: f64,
+    /// Limit of the wish's acceleration, m/s². Default 1.5, an unhurried arm (a choice).
+    pub acceleration_m_per_s2: f64,
+    /// Force at which the operator presses no harder, N. Default 8, the default device's limit.
+    pub press_max_n: f64,
+    /// Beyond this distance from where it began the box is pushed back, m. Default 1 (a choice).
+    pub home_radius_m: f64,
+    /// The hand.
+    pub hand: HandConfig,
+}
+
+impl Default for ScriptedConfig {
+    fn default() -> Self {
+        Self {
+            seed: 1,
+            lateral_max_m: 0.05,
+            travel_m_per_s: 0.35,
+            stand_off_m: 0.05,
+            approach_m_per_s: 0.06,
+            push_m: 0.35,
+            push_speed_m_per_s: (0.10, 0.22),
+            slow_share: 0.30,
+            slow_hz: (0.4, 1.0),
+            fast_share: 0.12,
+            fast_hz: (1.5, 3.0),
+            hold_s: 0.4,
+            retract_m: 0.12,
+            acceleration_m_per_s2: 1.5,
+            press_max_n: 8.0,
+            home_radius_m: 1.0,
+            hand: HandConfig::default(),
+        }
+    }
+}
+
+/// A number of the configuration that no hand could follow.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[error("operator.{name} = {value} is outside the accepted range {min} to {max}; change it")]
+pub struct ScriptedError {
+    /// Name of the key.
+    pub name: &'static str,
+    /// What it was.
+    pub value: f64,
+    /// Least accepted value.
+    pub min: f64,
+    /// Greatest accepted value.
+    pub max: f64,
+}
+
+impl ScriptedConfig {
+    /// Checks every number; a number that is not finite is outside every range.
+    fn checked(&self) -> Result<(), ScriptedError> {
+        let hand = &self.hand;
+        let (slowest, fastest) = self.push_speed_m_per_s;
+        let speeds = (0.01, 0.4);
+        for (name, value, (min, max)) in [
+            ("lateral_max_m", self.lateral_max_m, (0.0, 0.15)),
+            ("travel_m_per_s", self.travel_m_per_s, speeds),
+            ("stand_off_m", self.stand_off_m, (route::CLOSE_M, 0.5)),
+            ("approach_m_per_s", self.approach_m_per_s, (0.01, 0.1)),
+            ("push_m", self.push_m, (0.01, 1.0)),
+            ("push_speed_m_per_s.0", slowest, speeds),
+            ("push_speed_m_per_s.1", fastest, (slowest, 0.3)),
+            ("slow_share", self.slow_share, (0.0, 0.5)),
+            ("slow_hz.0", self.slow_hz.0, (0.0, 5.0)),
+            ("slow_hz.1", self.slow_hz.1, (self.slow_hz.0, 5.0)),
+            ("fast_share", self.fast_share, (0.0, 0.4)),
+            ("fast_hz.0", self.fast_hz.0, (0.0, 5.0)),
+            ("fast_hz.1", self.fast_hz.1, (self.fast_hz.0, 5.0)),
+            ("hold_s", self.hold_s, (0.0, 60.0)),
+            ("retract_m", self.retract_m, (route::CLOSE_M + 0.02, 0.5)),
+            (
+                "acceleration_m_per_s2",
+                self.acceleration_m_per_s2,
+                (0.5, 3.0),
+            ),
+            ("press_max_n", self.press_max_n, (1.0, 20.0)),
+            ("home_radius_m", self.home_radius_m, (0.5, 3.0)),
+            ("hand.mass_kg", hand.mass_kg, (0.1, 5.0)),
+            (
+                "hand.stiffness_n_per_m",
+                hand.stiffness_n_per_m,
+                (50.0, 2000.0),
+            ),
+            ("hand.damping_ns_per_m", hand.damping_ns_per_m, (1.0, 100.0)),
+            ("hand.tremor_hz", hand.tremor_hz, (0.0, 20.0)),
+            ("hand.tremor_m", hand.tremor_m, (0.0, 1e-3)),
+        ] {
+            if !(min..=max).contains(&value) {
+                return Err(ScriptedError {
+                    name,
+                    value,
+                    min,
+                    max,
+                });
+            }
+        }
+        Ok(())
+    }
+}
+
+/// The box as the operator sees it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct View {
+    /// `world_from_object`.
+    pub pose: Pose,
+    /// How large it is.
+    pub footprint: BoxFootprint,
+    /// Whether the HIP touches it.
+    pub in_contact: bool,
+}
+
+impl View {
+    fn is_finite(&self) -> bool {
+        self.pose.is_finite()
+            && Face::ALL
+                .iter()
+                .all(|face| self.footprint.offset(*face).is_finite())
+    }
+
+    fn inward(&self, face: Face) -> Vec2 {
+        rotate(self.pose.angle, -face.outward())
+    }
+}
+
+/// What the scripted operator is about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Phase {
+    /// On the way to the stand-off in front of the face.
+    Travel,
+    /// Slowly towards the face, until it touches.
+    Approach,
+    /// Pushes.
+    Push,
+    /// Rests at the end of a push.
+    Hold,
+    /// Backs off.
+    Retract,
+}
+
+/// The scripted operator.
+#[derive(Clone, Debug)]
+pub struct Scripted {
+    config: ScriptedConfig,
+    hand: Hand,
+    home: Vec2,
+    seen: View,
+    phase: Phase,
+    ticks_in_phase: u32,
+    face: Face,
+    stroke: Stroke,
+    pushes_begun: u64,
+    pushes_completed: u64,
+    /// Way made along the face's normal in this push, m.
+    pushed: f64,
+    /// Where the operator wants the HIP, m, and its velocity, m/s.
+    wanted: Vec2,
+    wanted_velocity: Vec2,
+}
+
+impl Scripted {
+    /// An operator at rest in front of the west face of the box in `view`, which is where its home is.
+    ///
+    /// # Errors
+    /// Names the first number of the configuration that is outside its range.
+    pub fn try_new(config: ScriptedConfig, view: View) -> Result<Self, ScriptedError> {
+        config.checked()?;
+        let face = Face::West;
+        let start =
+            view.pose
+                .point_to_world(route::in_front_of(&view.footprint, face, START_M, 0.0));
+        Ok(Self {
+            hand: Hand::new(config.hand, config.seed, start),
+            home: view.pose.position,
+            seen: view,
+            phase: Phase::Travel,
+            ticks_in_phase: 0,
+            face,
+            stroke: Stroke::draw(&config, 0),
+            pushes_begun: 0,
+            pushes_completed: 0,
+            pushed: 0.0,
+            wanted: start,
+            wanted_velocity: Vec2::zeros(),
+            config,
+        })
+    }
+
+    /// Where the HIP is now, m, world frame.
+    #[must_use]
+    pub fn hip(&self) -> Vec2 {
+        self.hand.hip()
+    }
+
+    /// What it is about.
+    #[must_use]
+    pub fn phase(&self) -> Phase {
+        self.phase
+    }
+
+    /// The face that it pushes, or will push next.
+    #[must_use]
+    pub fn face(&self) -> Face {
+        self.face
+    }
+
+    /// Pushes that went over their whole length.
+    #[must_use]
+    pub fn pushes_completed(&self) -> u64 {
+        self.pushes_completed
+    }
+
+    /// Moves on by one tick T and returns the HIP, m, world frame.
+    ///
+    /// `view` is the box as it is seen now (a view that is not finite is not looked at); `force_on_hand`
+    /// is the device's force, N.
+    pub fn step(&mut self, view: &View, force_on_hand: Vec2) -> Vec2 {
+        if view.is_finite() {
+            self.seen = *view;
+        }
+        self.decide();
+        let wish = self.wish();
+        let change = wish - self.wanted_velocity;
+        let most = self.config.acceleration_m_per_s2 * TICK_S;
+        self.wanted_velocity += change * (most / change.norm().max(most));
+        self.wanted += self.wanted_velocity * TICK_S;
+        self.give_way();
+        if self.phase == Phase::Push {
+            self.pushed += self.wanted_velocity.dot(&self.seen.inward(self.face)) * TICK_S;
+        }
+        self.ticks_in_phase = self.ticks_in_phase.saturating_add(1);
+        self.hand
+            .step(self.wanted, self.wanted_velocity, force_on_hand)
+    }
+
+    fn seconds_in_phase(&self) -> f64 {
+        f64::from(self.ticks_in_phase) * TICK_S
+    }
+
+    fn enter(&mut self, phase: Phase) {
+        self.phase = phase;
+        self.ticks_in_phase = 0;
+    }
+
+    /// Goes on to the next phase when this one is done.
+    fn decide(&mut self) {
+        let late = self.seconds_in_phase() > GIVE_UP_S;
+        match self.phase {
+            Phase::Travel if self.distance_to(self.stand_off()) < REACHED_M => {
+                self.enter(Phase::Approach);
+            }
+            Phase::Approach if self.seen.in_contact => {
+                self.pushed = 0.0;
+                self.enter(Phase::Push);
+            }
+            Phase::Push if self.pushed >= self.config.push_m => {
+                self.pushes_completed += 1;
+                self.enter(Phase::Hold);
+            }
+            Phase::Approach | Phase::Push if late => self.enter(Phase::Retract),
+            Phase::Hold if self.seconds_in_phase() >= self.config.hold_s => {
+                self.enter(Phase::Retract);
+            }
+            Phase::Retract if self.distance_to(self.retreat()) < REACHED_M => self.next_push(),
+            _ => {}
+        }
+    }
+
+    fn next_push(&mut self) {
+        self.pushes_begun += 1;
+        self.stroke = Stroke::draw(&self.config, self.pushes_begun);
+        self.face = self.next_face();
+        self.enter(Phase::Travel);
+    }
+
+    /// Round and round, unless the box has strayed: then the face that pushes it home.
+    fn next_face(&self) -> Face {
+        let next = route::next_face(self.face);
+        let homeward = self.home - self.seen.pose.position;
+        if homeward.norm() <= self.config.home_radius_m {
+            return next;
+        }
+        let homeward_by = |face: Face| self.seen.inward(face).dot(&homeward);
+        Face::ALL.into_iter().fold(next, |best, face| {
+            if homeward_by(face) > homeward_by(best) {
+                face
+            } else {
+                best
+            }
+        })
+    }
+
+    /// The velocity that the operator would like now, m/s, world frame.
+    fn wish(&self) -> Vec2 {
+        let config = &self.config;
+        match self.phase {
+            Phase::Travel => self.travel(),
+            Phase::Approach => self.forward(config.approach_m_per_s),
+            Phase::Push => self.forward(self.stroke.speed(self.seconds_in_phase()) * self.ease()),
+            Phase::Hold => Vec2::zeros(),
+            Phase::Retract => self.towards(self.retreat()),
+        }
+    }
+
+    /// Along the face's inward normal, steered onto the lateral place that was drawn.
+    fn forward(&self, speed: f64) -> Vec2 {
+        let at = self.wanted_in_object();
+        let left = route::left_of(self.face);
+        let error = self.stroke.lateral - left.dot(&at);
+        let steer = (STEER_PER_S * error).clamp(-STEER_MAX_M_PER_S, STEER_MAX_M_PER_S);
+        rotate(
+            self.seen.pose.angle,
+            left * steer - self.face.outward() * speed,
+        )
+    }
+
+    /// 1 at a light press, 0 at the hardest: the operator does not push against a wall.
+    fn ease(&self) -> f64 {
+        let press = self
+            .hand
+            .pull(self.wanted)
+            .dot(&self.seen.inward(self.face));
+        (4.0 * (1.0 - press / self.config.press_max_n)).clamp(0.0, 1.0)
+    }
+
+    /// Does not let the wish run ahead into a box that stands: the press is at most the limit.
+    fn give_way(&mut self) {
+        if !matches!(self.phase, Phase::Push | Phase::Hold) {
+            return;
+        }
+        let inward = self.seen.inward(self.face);
+        let excess = self.hand.pull(self.wanted).dot(&inward) - self.config.press_max_n;
+        if excess > 0.0 {
+            self.wanted -= inward * (excess / self.config.hand.stiffness_n_per_m);
+            self.wanted_velocity -= inward * self.wanted_velocity.dot(&inward).max(0.0);
+        }
+    }
+
+    fn travel(&self) -> Vec2 {
+        let (at, goal) = (self.wanted_in_object(), self.stand_off());
+        let next = route::way_point(&self.seen.footprint, at, self.face, goal);
+        if next == goal {
+            return self.towards(goal);
+        }
+        let way = next - at;
+        rotate(
+            self.seen.pose.angle,
+            way * (self.config.travel_m_per_s / way.norm().max(REACHED_M)),
+        )
+    }
+
+    /// Straight to a point of the object's frame, braking in time.
+    fn towards(&self, goal: Vec2) -> Vec2 {
+        let way = goal - self.wanted_in_object();
+        let distance = way.norm();
+        let brake = BRAKE_SHARE * self.config.acceleration_m_per_s2;
+        let speed = (2.0 * brake * distance)
+            .sqrt()
+            .min(self.config.travel_m_per_s);
+        rotate(
+            self.seen.pose.angle,
+            way * (speed / distance.max(REACHED_M)),
+        )
+    }
+
+    fn wanted_in_object(&self) -> Vec2 {
+        self.seen.pose.point_to_object(self.wanted)
+    }
+
+    fn distance_to(&self, point_in_object: Vec2) -> f64 {
+        (point_in_object - self.wanted_in_object()).norm()
+    }
+
+    fn stand_off(&self) -> Vec2 {
+        route::in_front_of(
+            &self.seen.footprint,
+            self.face,
+            self.config.stand_off_m,
+            self.stroke.lateral,
+        )
+    }
+
+    /// Straight back from where the wish is to the retracted distance.
+    fn retreat(&self) -> Vec2 {
+        let lateral = route::left_of(self.face).dot(&self.wanted_in_object());
+        route::in_front_of(
+            &self.seen.footprint,
+            self.face,
+            self.config.retract_m,
+            lateral,
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests;

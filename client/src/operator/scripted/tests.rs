@@ -1,0 +1,237 @@
+//! The scripted operator against a small quasi-static box.
+
+use super::*;
+use mmt_shared::contact::{Coupling, GodObject, contact_force};
+use mmt_shared::geometry::{Twist, cross};
+
+/// A box that slides when pushed harder than `friction_n`, slowly enough to have no inertia.
+struct Slab {
+    pose: Pose,
+    footprint: BoxFootprint,
+    friction_n: f64,
+    god: GodObject,
+    last_hip: Vec2,
+    /// Force on the box, N.
+    force: Vec2,
+}
+
+impl Slab {
+    const DAMPING: f64 = 8.0;
+    /// e/c of a 0.4 m square, m.
+    const LEVER: f64 = 0.153;
+
+    fn new(friction_n: f64) -> Self {
+        Self {
+            pose: Pose::default(),
+            footprint: BoxFootprint::square(0.4),
+            friction_n,
+            god: GodObject::default(),
+            last_hip: Vec2::zeros(),
+            force: Vec2::zeros(),
+        }
+    }
+
+    fn view(&self) -> View {
+        View {
+            pose: self.pose,
+            footprint: self.footprint,
+            in_contact: self.god.touched().is_some(),
+        }
+    }
+
+    fn step(&mut self, hip: Vec2) {
+        let velocity = (hip - self.last_hip) / TICK_S;
+        self.last_hip = hip;
+        self.force = Vec2::zeros();
+        let Some(touch) = self.god.follow(&self.footprint, &self.pose, hip) else {
+            return;
+        };
+        // the spring alone moves the box, the damper is felt: no inertia to balance it here
+        let coupling = Coupling::for_stiffness(1000.0);
+        let centre = self.pose.position;
+        let spring = touch.inward * coupling.force(touch.penetration, 0.0);
+        let excess = (1.0 - self.friction_n / spring.norm().max(1e-9)).max(0.0);
+        let moment = cross(touch.proxy - centre, spring);
+        let twist = Twist {
+            linear: spring * (excess / Self::DAMPING),
+            angular: moment * excess / (Self::DAMPING * Self::LEVER * Self::LEVER),
+        };
+        self.pose.position += twist.linear * TICK_S;
+        self.pose.angle += twist.angular * TICK_S;
+        self.force = contact_force(&coupling, &touch, velocity, &twist, centre);
+    }
+}
+
+/// What a run showed.
+#[derive(Debug, Default, PartialEq)]
+struct Run {
+    first_contact_s: Option<f64>,
+    pushes: u64,
+    fastest: f64,
+    hardest: f64,
+    strayed: f64,
+    turned: f64,
+    wrong_face: u64,
+    touched_in_travel: u64,
+    path: Vec<Vec2>,
+    faces: Vec<Face>,
+}
+
+fn run(config: ScriptedConfig, friction_n: f64, seconds: u32) -> Run {
+    let mut slab = Slab::new(friction_n);
+    let mut operator = Scripted::try_new(config, slab.view()).unwrap();
+    let mut run = Run::default();
+    slab.last_hip = operator.hip();
+    let mut last = operator.hip();
+    for tick in 0..seconds * 1000 {
+        let hip = operator.step(&slab.view(), -slab.force);
+        assert!(hip.x.is_finite() && hip.y.is_finite());
+        run.fastest = run.fastest.max((hip - last).norm() / TICK_S);
+        last = hip;
+        slab.step(hip);
+        run.path.push(hip);
+        if let Some(face) = slab.god.touched() {
+            run.first_contact_s = run.first_contact_s.or(Some(f64::from(tick) * TICK_S));
+            run.wrong_face += u64::from(face != operator.face());
+            run.touched_in_travel += u64::from(operator.phase() == Phase::Travel);
+        }
+        if operator.phase() == Phase::Push && run.faces.last() != Some(&operator.face()) {
+            run.faces.push(operator.face());
+        }
+        run.hardest = run.hardest.max(slab.force.norm());
+        run.strayed = run.strayed.max(slab.pose.position.norm());
+        run.turned = run.turned.max(slab.pose.angle.abs());
+    }
+    run.pushes = operator.pushes_completed();
+    run
+}
+
+fn seeded(seed: u64) -> ScriptedConfig {
+    ScriptedConfig {
+        seed,
+        ..ScriptedConfig::default()
+    }
+}
+
+#[test]
+fn at_least_two_pushes_are_completed_in_20_seconds_whatever_the_seed() {
+    let mut pushes = 0;
+    for seed in 0..20 {
+        let run = run(seeded(seed), 2.0, 20);
+        let first = run.first_contact_s.unwrap();
+        assert!((1.2..2.4).contains(&first), "seed {seed}: {first} s");
+        assert!(run.pushes >= 2, "seed {seed}: {} pushes", run.pushes);
+        pushes += run.pushes;
+    }
+    eprintln!("pushes {pushes}");
+    assert!(pushes >= 50, "{pushes} pushes in 20 runs");
+}
+
+#[test]
+fn the_hip_never_jumps_and_touches_only_the_face_that_is_meant() {
+    for seed in 0..10 {
+        let run = run(seeded(seed), 2.0, 60);
+        assert!(run.pushes >= 6);
+        assert!(run.fastest < 0.6, "seed {seed}: {} m/s", run.fastest);
+        assert!(run.hardest < 8.0, "seed {seed}: {} N", run.hardest);
+        assert_eq!((run.wrong_face, run.touched_in_travel), (0, 0));
+    }
+}
+
+#[test]
+fn the_faces_are_pushed_west_south_east_north() {
+    let run = run(seeded(1), 2.0, 40);
+    let order = [Face::West, Face::South, Face::East, Face::North];
+    assert!(run.faces.len() >= 4, "{:?}", run.faces);
+    assert_eq!(run.faces[..4], order);
+}
+
+#[test]
+fn a_run_is_a_pure_function_of_its_seed() {
+    assert_eq!(run(seeded(7), 2.0, 20), run(seeded(7), 2.0, 20));
+    assert_ne!(run(seeded(7), 2.0, 20).path, run(seeded(8), 2.0, 20).path);
+}
+
+#[test]
+fn a_lateral_offset_turns_the_box_and_none_hardly_does() {
+    let centred = ScriptedConfig {
+        lateral_max_m: 0.0,
+        ..seeded(3)
+    };
+    assert!(run(seeded(3), 2.0, 20).turned > 0.1);
+    assert!(run(centred, 2.0, 20).turned < 0.05);
+}
+
+#[test]
+fn the_box_stays_near_home_for_ten_minutes() {
+    for seed in 0..2 {
+        let run = run(seeded(seed), 2.0, 600);
+        eprintln!(
+            "strayed {} turned {} pushes {} fastest {}",
+            run.strayed, run.turned, run.pushes, run.fastest
+        );
+        assert!(run.strayed < 2.0, "seed {seed}: {} m", run.strayed);
+        assert_eq!((run.wrong_face, run.touched_in_travel), (0, 0));
+        assert!(run.pushes >= 60, "seed {seed}: {} pushes", run.pushes);
+    }
+}
+
+#[test]
+fn a_box_that_does_not_move_is_pressed_within_the_limit_and_given_up() {
+    let run = run(seeded(1), f64::MAX, 40);
+    eprintln!("blocked {}", run.hardest);
+    assert_eq!(run.pushes, 0);
+    assert!(run.faces.len() >= 2, "{:?}", run.faces);
+    assert!(run.hardest > 4.0 && run.hardest < 10.0, "{}", run.hardest);
+    assert_eq!(run.strayed, 0.0);
+}
+
+#[test]
+fn force_feedback_moves_the_hip() {
+    let view = Slab::new(2.0).view();
+    let (mut felt, mut numb) = (
+        Scripted::try_new(seeded(1), view).unwrap(),
+        Scripted::try_new(seeded(1), view).unwrap(),
+    );
+    for _ in 0..500 {
+        felt.step(&view, Vec2::new(0.0, -2.0));
+        numb.step(&view, Vec2::zeros());
+    }
+    assert!((numb.hip() - felt.hip() - Vec2::new(0.0, 0.005)).norm() < 1e-4);
+}
+
+#[test]
+fn a_view_that_is_not_finite_is_not_looked_at() {
+    let good = Slab::new(2.0).view();
+    let (mut a, mut b) = (
+        Scripted::try_new(seeded(1), good).unwrap(),
+        Scripted::try_new(seeded(1), good).unwrap(),
+    );
+    let mut bad = good;
+    bad.pose.angle = f64::NAN;
+    bad.footprint.west = f64::INFINITY;
+    for _ in 0..3000 {
+        assert_eq!(
+            a.step(&bad, Vec2::new(f64::NAN, 0.0)),
+            b.step(&good, Vec2::zeros())
+        );
+    }
+}
+
+#[test]
+fn a_number_outside_its_range_is_named_with_the_range() {
+    let view = Slab::new(2.0).view();
+    let with = |lateral_max_m| {
+        let config = ScriptedConfig {
+            lateral_max_m,
+            ..seeded(1)
+        };
+        Scripted::try_new(config, view).map(|_| ())
+    };
+    assert_eq!(with(0.15), Ok(()));
+    assert_eq!(
+        with(0.5).unwrap_err().to_string(),
+        "operator.lateral_max_m = 0.5 is outside the accepted range 0 to 0.15; change it"
+    );
+    assert!(with(f64::NAN).is_err());
+}
