@@ -8,10 +8,11 @@ use std::time::Duration;
 use mmt_shared::geometry::Vec2;
 use mmt_shared::local_model::{LocalModel, Rendered};
 use mmt_shared::time::Time;
-use mmt_shared::wire::message::{ForceCounts, HipCounts, HipSample, Update, Welcome};
+use mmt_shared::wire::{ForceCounts, HipCounts, HipSample, Update, Welcome};
 
 use crate::failsafe::LinkState;
-use crate::limiter::Limiter;
+use crate::limiter::ForceLimiter;
+use crate::operator::scripted::View;
 
 /// What one haptic tick gave.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -30,22 +31,27 @@ pub struct MasterTick {
 #[derive(Clone, Debug)]
 pub struct Master {
     model: LocalModel,
-    limiter: Limiter,
+    limiter: ForceLimiter,
     link: LinkState,
     hip: HipCounts,
     bad_readings: u64,
+    applied: u32,
+    frozen: u32,
 }
 
 impl Master {
     /// A master that renders what the slave's welcome says, its force limited by `limiter`.
     #[must_use]
-    pub fn new(welcome: &Welcome, limiter: Limiter) -> Self {
+    pub fn new(welcome: &Welcome, mut limiter: ForceLimiter) -> Self {
+        limiter.engage();
         Self {
             model: LocalModel::new(welcome.settings, welcome.state),
             limiter,
             link: LinkState::Fresh,
             hip: HipCounts::default(),
             bad_readings: 0,
+            applied: 0,
+            frozen: 0,
         }
     }
 
@@ -57,7 +63,7 @@ impl Master {
 
     /// The force limiter.
     #[must_use]
-    pub fn limiter(&self) -> &Limiter {
+    pub fn limiter(&self) -> &ForceLimiter {
         &self.limiter
     }
 
@@ -67,10 +73,41 @@ impl Master {
         self.bad_readings
     }
 
+    /// Updates that reached the model.
+    #[must_use]
+    pub fn applied(&self) -> u32 {
+        self.applied
+    }
+
+    /// Updates that came after the hand had been released and were not applied.
+    #[must_use]
+    pub fn frozen(&self) -> u32 {
+        self.frozen
+    }
+
+    /// What the operator sees: the local model, which is where it is felt.
+    #[must_use]
+    pub fn view(&self) -> View {
+        let state = self.model.state();
+        View {
+            pose: state.pose,
+            footprint: state.footprint,
+            in_contact: self.model.rendered().in_contact(),
+        }
+    }
+
+    /// Begins to ramp the force out: the session ends.
+    pub fn release(&mut self) {
+        self.limiter.release();
+    }
+
     /// Takes in an accepted update, unless the link has been taken for dead.
     pub fn apply(&mut self, update: &Update) {
         if self.link < LinkState::Released {
             self.model.apply(update);
+            self.applied = self.applied.saturating_add(1);
+        } else {
+            self.frozen = self.frozen.saturating_add(1);
         }
     }
 
@@ -90,7 +127,7 @@ impl Master {
         let rendered = self.model.step(stamp, self.hip.metres());
         let force = ForceCounts::nearest(rendered.force);
         let sample = HipSample { stamp, hip: self.hip, force };
-        let hand_force = self.limiter.step(-rendered.force);
+        let hand_force = self.limiter.limit(-rendered.force);
         MasterTick { sample, rendered, hand_force, link: self.link }
     }
 

@@ -5,4 +5,4 @@
 
 pub mod environment;
 pub mod link;
-pub mod pose_observer;
+pub mod trigger;

@@ -1,0 +1,225 @@
+//! When the slave sends an update: (12), the timer, and the contact mismatches of III-A.
+//!
+//! Pure, and only of what it is given. Rules that the paper leaves open: (12) is evaluated while both
+//! sides are in contact, with the force divided by no less than a floor; a contact that only one side has
+//! counts after a debounce and is told again at intervals, not at every sample; a lost contact is told
+//! once. Every update, whatever its cause, resets the timer.
+
+mod contact;
+mod scheme;
+
+pub use contact::{ContactConfig, ContactDetector};
+pub use scheme::{Scheme, SchemeError};
+
+use std::time::Duration;
+
+use mmt_shared::geometry::{Vec2, wrap_angle};
+use mmt_shared::params::ModelParams;
+use mmt_shared::settings::Mode;
+use mmt_shared::time::Time;
+use mmt_shared::wire::Cause;
+use serde::{Deserialize, Serialize};
+
+/// The shortest time between two updates of the scheme `useful`.
+const USEFUL_GAP: Duration = Duration::from_millis(10);
+/// A predicted force change above this share of the force is felt (`useful`).
+const USEFUL_SHARE: f64 = 0.01;
+/// The force that the share is taken of is at least this, N (`useful`).
+const USEFUL_FLOOR_N: f64 = 0.3;
+/// A change of the face's direction above this is felt, rad (`useful`).
+const USEFUL_TURN_RAD: f64 = 0.010;
+
+/// The trigger's settings.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct TriggerConfig {
+    /// When updates are sent.
+    pub scheme: Scheme,
+    /// Least force that (12) divides by, N.
+    pub force_floor_n: f64,
+    /// Whether a box that sticks can be mismatched: its force is whatever friction holds.
+    pub judge_sticking: bool,
+    /// How long only one side must be in contact before it counts.
+    pub mismatch_debounce: Duration,
+    /// How often a contact mismatch that lasts is told again.
+    pub mismatch_repeat: Duration,
+    /// Thresholds of contact.
+    pub contact: ContactConfig,
+}
+
+impl TriggerConfig {
+    /// The settings of a mode. Paper: hybrid at its best point (10 %, 150 ms), floor F_min = 0.04 N.
+    /// Recommended: `useful` with the same numbers, floor 0.3 N.
+    #[must_use]
+    pub fn of_mode(mode: Mode) -> Self {
+        let (delta, t_update) = (0.10, Duration::from_millis(150));
+        let (scheme, force_floor_n, judge_sticking) = match mode {
+            Mode::Paper => (Scheme::Hybrid { delta, t_update }, 0.04, true),
+            Mode::Recommended => (Scheme::Useful { delta, t_update }, 0.3, false),
+        };
+        Self {
+            scheme,
+            force_floor_n,
+            judge_sticking,
+            mismatch_debounce: Duration::from_millis(10),
+            mismatch_repeat: Duration::from_millis(50),
+            contact: ContactConfig::default(),
+        }
+    }
+}
+
+impl Default for TriggerConfig {
+    fn default() -> Self {
+        Self::of_mode(Mode::Recommended)
+    }
+}
+
+/// What an update would say.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Candidate {
+    /// Parameters.
+    pub params: ModelParams,
+    /// theta, rad.
+    pub angle: f64,
+}
+
+/// What the trigger is told every sample period.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TriggerInput {
+    /// f_s as measured, raw, N.
+    pub f_s: Vec2,
+    /// The shadow's force, N.
+    pub f_m: Vec2,
+    /// Whether the slave's tool touches the object.
+    pub slave_in_contact: bool,
+    /// Whether the HIP touches the shadow.
+    pub shadow_in_contact: bool,
+    /// Whether the object does not move although it is pushed.
+    pub sticking: bool,
+    /// Speed of the object along the push, m/s.
+    pub speed: f64,
+    /// Acceleration of the object along the push, m/s².
+    pub acceleration: f64,
+    /// What an update would say now.
+    pub candidate: Candidate,
+}
+
+/// Only one side is in contact.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Mismatch {
+    cause: Cause,
+    since: Time,
+    told: Option<Time>,
+}
+
+/// Decides, sample by sample.
+#[derive(Clone, Debug)]
+pub struct Trigger {
+    config: TriggerConfig,
+    /// When the last update went out and what it said.
+    last: Option<(Time, Candidate)>,
+    began: Option<Time>,
+    was_in_contact: bool,
+    mismatch: Option<Mismatch>,
+}
+
+impl Trigger {
+    /// A trigger that has sent nothing.
+    #[must_use]
+    pub fn new(config: TriggerConfig) -> Self {
+        Self { config, last: None, began: None, was_in_contact: false, mismatch: None }
+    }
+
+    /// Whether an update is to be sent now, and why. An answer counts as sent.
+    pub fn decide(&mut self, now: Time, input: &TriggerInput) -> Option<Cause> {
+        self.began.get_or_insert(now);
+        let cause = self.geometry(now, input).or_else(|| self.scheme(now, input));
+        if cause.is_some() {
+            self.last = Some((now, input.candidate));
+        }
+        cause
+    }
+
+    /// Contact that only one side has (III-A cases 1 and 2), and contact that has ended.
+    fn geometry(&mut self, now: Time, input: &TriggerInput) -> Option<Cause> {
+        let lost = self.was_in_contact && !input.slave_in_contact;
+        self.was_in_contact = input.slave_in_contact;
+        let cause = match (input.shadow_in_contact, input.slave_in_contact) {
+            (true, false) => Some(Cause::MasterOnlyContact),
+            (false, true) => Some(Cause::SlaveOnlyContact),
+            _ => None,
+        };
+        let Some(cause) = cause else {
+            self.mismatch = None;
+            return lost.then_some(Cause::ContactLost);
+        };
+        let fresh = Mismatch { cause, since: now, told: None };
+        let mismatch = self.mismatch.filter(|old| old.cause == cause).unwrap_or(fresh);
+        let due = match mismatch.told {
+            None => now >= mismatch.since + self.config.mismatch_debounce,
+            Some(told) => now >= told + self.config.mismatch_repeat,
+        };
+        let told = if due { Some(now) } else { mismatch.told };
+        self.mismatch = Some(Mismatch { told, ..mismatch });
+        if due { Some(cause) } else { lost.then_some(Cause::ContactLost) }
+    }
+
+    fn scheme(&self, now: Time, input: &TriggerInput) -> Option<Cause> {
+        match self.config.scheme {
+            Scheme::Deadband { delta } => self.violated(input, delta),
+            Scheme::Hybrid { delta, t_update } => {
+                self.violated(input, delta).or_else(|| self.timed(now, t_update))
+            }
+            Scheme::Timer { t_update } => self.timed(now, t_update),
+            Scheme::EverySample => Some(Cause::EverySample),
+            Scheme::Dis { threshold_n, heartbeat } => {
+                let beyond = self.judged(input) && (input.f_s - input.f_m).norm() > threshold_n;
+                beyond.then_some(Cause::Deadband).or_else(|| self.timed(now, heartbeat))
+            }
+            Scheme::Useful { delta, t_update } => {
+                let in_contact = input.slave_in_contact && input.shadow_in_contact;
+                let timed = || self.timed(now, t_update).filter(|_| in_contact);
+                self.violated(input, delta).or_else(timed).filter(|_| self.useful(now, input))
+            }
+        }
+    }
+
+    /// Whether the forces can be compared at all.
+    fn judged(&self, input: &TriggerInput) -> bool {
+        let both = input.slave_in_contact && input.shadow_in_contact;
+        both && (self.config.judge_sticking || !input.sticking)
+    }
+
+    fn violated(&self, input: &TriggerInput, delta: f64) -> Option<Cause> {
+        let scale = input.f_s.norm().max(self.config.force_floor_n);
+        // (12), multiplied out
+        let beyond = (input.f_s - input.f_m).norm() > delta * scale;
+        (self.judged(input) && beyond).then_some(Cause::Deadband)
+    }
+
+    /// The paper's second step. Its `Timer > T_update` with its bounds of 20 and 7 packets/s means an
+    /// interval of T_update exactly.
+    fn timed(&self, now: Time, t_update: Duration) -> Option<Cause> {
+        let since = self.last.map(|(time, _)| time).or(self.began)?;
+        (now >= since + t_update).then_some(Cause::Timer)
+    }
+
+    /// Whether the hand would feel what an update says: by the force that the changed parameters would
+    /// give in the present motion, or by the direction of the face.
+    fn useful(&self, now: Time, input: &TriggerInput) -> bool {
+        let Some((time, sent)) = self.last else {
+            return true;
+        };
+        if now < time + USEFUL_GAP {
+            return false;
+        }
+        let (is, was) = (&input.candidate.params, &sent.params);
+        let change = (is.m() - was.m()).abs() * input.acceleration.abs()
+            + ((is.b() - was.b()) * input.speed.abs() + is.c() - was.c()).abs();
+        let turn = wrap_angle(input.candidate.angle - sent.angle).abs();
+        change > USEFUL_SHARE * input.f_s.norm().max(USEFUL_FLOOR_N) || turn > USEFUL_TURN_RAD
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,232 @@
+//! The update schemes and the words they are written with.
+
+use std::fmt;
+use std::str::FromStr;
+use std::time::Duration;
+
+use serde::{Deserialize, Serialize};
+
+/// When updates are sent.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case", rename_all_fields = "snake_case", tag = "name")]
+pub enum Scheme {
+    /// (12) alone.
+    Deadband {
+        /// Delta, relative force error.
+        delta: f64,
+    },
+    /// Section III-B: (12), or T_update since the last update.
+    Hybrid {
+        /// Delta, relative force error.
+        delta: f64,
+        /// T_update.
+        t_update: Duration,
+    },
+    /// T_update since the last update alone.
+    Timer {
+        /// T_update.
+        t_update: Duration,
+    },
+    /// Every sample period.
+    EverySample,
+    /// Distributed simulation's dead reckoning: an absolute threshold and a heartbeat.
+    Dis {
+        /// Greatest force error, N.
+        threshold_n: f64,
+        /// Longest time without an update.
+        heartbeat: Duration,
+    },
+    /// (12) or T_update, in contact, if the update would change what is felt.
+    Useful {
+        /// Delta, relative force error.
+        delta: f64,
+        /// T_update.
+        t_update: Duration,
+    },
+}
+
+/// Accepted Delta: beyond 100 % nothing is left of the force.
+const DELTA: (f64, f64) = (0.001, 1.0);
+/// Accepted T_update and heartbeat, ms.
+const PERIOD_MS: (f64, f64) = (1.0, 60_000.0);
+/// Accepted absolute threshold, N.
+const THRESHOLD_N: (f64, f64) = (0.001, 100.0);
+
+/// Why a text names no scheme.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum SchemeError {
+    /// The first word is not a scheme.
+    #[error(
+        "unknown update scheme '{word}'; use one of 'deadband 10%', 'hybrid 10% 150ms', \
+         'timer 150ms', 'every-sample', 'dis 0.3N 1s', 'useful 10% 150ms'"
+    )]
+    Unknown {
+        /// The word.
+        word: String,
+    },
+    /// The scheme takes other words.
+    #[error("the scheme '{scheme}' is written '{usage}', not '{text}'")]
+    Words {
+        /// The scheme.
+        scheme: &'static str,
+        /// How it is written.
+        usage: &'static str,
+        /// What was written.
+        text: String,
+    },
+    /// A number is not a number with its unit, or out of range.
+    #[error("'{word}' is not a {what} from {min} to {max} {unit}")]
+    Number {
+        /// The word.
+        word: String,
+        /// What it should be.
+        what: &'static str,
+        /// Least accepted.
+        min: f64,
+        /// Greatest accepted.
+        max: f64,
+        /// Unit of both.
+        unit: &'static str,
+    },
+}
+
+impl Scheme {
+    /// The name used in files and on screens.
+    #[must_use]
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Deadband { .. } => "deadband",
+            Self::Hybrid { .. } => "hybrid",
+            Self::Timer { .. } => "timer",
+            Self::EverySample => "every-sample",
+            Self::Dis { .. } => "dis",
+            Self::Useful { .. } => "useful",
+        }
+    }
+}
+
+impl fmt::Display for Scheme {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let ms = |t: &Duration| t.as_secs_f64() * 1e3;
+        match self {
+            Self::Deadband { delta } => write!(f, "deadband {}%", percent(*delta)),
+            Self::Hybrid { delta, t_update } => {
+                write!(f, "hybrid {}% {}ms", percent(*delta), ms(t_update))
+            }
+            Self::Timer { t_update } => write!(f, "timer {}ms", ms(t_update)),
+            Self::EverySample => f.write_str("every-sample"),
+            Self::Dis { threshold_n, heartbeat } => {
+                write!(f, "dis {threshold_n}N {}ms", ms(heartbeat))
+            }
+            Self::Useful { delta, t_update } => {
+                write!(f, "useful {}% {}ms", percent(*delta), ms(t_update))
+            }
+        }
+    }
+}
+
+/// Per cent without the dust of binary fractions: six digits are more than anybody writes.
+fn percent(share: f64) -> f64 {
+    libm::round(share * 1e8) / 1e6
+}
+
+impl FromStr for Scheme {
+    type Err = SchemeError;
+
+    fn from_str(text: &str) -> Result<Self, SchemeError> {
+        let words: Vec<&str> = text.split_whitespace().collect();
+        let wrong = |scheme, usage| SchemeError::Words { scheme, usage, text: text.to_owned() };
+        match words.as_slice() {
+            ["deadband", delta] => Ok(Self::Deadband { delta: share(delta)? }),
+            ["hybrid", delta, t] => {
+                Ok(Self::Hybrid { delta: share(delta)?, t_update: period(t)? })
+            }
+            ["timer", t] => Ok(Self::Timer { t_update: period(t)? }),
+            ["every-sample"] => Ok(Self::EverySample),
+            ["dis", threshold, t] => {
+                Ok(Self::Dis { threshold_n: newtons(threshold)?, heartbeat: period(t)? })
+            }
+            ["useful", delta, t] => {
+                Ok(Self::Useful { delta: share(delta)?, t_update: period(t)? })
+            }
+            ["deadband", ..] => Err(wrong("deadband", "deadband 10%")),
+            ["hybrid", ..] => Err(wrong("hybrid", "hybrid 10% 150ms")),
+            ["timer", ..] => Err(wrong("timer", "timer 150ms")),
+            ["every-sample", ..] => Err(wrong("every-sample", "every-sample")),
+            ["dis", ..] => Err(wrong("dis", "dis 0.3N 1s")),
+            ["useful", ..] => Err(wrong("useful", "useful 10% 150ms")),
+            _ => Err(SchemeError::Unknown {
+                word: words.first().copied().unwrap_or_default().to_owned(),
+            }),
+        }
+    }
+}
+
+fn number(
+    word: &str,
+    digits: Option<&str>,
+    factor: f64,
+    what: &'static str,
+    (min, max): (f64, f64),
+    unit: &'static str,
+) -> Result<f64, SchemeError> {
+    let value = digits.and_then(|digits| digits.parse::<f64>().ok()).map(|value| value * factor);
+    value
+        .filter(|value| (min..=max).contains(value))
+        .ok_or_else(|| SchemeError::Number { word: word.to_owned(), what, min, max, unit })
+}
+
+fn share(word: &str) -> Result<f64, SchemeError> {
+    let (min, max) = (DELTA.0 * 100.0, DELTA.1 * 100.0);
+    number(word, word.strip_suffix('%'), 1.0, "deadband", (min, max), "%").map(|p| p / 100.0)
+}
+
+fn period(word: &str) -> Result<Duration, SchemeError> {
+    let (digits, factor) = match (word.strip_suffix("ms"), word.strip_suffix('s')) {
+        (Some(digits), _) => (Some(digits), 1.0),
+        (None, Some(digits)) => (Some(digits), 1e3),
+        (None, None) => (None, 1.0),
+    };
+    let ms = number(word, digits, factor, "time", PERIOD_MS, "ms")?;
+    Ok(Duration::from_nanos(libm::round(ms * 1e6) as u64))
+}
+
+fn newtons(word: &str) -> Result<f64, SchemeError> {
+    number(word, word.strip_suffix('N'), 1.0, "force", THRESHOLD_N, "N")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_displayed_is_read_back() {
+        for text in [
+            "deadband 2.5%",
+            "hybrid 10% 150ms",
+            "timer 50ms",
+            "every-sample",
+            "dis 0.3N 1000ms",
+            "useful 10% 150ms",
+        ] {
+            let scheme: Scheme = text.parse().unwrap();
+            assert_eq!(scheme.to_string(), text);
+            assert_eq!(scheme.to_string().parse(), Ok(scheme));
+        }
+        assert_eq!("dis 0.3N 1s".parse(), "dis 0.3N 1000ms".parse::<Scheme>());
+    }
+
+    #[test]
+    fn what_is_wrong_is_named() {
+        let error = |text: &str| text.parse::<Scheme>().unwrap_err().to_string();
+        assert!(error("").starts_with("unknown update scheme ''"));
+        assert!(error("dedband 10%").starts_with("unknown update scheme 'dedband'"));
+        assert_eq!(
+            error("hybrid 10%"),
+            "the scheme 'hybrid' is written 'hybrid 10% 150ms', not 'hybrid 10%'"
+        );
+        assert_eq!(error("deadband 10"), "'10' is not a deadband from 0.1 to 100 %");
+        assert_eq!(error("timer nans"), "'nans' is not a time from 1 to 60000 ms");
+        assert_eq!(error("timer 0ms"), "'0ms' is not a time from 1 to 60000 ms");
+    }
+}
