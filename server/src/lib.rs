@@ -3,3 +3,5 @@
 //! The modules here are pure; the QUIC endpoint and the 1 kHz thread live behind the feature `io`.
 
 pub mod environment;
+pub mod playout;
+pub mod sensing;

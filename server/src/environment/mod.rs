@@ -88,9 +88,12 @@ impl Environment {
             (Vec2::zeros(), 0.0)
         };
         let (angle, twist, load) = (self.pose().angle, self.twist(), &self.load);
-        let v = rotate(-angle, twist.linear + force * (TICK_S / load.m));
-        let omega = twist.angular + torque * TICK_S / load.inertia;
-        let u = self.patch.step(load, Vector3::new(v.x, v.y, omega));
+        let v = rotate(-angle, twist.linear);
+        let before = Vector3::new(v.x, v.y, twist.angular);
+        // v* = v + T f/m, omega* = omega + T M/I
+        let gain = rotate(-angle, force) * (TICK_S / load.m);
+        let gained = Vector3::new(gain.x, gain.y, torque * TICK_S / load.inertia);
+        let u = self.patch.step(load, before, before + gained);
         self.body.advance(Twist {
             linear: rotate(angle, u.xy()),
             angular: u.z,
