@@ -67,7 +67,7 @@ fn the_same_push_at_45_degrees_moves_as_far() {
 #[test]
 fn friction_is_the_same_in_every_direction() {
     let reach = |degrees: f64| {
-        let (sin, cos) = degrees.to_radians().sin_cos();
+        let (sin, cos) = libm::sincos(degrees.to_radians());
         let pose = pushed(reference(), Vec2::new(4.0 * cos, 4.0 * sin), 0.0, 500);
         let along = pose.position.x * cos + pose.position.y * sin;
         let across = pose.position.y * cos - pose.position.x * sin;

@@ -8,7 +8,7 @@
 
 use mmt_shared::params::friction_torque_of_square;
 use mmt_shared::time::TICK_S;
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix3, SVector, Vector3};
 
 /// Patch points along one side.
 const POINTS_PER_SIDE: usize = 8;
@@ -26,6 +26,10 @@ const LAST_STEP_M_PER_S: f64 = 3e-7;
 const NEWTON_STEPS_MAX: usize = 40;
 /// Patch points that are summed side by side, so that the machine may use its vector registers.
 const LANES: usize = 4;
+/// Terms summed over the points: potential, gradient, upper half of the curvature.
+const TERMS: usize = 10;
+/// One number of each of [`LANES`] points.
+type Lanes = SVector<f64, LANES>;
 /// The ellipse `(|F|/c)² + (M/e)² ≤ HELD²` lies inside the set of wrenches that the patch can hold. A
 /// test scans the patch's support function; its least ratio to the ellipsoid's is just above this.
 const HELD: f64 = 0.93;
@@ -69,8 +73,10 @@ pub(super) struct Patch {
 /// Some patch points side by side.
 #[derive(Clone, Copy, Debug, Default)]
 struct Row {
-    x: [f64; LANES],
-    y: [f64; LANES],
+    x: Lanes,
+    y: Lanes,
+    /// x² + y², m².
+    arm_squared: Lanes,
 }
 
 /// Sums over the patch at one velocity, each point weighing 1/64.
@@ -96,11 +102,13 @@ impl Patch {
         let mean_arm = grid.clone().map(length).sum::<f64>() / POINTS as f64;
         let spread = friction_torque_of_square(1.0, side) / mean_arm;
         let mut points = [Row::default(); POINTS / LANES];
-        let slots = points
-            .iter_mut()
-            .flat_map(|row| row.x.iter_mut().zip(row.y.iter_mut()));
-        for ((x, y), point) in slots.zip(grid.clone()) {
+        let slots = points.iter_mut().flat_map(|row| {
+            let places = row.x.iter_mut().zip(row.y.iter_mut());
+            places.zip(row.arm_squared.iter_mut())
+        });
+        for (((x, y), arm_squared), point) in slots.zip(grid.clone()) {
             (*x, *y) = (point.0 * spread, point.1 * spread);
+            *arm_squared = *x * *x + *y * *y;
         }
         Self {
             points,
@@ -210,18 +218,15 @@ impl Patch {
     }
 
     fn sums(&self, u: &Vector3<f64>, eps: f64) -> Sums {
-        let (vx, vy, omega, eps_squared) = (u.x, u.y, u.z, eps * eps);
-        let mut lanes = [[0.0; LANES]; 10];
+        let eps_squared = eps * eps;
+        let mut sums = [Lanes::zeros(); TERMS];
         for row in &self.points {
-            let terms = row.terms(vx, vy, omega, eps_squared);
-            for (sum, term) in lanes.iter_mut().zip(&terms) {
-                for (sum, term) in sum.iter_mut().zip(term) {
-                    *sum += term;
-                }
+            for (sum, term) in sums.iter_mut().zip(row.terms(u, eps_squared)) {
+                *sum += term;
             }
         }
         let [q, gx, gy, gz, hxx, hxy, hyy, hxz, hyz, hzz] =
-            lanes.map(|[a, b, c, d]| ((a + b) + (c + d)) / POINTS as f64);
+            sums.map(|lanes| lanes.sum() / POINTS as f64);
         Sums {
             potential: q,
             gradient: Vector3::new(gx, gy, gz),
@@ -231,30 +236,34 @@ impl Patch {
 }
 
 impl Row {
-    /// Each point's potential, its gradient and its second derivative in u.
+    /// Each point's potential, its gradient in u and the upper half of its second derivative.
     #[inline]
-    fn terms(&self, vx: f64, vy: f64, omega: f64, eps_squared: f64) -> [[f64; LANES]; 10] {
-        let mut terms = [[0.0; LANES]; 10];
-        let [q, gx, gy, gz, hxx, hxy, hyy, hxz, hyz, hzz] = &mut terms;
-        for k in 0..LANES {
-            let (x, y) = (self.x[k], self.y[k]);
-            // s = v + omega × r
-            let (sx, sy) = (vx - omega * y, vy + omega * x);
-            q[k] = (sx * sx + sy * sy + eps_squared).sqrt();
-            let a = 1.0 / q[k];
-            // d = s/q, seen from u by the columns (1, 0), (0, 1), (−y, x)
-            (gx[k], gy[k]) = (sx * a, sy * a);
-            gz[k] = x * gy[k] - y * gx[k];
-            // (1 − d dᵀ)/q, seen likewise
-            let (ax, ay, az) = (a * gx[k], a * gy[k], a * gz[k]);
-            hxx[k] = a - ax * gx[k];
-            hxy[k] = -ax * gy[k];
-            hyy[k] = a - ay * gy[k];
-            hxz[k] = -a * y - ax * gz[k];
-            hyz[k] = a * x - ay * gz[k];
-            hzz[k] = a * (x * x + y * y) - az * gz[k];
-        }
-        terms
+    fn terms(&self, u: &Vector3<f64>, eps_squared: f64) -> [Lanes; TERMS] {
+        let (x, y) = (&self.x, &self.y);
+        // s = v + omega × r
+        let sx = (y * -u.z).add_scalar(u.x);
+        let sy = (x * u.z).add_scalar(u.y);
+        let squared = sx.component_mul(&sx) + sy.component_mul(&sy);
+        let q = squared.add_scalar(eps_squared).map(f64::sqrt);
+        let a = q.map(|q| 1.0 / q);
+        // d = s/q, seen from u by the columns (1, 0), (0, 1), (−y, x)
+        let (dx, dy) = (sx.component_mul(&a), sy.component_mul(&a));
+        let dz = x.component_mul(&dy) - y.component_mul(&dx);
+        // (1 − d dᵀ)/q, seen likewise
+        let (ax, ay) = (a.component_mul(&dx), a.component_mul(&dy));
+        let az = a.component_mul(&dz);
+        [
+            q,
+            dx,
+            dy,
+            dz,
+            a - ax.component_mul(&dx),
+            -ax.component_mul(&dy),
+            a - ay.component_mul(&dy),
+            -a.component_mul(y) - ax.component_mul(&dz),
+            a.component_mul(x) - ay.component_mul(&dz),
+            a.component_mul(&self.arm_squared) - az.component_mul(&dz),
+        ]
     }
 }
 

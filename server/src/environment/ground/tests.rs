@@ -34,7 +34,7 @@ fn support(patch: &Patch, d: &Vector3<f64>) -> f64 {
         let (sx, sy) = (d.x - d.z * y, d.y + d.z * x);
         (sx * sx + sy * sy).sqrt()
     };
-    let row = |row: &Row| row.x.iter().zip(&row.y).map(speed).sum::<f64>();
+    let row = |row: &Row| row.x.iter().zip(row.y.iter()).map(speed).sum::<f64>();
     patch.points.iter().map(row).sum::<f64>() / POINTS as f64
 }
 
