@@ -14,14 +14,14 @@ use nalgebra::{Matrix3, SVector, Vector3};
 const POINTS_PER_SIDE: usize = 8;
 /// Patch points in all.
 const POINTS: usize = POINTS_PER_SIDE * POINTS_PER_SIDE;
-/// Smoothing speed eps of sliding friction, m/s: a model study's choice, 1 % of the slowest push.
+/// Smoothing speed eps of sliding friction, m/s: a model study's choice, a thousandth of the slowest push.
 const EPS_M_PER_S: f64 = 1e-4;
 /// How often eps is divided by ten while neither sliding nor sticking is proven: at the last level the
 /// two proofs leave a gap of 1e-4 of the friction limit.
 const EPS_LEVELS: usize = 6;
-/// The Newton iteration ends with a step that moves no patch point by more than this, m/s. It converges
-/// quadratically: what is left then is below 1e-9 m/s.
-const LAST_STEP_M_PER_S: f64 = 3e-7;
+/// The Newton iteration ends with a step that moves no patch point by more than this share of eps. It
+/// converges quadratically: what is left then is below 1e-5 eps, 1 nm/s at the usual eps.
+const LAST_STEP: f64 = 3e-3;
 /// Bound of the Newton iteration; one or two steps are usual.
 const NEWTON_STEPS_MAX: usize = 40;
 /// Patch points that are summed side by side, so that the machine may use its vector registers.
@@ -181,7 +181,7 @@ impl Patch {
             };
             let newton = -factor.solve(&gradient);
             let stretch = newton.xy().norm() + newton.z.abs() * self.reach;
-            if stretch < LAST_STEP_M_PER_S {
+            if stretch < LAST_STEP * eps {
                 // q_i changes by no more than its point's velocity
                 return (u + newton, sums.potential + stretch);
             }

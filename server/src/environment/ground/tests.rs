@@ -154,3 +154,18 @@ fn without_friction_only_damping_remains() {
     assert!((u.x - 0.1 * 0.7 / 0.703).abs() < 1e-15);
     assert!(u.z < 1.0 && u.z > 0.99);
 }
+
+#[test]
+fn the_stick_test_is_sharp_to_1e_4_of_the_limit() {
+    let (patch, load) = (Patch::square(SIDE), load());
+    for limit in [
+        Vector3::new(load.c, 0.0, 0.0),
+        Vector3::new(0.6 * load.c, -0.8 * load.c, 0.0),
+        Vector3::new(0.0, 0.0, -load.e),
+    ] {
+        for (share, sticks) in [(0.9999, true), (1.0001, false)] {
+            let u = patch.step(&load, Vector3::zeros(), free(&load, limit * share));
+            assert_eq!(u == Vector3::zeros(), sticks, "{share} of {limit}: {u}");
+        }
+    }
+}
