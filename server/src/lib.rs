@@ -6,3 +6,5 @@
 pub mod environment;
 pub mod link;
 pub mod trigger;
+pub mod playout;
+pub mod sensing;

@@ -67,7 +67,7 @@ fn the_same_push_at_45_degrees_moves_as_far() {
 #[test]
 fn friction_is_the_same_in_every_direction() {
     let reach = |degrees: f64| {
-        let (sin, cos) = degrees.to_radians().sin_cos();
+        let (sin, cos) = libm::sincos(degrees.to_radians());
         let pose = pushed(reference(), Vec2::new(4.0 * cos, 4.0 * sin), 0.0, 500);
         let along = pose.position.x * cos + pose.position.y * sin;
         let across = pose.position.y * cos - pose.position.x * sin;
@@ -130,4 +130,15 @@ fn a_push_differs_from_newton_by_the_half_period_of_the_step_and_no_more() {
         .x;
     let exact = 0.5 * a * t * (t + 1e-3);
     assert!((x / exact - 1.0).abs() < 1e-5, "{x} against {exact}");
+}
+
+#[test]
+fn a_held_oblique_wrench_does_not_creep() {
+    // 0.6 c and 0.6 e together are inside the limit surface; 0.85 of both are outside
+    let e = 0.382_598 * C * 0.36;
+    let force = |share: f64| Vec2::new(0.6 * share * C, -0.8 * share * C);
+    let pose = pushed(reference(), force(0.6), 0.6 * e, 10_000);
+    assert_eq!(pose, Pose::default());
+    let pose = pushed(reference(), force(0.85), 0.85 * e, 1_000);
+    assert!(pose.position.norm() > 0.01 && pose.angle > 0.01, "{pose:?}");
 }

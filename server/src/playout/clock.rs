@@ -1,0 +1,94 @@
+//! The sender's clock as seen from here: the least (arrival − stamp) of the last ten seconds.
+//!
+//! Two clocks that run apart by 200 ppm differ by 2 ms after ten seconds, so the minimum is over a sliding
+//! window, and the offset in use follows it slowly. It must never make the played stamps jump.
+
+use std::time::Duration;
+
+use mmt_shared::time::{Time, duration_nanos};
+
+/// One part of the window.
+const SLICE_NS: u64 = 1_000_000_000;
+/// Parts of the window.
+const SLICES: usize = 10;
+/// The offset in use stays while the measured one is within this, ns: half a tick. Stamps then advance by
+/// exactly one tick per tick nearly always, even while the clocks drift apart.
+const BAND_NS: u64 = 500_000;
+/// Once it moves, it moves by at most 1/100 of the time that passes: played motion is 1 % too quick or slow.
+const SLEW_DIVISOR: u64 = 100;
+
+/// Offset of the receiver's clock to the sender's, the quickest transit included.
+#[derive(Clone, Debug, Default)]
+pub(super) struct SenderClock {
+    slices: [Option<i64>; SLICES],
+    /// Number of the newest slice since the receiver's epoch.
+    newest: u64,
+    /// The offset in use, ns; none before the first sample.
+    offset: Option<i64>,
+    moving: bool,
+}
+
+impl SenderClock {
+    /// How far a stamp lies in the future of the quickest sample known; zero before the first.
+    pub(super) fn ahead(&self, arrived: Time, stamp: Time) -> Duration {
+        let earliest = match self.least() {
+            Some(least) => arrived.offset_by(least.saturating_neg()),
+            None => stamp,
+        };
+        stamp.saturating_since(earliest)
+    }
+
+    /// Learns from one sample.
+    pub(super) fn observe(&mut self, arrived: Time, stamp: Time) {
+        self.turn(arrived);
+        let seen = arrived.signed_since(stamp);
+        let number = self.newest;
+        if let Some(slice) = self.slice(number) {
+            *slice = Some(slice.map_or(seen, |least| least.min(seen)));
+        }
+        self.offset.get_or_insert(seen);
+    }
+
+    /// Lets `elapsed` pass. Before play-out has started the offset follows at once.
+    pub(super) fn advance(&mut self, now: Time, elapsed: Duration, playing: bool) {
+        self.turn(now);
+        let (Some(target), Some(offset)) = (self.least(), self.offset) else {
+            return;
+        };
+        let off = target.saturating_sub(offset);
+        self.moving = off != 0 && (self.moving || off.unsigned_abs() > BAND_NS);
+        let step = i64::try_from(duration_nanos(elapsed) / SLEW_DIVISOR).unwrap_or(i64::MAX);
+        self.offset = Some(match (playing, self.moving) {
+            (false, _) => target,
+            (true, true) => offset.saturating_add(off.clamp(-step, step)),
+            (true, false) => offset,
+        });
+    }
+
+    /// The stamp whose quickest sample arrives at `now`; none before the first sample.
+    pub(super) fn stamp_at(&self, now: Time) -> Option<Time> {
+        self.offset
+            .map(|offset| now.offset_by(offset.saturating_neg()))
+    }
+
+    fn least(&self) -> Option<i64> {
+        self.slices.iter().flatten().min().copied()
+    }
+
+    fn slice(&mut self, number: u64) -> Option<&mut Option<i64>> {
+        let index = usize::try_from(number % SLICES as u64).ok()?;
+        self.slices.get_mut(index)
+    }
+
+    /// Clears the slices that `now` begins.
+    fn turn(&mut self, now: Time) {
+        let number = now.as_nanos() / SLICE_NS;
+        let begun = number.saturating_sub(self.newest).min(SLICES as u64);
+        for passed in 0..begun {
+            if let Some(slice) = self.slice(number - passed) {
+                *slice = None;
+            }
+        }
+        self.newest = self.newest.max(number);
+    }
+}

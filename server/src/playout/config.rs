@@ -1,0 +1,98 @@
+//! How samples are played, with the defaults and the checks on them.
+
+use std::time::Duration;
+
+use serde::{Deserialize, Serialize};
+
+/// Accepted play-out delay, ms.
+const DELAY_MS: (f64, f64) = (0.0, 250.0);
+/// Accepted time of extrapolation, ms: at most `reliability.md`'s 30 ms, tripled for studies.
+const EXTRAPOLATION_MS: (f64, f64) = (0.0, 100.0);
+/// Accepted speed limit, m/s.
+const SPEED_M_PER_S: (f64, f64) = (0.01, 10.0);
+/// Accepted deceleration, m/s².
+const DECELERATION_M_PER_S2: (f64, f64) = (0.1, 1000.0);
+
+/// How samples are played.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct PlayoutConfig {
+    /// From the earliest possible arrival of a sample to its play-out, ms. Default 16: ten samples to a
+    /// packet and 5 ms of jitter.
+    pub delay_ms: f64,
+    /// How long an underrun is bridged at constant velocity, ms. Default 30: the slave never moves on
+    /// older news.
+    pub extrapolation_ms: f64,
+    /// Greatest speed of the played HIP, m/s. Default 0.6: after an outage the HIP does not jump, and the
+    /// scripted operator stays below 0.4.
+    pub speed_max_m_per_s: f64,
+    /// Deceleration after the extrapolation, m/s². Default 10: from 0.4 m/s it stops within 8 mm.
+    pub deceleration_m_per_s2: f64,
+}
+
+impl Default for PlayoutConfig {
+    fn default() -> Self {
+        Self::for_packing_and_jitter(10, Duration::from_millis(5))
+    }
+}
+
+impl PlayoutConfig {
+    /// The defaults with the delay that packing and jitter need: the oldest sample of a packet waited
+    /// `samples_per_command − 1` ms, jitter (peak to peak) comes on top, and 2 ms for the slave's ticks.
+    #[must_use]
+    pub fn for_packing_and_jitter(samples_per_command: u8, jitter: Duration) -> Self {
+        let packing = f64::from(samples_per_command.saturating_sub(1));
+        Self {
+            delay_ms: (packing + jitter.as_secs_f64() * 1e3 + 2.0).min(DELAY_MS.1),
+            extrapolation_ms: 30.0,
+            speed_max_m_per_s: 0.6,
+            deceleration_m_per_s2: 10.0,
+        }
+    }
+
+    pub(super) fn check(&self) -> Result<(), PlayoutError> {
+        for (name, unit, value, (min, max)) in [
+            ("delay", "ms", self.delay_ms, DELAY_MS),
+            (
+                "extrapolation",
+                "ms",
+                self.extrapolation_ms,
+                EXTRAPOLATION_MS,
+            ),
+            ("speed limit", "m/s", self.speed_max_m_per_s, SPEED_M_PER_S),
+            (
+                "deceleration",
+                "m/s^2",
+                self.deceleration_m_per_s2,
+                DECELERATION_M_PER_S2,
+            ),
+        ] {
+            if !(min..=max).contains(&value) {
+                return Err(PlayoutError {
+                    name,
+                    value,
+                    min,
+                    max,
+                    unit,
+                });
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Why samples cannot be played like this: a number lies outside its accepted range.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[error("play-out: {name} {value} is outside the accepted range {min} to {max} {unit}")]
+pub struct PlayoutError {
+    /// Which number.
+    pub name: &'static str,
+    /// What it was.
+    pub value: f64,
+    /// Least accepted value.
+    pub min: f64,
+    /// Greatest accepted value.
+    pub max: f64,
+    /// Unit of all three.
+    pub unit: &'static str,
+}

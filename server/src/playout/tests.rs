@@ -1,0 +1,358 @@
+//! Promises of the play-out buffer.
+
+use super::*;
+use mmt_shared::rng::Substream;
+use mmt_shared::wire::message::{ForceCounts, HipCounts};
+
+const MS: i64 = 1_000_000;
+/// The master's clock starts elsewhere.
+const MASTER_EPOCH: u64 = 7_000_000_000_000;
+
+fn stamp(k: u64) -> Time {
+    Time::from_nanos(MASTER_EPOCH + k * MS as u64)
+}
+
+/// A smooth motion of at most 0.3 m/s.
+fn truth(seconds: f64) -> Vec2 {
+    Vec2::new(
+        0.1 * libm::sin(2.0 * seconds),
+        0.05 * libm::cos(3.0 * seconds),
+    )
+}
+
+fn sample(k: u64) -> HipSample {
+    let hip = truth(k as f64 * 1e-3);
+    HipSample {
+        stamp: stamp(k),
+        hip: HipCounts::nearest(hip),
+        force: ForceCounts::nearest(hip * 10.0),
+    }
+}
+
+/// What the network does with the packet that holds the samples up to k: its transit in ns, or a loss.
+type Transit<'a> = &'a mut dyn FnMut(u64) -> Option<i64>;
+
+/// Plays `ticks` ms of packets of `packing` samples; returns what was played, with the slave's time.
+fn play(
+    config: PlayoutConfig,
+    packing: u64,
+    ticks: u64,
+    transit: Transit<'_>,
+) -> (PlayoutBuffer, Vec<(Time, Played)>) {
+    let mut buffer = PlayoutBuffer::try_new(config).unwrap();
+    let mut packets = Vec::new();
+    for k in (packing - 1..ticks).step_by(packing as usize) {
+        if let Some(ns) = transit(k) {
+            packets.push((k as i64 * MS + ns, k));
+        }
+    }
+    packets.sort_unstable();
+    let mut packets = packets.into_iter().peekable();
+    let mut played = Vec::new();
+    for tick in 0..ticks {
+        let now = Time::from_millis(tick);
+        while let Some((at, k)) = packets.next_if(|(at, _)| *at <= tick as i64 * MS) {
+            for j in k + 1 - packing..=k {
+                buffer.push(Time::from_nanos(at as u64), &sample(j));
+            }
+        }
+        played.extend(buffer.advance(now).map(|p| (now, p)));
+    }
+    (buffer, played)
+}
+
+/// Index of the sample of exactly this stamp.
+fn index(stamp: Time) -> Option<u64> {
+    let off = stamp.as_nanos().checked_sub(MASTER_EPOCH)?;
+    (off % MS as u64 == 0).then_some(off / MS as u64)
+}
+
+fn assert_steady(played: &[(Time, Played)]) {
+    for pair in played.windows(2) {
+        let step = pair[1].1.stamp.signed_since(pair[0].1.stamp);
+        assert_eq!(step, MS, "at {:?}", pair[0].0);
+    }
+}
+
+fn assert_is_the_input(played: &[(Time, Played)]) {
+    for (now, p) in played {
+        let k = index(p.stamp).unwrap_or_else(|| panic!("between samples at {now:?}"));
+        assert_eq!(p.hip, sample(k).hip.metres(), "at {now:?}");
+        assert_eq!(p.force, Some(sample(k).force.newtons()));
+        assert_eq!((p.status, p.limited), (Status::Interpolated, false));
+    }
+}
+
+fn random_transit(jitter_ns: i64) -> impl FnMut(u64) -> Option<i64> {
+    let mut stream = Substream::new(5, "test/jitter", 0);
+    move |_| Some(50 * MS + stream.uniform_in(0.0, jitter_ns as f64) as i64)
+}
+
+#[test]
+fn with_constant_delay_the_input_comes_out_bit_for_bit() {
+    let (buffer, played) = play(PlayoutConfig::default(), 10, 3_000, &mut |_| Some(50 * MS));
+    // the first packet leaves at 9 ms; its last sample is played 50 + 16 ms after its stamp
+    assert_eq!(played[0].0, Time::from_millis(66));
+    assert_eq!(played[0].1.stamp, stamp(0));
+    assert_eq!(played.len(), 3_000 - 66);
+    assert_is_the_input(&played);
+    assert_steady(&played);
+    let counts = buffer.counts();
+    assert_eq!((counts.pushed, counts.interpolated), (2_950, 2_934));
+    assert_eq!((counts.late, counts.duplicate, counts.overflow), (0, 0, 0));
+}
+
+#[test]
+fn jitter_below_the_delay_leaves_no_trace() {
+    let mut stream = Substream::new(5, "test/jitter", 0);
+    let mut transit = |_| Some((50 + (stream.bits() % 6) as i64) * MS);
+    let (buffer, played) = play(PlayoutConfig::default(), 10, 20_000, &mut transit);
+    // the first packets may have been slow: the clock settles within the first second
+    let settled: Vec<_> = played
+        .into_iter()
+        .filter(|(now, _)| *now >= Time::from_millis(1_500))
+        .collect();
+    assert_is_the_input(&settled);
+    assert_steady(&settled);
+    assert_eq!(buffer.counts().late, 0);
+    assert_eq!(buffer.counts().extrapolated, 0);
+}
+
+#[test]
+fn between_samples_it_interpolates_and_the_clocks_may_drift() {
+    // the slave's clock runs 200 ppm slow: it sees the master's stamps come ever earlier
+    let mut transit = |k: u64| Some(60 * MS - (k as i64 * MS) / 5_000);
+    let (_, played) = play(PlayoutConfig::default(), 10, 60_000, &mut transit);
+    let mut off_grid = 0;
+    for (now, p) in &played {
+        let want = truth(p.stamp.signed_since(stamp(0)) as f64 * 1e-9);
+        assert!((p.hip - want).norm() < 1e-6, "at {now:?}");
+        assert_eq!(p.status, Status::Interpolated);
+        off_grid += u32::from(index(p.stamp).is_none());
+    }
+    assert!(off_grid > 1_000, "nothing was interpolated");
+    for pair in played.windows(2) {
+        let step = pair[1].1.stamp.signed_since(pair[0].1.stamp);
+        assert!((step - MS).abs() <= MS / 100, "{step}");
+    }
+    // and it keeps up: 12 ms of drift leave the play-out delay where it was
+    let (now, last) = played.last().unwrap();
+    let behind = now.as_nanos() as i64 - last.stamp.signed_since(stamp(0));
+    assert!((behind - (48 + 16) * MS).abs() < MS, "{behind}");
+}
+
+#[test]
+fn a_lost_packet_is_bridged_and_costs_at_most_its_own_curvature() {
+    let config = PlayoutConfig::for_packing_and_jitter(10, Duration::from_millis(15));
+    let mut lose = |k| (k % 100 != 9).then_some(50 * MS);
+    let (buffer, played) = play(config, 10, 3_000, &mut lose);
+    for (now, p) in &played {
+        let want = truth(p.stamp.signed_since(stamp(0)) as f64 * 1e-9);
+        // 1/8 a t² with a < 0.7 m/s², t = 11 ms
+        assert!((p.hip - want).norm() < 2e-5, "at {now:?}");
+    }
+    assert_eq!(buffer.counts().extrapolated + buffer.counts().stopped, 0);
+}
+
+#[test]
+fn an_underrun_is_extrapolated_for_30_ms_and_then_it_stops() {
+    let mut stop = |k| (k < 1_000).then_some(50 * MS);
+    let (_, played) = play(PlayoutConfig::default(), 10, 3_000, &mut stop);
+    let last_sample = stamp(999);
+    let count = |status| played.iter().filter(|(_, p)| p.status == status).count();
+    assert_eq!(count(Status::Extrapolated), 30);
+    let (mut before, mut still) = (None::<Played>, 0);
+    for (_, p) in &played {
+        let since = p.stamp.signed_since(last_sample) / MS;
+        assert_eq!(p.force.is_some(), since <= 0);
+        if let Some(before) = before.filter(|_| since > 30) {
+            assert_eq!(p.status, Status::Stopped);
+            // bounded deceleration: 10 m/s² over a tick
+            assert!((p.velocity - before.velocity).norm() <= 0.010_001);
+            still += u32::from(p.hip == before.hip);
+        }
+        before = Some(*p);
+    }
+    assert!(still > 1_800, "it does not stop: {still}");
+    let end = played.last().unwrap().1.hip;
+    let reach = (end - sample(999).hip.metres()).norm();
+    assert!(
+        reach > 2e-3 && reach < 0.3 * 0.030 + 0.3 * 0.3 / 20.0 + 1e-3,
+        "{reach}"
+    );
+}
+
+#[test]
+fn after_an_outage_the_speed_limit_holds() {
+    let outage = |k: &u64| (1_000..2_000).contains(k);
+    let mut transit = |k| (!outage(&k)).then_some(50 * MS);
+    let (buffer, played) = play(PlayoutConfig::default(), 10, 3_000, &mut transit);
+    let mut fastest = 0.0_f64;
+    for pair in played.windows(2) {
+        fastest = fastest.max((pair[1].1.hip - pair[0].1.hip).norm() / 1e-3);
+    }
+    assert!(fastest <= 0.6 * (1.0 + 1e-6), "{fastest}");
+    assert!(buffer.counts().limited > 20, "there was a jump to limit");
+    assert!(
+        played
+            .iter()
+            .all(|(_, p)| !(p.limited && p.force.is_some()))
+    );
+    // and it catches up to the bit
+    assert_is_the_input(&played[played.len() - 500..]);
+}
+
+#[test]
+fn the_first_sample_is_reached_at_the_speed_limit_from_the_start() {
+    let mut buffer = PlayoutBuffer::try_new(PlayoutConfig::default()).unwrap();
+    buffer.start_at(Vec2::new(0.0, -0.1));
+    buffer.push(Time::ZERO, &sample(0));
+    let played = buffer.advance(Time::from_millis(16)).unwrap();
+    assert!(played.limited);
+    assert!((played.hip - Vec2::new(0.0, -0.1)).norm() <= 0.6e-3 * 1.000_001);
+}
+
+#[test]
+fn holding_the_newest_sample_is_far_worse_than_the_buffer_under_jitter() {
+    // 1 sample a packet, 10 ms of jitter; error against the truth at each method's own mean delay
+    let config = PlayoutConfig::for_packing_and_jitter(1, Duration::from_millis(10));
+    let (_, played) = play(config, 1, 10_000, &mut random_transit(10 * MS));
+    let error_of = |pairs: &[(f64, Vec2)]| {
+        let error = |delay: f64| {
+            let squares = pairs
+                .iter()
+                .map(|(t, hip)| (hip - truth(t - delay)).norm_squared());
+            (squares.sum::<f64>() / pairs.len() as f64).sqrt()
+        };
+        (0..400)
+            .map(|k| error(0.045 + f64::from(k) * 1e-4))
+            .fold(f64::MAX, f64::min)
+    };
+    let buffered: Vec<_> = played[2_000..]
+        .iter()
+        .map(|(now, p)| (now.as_secs_f64(), p.hip))
+        .collect();
+
+    let mut transit = random_transit(10 * MS);
+    let mut arrivals: Vec<_> = (0..10_000_u64)
+        .filter_map(|k| transit(k).map(|ns| (k as i64 * MS + ns, k)))
+        .collect();
+    arrivals.sort_unstable();
+    let held: Vec<_> = (2_000..9_900_i64)
+        .map(|tick| {
+            // the sample that arrived last
+            let next = arrivals.partition_point(|(at, _)| *at <= tick * MS);
+            (
+                tick as f64 * 1e-3,
+                sample(arrivals[next - 1].1).hip.metres(),
+            )
+        })
+        .collect();
+
+    let (buffered, held) = (error_of(&buffered), error_of(&held));
+    println!("r.m.s. motion error: held {held:.2e} m, buffered {buffered:.2e} m");
+    assert!(held > 20.0 * buffered, "{held} {buffered}");
+}
+
+#[test]
+fn copies_late_and_reordered_samples_are_counted_and_do_not_change_the_motion() {
+    let mut buffer = PlayoutBuffer::try_new(PlayoutConfig::default()).unwrap();
+    let at = |ms: u64| Time::from_millis(100 + ms);
+    for k in [1, 0, 3, 2, 2, 4] {
+        buffer.push(at(4), &sample(k));
+    }
+    assert_eq!(buffer.counts().duplicate, 1);
+    for tick in 16..=20 {
+        let played = buffer.advance(at(tick)).unwrap();
+        assert_eq!(played.hip, sample(tick - 16).hip.metres());
+    }
+    // already played: a copy; and one from before all others: late
+    buffer.push(at(20), &sample(3));
+    assert_eq!(buffer.counts().duplicate, 2);
+    let early = HipSample {
+        stamp: stamp(0).offset_by(-5 * MS),
+        ..sample(0)
+    };
+    buffer.push(at(20), &early);
+    assert_eq!(buffer.counts().late, 1);
+}
+
+#[test]
+fn a_path_that_becomes_slower_for_good_is_learned_anew_and_no_stamp_is_played_twice() {
+    let mut transit = |k| Some(if k < 2_000 { 50 * MS } else { 350 * MS });
+    let (buffer, played) = play(PlayoutConfig::default(), 10, 6_000, &mut transit);
+    assert_eq!(buffer.counts().relearned, 1);
+    assert!(played.windows(2).all(|w| w[0].1.stamp <= w[1].1.stamp));
+    assert_is_the_input(&played[played.len() - 2_000..]);
+}
+
+#[test]
+fn hostile_stamps_neither_panic_nor_block_the_buffer() {
+    let hostile = [0, 1, u64::MAX, u64::MAX - 1, u64::MAX / 2, MASTER_EPOCH * 2];
+    for bad in hostile {
+        for first in [true, false] {
+            let mut buffer = PlayoutBuffer::try_new(PlayoutConfig::default()).unwrap();
+            let mut poison = |at| {
+                let sample = HipSample {
+                    stamp: Time::from_nanos(bad),
+                    ..sample(0)
+                };
+                buffer.push(at, &sample);
+                buffer.advance(at);
+            };
+            if first {
+                for tick in 0..30 {
+                    poison(Time::from_millis(tick));
+                }
+            }
+            let mut last = None;
+            for k in 0..3_000_u64 {
+                let now = Time::from_millis(50 + k);
+                if k == 1_000 {
+                    let sample = HipSample {
+                        stamp: Time::from_nanos(bad),
+                        ..sample(0)
+                    };
+                    buffer.push(now, &sample);
+                }
+                buffer.push(now, &sample(k));
+                last = buffer.advance(now);
+            }
+            let last = last.unwrap();
+            assert_eq!(last.stamp, stamp(2_999 - 16), "{bad} {first}");
+            assert_eq!(last.hip, sample(2_999 - 16).hip.metres());
+        }
+    }
+    // the slave's own time may be anything, too
+    let mut buffer = PlayoutBuffer::try_new(PlayoutConfig::default()).unwrap();
+    for now in [Time::MAX, Time::ZERO, Time::from_millis(5), Time::MAX] {
+        buffer.push(now, &sample(3));
+        buffer.advance(now);
+    }
+}
+
+#[test]
+fn a_slave_that_does_not_tick_keeps_the_newest_half_second() {
+    let mut buffer = PlayoutBuffer::try_new(PlayoutConfig::default()).unwrap();
+    let capacity = buffer.samples.capacity();
+    for k in 0..2_000 {
+        buffer.push(Time::from_millis(50 + k), &sample(k));
+    }
+    assert_eq!(buffer.counts().overflow, 2_000 - SAMPLES_MAX as u64);
+    assert_eq!(buffer.samples.back().unwrap().stamp, stamp(1_999));
+    assert_eq!(buffer.samples.capacity(), capacity, "it allocated");
+}
+
+#[test]
+fn a_wrong_configuration_is_named() {
+    let config = PlayoutConfig {
+        delay_ms: f64::NAN,
+        ..PlayoutConfig::default()
+    };
+    let error = PlayoutBuffer::try_new(config).unwrap_err().to_string();
+    assert!(error.contains("delay NaN"), "{error}");
+    let config = PlayoutConfig::for_packing_and_jitter(10, Duration::from_millis(5));
+    assert!((config.delay_ms - 16.0).abs() < 1e-9);
+    let slowest = PlayoutConfig::for_packing_and_jitter(255, Duration::from_secs(9));
+    assert!(PlayoutBuffer::try_new(slowest).is_ok());
+}

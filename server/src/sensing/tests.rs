@@ -1,0 +1,131 @@
+//! Promises of the sensors.
+
+use super::*;
+
+const TOOL: Vec2 = Vec2::new(0.1, -0.2);
+const FORCE: Vec2 = Vec2::new(3.0, -1.0);
+
+fn pose() -> Pose {
+    Pose::new(0.5, 0.25, 1.0)
+}
+
+fn run(config: SensingConfig, ticks: u64) -> (Sensing, Vec<(Time, Sensed)>) {
+    let mut sensing = Sensing::try_new(config, 1).unwrap();
+    let sensed = (0..ticks)
+        .map(|tick| {
+            let now = Time::from_millis(1000 + tick);
+            (now, sensing.sense(now, TOOL, FORCE, &pose()))
+        })
+        .collect();
+    (sensing, sensed)
+}
+
+fn images(sensed: &[(Time, Sensed)]) -> Vec<(Time, VisionSample)> {
+    let seen = |(now, s): &(Time, Sensed)| s.vision.map(|image| (*now, image));
+    sensed.iter().filter_map(seen).collect()
+}
+
+/// r.m.s. of numbers that should have mean zero.
+fn rms(numbers: impl Iterator<Item = f64>) -> f64 {
+    let (mut sum, mut n) = (0.0, 0.0);
+    for x in numbers {
+        sum += x * x;
+        n += 1.0;
+    }
+    f64::sqrt(sum / n)
+}
+
+#[test]
+fn noise_has_the_configured_size_on_every_axis() {
+    let (_, sensed) = run(SensingConfig::default(), 20_000);
+    // four standard errors of an r.m.s. of 20 000: 2 %
+    let near = |got: f64, want: f64| assert!((got / want - 1.0).abs() < 0.02, "{got} {want}");
+    near(rms(sensed.iter().map(|(_, s)| s.tool.x - TOOL.x)), 10e-6);
+    near(rms(sensed.iter().map(|(_, s)| s.tool.y - TOOL.y)), 10e-6);
+    near(rms(sensed.iter().map(|(_, s)| s.force.x - FORCE.x)), 10e-3);
+    near(rms(sensed.iter().map(|(_, s)| s.force.y - FORCE.y)), 10e-3);
+    let images = images(&sensed);
+    let within = |got: f64, want: f64| assert!((got / want - 1.0).abs() < 0.12, "{got} {want}");
+    within(
+        rms(images.iter().map(|(_, i)| i.pose.position.x - 0.5)),
+        1e-3,
+    );
+    within(rms(images.iter().map(|(_, i)| i.pose.angle - 1.0)), 5e-3);
+}
+
+#[test]
+fn ideal_sensors_tell_the_truth_to_the_bit() {
+    let (_, sensed) = run(SensingConfig::ideal(), 100);
+    for (_, s) in sensed {
+        assert_eq!((s.tool, s.force, s.vision), (TOOL, FORCE, None));
+    }
+}
+
+#[test]
+fn vision_delivers_30_images_a_second_each_once_after_its_latency() {
+    let (sensing, sensed) = run(SensingConfig::default(), 10_001);
+    let images = images(&sensed);
+    assert_eq!(images.len(), 300);
+    for (delivered, image) in &images {
+        let age = delivered.signed_since(image.taken);
+        assert_eq!(age, 30_000_000, "taken at {:?}", image.taken);
+    }
+    assert!(images.windows(2).all(|w| w[0].1.taken < w[1].1.taken));
+    assert_eq!(sensing.images_dropped(), 0);
+}
+
+#[test]
+fn the_noise_of_one_sensor_does_not_depend_on_the_settings_of_another() {
+    let silent = SensingConfig {
+        position_noise_m: 0.0,
+        ..SensingConfig::ideal()
+    };
+    let only_force = SensingConfig {
+        force_noise_n: 10e-3,
+        ..silent
+    };
+    let (_, all) = run(SensingConfig::default(), 500);
+    let (_, one) = run(only_force, 500);
+    assert!(all.iter().zip(&one).all(|(a, b)| a.1.force == b.1.force));
+    assert!(all.iter().zip(&one).all(|(a, b)| a.1.tool != b.1.tool));
+}
+
+#[test]
+fn a_gap_in_time_yields_the_newest_image_and_counts_the_rest() {
+    let config = SensingConfig {
+        vision: VisionConfig {
+            rate_hz: 100.0,
+            latency_ms: 50.0,
+            ..VisionConfig::default()
+        },
+        ..SensingConfig::default()
+    };
+    let (mut sensing, _) = run(config, 45);
+    let late = Time::from_millis(60_000);
+    let seen = sensing.sense(late, TOOL, FORCE, &pose()).vision.unwrap();
+    assert_eq!(seen.taken, Time::from_millis(1040));
+    assert_eq!(sensing.images_dropped(), 4);
+    // and then one image a period again, not a burst
+    let next = |ms: i64| late.offset_by(ms * 1_000_000);
+    let burst = (1..=49).filter(|&ms| {
+        let sensed = sensing.sense(next(ms), TOOL, FORCE, &pose());
+        sensed.vision.is_some()
+    });
+    assert_eq!(burst.count(), 0);
+    assert!(sensing.on_their_way.len() <= 6);
+}
+
+#[test]
+fn wrong_settings_are_named() {
+    let config = SensingConfig {
+        force_noise_n: f64::NAN,
+        ..SensingConfig::default()
+    };
+    let error = Sensing::try_new(config, 1).unwrap_err();
+    assert!(error.to_string().contains("force noise NaN"), "{error}");
+    let mut config = SensingConfig::default();
+    config.vision.latency_ms = 5_000.0;
+    let error = Sensing::try_new(config, 1).unwrap_err();
+    assert!(error.to_string().contains("62 images"), "{error}");
+    assert!(Sensing::try_new(SensingConfig::ideal(), 1).is_ok());
+}
