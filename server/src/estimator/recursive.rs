@@ -1,0 +1,217 @@
+//! Recursive least squares for m, b, c of (1) with forgetting, a prior and physical bounds.
+//!
+//! Minimises (3) over all rows so far, each weighed by forgetting, plus a pull towards the last well
+//! founded value: what the data do not show stays where it was. m ≥ 0.05 kg, b ≥ 0 and c ≥ 0 hold by the
+//! constrained minimum. It must never publish a number that is not finite, and never move when no row
+//! comes.
+
+use mmt_shared::params::MASS_KG;
+use mmt_shared::time::TICK_S;
+use nalgebra::{Matrix3, Vector3};
+use serde::{Deserialize, Serialize};
+
+use super::filter::Row;
+use super::quadratic::{condition, minimum_above};
+
+/// Least values of m, b, c: the least mass that the model accepts, and no negative resistance.
+const LEAST: Vector3<f64> = Vector3::new(MASS_KG.0, 0.0, 0.0);
+/// Least variance of a filtered row's error, N²: 1 mN r.m.s., the default force noise after the filter.
+const ROW_VARIANCE_MIN: f64 = 1e-6;
+
+/// Forget faster while the prediction is off: model notes, section 3.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ChangeTest {
+    /// Share of the force by which the prediction must be off.
+    pub error_share: f64,
+    /// For how long, s.
+    pub after_s: f64,
+    /// Forgetting per tick then.
+    pub forgetting: f64,
+}
+
+/// Settings of [`Recursive`].
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct RecursiveConfig {
+    /// Weight that a row keeps from tick to tick. 0.995 is a memory of 200 ms.
+    pub forgetting: f64,
+    /// Faster forgetting after a change; none: always the same.
+    pub change: Option<ChangeTest>,
+    /// Values of m (kg), b (N s/m), c (N) before any data.
+    pub prior: [f64; 3],
+    /// By how much (standard deviation, same units) b and c may have moved away from their last well
+    /// founded values when the data cannot tell them apart.
+    pub prior_deviation: [f64; 2],
+    /// How many times the power of the noise the acceleration must have for m to count as seen.
+    pub excitation: f64,
+    /// Largest force that the uncertainty of b may stand for at the present speed, N.
+    pub damping_force_n: f64,
+}
+
+impl Default for RecursiveConfig {
+    fn default() -> Self {
+        Self {
+            forgetting: 0.995,
+            change: None,
+            prior: [0.4, 0.0, 1.0],
+            prior_deviation: [1.0, 1.0],
+            excitation: 20.0,
+            damping_force_n: 0.1,
+        }
+    }
+}
+
+/// The running solution.
+#[derive(Clone, Copy, Debug)]
+pub struct Recursive {
+    config: RecursiveConfig,
+    /// Variance of the noise in a filtered acceleration, (m/s²)².
+    acceleration_noise: f64,
+    gram: Matrix3<f64>,
+    moment: Vector3<f64>,
+    weight: f64,
+    squares: f64,
+    off_ticks: u32,
+    held: Vector3<f64>,
+    estimate: Vector3<f64>,
+    covariance: Matrix3<f64>,
+    condition: f64,
+    excited: bool,
+    samples: u64,
+}
+
+impl Recursive {
+    /// At the prior. `acceleration_noise` is the variance of the noise in a filtered acceleration,
+    /// (m/s²)².
+    #[must_use]
+    pub fn new(config: RecursiveConfig, acceleration_noise: f64) -> Self {
+        let prior = Vector3::from(config.prior).sup(&LEAST);
+        let [b, c] = config.prior_deviation;
+        Self {
+            config,
+            acceleration_noise,
+            gram: Matrix3::zeros(),
+            moment: Vector3::zeros(),
+            weight: 0.0,
+            squares: 0.0,
+            off_ticks: 0,
+            held: prior,
+            estimate: prior,
+            covariance: Matrix3::from_diagonal(&Vector3::new(prior.x * prior.x, b * b, c * c)),
+            condition: f64::INFINITY,
+            excited: false,
+            samples: 0,
+        }
+    }
+
+    /// Takes one filtered row.
+    pub fn update(&mut self, row: &Row) {
+        let keep = self.forgetting(row);
+        let error = row.force - self.estimate.dot(&row.regressor);
+        self.gram = self.gram * keep + row.regressor * row.regressor.transpose();
+        self.moment = self.moment * keep + row.regressor * row.force;
+        self.weight = self.weight * keep + 1.0;
+        self.squares = self.squares * keep + error * error;
+        self.samples = self.samples.saturating_add(1);
+        self.solve(row);
+    }
+
+    /// No row this tick: hold, and say so.
+    pub fn hold(&mut self) {
+        self.excited = false;
+        self.off_ticks = 0;
+    }
+
+    /// m (kg), b (N s/m), c (N).
+    #[must_use]
+    pub fn estimate(&self) -> Vector3<f64> {
+        self.estimate
+    }
+
+    /// Covariance of m, b, c as if the errors of the rows were independent.
+    #[must_use]
+    pub fn covariance(&self) -> Matrix3<f64> {
+        self.covariance
+    }
+
+    /// Condition number of the data in memory: see [`condition`].
+    #[must_use]
+    pub fn condition(&self) -> f64 {
+        self.condition
+    }
+
+    /// Whether the last tick brought data from which m, b and c can all be told.
+    #[must_use]
+    pub fn excited(&self) -> bool {
+        self.excited
+    }
+
+    /// Rows so far.
+    #[must_use]
+    pub fn samples(&self) -> u64 {
+        self.samples
+    }
+
+    fn forgetting(&mut self, row: &Row) -> f64 {
+        let Some(change) = self.config.change else {
+            return self.config.forgetting;
+        };
+        let predicted = self.estimate.dot(&row.regressor);
+        // 0.3 N: below, ten per cent would be force noise
+        let off = (row.force - predicted).abs() > change.error_share * row.force.abs().max(0.3);
+        self.off_ticks = if off { self.off_ticks.saturating_add(1) } else { 0 };
+        if f64::from(self.off_ticks) * TICK_S > change.after_s {
+            change.forgetting
+        } else {
+            self.config.forgetting
+        }
+    }
+
+    fn solve(&mut self, row: &Row) {
+        let variance = (self.squares / self.weight).max(ROW_VARIANCE_MIN);
+        let pull = self.pull(variance);
+        let matrix = self.gram + pull;
+        let right = self.moment + pull * self.held;
+        // (3), under the bounds
+        let Some(estimate) = minimum_above(&matrix, &right, &LEAST) else {
+            return self.hold();
+        };
+        let Some(inverse) = matrix.try_inverse() else {
+            return self.hold();
+        };
+        if !estimate.iter().chain(inverse.iter()).all(|x| x.is_finite()) {
+            return self.hold();
+        }
+        self.estimate = estimate;
+        self.covariance = inverse * variance;
+        self.judge(row, variance);
+        if self.excited {
+            self.held = estimate;
+        }
+    }
+
+    /// The pull towards the held value: as strong as the least acceleration that counts would be for m,
+    /// and as the prior deviations say for b and c.
+    fn pull(&self, variance: f64) -> Matrix3<f64> {
+        let [b, c] = self.config.prior_deviation;
+        let m = self.config.excitation * self.acceleration_noise * self.memory();
+        Matrix3::from_diagonal(&Vector3::new(m, variance / (b * b), variance / (c * c)))
+    }
+
+    /// Rows in a full memory.
+    fn memory(&self) -> f64 {
+        1.0 / (1.0 - self.config.forgetting)
+    }
+
+    fn judge(&mut self, row: &Row, variance: f64) {
+        let inverse = self.gram.try_inverse();
+        self.condition = condition(&self.gram, inverse.as_ref());
+        self.excited = inverse.is_some_and(|inverse| {
+            // what of the acceleration v and s do not explain, and what b is worth at this speed
+            let seen = 1.0 / inverse.m11;
+            let b_force = (variance * inverse.m22).sqrt() * row.regressor.y.abs();
+            self.condition.is_finite()
+                && seen > self.config.excitation * self.acceleration_noise * self.memory()
+                && b_force < self.config.damping_force_n
+        });
+    }
+}
