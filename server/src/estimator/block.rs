@@ -7,7 +7,7 @@
 use mmt_shared::geometry::Vec2;
 use nalgebra::{Matrix3, Matrix3x2, Vector3};
 
-use super::quadratic::condition;
+use super::quadratic::{condition, inverse_of_gram};
 
 /// Above this condition number the block says nothing and the last value is kept.
 ///
@@ -90,7 +90,11 @@ impl Block {
     /// Takes one tick: acceleration (m/s²), velocity (m/s), force on the object (N).
     pub fn push(&mut self, a: Vec2, v: Vec2, force: Vec2) {
         let speed = v.norm();
-        let sliding = if speed > 0.0 { v / speed } else { Vec2::zeros() };
+        let sliding = if speed > 0.0 {
+            v / speed
+        } else {
+            Vec2::zeros()
+        };
         let regressor = Matrix3x2::from_rows(&[a.transpose(), v.transpose(), sliding.transpose()]);
         let row = PlanarRow { regressor, force };
         let Some(slot) = self.ring.get_mut(self.next) else {
@@ -112,7 +116,7 @@ impl Block {
     /// The condition number of the window and, if the window is full and can be solved, what it says.
     #[must_use]
     pub fn solve(&self) -> (f64, Option<Solution>) {
-        let inverse = self.sums.gram.try_inverse();
+        let inverse = inverse_of_gram(&self.sums.gram);
         let condition = condition(&self.sums.gram, inverse.as_ref());
         let solvable = self.filled && condition < CONDITION_MAX;
         let solution = inverse.filter(|_| solvable).map(|inverse| {
@@ -125,7 +129,12 @@ impl Block {
                 covariance: inverse * (error / (rows - 3.0)),
             }
         });
-        let finite = |s: &Solution| s.estimate.iter().chain(s.covariance.iter()).all(|x| x.is_finite());
+        let finite = |s: &Solution| {
+            s.estimate
+                .iter()
+                .chain(s.covariance.iter())
+                .all(|x| x.is_finite())
+        };
         (condition, solution.filter(finite))
     }
 }

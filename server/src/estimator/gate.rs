@@ -69,7 +69,11 @@ impl Gate {
             self.age = 0;
             return Passage::Closed;
         }
-        self.age = if turned { 1 } else { self.age.saturating_add(1) };
+        self.age = if turned {
+            1
+        } else {
+            self.age.saturating_add(1)
+        };
         match self.age {
             1 => Passage::Begins,
             age if age > self.config.ticks => Passage::Open,

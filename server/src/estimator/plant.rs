@@ -107,7 +107,11 @@ impl Plant {
         let penetration = self.tool - self.position;
         let rate = self.tool_speed - self.velocity;
         let touching = penetration > 0.0;
-        let force = if touching { COUPLING.force(penetration, rate) } else { 0.0 };
+        let force = if touching {
+            COUPLING.force(penetration, rate)
+        } else {
+            0.0
+        };
         self.advance(force);
         self.measure(force, touching)
     }
@@ -123,7 +127,11 @@ impl Plant {
         // implicit Coulomb: what friction cannot stop within the step goes on sliding
         let free = m * self.velocity + TICK_S * force;
         let left = free.abs() - TICK_S * c;
-        self.velocity = if left > 0.0 { left.copysign(free) / (m + TICK_S * b) } else { 0.0 };
+        self.velocity = if left > 0.0 {
+            left.copysign(free) / (m + TICK_S * b)
+        } else {
+            0.0
+        };
         self.position += TICK_S * self.velocity;
     }
 

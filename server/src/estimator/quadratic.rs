@@ -61,7 +61,22 @@ fn minimum_on(
     Some(x)
 }
 
-/// How far a symmetric Gram matrix is from singular, whatever the units of its coordinates.
+/// Below this determinant, with every column scaled to length 1, an inverse is rounding noise.
+const DETERMINANT_MIN: f64 = 1e-13;
+
+/// Inverse of a Gram matrix; none if it is singular to working precision, whatever the units.
+#[must_use]
+pub fn inverse_of_gram(gram: &Matrix3<f64>) -> Option<Matrix3<f64>> {
+    let lengths = gram.m11 * gram.m22 * gram.m33;
+    // written so that NaN fails
+    if gram.determinant() > DETERMINANT_MIN * lengths {
+        gram.try_inverse()
+    } else {
+        None
+    }
+}
+
+/// How far a Gram matrix is from singular, whatever the units of its coordinates.
 ///
 /// The condition number of the least-squares problem (square root of the matrix's own, Frobenius norm)
 /// after every column has been scaled to length 1; √3 is perfect, infinity is singular.
@@ -128,12 +143,18 @@ mod tests {
         let m = Matrix3::new(4.0, 1.0, 0.5, 1.0, 3.0, 0.2, 0.5, 0.2, 2.0);
         let units = Matrix3::from_diagonal(&Vector3::new(1e3, 1e-3, 1.0));
         let scaled = units * m * units;
-        let plain = condition(&m, m.try_inverse().as_ref());
-        let other = condition(&scaled, scaled.try_inverse().as_ref());
+        let plain = condition(&m, inverse_of_gram(&m).as_ref());
+        let other = condition(&scaled, inverse_of_gram(&scaled).as_ref());
         assert!((plain - other).abs() < 1e-9, "{plain} {other}");
         let orthogonal = Matrix3::identity();
         assert!((condition(&orthogonal, Some(&orthogonal)) - 3.0_f64.sqrt()).abs() < 1e-12);
         assert_eq!(condition(&Matrix3::zeros(), None), f64::INFINITY);
-        assert_eq!(condition(&Matrix3::zeros(), Some(&orthogonal)), f64::INFINITY);
+        let one_row = Vector3::new(0.1, 0.2, 0.3);
+        assert!(inverse_of_gram(&(one_row * one_row.transpose())).is_none());
+        assert!(inverse_of_gram(&Matrix3::repeat(f64::NAN)).is_none());
+        assert_eq!(
+            condition(&Matrix3::zeros(), Some(&orthogonal)),
+            f64::INFINITY
+        );
     }
 }

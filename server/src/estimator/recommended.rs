@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 use super::direction::{DirectionConfig, ForceDirection};
 use super::filter::{Row, StateVariableFilter, stage_weight};
 use super::gate::{Gate, GateConfig, Passage};
-use super::recursive::{Recursive, RecursiveConfig};
+use super::recursive::{Recursive, RecursiveConfig, Verdict};
 use super::surface::Surface;
 use super::{Estimate, Measured, STICK_SPEED};
 
@@ -79,7 +79,10 @@ impl RecommendedEstimator {
     /// At the prior.
     #[must_use]
     pub fn new(config: &RecommendedConfig) -> Self {
-        let speed_min = config.gate.speed_min_m_per_s.max(3.0 * config.speed_noise());
+        let speed_min = config
+            .gate
+            .speed_min_m_per_s
+            .max(3.0 * config.speed_noise());
         let gate = GateConfig {
             speed_min_m_per_s: speed_min,
             ..config.gate
@@ -101,7 +104,11 @@ impl RecommendedEstimator {
     /// Takes one tick; a tick with numbers that no sensor gives ends the contact for the regression.
     pub fn step(&mut self, measured: &Measured) -> Estimate {
         let usable = measured.is_usable();
-        let force = if usable { measured.force } else { Vec2::zeros() };
+        let force = if usable {
+            measured.force
+        } else {
+            Vec2::zeros()
+        };
         let angle = self.direction.step(force);
         match measured.normal.filter(|_| usable) {
             Some(normal) => self.touch(measured, angle, normal),
@@ -146,7 +153,9 @@ impl RecommendedEstimator {
         let filtered = self.filter.step(row);
         self.estimate.acceleration = filtered.regressor.x;
         if passage == Passage::Open {
-            self.recursive.update(&filtered);
+            if self.recursive.update(&filtered) == Verdict::Changed {
+                self.gate.close();
+            }
         } else {
             self.recursive.hold();
         }
