@@ -8,3 +8,6 @@ pub mod link;
 pub mod trigger;
 pub mod playout;
 pub mod sensing;
+//! placeholder
+
+pub mod estimator;

@@ -1,0 +1,119 @@
+//! When a tick says something about m, b and c: section 3 of the model notes.
+//!
+//! Only while the tool pushes and the object slides, both for a while. While the object sticks the force
+//! is anything between 0 and c, so a sticking tick must never reach the regression.
+
+use serde::{Deserialize, Serialize};
+
+/// Settings of [`Gate`].
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct GateConfig {
+    /// Least force along the normal, N. 0.15 N: 15 times the default force noise.
+    pub force_min_n: f64,
+    /// Least speed along the normal, m/s; three standard deviations of its noise if that is more.
+    pub speed_min_m_per_s: f64,
+    /// How long both must have lasted, ticks. 42: five time constants of a 120 rad/s stage.
+    pub ticks: u32,
+}
+
+impl Default for GateConfig {
+    fn default() -> Self {
+        Self {
+            force_min_n: 0.15,
+            speed_min_m_per_s: 0.020,
+            ticks: 42,
+        }
+    }
+}
+
+/// What a tick is good for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Passage {
+    /// No push, or the object sticks.
+    Closed,
+    /// First tick of a sliding push: the filter must start here.
+    Begins,
+    /// A sliding push, too young.
+    Young,
+    /// A sliding push whose rows count.
+    Open,
+}
+
+/// Watches force and speed and opens when both have been enough for long enough.
+#[derive(Clone, Copy, Debug)]
+pub struct Gate {
+    config: GateConfig,
+    age: u32,
+    backwards: bool,
+}
+
+impl Gate {
+    /// A closed gate.
+    #[must_use]
+    pub fn new(config: GateConfig) -> Self {
+        Self {
+            config,
+            age: 0,
+            backwards: false,
+        }
+    }
+
+    /// Takes force (N) and smoothed speed (m/s) along the normal.
+    ///
+    /// A speed that changes sign begins anew: it has been through zero, where the object may stick.
+    pub fn step(&mut self, force: f64, speed: f64) -> Passage {
+        let enough = force > self.config.force_min_n && speed.abs() > self.config.speed_min_m_per_s;
+        let turned = self.age > 0 && self.backwards != (speed < 0.0);
+        self.backwards = speed < 0.0;
+        if !enough {
+            self.age = 0;
+            return Passage::Closed;
+        }
+        self.age = if turned {
+            1
+        } else {
+            self.age.saturating_add(1)
+        };
+        match self.age {
+            1 => Passage::Begins,
+            age if age > self.config.ticks => Passage::Open,
+            _ => Passage::Young,
+        }
+    }
+
+    /// Closes: contact was lost.
+    pub fn close(&mut self) {
+        self.age = 0;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn pushed(ticks: u32) -> Gate {
+        let mut gate = Gate::new(GateConfig::default());
+        for _ in 0..ticks {
+            gate.step(2.0, 0.1);
+        }
+        gate
+    }
+
+    #[test]
+    fn it_opens_after_42_ticks_of_sliding_and_not_before() {
+        assert_eq!(pushed(0).step(2.0, 0.1), Passage::Begins);
+        assert_eq!(pushed(1).step(2.0, 0.1), Passage::Young);
+        assert_eq!(pushed(41).step(2.0, 0.1), Passage::Young);
+        assert_eq!(pushed(42).step(2.0, 0.1), Passage::Open);
+    }
+
+    #[test]
+    fn sticking_a_light_touch_and_a_reversal_each_begin_anew() {
+        for (force, speed) in [(2.0, 0.020), (0.15, 0.1), (f64::NAN, 0.1), (2.0, f64::NAN)] {
+            let mut gate = pushed(100);
+            assert_eq!(gate.step(force, speed), Passage::Closed);
+            assert_eq!(gate.step(2.0, 0.1), Passage::Begins);
+        }
+        assert_eq!(pushed(100).step(2.0, -0.1), Passage::Begins);
+    }
+}

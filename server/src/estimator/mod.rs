@@ -1,0 +1,193 @@
+//! The estimators: mass m, damping b and friction c of the pushed object, (1)–(3) of the paper.
+//!
+//! *Paper mode* is section II-A as printed; *recommended mode* filters force and motion alike and looks
+//! along the contact normal. I and e follow from m and c by (8) and (9), which `mmt_shared::params`
+//! holds. The estimators are pure and take one tick of T = 1 ms at a time; they must never allocate in
+//! a tick, and never poison themselves with a number that is not finite.
+
+use mmt_shared::contact::Coupling;
+use mmt_shared::geometry::Vec2;
+use mmt_shared::settings::Mode;
+use nalgebra::{Matrix3, Vector3};
+use serde::{Deserialize, Serialize};
+
+pub mod block;
+pub mod direction;
+pub mod filter;
+pub mod gate;
+pub mod kalman;
+pub mod paper;
+#[cfg(test)]
+mod plant;
+pub mod quadratic;
+pub mod recommended;
+pub mod recursive;
+pub mod surface;
+#[cfg(test)]
+mod tests;
+
+pub use direction::{DirectionConfig, ForceDirection};
+pub use paper::{PaperConfig, PaperEstimator};
+pub use recommended::{RecommendedConfig, RecommendedEstimator};
+
+/// Below this speed along the normal the object is taken to stick, m/s: four standard deviations of the
+/// smoothed speed at the default position noise.
+pub const STICK_SPEED: f64 = 0.005;
+/// No sensor of this system gives a position beyond this, m.
+const POSITION_LIMIT: f64 = 100.0;
+/// No sensor of this system gives a force beyond this, N.
+const FORCE_LIMIT: f64 = 1e4;
+
+/// What the slave measured in one tick: tool and force of the same instant.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Measured {
+    /// Tool position, world frame, m.
+    pub tool: Vec2,
+    /// f_s, contact force on the object, world frame, N; positive when the tool pushes the object.
+    pub force: Vec2,
+    /// Inward unit normal of the touched face as the slave believes it; none when not in contact. It
+    /// serves until the direction of the force is known.
+    pub normal: Option<Vec2>,
+}
+
+impl Measured {
+    fn is_usable(&self) -> bool {
+        // written so that NaN fails
+        let within = |v: &Vec2, limit: f64| v.x.abs() <= limit && v.y.abs() <= limit;
+        within(&self.tool, POSITION_LIMIT)
+            && within(&self.force, FORCE_LIMIT)
+            && self.normal.is_none_or(|normal| within(&normal, 1.0))
+    }
+}
+
+/// What an estimator believes after a tick.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Estimate {
+    /// Mass m, kg.
+    pub m: f64,
+    /// Viscous damping b, N s/m.
+    pub b: f64,
+    /// Coulomb friction force c, N.
+    pub c: f64,
+    /// Covariance of (m, b, c) in the units above, as if the errors of the rows were independent.
+    pub covariance: Matrix3<f64>,
+    /// Condition number of the data in memory with every regressor scaled to length 1 (√3 is perfect);
+    /// infinite before there are data.
+    pub condition: f64,
+    /// Whether this tick brought data from which m, b and c can be told; if not, values are held.
+    pub excited: bool,
+    /// Ticks that counted, so far.
+    pub samples: u64,
+    /// Angle of the force, which is that of the inward normal, world frame, rad, in (−π, π]; none when
+    /// not in contact or when the force is too small to have a direction.
+    pub heading: Option<f64>,
+    /// Speed v·n of the touched surface along the normal, smoothed, m/s; 0 when not in contact.
+    pub speed: f64,
+    /// Acceleration a·n of the touched surface along the normal, smoothed, m/s²; 0 when not sliding.
+    pub acceleration: f64,
+    /// In contact, and slower than [`STICK_SPEED`]: static friction holds the object.
+    pub sticking: bool,
+}
+
+impl Estimate {
+    /// No data yet: `values` are m, b, c.
+    fn at(values: Vector3<f64>) -> Self {
+        Self {
+            m: values.x,
+            b: values.y,
+            c: values.z,
+            covariance: Matrix3::identity(),
+            condition: f64::INFINITY,
+            excited: false,
+            samples: 0,
+            heading: None,
+            speed: 0.0,
+            acceleration: 0.0,
+            sticking: false,
+        }
+    }
+
+    fn set(&mut self, values: Vector3<f64>, covariance: Matrix3<f64>) {
+        (self.m, self.b, self.c) = (values.x, values.y, values.z);
+        self.covariance = covariance;
+    }
+
+    /// Contact was lost: the parameters stay, the motion is unknown.
+    fn release(&mut self) {
+        self.excited = false;
+        self.heading = None;
+        (self.speed, self.acceleration) = (0.0, 0.0);
+        self.sticking = false;
+    }
+
+    /// Standard deviations of m (kg), b (N s/m), c (N).
+    #[must_use]
+    pub fn deviation(&self) -> [f64; 3] {
+        let variance = self.covariance.diagonal();
+        [variance.x, variance.y, variance.z].map(|v| v.max(0.0).sqrt())
+    }
+}
+
+/// Which estimator, and how.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum EstimatorConfig {
+    /// Section II-A as printed.
+    Paper(PaperConfig),
+    /// Along the normal, filtered alike, recursive.
+    Recommended(RecommendedConfig),
+}
+
+impl EstimatorConfig {
+    /// The defaults of a mode under the coupling of the slave's contact.
+    #[must_use]
+    pub fn of_mode(mode: Mode, coupling: Coupling) -> Self {
+        match mode {
+            Mode::Paper => Self::Paper(PaperConfig::default()),
+            Mode::Recommended => Self::Recommended(RecommendedConfig::new(coupling)),
+        }
+    }
+}
+
+/// The slave's estimator of m, b and c.
+#[derive(Clone, Debug)]
+#[expect(
+    clippy::large_enum_variant,
+    reason = "one per slave, never moved in a tick"
+)]
+pub enum Estimator {
+    /// Section II-A as printed.
+    Paper(PaperEstimator),
+    /// Along the normal, filtered alike, recursive.
+    Recommended(RecommendedEstimator),
+}
+
+impl Estimator {
+    /// An estimator at its prior.
+    #[must_use]
+    pub fn new(config: &EstimatorConfig) -> Self {
+        match config {
+            EstimatorConfig::Paper(config) => Self::Paper(PaperEstimator::new(config)),
+            EstimatorConfig::Recommended(config) => {
+                Self::Recommended(RecommendedEstimator::new(config))
+            }
+        }
+    }
+
+    /// Takes one tick and says what is believed now. Allocates nothing.
+    pub fn step(&mut self, measured: &Measured) -> Estimate {
+        match self {
+            Self::Paper(estimator) => estimator.step(measured),
+            Self::Recommended(estimator) => estimator.step(measured),
+        }
+    }
+
+    /// What is believed now.
+    #[must_use]
+    pub fn estimate(&self) -> &Estimate {
+        match self {
+            Self::Paper(estimator) => estimator.estimate(),
+            Self::Recommended(estimator) => estimator.estimate(),
+        }
+    }
+}

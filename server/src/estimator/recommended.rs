@@ -1,0 +1,178 @@
+//! Recommended mode: the surface's motion along the contact normal, filtered like the force, and
+//! recursive least squares for m, b, c of (1).
+//!
+//! Order of a tick: direction of the force, surface from the force law, gate, the shared filter,
+//! regression. It must never let a sticking tick or a tick without contact reach the regression.
+
+use mmt_shared::contact::Coupling;
+use mmt_shared::geometry::{Vec2, rotate};
+use mmt_shared::time::TICK_S;
+use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
+
+use super::direction::{DirectionConfig, ForceDirection};
+use super::filter::{Row, StateVariableFilter, stage_weight};
+use super::gate::{Gate, GateConfig, Passage};
+use super::recursive::{Recursive, RecursiveConfig, Verdict};
+use super::surface::Surface;
+use super::{Estimate, Measured, STICK_SPEED};
+
+/// Settings of [`RecommendedEstimator`].
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct RecommendedConfig {
+    /// k_p and k_d between the tool and the object, as the slave's contact has them.
+    pub coupling: Coupling,
+    /// Corner of each of the three stages that force and motion share, rad/s. 120; 60 for position noise
+    /// of 30 µm and more.
+    pub cutoff_rad_per_s: f64,
+    /// Standard deviation of the measured tool position, m.
+    pub position_noise_m: f64,
+    /// The direction of the force.
+    pub direction: DirectionConfig,
+    /// When a tick counts.
+    pub gate: GateConfig,
+    /// The regression.
+    pub recursive: RecursiveConfig,
+}
+
+impl RecommendedConfig {
+    /// The defaults under a coupling.
+    #[must_use]
+    pub fn new(coupling: Coupling) -> Self {
+        Self {
+            coupling,
+            cutoff_rad_per_s: 120.0,
+            position_noise_m: 10e-6,
+            direction: DirectionConfig::default(),
+            gate: GateConfig::default(),
+            recursive: RecursiveConfig::default(),
+        }
+    }
+
+    /// Standard deviation of the speed that opens the gate (one first-order stage), m/s.
+    fn speed_noise(&self) -> f64 {
+        let w = stage_weight(self.cutoff_rad_per_s);
+        w * self.position_noise_m / TICK_S * (2.0 / (2.0 - w)).sqrt()
+    }
+
+    /// Variance of the noise in the filtered acceleration, (m/s²)²: white position noise through ω² and
+    /// three stages, σ² T/(2π) ∫ ω⁴/(1 + (ω/ω₀)²)³ dω = (3/16) σ² T ω₀⁵.
+    fn acceleration_noise(&self) -> f64 {
+        let (s, w) = (self.position_noise_m, self.cutoff_rad_per_s);
+        0.1875 * s * s * TICK_S * w * w * w * w * w
+    }
+}
+
+/// The recommended estimator.
+#[derive(Clone, Copy, Debug)]
+pub struct RecommendedEstimator {
+    direction: ForceDirection,
+    surface: Surface,
+    speed_weight: f64,
+    gate: Gate,
+    filter: StateVariableFilter,
+    recursive: Recursive,
+    estimate: Estimate,
+}
+
+impl RecommendedEstimator {
+    /// At the prior.
+    #[must_use]
+    pub fn new(config: &RecommendedConfig) -> Self {
+        let speed_min = config
+            .gate
+            .speed_min_m_per_s
+            .max(3.0 * config.speed_noise());
+        let gate = GateConfig {
+            speed_min_m_per_s: speed_min,
+            ..config.gate
+        };
+        let recursive = Recursive::new(config.recursive, config.acceleration_noise());
+        let mut estimate = Estimate::at(recursive.estimate());
+        estimate.covariance = recursive.covariance();
+        Self {
+            direction: ForceDirection::new(&config.direction),
+            surface: Surface::new(config.coupling),
+            speed_weight: stage_weight(config.cutoff_rad_per_s),
+            gate: Gate::new(gate),
+            filter: StateVariableFilter::new(config.cutoff_rad_per_s),
+            recursive,
+            estimate,
+        }
+    }
+
+    /// Takes one tick; a tick with numbers that no sensor gives ends the contact for the regression.
+    pub fn step(&mut self, measured: &Measured) -> Estimate {
+        let usable = measured.is_usable();
+        let force = if usable {
+            measured.force
+        } else {
+            Vec2::zeros()
+        };
+        let angle = self.direction.step(force);
+        match measured.normal.filter(|_| usable) {
+            Some(normal) => self.touch(measured, angle, normal),
+            None => self.release(),
+        }
+        self.publish();
+        self.estimate
+    }
+
+    /// What is estimated now.
+    #[must_use]
+    pub fn estimate(&self) -> &Estimate {
+        &self.estimate
+    }
+
+    fn touch(&mut self, measured: &Measured, angle: Option<f64>, normal: Vec2) {
+        let normal = angle.map_or(normal, |angle| rotate(angle, Vec2::new(1.0, 0.0)));
+        self.estimate.heading = angle;
+        let motion = self.surface.step(measured.tool, measured.force, normal);
+        let Some(motion) = motion else {
+            self.recursive.hold();
+            return;
+        };
+        let v = motion.row.regressor.y;
+        self.estimate.speed += (v - self.estimate.speed) * self.speed_weight;
+        self.estimate.sticking = self.estimate.speed.abs() < STICK_SPEED;
+        self.slide(motion.row);
+    }
+
+    fn slide(&mut self, mut row: Row) {
+        let speed = self.estimate.speed;
+        let passage = self.gate.step(row.force, speed);
+        if passage == Passage::Closed {
+            self.estimate.acceleration = 0.0;
+            return self.recursive.hold();
+        }
+        if passage == Passage::Begins {
+            self.filter.restart();
+        }
+        // the smoothed speed has been far from zero since the filter started, so its sign is v's
+        row.regressor.z = 1.0_f64.copysign(speed);
+        let filtered = self.filter.step(row);
+        self.estimate.acceleration = filtered.regressor.x;
+        if passage == Passage::Open {
+            if self.recursive.update(&filtered) == Verdict::Changed {
+                self.gate.close();
+            }
+        } else {
+            self.recursive.hold();
+        }
+    }
+
+    fn release(&mut self) {
+        self.surface.reset();
+        self.gate.close();
+        self.recursive.hold();
+        self.estimate.release();
+    }
+
+    fn publish(&mut self) {
+        let found: Vector3<f64> = self.recursive.estimate();
+        self.estimate.set(found, self.recursive.covariance());
+        self.estimate.condition = self.recursive.condition();
+        self.estimate.excited = self.recursive.excited();
+        self.estimate.samples = self.recursive.samples();
+    }
+}
