@@ -280,14 +280,16 @@ impl Scripted {
         let change = wish - self.wanted_velocity;
         let most = self.config.acceleration_m_per_s2 * TICK_S;
         self.wanted_velocity += change * (most / change.norm().max(most));
+        let hip = self
+            .hand
+            .step(self.wanted, self.wanted_velocity, force_on_hand);
         self.wanted += self.wanted_velocity * TICK_S;
         self.give_way();
         if self.phase == Phase::Push {
             self.pushed += self.wanted_velocity.dot(&self.seen.inward(self.face)) * TICK_S;
         }
         self.ticks_in_phase = self.ticks_in_phase.saturating_add(1);
-        self.hand
-            .step(self.wanted, self.wanted_velocity, force_on_hand)
+        hip
     }
 
     fn seconds_in_phase(&self) -> f64 {
