@@ -180,7 +180,10 @@ fn a_box_that_does_not_move_is_pressed_within_the_limit_and_given_up() {
     config.hand.tremor_m = 0.0;
     // the press at rest, some seconds into the first push
     let pressed = run(config, f64::MAX, 8).last_force;
-    assert!(pressed > 5.0 && pressed < config.press_max_n, "{pressed} N");
+    assert!(
+        pressed > 5.0 && pressed < config.press_max_n + 1e-9,
+        "{pressed} N"
+    );
     let run = run(config, f64::MAX, 40);
     assert_eq!((run.pushes, run.strayed), (0, 0.0));
     assert!(run.faces.len() >= 2, "{:?}", run.faces);
