@@ -8,6 +8,7 @@ pub mod contact;
 pub mod geometry;
 pub mod metrics;
 pub mod params;
+pub mod report;
 pub mod rng;
 pub mod settings;
 pub mod time;
