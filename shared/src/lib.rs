@@ -16,6 +16,7 @@ pub mod pairing;
 pub mod params;
 pub mod peer;
 pub mod recording;
+pub mod report;
 pub mod rng;
 pub mod settings;
 pub mod time;

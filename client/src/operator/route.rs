@@ -87,9 +87,12 @@ mod tests {
             let mut outside = footprint.nearest(at).1 >= CLOSE_M;
             let face = Face::ALL[(stream.bits() % 4) as usize];
             let goal = in_front_of(&footprint, face, 0.05, stream.uniform_in(-0.05, 0.05));
-            let mut steps = 0;
+            let (mut steps, mut legs, mut last) = (0, 0, None);
             while (at - goal).norm() > 1e-3 {
-                let to = way_point(&footprint, at, face, goal) - at;
+                let heading = way_point(&footprint, at, face, goal);
+                legs += u32::from(outside && last != Some(heading));
+                last = Some(heading);
+                let to = heading - at;
                 at += to * (1e-3 / to.norm()).min(1.0);
                 let distance = footprint.nearest(at).1;
                 assert!(!outside || distance >= CLOSE_M - 1e-3, "{at} to {face:?}");
@@ -97,6 +100,8 @@ mod tests {
                 steps += 1;
                 assert!(steps < 4000, "does not arrive at {face:?} from {at}");
             }
+            // two corners and the goal; more would be a way that creeps along the box
+            assert!(legs <= 3, "{legs} legs to {face:?}");
         }
     }
 

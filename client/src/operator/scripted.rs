@@ -5,13 +5,17 @@
 //! pure function of the configuration, the views and the forces. Its HIP must never jump, never leave
 //! the finite numbers, and never enter the box but by the face it means to push.
 
+mod config;
+
 use mmt_shared::geometry::{BoxFootprint, Face, Pose, Vec2, rotate};
 use mmt_shared::time::TICK_S;
 use serde::{Deserialize, Serialize};
 
-use super::hand::{Hand, HandConfig};
+use super::hand::Hand;
 use super::route;
 use super::stroke::Stroke;
+
+pub use config::{ScriptedConfig, ScriptedError};
 
 /// A push or an approach that takes longer is given up, s: the box is blocked or not there.
 const GIVE_UP_S: f64 = 10.0;
@@ -24,136 +28,6 @@ const STEER_MAX_M_PER_S: f64 = 0.15;
 const BRAKE_SHARE: f64 = 0.6;
 /// Where the HIP starts: in front of the first face, m.
 const START_M: f64 = 0.25;
-
-/// What the scripted operator does. The defaults are those of the design study unless said otherwise.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct ScriptedConfig {
-    /// Seed of everything that is drawn. Default 1.
-    pub seed: u64,
-    /// Largest lateral offset of a push from the face's middle, m; drawn uniformly. Default 0.05.
-    pub lateral_max_m: f64,
-    /// Speed on the way round the box, m/s. Default 0.35.
-    pub travel_m_per_s: f64,
-    /// Distance in front of the face at which the approach begins, m. Default 0.05.
-    pub stand_off_m: f64,
-    /// Speed of the approach, m/s. Default 0.06.
-    pub approach_m_per_s: f64,
-    /// Length of a push from contact, m. Default 0.35.
-    pub push_m: f64,
-    /// Range of a push's mean speed, m/s; drawn uniformly. Default 0.10 to 0.22.
-    pub push_speed_m_per_s: (f64, f64),
-    /// Slow modulation of the speed, share of the mean. Default 0.30.
-    pub slow_share: f64,
-    /// Its range of frequency, Hz. Default 0.4 to 1.
-    pub slow_hz: (f64, f64),
-    /// Fast modulation of the speed, share of the mean. Default 0.12.
-    pub fast_share: f64,
-    /// Its range of frequency, Hz. Default 1.5 to 3.
-    pub fast_hz: (f64, f64),
-    /// Rest at the end of a push, s. Default 0.4.
-    pub hold_s: f64,
-    /// Distance to back off after a push, m. Default 0.12.
-    pub retract_m: f64,
-    /// Limit of the wish's acceleration, m/s². Default 1.5, an unhurried arm (a choice).
-    pub acceleration_m_per_s2: f64,
-    /// Force at which the operator presses no harder, N. Default 8, the default device's limit.
-    pub press_max_n: f64,
-    /// Beyond this distance from where it began the box is pushed back, m. Default 1 (a choice).
-    pub home_radius_m: f64,
-    /// The hand.
-    pub hand: HandConfig,
-}
-
-impl Default for ScriptedConfig {
-    fn default() -> Self {
-        Self {
-            seed: 1,
-            lateral_max_m: 0.05,
-            travel_m_per_s: 0.35,
-            stand_off_m: 0.05,
-            approach_m_per_s: 0.06,
-            push_m: 0.35,
-            push_speed_m_per_s: (0.10, 0.22),
-            slow_share: 0.30,
-            slow_hz: (0.4, 1.0),
-            fast_share: 0.12,
-            fast_hz: (1.5, 3.0),
-            hold_s: 0.4,
-            retract_m: 0.12,
-            acceleration_m_per_s2: 1.5,
-            press_max_n: 8.0,
-            home_radius_m: 1.0,
-            hand: HandConfig::default(),
-        }
-    }
-}
-
-/// A number of the configuration that no hand could follow.
-#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-#[error("operator.{name} = {value} is outside the accepted range {min} to {max}; change it")]
-pub struct ScriptedError {
-    /// Name of the key.
-    pub name: &'static str,
-    /// What it was.
-    pub value: f64,
-    /// Least accepted value.
-    pub min: f64,
-    /// Greatest accepted value.
-    pub max: f64,
-}
-
-impl ScriptedConfig {
-    /// Checks every number; a number that is not finite is outside every range.
-    fn checked(&self) -> Result<(), ScriptedError> {
-        let hand = &self.hand;
-        let (slowest, fastest) = self.push_speed_m_per_s;
-        let speeds = (0.01, 0.4);
-        for (name, value, (min, max)) in [
-            ("lateral_max_m", self.lateral_max_m, (0.0, 0.15)),
-            ("travel_m_per_s", self.travel_m_per_s, speeds),
-            ("stand_off_m", self.stand_off_m, (route::CLOSE_M, 0.5)),
-            ("approach_m_per_s", self.approach_m_per_s, (0.01, 0.1)),
-            ("push_m", self.push_m, (0.01, 1.0)),
-            ("push_speed_m_per_s.0", slowest, speeds),
-            ("push_speed_m_per_s.1", fastest, (slowest, 0.3)),
-            ("slow_share", self.slow_share, (0.0, 0.5)),
-            ("slow_hz.0", self.slow_hz.0, (0.0, 5.0)),
-            ("slow_hz.1", self.slow_hz.1, (self.slow_hz.0, 5.0)),
-            ("fast_share", self.fast_share, (0.0, 0.4)),
-            ("fast_hz.0", self.fast_hz.0, (0.0, 5.0)),
-            ("fast_hz.1", self.fast_hz.1, (self.fast_hz.0, 5.0)),
-            ("hold_s", self.hold_s, (0.0, 60.0)),
-            ("retract_m", self.retract_m, (route::CLOSE_M + 0.02, 0.5)),
-            (
-                "acceleration_m_per_s2",
-                self.acceleration_m_per_s2,
-                (0.5, 3.0),
-            ),
-            ("press_max_n", self.press_max_n, (1.0, 20.0)),
-            ("home_radius_m", self.home_radius_m, (0.5, 3.0)),
-            ("hand.mass_kg", hand.mass_kg, (0.1, 5.0)),
-            (
-                "hand.stiffness_n_per_m",
-                hand.stiffness_n_per_m,
-                (50.0, 2000.0),
-            ),
-            ("hand.damping_ns_per_m", hand.damping_ns_per_m, (1.0, 100.0)),
-            ("hand.tremor_hz", hand.tremor_hz, (0.0, 20.0)),
-            ("hand.tremor_m", hand.tremor_m, (0.0, 1e-3)),
-        ] {
-            if !(min..=max).contains(&value) {
-                return Err(ScriptedError {
-                    name,
-                    value,
-                    min,
-                    max,
-                });
-            }
-        }
-        Ok(())
-    }
-}
 
 /// The box as the operator sees it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -280,14 +154,16 @@ impl Scripted {
         let change = wish - self.wanted_velocity;
         let most = self.config.acceleration_m_per_s2 * TICK_S;
         self.wanted_velocity += change * (most / change.norm().max(most));
+        let hip = self
+            .hand
+            .step(self.wanted, self.wanted_velocity, force_on_hand);
         self.wanted += self.wanted_velocity * TICK_S;
         self.give_way();
         if self.phase == Phase::Push {
             self.pushed += self.wanted_velocity.dot(&self.seen.inward(self.face)) * TICK_S;
         }
         self.ticks_in_phase = self.ticks_in_phase.saturating_add(1);
-        self.hand
-            .step(self.wanted, self.wanted_velocity, force_on_hand)
+        hip
     }
 
     fn seconds_in_phase(&self) -> f64 {

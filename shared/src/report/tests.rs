@@ -1,0 +1,234 @@
+//! The document's keys, its nulls, and the table.
+
+use super::*;
+use crate::geometry::{Pose, Vec2};
+use crate::metrics::ForceMetrics;
+use crate::time::Time;
+use crate::wire::message::Cause;
+use serde_json::{Value, json};
+
+fn empty() -> RunReport<Value> {
+    RunReport::new("0.1.0", "demo", json!({ "mode": "recommended" }))
+}
+
+/// A report in which every key has a meaning.
+fn full() -> RunReport<Value> {
+    let mut counts = UpdateCounts::default();
+    (0..20_000).for_each(|tick| counts.tick(tick % 2 == 0));
+    (0..30).for_each(|_| counts.sent(Cause::Deadband));
+    counts.sent(Cause::ContactLost);
+    let mut force = ForceMetrics::default();
+    force.push(Vec2::new(2.0, 1.0), Vec2::new(1.9, 1.1));
+    let mut peak = ForcePeak::default();
+    peak.push(Vec2::new(2.0, 0.0));
+    peak.push(Vec2::new(2.5, 0.0));
+    let mut breaks = ContactBreaks::default();
+    for touch in [true, false, true, false] {
+        breaks.push(touch);
+    }
+    let mut pose = PoseError::default();
+    pose.push(&Pose::new(0.003, 0.004, 0.01), &Pose::default());
+    let mut age = AgeOfInformation::default();
+    age.push(Time::from_millis(150), Time::from_millis(40));
+
+    let mut report = empty();
+    report.seed = Some(1);
+    report.duration_s = 20.0.into();
+    report.ending = Some(ending_name(Ending::Finished).to_owned());
+    report.pushes = PushesReport::new(2, &breaks);
+    report.updates.set_sent(&counts);
+    report.updates.applied = Some(30);
+    report.updates.dropped = Some(Counts::from([("stale".to_owned(), 1)]));
+    report.updates.age_ms = AgeReport::from(&age);
+    report.messages.up.commands = Some(2000);
+    report.messages.up.heartbeats = Some(3);
+    report.messages.down.updates = Some(31);
+    report.messages.down.scenes = Some(600);
+    report.messages.down.heartbeats = Some(390);
+    report.wire.up = WireReport::new(2100, 336_000, 28, 20.0);
+    report.wire.down = WireReport::new(1100, 110_000, 28, 20.0);
+    report.force = ForceReport::new(&force.summary(), Some(&peak));
+    report.model.mass_kg = EstimateReport::new(0.707, 0.7);
+    report.model.damping_ns_per_m = EstimateReport::new(3.03, 3.0);
+    report.model.friction_n = EstimateReport::new(2.06, 2.0601);
+    report.pose = PoseReport::from(&pose);
+    report.link.rtt_ms = RttReport {
+        p50: 100.2.into(),
+        p99: 117.9.into(),
+    };
+    (report.link.loss_up, report.link.loss_down) = (0.01.into(), 0.012.into());
+    report.haptic_loop = LoopReport {
+        ticks: Some(20_000),
+        skipped: Some(2),
+        cpu_us: quantiles(3.1),
+        lateness_us: quantiles(12.0),
+    };
+    report.slave_loop = report.haptic_loop.clone();
+    report.drops = Some(Counts::from([("malformed".to_owned(), 0)]));
+    report
+}
+
+fn quantiles(p50: f64) -> QuantilesReport {
+    QuantilesReport {
+        p50: p50.into(),
+        p99: (p50 * 4.0).into(),
+        p999: (p50 * 9.0).into(),
+    }
+}
+
+/// Every path of the document; what hangs under the names of counts is left out.
+fn paths(value: &Value, prefix: &str, into: &mut Vec<String>) {
+    let open = [
+        "updates.by_cause",
+        "updates.dropped",
+        "drops",
+        "configuration",
+    ];
+    match value {
+        Value::Object(keys) if !open.contains(&prefix) => {
+            for (key, value) in keys {
+                let dot = if prefix.is_empty() { "" } else { "." };
+                paths(value, &format!("{prefix}{dot}{key}"), into);
+            }
+        }
+        _ => into.push(prefix.to_owned()),
+    }
+}
+
+const REQUIRED: &str = "version command seed duration_s ending configuration drops \
+    pushes.completed pushes.contact_breaks_per_push \
+    updates.sent updates.rate_hz updates.contact_rate_hz updates.by_cause updates.applied \
+    updates.dropped updates.age_ms.mean updates.age_ms.max \
+    messages.up.commands messages.up.updates messages.up.scenes messages.up.heartbeats \
+    messages.down.commands messages.down.updates messages.down.scenes messages.down.heartbeats \
+    wire.up.datagrams wire.up.bytes wire.up.rate_hz wire.up.bits_per_s wire.up.header_bytes \
+    wire.down.datagrams wire.down.bytes wire.down.rate_hz wire.down.bits_per_s \
+    wire.down.header_bytes \
+    force.samples force.contact_samples force.pmse force.pmse_x force.pmse_y \
+    force.pmse_magnitude force.relative_error force.error_rms_n force.jnd7_share \
+    force.jnd10_share force.largest_n force.largest_step_n \
+    model.mass_kg.estimate model.mass_kg.truth \
+    model.damping_ns_per_m.estimate model.damping_ns_per_m.truth \
+    model.friction_n.estimate model.friction_n.truth \
+    pose.position_rms_m pose.position_max_m pose.angle_rms_rad pose.angle_max_rad \
+    link.rtt_ms.p50 link.rtt_ms.p99 link.loss_up link.loss_down \
+    haptic_loop.ticks haptic_loop.skipped \
+    haptic_loop.cpu_us.p50 haptic_loop.cpu_us.p99 haptic_loop.cpu_us.p999 \
+    haptic_loop.lateness_us.p50 haptic_loop.lateness_us.p99 haptic_loop.lateness_us.p999 \
+    slave_loop.ticks slave_loop.skipped \
+    slave_loop.cpu_us.p50 slave_loop.cpu_us.p99 slave_loop.cpu_us.p999 \
+    slave_loop.lateness_us.p50 slave_loop.lateness_us.p99 slave_loop.lateness_us.p999";
+
+#[test]
+fn an_empty_report_and_a_full_one_have_the_same_keys_to_the_letter() {
+    let mut expected: Vec<_> = REQUIRED.split_whitespace().map(str::to_owned).collect();
+    expected.sort();
+    for report in [empty(), full()] {
+        let mut found = Vec::new();
+        paths(&serde_json::to_value(&report).unwrap(), "", &mut found);
+        found.sort();
+        assert_eq!(found, expected);
+    }
+}
+
+#[test]
+fn a_key_without_meaning_is_null_and_neither_missing_nor_zero() {
+    let document = serde_json::to_value(empty()).unwrap();
+    for path in REQUIRED.split_whitespace() {
+        let value = path.split('.').fold(&document, |value, key| &value[key]);
+        let meant = ["version", "command", "configuration"].contains(&path);
+        assert_eq!(value.is_null(), !meant, "{path}");
+    }
+}
+
+#[test]
+fn every_key_is_filled_by_a_run_in_which_it_has_a_meaning() {
+    let document = serde_json::to_value(full()).unwrap();
+    let other_way = [
+        "messages.up.updates",
+        "messages.up.scenes",
+        "messages.down.commands",
+    ];
+    for path in REQUIRED.split_whitespace() {
+        let value = path.split('.').fold(&document, |value, key| &value[key]);
+        assert_eq!(value.is_null(), other_way.contains(&path), "{path}");
+    }
+}
+
+#[test]
+fn values_stand_under_their_keys() {
+    let document = serde_json::to_value(full()).unwrap();
+    assert_eq!(document["updates"]["sent"], 31);
+    assert_eq!(document["updates"]["rate_hz"], 1.55);
+    assert_eq!(document["updates"]["contact_rate_hz"], 3.1);
+    assert_eq!(
+        document["updates"]["by_cause"],
+        json!({
+            "deadband": 30, "timer": 0, "master_only_contact": 0,
+            "slave_only_contact": 0, "contact_lost": 1, "every_sample": 0
+        })
+    );
+    assert_eq!(document["updates"]["dropped"], json!({ "stale": 1 }));
+    assert_eq!(document["updates"]["age_ms"]["max"], 110.0);
+    // 2100 datagrams of 160 bytes in 20 s: 105 a second, 188 bytes each with headers
+    assert_eq!(document["wire"]["up"]["rate_hz"], 105.0);
+    assert_eq!(document["wire"]["up"]["bits_per_s"], 157_920.0);
+    assert_eq!(document["pose"]["position_rms_m"], 0.005);
+    assert_eq!(document["force"]["largest_step_n"], 0.5);
+    assert_eq!(document["pushes"]["contact_breaks_per_push"], 1.0);
+    assert_eq!(document["configuration"]["mode"], "recommended");
+}
+
+#[test]
+fn numbers_that_are_not_finite_become_null() {
+    let mut report = full();
+    report.duration_s = f64::NAN.into();
+    report.model.mass_kg = EstimateReport::new(f64::INFINITY, 0.7);
+    report.wire.up = WireReport::new(1, 1, 28, 0.0);
+    let document = serde_json::to_value(&report).unwrap();
+    assert!(document["duration_s"].is_null());
+    assert!(document["model"]["mass_kg"]["estimate"].is_null());
+    assert!(document["wire"]["up"]["bits_per_s"].is_null());
+    let shown = report.to_string();
+    let nonsense = ["NaN", "inf", "-inf"];
+    let mut words = shown.split_whitespace();
+    assert!(words.all(|word| !nonsense.contains(&word)), "{shown}");
+}
+
+#[test]
+fn a_document_that_was_written_is_read_back_the_same() {
+    for report in [empty(), full()] {
+        let document = serde_json::to_value(&report).unwrap();
+        let back: RunReport<Value> = serde_json::from_value(document).unwrap();
+        assert_eq!(back, report);
+    }
+}
+
+#[test]
+fn the_table_shows_what_is_known_and_leaves_out_what_is_not() {
+    assert_eq!(empty().to_string(), "mmt demo 0.1.0\n");
+    let mut report = empty();
+    report.model.mass_kg = EstimateReport::new(0.707, None);
+    assert_eq!(
+        report.to_string(),
+        "mmt demo 0.1.0\n\nModel\n  mass m                    0.707 kg           -                  -\n"
+    );
+}
+
+#[test]
+fn the_table_of_a_full_report_is_aligned_and_stays_within_100_columns() {
+    let shown = full().to_string();
+    assert!(shown.starts_with("mmt demo 0.1.0, seed 1, 20.0 s, finished\n"));
+    for row in [
+        "  rate                      1.55 /s            3.10 /s of contact",
+        "  for deadband              30",
+        "  mass m                    0.707 kg           truth 0.700 kg     error 1.0 %",
+        "  loss                      up 1.0 %           down 1.2 %",
+        "  datagrams up              2100               105.0 /s           336000 B           157.9 kbit/s",
+    ] {
+        assert!(shown.lines().any(|line| line == row), "{row}\n{shown}");
+    }
+    for line in shown.lines() {
+        assert!(line.len() <= 100 && line.is_ascii(), "{line}");
+    }
+}
