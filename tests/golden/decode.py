@@ -1,0 +1,280 @@
+#!/usr/bin/env python3
+"""Decodes mmt's golden vectors, from docs/protocol.md alone: it shares no code with mmt.
+
+Reads every *.json beside it, compares each decoded field, and makes sure that each message of
+must_refuse.json is refused. Prints what it checked; exit code 1 at the first difference.
+Python 3.8 or later, standard library only.
+"""
+
+import json
+import math
+import pathlib
+import struct
+import sys
+import unicodedata
+
+KINDS = {1: "command", 2: "update", 3: "scene", 4: "heartbeat", 16: "hello", 17: "welcome",
+         18: "refused", 19: "master_farewell", 20: "slave_farewell"}
+SENDERS = {"command": ["master"], "update": ["slave"], "scene": ["slave"],
+           "heartbeat": ["master", "slave"], "hello": ["master"], "welcome": ["slave"],
+           "refused": ["slave"], "master_farewell": ["master"], "slave_farewell": ["slave"]}
+DATAGRAM_TYPES = ["command", "update", "scene", "heartbeat"]
+STATE = ["m", "b", "c", "inertia", "e", "east", "north", "west", "south",
+         "x", "y", "angle", "v_x", "v_y", "omega"]
+
+
+class Refused(Exception):
+    """These bytes are no message."""
+
+
+def demand(holds, why):
+    if not holds:
+        raise Refused(why)
+
+
+class Reader:
+    """Takes values from the front of a body."""
+
+    def __init__(self, data):
+        self.data, self.at = data, 0
+
+    def take(self, count):
+        demand(self.at + count <= len(self.data), "ends too early")
+        self.at += count
+        return self.data[self.at - count:self.at]
+
+    def u8(self):
+        return self.take(1)[0]
+
+    def varint(self, bits):
+        value = shift = 0
+        while True:
+            byte = self.u8()
+            value |= (byte & 0x7F) << shift
+            shift += 7
+            if byte < 0x80:
+                demand(byte != 0 or shift == 7, "over-long varint")
+                demand(value < 1 << bits, "varint beyond its type")
+                return value
+            demand(shift < bits, "varint too long")
+
+    def u32(self):
+        return self.varint(32)
+
+    def u64(self):
+        return self.varint(64)
+
+    def zigzag(self, bits):
+        value = self.varint(bits)
+        return value >> 1 if value % 2 == 0 else -(value + 1 >> 1)
+
+    def i32(self):
+        return self.zigzag(32)
+
+    def f64(self):
+        value = struct.unpack("<d", self.take(8))[0]
+        demand(math.isfinite(value), "float not finite")
+        return value
+
+    def floats(self, count):
+        return [self.f64() for _ in range(count)]
+
+    def boolean(self):
+        value = self.u8()
+        demand(value < 2, "truth value neither 0 nor 1")
+        return value == 1
+
+    def option(self, read):
+        return read() if self.boolean() else None
+
+    def choice(self, names):
+        value = self.u32()
+        demand(value < len(names), "unknown choice")
+        return names[value]
+
+    def text(self):
+        raw = self.take(self.u32())
+        demand(len(raw) <= 64, "text too long")
+        try:
+            text = raw.decode("utf-8")
+        except UnicodeDecodeError as error:
+            raise Refused("not UTF-8") from error
+        demand(all(unicodedata.category(c) != "Cc" for c in text), "control character")
+        return text
+
+    def numbered(self):
+        value = self.u32()
+        demand(value >= 1, "number 0")
+        return value
+
+
+def echo(r):
+    return {"number": r.numbered(), "sent": r.u64(), "held_ns": r.u64(), "received": r.u32()}
+
+
+def envelope(r):
+    return {"number": r.numbered(), "sent": r.u64(), "echo": r.option(lambda: echo(r))}
+
+
+def in_i32(value):
+    demand(-2**31 <= value < 2**31, "sample leaves 32 bits")
+    return value
+
+
+def samples(r):
+    count = r.u32()
+    demand(1 <= count <= 32, "number of samples")
+    sample = {"stamp": r.u64(), "x": r.i32(), "y": r.i32(), "force_x": r.i32(), "force_y": r.i32()}
+    block = [sample]
+    for _ in range(count - 1):
+        ticks = r.u32()
+        demand(ticks >= 1, "time stands still")
+        stamp = sample["stamp"] + ticks * 1_000_000
+        demand(stamp < 2**64, "stamp leaves 64 bits")
+        fields = ("x", "y", "force_x", "force_y")
+        sample = {"stamp": stamp, **{k: in_i32(sample[k] + r.zigzag(64)) for k in fields}}
+        block.append(sample)
+    return block
+
+
+def state(r):
+    return dict(zip(STATE, r.floats(15)))
+
+
+def command(r):
+    return {**envelope(r), "newest_update": r.u32(), "samples": samples(r)}
+
+
+def update(r):
+    causes = ["deadband", "timer", "master_only_contact", "slave_only_contact", "contact_lost",
+              "every_sample"]
+    return {**envelope(r), "sequence": r.numbered(), "cause": r.choice(causes),
+            "answers": r.u64(), "newest_command": r.u32(), "slave_in_contact": r.boolean(),
+            "state": state(r)}
+
+
+def scene(r):
+    return {**envelope(r), "answers": r.u64(), "object": r.floats(3), "tool": r.floats(2),
+            "force": r.floats(2)}
+
+
+def hello(r):
+    return {"token": r.take(32).hex(), "role": r.choice(["operator"]),
+            "stiffness_n_per_m": r.f64(), "damping_ns_per_m": r.f64(),
+            "samples_per_command": r.u8(), "hip": r.floats(2), "program": r.text()}
+
+
+def welcome(r):
+    fields = {"stiffness_n_per_m": r.f64(), "damping_ns_per_m": r.f64(),
+              "friction": r.choice(["sign", "limit_surface"]),
+              "smoothing": r.choice(["per_packet", "in_time"])}
+    fields["lambda" if fields["smoothing"] == "per_packet" else "tau_s"] = r.f64()
+    return {**fields, "correction": r.choice(["snap", "matched_stamps"]), "state": state(r),
+            "scheme": r.text(), "program": r.text()}
+
+
+def refused(r):
+    return {"refusal": r.choice(["busy", "wrong_token", "bad_hello", "ending"])}
+
+
+def counters(r, names, read):
+    return {name: read() for name in names.split()}
+
+
+def traffic(r):
+    kinds = "commands updates scenes heartbeats"
+    udp = "udp_datagrams_sent udp_bytes_sent udp_datagrams_received udp_bytes_received"
+    return {"sent": counters(r, kinds, r.u32), "received": counters(r, kinds, r.u32),
+            **counters(r, "duplicates too_old malformed", r.u32), **counters(r, udp, r.u64)}
+
+
+def ending(r):
+    return r.choice(["finished", "interrupted", "failed"])
+
+
+def master_farewell(r):
+    def quantiles():
+        return dict(zip(("p50", "p99", "p999"), r.floats(3)))
+
+    why = ending(r)
+    totals = {"duration_ns": r.u64(), "traffic": traffic(r), "updates_applied": r.u32()}
+    drops = "duplicate stale rejected superseded frozen"
+    totals["updates_dropped"] = counters(r, drops, r.u32)
+    totals["haptic_loop"] = {"ticks": r.u64(), "skipped": r.u64(),
+                             "cpu_us": r.option(quantiles), "lateness_us": r.option(quantiles)}
+    return {"ending": why, "totals": totals}
+
+
+def slave_farewell(r):
+    why = ending(r)
+    totals = {"duration_ns": r.u64(), "traffic": traffic(r),
+              "updates_by_cause": [r.u32() for _ in range(6)], "samples_received": r.u64()}
+    metrics = "pmse pmse_x pmse_y pmse_magnitude relative_error jnd7_share"
+    totals["force"] = {name: r.option(r.f64) for name in metrics.split()}
+    for name in ("mass_kg", "damping_ns_per_m", "friction_n"):
+        totals[name] = {"estimate": r.option(r.f64), "truth": r.option(r.f64)}
+    return {"ending": why, "totals": totals}
+
+
+BODIES = {"command": command, "update": update, "scene": scene, "heartbeat": envelope,
+          "hello": hello, "welcome": welcome, "refused": refused,
+          "master_farewell": master_farewell, "slave_farewell": slave_farewell}
+
+
+def decode(data, channel, sender):
+    """The type and the fields of one message; raises Refused if the bytes are none."""
+    if channel == "stream":
+        demand(len(data) >= 4, "no length prefix")
+        length = struct.unpack("<I", data[:4])[0]
+        demand(8 <= length <= 4096, "length prefix")
+        data = data[4:]
+        demand(len(data) == length, "length prefix does not match")
+    demand(len(data) <= (1024 if channel == "datagram" else 4096), "too long")
+    demand(len(data) >= 8, "shorter than a header")
+    magic, version, number, flags = struct.unpack("<4sBBH", data[:8])
+    demand(magic == b"MMTP", "other magic")
+    demand(version == 1, f"the other side speaks version {version}, this side version 1")
+    demand(number in KINDS, "unknown type")
+    demand(flags == 0, "unknown flags")
+    kind = KINDS[number]
+    demand((kind in DATAGRAM_TYPES) == (channel == "datagram"), "wrong channel")
+    demand(sender in SENDERS[kind], "wrong direction")
+    reader = Reader(data[8:])
+    fields = BODIES[kind](reader)
+    demand(reader.at == len(reader.data), "bytes left after the body")
+    return kind, fields
+
+
+def same(a, b):
+    """Equal, and alike in the sign of zero."""
+    return json.dumps(a, sort_keys=True) == json.dumps(b, sort_keys=True)
+
+
+def main():
+    here = pathlib.Path(__file__).resolve().parent
+    decoded = refusals = 0
+    for kind in KINDS.values():
+        book = json.loads((here / f"{kind}.json").read_text(encoding="utf-8"))
+        for vector in book["vectors"]:
+            name = f"{kind}/{vector['name']}"
+            data = bytes.fromhex(vector["hex"])
+            try:
+                read = decode(data, book["channel"], vector["from"])
+            except Refused as error:
+                sys.exit(f"{name}: refused: {error}")
+            if not same(read, (kind, vector["fields"])):
+                sys.exit(f"{name}: decoded to\n{json.dumps(read[1])}\ninstead of\n"
+                         f"{json.dumps(vector['fields'])}")
+            decoded += 1
+    for vector in json.loads((here / "must_refuse.json").read_text(encoding="utf-8")):
+        try:
+            read = decode(bytes.fromhex(vector["hex"]), vector["channel"], vector["from"])
+        except Refused:
+            refusals += 1
+        else:
+            sys.exit(f"must_refuse/{vector['name']}: read as {read}: {vector['why']}")
+    print(f"{decoded} messages decoded, {refusals} refused")
+
+
+if __name__ == "__main__":
+    main()
