@@ -8,6 +8,8 @@
 pub mod config;
 pub mod counters;
 pub mod effect;
+#[cfg(feature = "io")]
+pub mod io;
 pub mod link;
 pub mod pipe;
 mod quantile;

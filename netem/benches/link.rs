@@ -1,0 +1,62 @@
+//! What a packet costs in the pure link.
+
+#![allow(missing_docs, reason = "criterion's macros make undocumented items")]
+
+use std::hint::black_box;
+
+use criterion::{Criterion, criterion_group, criterion_main};
+use mmt_netem::{Link, LinkId, PacketMeta, Pipe};
+use mmt_shared::time::{TICK, Time};
+
+const SETTINGS: [&str; 4] = [
+    "none",
+    "delay 50ms",
+    "delay 50ms 5ms loss 1%",
+    "delay 50ms 5ms distribution normal loss 1%",
+];
+
+fn offer(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("Link::offer");
+    for words in SETTINGS {
+        let Ok(config) = words.parse() else { continue };
+        let Ok(mut link) = Link::try_new(config, 1, LinkId::UP) else {
+            continue;
+        };
+        let mut now = Time::ZERO;
+        group.bench_function(words, |bencher| {
+            bencher.iter(|| {
+                now += TICK;
+                let meta = PacketMeta {
+                    bytes: 100,
+                    in_flight: 50,
+                };
+                link.offer(black_box(now), black_box(meta))
+            });
+        });
+    }
+    group.finish();
+}
+
+fn through_a_pipe(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("Pipe: push and pop");
+    for words in SETTINGS {
+        let Ok(config) = words.parse() else { continue };
+        let Ok(mut pipe) = Pipe::try_new(config, 1, LinkId::UP) else {
+            continue;
+        };
+        let mut now = Time::ZERO;
+        group.bench_function(words, |bencher| {
+            bencher.iter(|| {
+                now += TICK;
+                while let Some(packet) = pipe.pop_due(now) {
+                    black_box(packet);
+                }
+                pipe.push(now, 100, 0_u64)
+            });
+        });
+    }
+    group.finish();
+}
+
+criterion_group!(benches, offer, through_a_pipe);
+criterion_main!(benches);

@@ -1,0 +1,21 @@
+//! The drivers in real time: [`socket`] wraps a QUIC socket, [`relay`] stands between two hosts.
+//!
+//! Both let the pure [`crate::Pipe`] decide and only keep its times, each on one thread of its own that
+//! waits for absolute deadlines. How late it was is measured ([`lateness`]) and never fed back.
+
+#![allow(
+    clippy::disallowed_methods,
+    reason = "the drivers are the shell: they read the clock, own sockets and threads"
+)]
+
+pub mod alarm;
+pub mod lateness;
+pub mod relay;
+pub mod socket;
+
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+/// Locks; what a panicking thread left behind is plain counts and queues, good to go on with.
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}

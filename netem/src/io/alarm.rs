@@ -1,0 +1,108 @@
+//! The clock of the drivers, and waiting for a deadline or a call, whichever comes first.
+
+use std::io;
+use std::num::NonZeroU64;
+use std::os::fd::{AsFd, OwnedFd};
+use std::sync::Arc;
+use std::task::Wake;
+
+use mmt_shared::time::Time;
+use rustix::event::{EventfdFlags, PollFd, PollFlags, Timespec, eventfd, poll};
+use rustix::time::{ClockId, clock_gettime};
+
+/// The time of `CLOCK_MONOTONIC`, which is the clock of every `Time` in the drivers.
+#[must_use]
+pub fn now() -> Time {
+    let time = clock_gettime(ClockId::Monotonic);
+    let seconds = u64::try_from(time.tv_sec).unwrap_or(0);
+    let nanos = u64::try_from(time.tv_nsec).unwrap_or(0);
+    Time::from_nanos(seconds.saturating_mul(1_000_000_000).saturating_add(nanos))
+}
+
+/// Asks the kernel to wake the calling thread at its deadlines instead of up to 50 us after them.
+pub(crate) fn sharpen_deadlines() {
+    // Refused nowhere that matters; the lateness histogram would show it.
+    let _ = rustix::thread::set_current_timer_slack(NonZeroU64::new(1));
+}
+
+/// Waits until one of `fds` is ready or the deadline has passed. May return early.
+///
+/// # Errors
+/// Those of ppoll, but an interruption counts as an early return.
+pub(crate) fn wait(fds: &mut [PollFd<'_>], until: Option<Time>) -> io::Result<()> {
+    let timeout = until
+        .map(|deadline| deadline.saturating_since(now()))
+        .and_then(|left| Timespec::try_from(left).ok());
+    match poll(fds, timeout.as_ref()) {
+        Ok(_) | Err(rustix::io::Errno::INTR) => Ok(()),
+        Err(errno) => Err(errno.into()),
+    }
+}
+
+/// A bell that wakes one waiting thread; rung before the wait, it ends the wait at once.
+#[derive(Debug)]
+pub(crate) struct Alarm(OwnedFd);
+
+impl Alarm {
+    pub(crate) fn try_new() -> io::Result<Self> {
+        let flags = EventfdFlags::CLOEXEC | EventfdFlags::NONBLOCK;
+        Ok(Self(eventfd(0, flags)?))
+    }
+
+    pub(crate) fn ring(&self) {
+        // It fails only when the bell has been rung 2^64 - 2 times unheard: it rings already.
+        let _ = rustix::io::write(&self.0, &1_u64.to_ne_bytes());
+    }
+
+    /// Stops the ringing; call it after a wait, before looking for the reason.
+    pub(crate) fn silence(&self) {
+        // It fails only when the bell does not ring.
+        let _ = rustix::io::read(&self.0, &mut [0; 8]);
+    }
+
+    pub(crate) fn as_poll_fd(&self) -> PollFd<'_> {
+        PollFd::from_borrowed_fd(self.0.as_fd(), PollFlags::IN)
+    }
+
+    /// Waits for a ring or the deadline. May return early.
+    pub(crate) fn wait(&self, until: Option<Time>) -> io::Result<()> {
+        wait(&mut [self.as_poll_fd()], until)?;
+        self.silence();
+        Ok(())
+    }
+}
+
+impl Wake for Alarm {
+    fn wake(self: Arc<Self>) {
+        self.ring();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::Duration;
+
+    use super::*;
+
+    #[test]
+    fn a_wait_ends_at_its_deadline_and_not_long_before() {
+        let alarm = Alarm::try_new().unwrap();
+        let deadline = now() + Duration::from_millis(5);
+        while now() < deadline {
+            alarm.wait(Some(deadline)).unwrap();
+        }
+        assert!(now() >= deadline);
+    }
+
+    #[test]
+    fn a_ring_before_the_wait_is_heard_once() {
+        let alarm = Alarm::try_new().unwrap();
+        alarm.ring();
+        alarm.ring();
+        // would wait for ever if the rings were lost
+        alarm.wait(None).unwrap();
+        let mut fds = [alarm.as_poll_fd()];
+        wait(&mut fds, Some(Time::ZERO)).unwrap();
+        assert!(fds[0].revents().is_empty(), "still ringing");
+    }
+}

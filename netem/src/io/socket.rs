@@ -1,0 +1,195 @@
+//! The *wrap* driver: a QUIC socket whose outgoing datagrams pass through an emulated link.
+//!
+//! [`EmulatedSocket`] decorates any socket of quinn's. Without emulation it passes straight through and
+//! only counts. With it, each datagram is judged at once and the ones that go on are sent by a thread of
+//! their own at their times; sending never blocks, never waits and never reports a full queue: what does
+//! not fit is dropped and counted.
+
+use std::fmt;
+use std::io::{self, IoSliceMut};
+use std::net::{IpAddr, SocketAddr};
+use std::pin::Pin;
+use std::sync::Arc;
+use std::task::{Context, Poll};
+
+use quinn::udp::{EcnCodepoint, RecvMeta, Transmit};
+use quinn::{AsyncUdpSocket, UdpPoller};
+
+use crate::config::{ConfigError, LinkConfig};
+use crate::link::LinkId;
+
+mod meter;
+mod release;
+#[cfg(test)]
+mod tests;
+
+pub use meter::{SocketCounters, SocketDrops, SocketMeter};
+use release::Release;
+
+/// A socket could not be wrapped.
+#[derive(Debug, thiserror::Error)]
+pub enum WrapError {
+    /// The settings of the link are out of range.
+    #[error(transparent)]
+    Config(#[from] ConfigError),
+    /// The system gave no event descriptor or no thread.
+    #[error("no thread for the emulated link: {0}")]
+    Thread(#[from] io::Error),
+    /// The lateness histogram could not be made.
+    #[error("no histogram for the emulated link: {0}")]
+    Histogram(#[from] hdrhistogram::CreationError),
+}
+
+/// A socket for `quinn::Endpoint::new_with_abstract_socket` that emulates a link on what it sends.
+///
+/// When it is dropped its thread ends; datagrams still in flight are counted as abandoned.
+pub struct EmulatedSocket {
+    inner: Arc<dyn AsyncUdpSocket>,
+    meter: SocketMeter,
+    /// None: nothing to emulate.
+    release: Option<Release>,
+}
+
+impl EmulatedSocket {
+    /// Wraps `inner`. A transparent `config` makes no thread and sends straight through.
+    ///
+    /// # Errors
+    /// Settings out of range, or no thread to be had.
+    pub fn try_new(
+        inner: Arc<dyn AsyncUdpSocket>,
+        config: LinkConfig,
+        seed: u64,
+        id: LinkId,
+    ) -> Result<Self, WrapError> {
+        let meter = SocketMeter::try_new()?;
+        config.check()?;
+        let release = match config.is_transparent() {
+            true => None,
+            false => Some(Release::start(&inner, config, seed, id, &meter)?),
+        };
+        Ok(Self {
+            inner,
+            meter,
+            release,
+        })
+    }
+
+    /// The counters, for as long as anybody wants to read them.
+    #[must_use]
+    pub fn meter(&self) -> SocketMeter {
+        self.meter.clone()
+    }
+}
+
+impl AsyncUdpSocket for EmulatedSocket {
+    fn create_io_poller(self: Arc<Self>) -> Pin<Box<dyn UdpPoller>> {
+        match self.release {
+            Some(_) => Box::pin(AlwaysWritable),
+            None => self.inner.clone().create_io_poller(),
+        }
+    }
+
+    fn try_send(&self, transmit: &Transmit<'_>) -> io::Result<()> {
+        let Some(release) = &self.release else {
+            let sent = self.inner.try_send(transmit);
+            self.meter.passed_through(transmit, &sent);
+            return sent;
+        };
+        for contents in segments(transmit) {
+            release.offer(Datagram::of(transmit, contents));
+        }
+        Ok(())
+    }
+
+    fn poll_recv(
+        &self,
+        cx: &mut Context<'_>,
+        bufs: &mut [IoSliceMut<'_>],
+        meta: &mut [RecvMeta],
+    ) -> Poll<io::Result<usize>> {
+        let polled = self.inner.poll_recv(cx, bufs, meta);
+        if let Poll::Ready(Ok(messages)) = &polled {
+            self.meter.received(meta.iter().take(*messages));
+        }
+        polled
+    }
+
+    fn local_addr(&self) -> io::Result<SocketAddr> {
+        self.inner.local_addr()
+    }
+
+    fn max_transmit_segments(&self) -> usize {
+        match self.release {
+            // each datagram has its own fate
+            Some(_) => 1,
+            None => self.inner.max_transmit_segments(),
+        }
+    }
+
+    fn max_receive_segments(&self) -> usize {
+        self.inner.max_receive_segments()
+    }
+
+    fn may_fragment(&self) -> bool {
+        self.inner.may_fragment()
+    }
+}
+
+impl fmt::Debug for EmulatedSocket {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("EmulatedSocket")
+            .field("inner", &self.inner)
+            .field("emulates", &self.release.is_some())
+            .finish_non_exhaustive()
+    }
+}
+
+/// The emulated link takes or drops every datagram: there is never anything to wait for.
+#[derive(Debug)]
+struct AlwaysWritable;
+
+impl UdpPoller for AlwaysWritable {
+    fn poll_writable(self: Pin<&mut Self>, _: &mut Context<'_>) -> Poll<io::Result<()>> {
+        Poll::Ready(Ok(()))
+    }
+}
+
+/// An outgoing datagram with all that quinn says about it.
+#[derive(Clone, Debug)]
+struct Datagram {
+    destination: SocketAddr,
+    ecn: Option<EcnCodepoint>,
+    src_ip: Option<IpAddr>,
+    contents: Vec<u8>,
+}
+
+impl Datagram {
+    fn of(transmit: &Transmit<'_>, contents: &[u8]) -> Self {
+        Self {
+            destination: transmit.destination,
+            ecn: transmit.ecn,
+            src_ip: transmit.src_ip,
+            contents: contents.to_owned(),
+        }
+    }
+
+    fn as_transmit(&self) -> Transmit<'_> {
+        Transmit {
+            destination: self.destination,
+            ecn: self.ecn,
+            contents: &self.contents,
+            segment_size: None,
+            src_ip: self.src_ip,
+        }
+    }
+}
+
+/// The datagrams in a transmit: one, or as many as the segment size makes of it.
+fn segments<'a>(transmit: &Transmit<'a>) -> impl Iterator<Item = &'a [u8]> {
+    let contents = transmit.contents;
+    let whole = contents.len().max(1);
+    let size = transmit.segment_size.unwrap_or(whole).clamp(1, whole);
+    // an empty datagram is one datagram too
+    let empty = contents.is_empty().then_some(contents);
+    contents.chunks(size).chain(empty)
+}

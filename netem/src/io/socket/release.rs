@@ -1,0 +1,184 @@
+//! The thread that sends each datagram at its time.
+
+use std::io;
+use std::pin::Pin;
+use std::sync::{Arc, Mutex};
+use std::task::{Context, Poll, Waker};
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+use mmt_shared::time::Time;
+use quinn::{AsyncUdpSocket, UdpPoller};
+
+use super::meter::{SocketMeter, Unsent};
+use super::{Datagram, WrapError};
+use crate::config::LinkConfig;
+use crate::io::alarm::{Alarm, now, sharpen_deadlines};
+use crate::io::lock;
+use crate::link::{Fate, LinkId};
+use crate::pipe::{Pipe, Released};
+
+/// How long the thread waits for a full socket before it drops the datagram: long against the time in
+/// which a kernel empties a socket, short against the delays that are emulated.
+const PATIENCE: Duration = Duration::from_millis(10);
+
+/// The emulated link of a socket, and its thread. Dropping it ends the thread.
+pub(super) struct Release {
+    shared: Arc<Shared>,
+    thread: Option<JoinHandle<()>>,
+}
+
+struct Shared {
+    queue: Mutex<Queue>,
+    alarm: Arc<Alarm>,
+    meter: SocketMeter,
+}
+
+struct Queue {
+    pipe: Pipe<Datagram>,
+    closed: bool,
+}
+
+impl Release {
+    pub(super) fn start(
+        inner: &Arc<dyn AsyncUdpSocket>,
+        config: LinkConfig,
+        seed: u64,
+        id: LinkId,
+        meter: &SocketMeter,
+    ) -> Result<Self, WrapError> {
+        let shared = Arc::new(Shared {
+            queue: Mutex::new(Queue {
+                pipe: Pipe::try_new(config, seed, id)?,
+                closed: false,
+            }),
+            alarm: Arc::new(Alarm::try_new()?),
+            meter: meter.clone(),
+        });
+        let sender = Sender {
+            poller: inner.clone().create_io_poller(),
+            inner: inner.clone(),
+            waker: Waker::from(shared.alarm.clone()),
+            shared: shared.clone(),
+        };
+        let thread = std::thread::Builder::new()
+            .name("netem-send".to_owned())
+            .spawn(move || sender.run())?;
+        Ok(Self {
+            shared,
+            thread: Some(thread),
+        })
+    }
+
+    /// Puts a datagram on the link, now.
+    pub(super) fn offer(&self, datagram: Datagram) {
+        let bytes = datagram.contents.len();
+        self.shared.meter.offered(bytes);
+        let mut queue = lock(&self.shared.queue);
+        let next = queue.pipe.next_due();
+        // read under the lock: times of offers never go back
+        let fate = queue.pipe.push(now(), bytes, datagram);
+        let sooner = queue.pipe.next_due() != next;
+        drop(queue);
+        if let Fate::Drop(cause) = fate {
+            self.shared.meter.dropped(cause, bytes);
+        }
+        if sooner {
+            self.shared.alarm.ring();
+        }
+    }
+}
+
+impl Drop for Release {
+    fn drop(&mut self) {
+        lock(&self.shared.queue).closed = true;
+        self.shared.alarm.ring();
+        if let Some(thread) = self.thread.take() {
+            // It panicked: there is nothing left to end.
+            let _ = thread.join();
+        }
+    }
+}
+
+/// What the thread does next.
+enum Step {
+    Send(Released<Datagram>),
+    Wait(Option<Time>),
+    End,
+}
+
+/// The thread's own half.
+struct Sender {
+    inner: Arc<dyn AsyncUdpSocket>,
+    poller: Pin<Box<dyn UdpPoller>>,
+    waker: Waker,
+    shared: Arc<Shared>,
+}
+
+impl Sender {
+    fn run(mut self) {
+        sharpen_deadlines();
+        loop {
+            match self.step() {
+                Step::Send(packet) => self.release(&packet),
+                // Only a program error makes the wait fail; to end beats to spin.
+                Step::Wait(until) if self.shared.alarm.wait(until).is_ok() => {}
+                Step::Wait(_) | Step::End => break self.abandon(),
+            }
+        }
+    }
+
+    fn step(&self) -> Step {
+        let mut queue = lock(&self.shared.queue);
+        if queue.closed {
+            return Step::End;
+        }
+        match queue.pipe.pop_due(now()) {
+            Some(packet) => Step::Send(packet),
+            None => Step::Wait(queue.pipe.next_due()),
+        }
+    }
+
+    fn release(&mut self, packet: &Released<Datagram>) {
+        let meter = self.shared.meter.clone();
+        meter.recorder().record(packet.due, now());
+        match self.send(&packet.payload) {
+            Ok(()) => meter.sent(packet.bytes),
+            Err(why) => meter.unsent(why, packet.bytes),
+        }
+    }
+
+    /// Sends, waiting at most [`PATIENCE`] for room in the socket.
+    fn send(&mut self, datagram: &Datagram) -> Result<(), Unsent> {
+        let deadline = now() + PATIENCE;
+        loop {
+            match self.inner.try_send(&datagram.as_transmit()) {
+                Ok(()) => return Ok(()),
+                Err(error) if error.kind() != io::ErrorKind::WouldBlock => {
+                    return Err(Unsent::Failed);
+                }
+                Err(_) if now() >= deadline => return Err(Unsent::Blocked),
+                Err(_) => self.wait_for_room(deadline)?,
+            }
+        }
+    }
+
+    fn wait_for_room(&mut self, deadline: Time) -> Result<(), Unsent> {
+        let mut cx = Context::from_waker(&self.waker);
+        match self.poller.as_mut().poll_writable(&mut cx) {
+            Poll::Ready(Ok(())) => Ok(()),
+            Poll::Ready(Err(_)) => Err(Unsent::Failed),
+            Poll::Pending => {
+                let waited = self.shared.alarm.wait(Some(deadline));
+                waited.map_err(|_| Unsent::Failed)
+            }
+        }
+    }
+
+    fn abandon(&self) {
+        let mut queue = lock(&self.shared.queue);
+        while let Some(packet) = queue.pipe.pop_due(Time::MAX) {
+            self.shared.meter.unsent(Unsent::Abandoned, packet.bytes);
+        }
+    }
+}
