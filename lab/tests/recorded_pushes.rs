@@ -3,7 +3,8 @@
 //! The data lie beside the repository. Where they are missing these tests say so loudly, and fail in CI.
 #![allow(
     clippy::disallowed_methods,
-    reason = "a test reads the recorded files and the environment variable CI"
+    clippy::unwrap_used,
+    reason = "a test reads the recorded files and the environment variable CI, and fails by panicking"
 )]
 
 use mmt_client::operator::trace::Trace;
@@ -14,8 +15,8 @@ use std::path::Path;
 /// A file, and the least upper bounds, with a margin, of what held-out prediction achieves on it:
 /// median |F| error of the limit surface at a point, of three points, of the surface from the twist.
 const FILES: [(&str, [f64; 3]); 4] = [
-    ("black-patch", [0.05, 0.05, 0.07]),
-    ("wood-patch", [0.075, 0.075, 0.11]),
+    ("black-patch", [0.035, 0.050, 0.055]),
+    ("wood-patch", [0.065, 0.095, 0.080]),
     ("black-3pt-10-130", [0.08, 0.08, 0.14]),
     ("black-3pt-30-90", [0.11, 0.11, 0.23]),
 ];

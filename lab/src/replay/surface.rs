@@ -76,7 +76,7 @@ impl Law {
 pub struct Surface {
     /// Friction c when the block slides without turning, N.
     pub friction_n: f64,
-    /// e/c: friction torque over friction, m.
+    /// e/c: friction torque over friction, m; positive.
     pub arm_m: f64,
     /// Centre of friction from the block's reference point, block's frame, m.
     pub centre_m: Vec2,
