@@ -1,1 +1,3 @@
-//! placeholder
+//! Experiments in virtual time: everything that is computed about the system rather than by it.
+
+pub mod replay;
