@@ -4,10 +4,10 @@
 //! name. Only `environment` names the physics engine.
 
 pub mod environment;
-pub mod link;
-pub mod trigger;
-pub mod playout;
-pub mod sensing;
-//! placeholder
-
 pub mod estimator;
+pub mod link;
+pub mod playout;
+pub mod pose_observer;
+pub mod sensing;
+pub mod slave;
+pub mod trigger;

@@ -8,91 +8,21 @@ use mmt_shared::contact::Coupling;
 use mmt_shared::geometry::{BoxFootprint, Pose, Twist, Vec2};
 use mmt_shared::local_model::LocalModel;
 use mmt_shared::metrics::ForceMetrics;
-use mmt_shared::params::{ModelParams, ModelState, ParamsError};
+use mmt_shared::params::{ModelParams, ModelState};
 use mmt_shared::settings::{Mode, ModelSettings};
-use mmt_shared::time::{TICK_S, Time};
+use mmt_shared::time::Time;
 use mmt_shared::wire::{Cause, HipSample, Scene, Update};
-use serde::{Deserialize, Serialize};
 
-use crate::environment::{Environment, EnvironmentConfig, EnvironmentError};
+use crate::environment::{Environment, EnvironmentConfig};
 use crate::estimator::{Estimate, Estimator, EstimatorConfig, Measured};
-use crate::playout::{PlayoutBuffer, PlayoutConfig};
+use crate::playout::PlayoutBuffer;
 use crate::pose_observer::{ObserverConfig, PoseObserver};
-use crate::sensing::{Sensing, SensingConfig};
-use crate::trigger::{ContactDetector, Trigger, TriggerConfig, TriggerInput};
+use crate::sensing::Sensing;
+use crate::trigger::{Candidate, ContactDetector, Trigger, TriggerInput};
 
-/// What the local model starts from before anything is known of the object.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct StartModel {
-    /// m, kg.
-    pub mass_kg: f64,
-    /// b, N s/m.
-    pub damping_ns_per_m: f64,
-    /// c, N.
-    pub friction_n: f64,
-    /// Side l of the model, m.
-    pub side_m: f64,
-}
+mod config;
 
-impl Default for StartModel {
-    /// Wrong on purpose, so that the estimator has something to do; the side is the paper's (IV-A).
-    fn default() -> Self {
-        Self { mass_kg: 0.4, damping_ns_per_m: 0.0, friction_n: 1.0, side_m: 0.40 }
-    }
-}
-
-/// Everything that a slave is made of.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct SlaveConfig {
-    /// Seed of the sensors' noise.
-    pub seed: u64,
-    /// The bundle of choices: paper or recommended.
-    pub mode: Mode,
-    /// The real object and its ground.
-    pub environment: EnvironmentConfig,
-    /// Noise, vision.
-    pub sensing: SensingConfig,
-    /// Buffer for the master's samples.
-    pub playout: PlayoutConfig,
-    /// When updates are sent.
-    pub trigger: TriggerConfig,
-    /// What the local model starts from.
-    pub start: StartModel,
-}
-
-impl SlaveConfig {
-    /// The default of a mode: the default scenario, with the mode's update scheme.
-    #[must_use]
-    pub fn of_mode(mode: Mode) -> Self {
-        Self {
-            seed: 1,
-            mode,
-            environment: EnvironmentConfig::default(),
-            sensing: SensingConfig::default(),
-            playout: PlayoutConfig::default(),
-            trigger: TriggerConfig::of_mode(mode),
-            start: StartModel::default(),
-        }
-    }
-}
-
-impl Default for SlaveConfig {
-    fn default() -> Self {
-        Self::of_mode(Mode::Recommended)
-    }
-}
-
-/// Why a slave could not be made.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum SlaveError {
-    /// The environment's numbers are wrong.
-    #[error("environment: {0}")]
-    Environment(#[from] EnvironmentError),
-    /// The start model's numbers are not accepted.
-    #[error("start model: {0}")]
-    Start(#[from] ParamsError),
-}
+pub use config::{SlaveConfig, SlaveError, StartModel};
 
 /// What one tick of the slave gave.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -118,7 +48,7 @@ pub struct SlaveTick {
 /// The slave between the link and the object.
 pub struct Slave {
     settings: ModelSettings,
-    start: StartModel,
+    learn: bool,
     playout: PlayoutBuffer,
     environment: Environment,
     sensing: Sensing,
@@ -127,7 +57,6 @@ pub struct Slave {
     estimator: Estimator,
     shadow: LocalModel,
     trigger: Trigger,
-    tool: Option<Vec2>,
     /// The last parameters that were accepted.
     params: ModelParams,
     refused_estimates: u64,
@@ -164,22 +93,22 @@ impl Slave {
         let observer = ObserverConfig {
             coupling,
             force_noise_n: sensing.force_noise_n,
-            vision_noise_m: sensing.vision_noise_m,
-            vision_noise_rad: sensing.vision_noise_rad,
+            vision_noise_m: sensing.vision.position_noise_m,
+            vision_noise_rad: sensing.vision.angle_noise_rad,
             learn,
         };
+        let estimator = EstimatorConfig::of_mode(config.mode, coupling).starting_at([m, b, c]);
         Ok(Self {
             settings,
-            start: config.start,
-            playout: PlayoutBuffer::new(config.playout),
+            learn,
+            playout: PlayoutBuffer::try_new(config.playout)?,
             environment,
-            sensing: Sensing::new(sensing, config.seed),
+            sensing: Sensing::try_new(sensing, config.seed)?,
             contact: ContactDetector::new(config.trigger.contact),
             observer: PoseObserver::new(observer, pose, footprint),
-            estimator: Estimator::new(EstimatorConfig::of_mode(config.mode, coupling), m, b, c),
+            estimator: Estimator::new(&estimator),
             shadow: LocalModel::new(settings, start),
             trigger: Trigger::new(config.trigger),
-            tool: None,
             params,
             refused_estimates: 0,
             sequence: 0,
@@ -213,7 +142,7 @@ impl Slave {
 
     /// What the estimator found so far.
     #[must_use]
-    pub fn estimate(&self) -> Estimate {
+    pub fn estimate(&self) -> &Estimate {
         self.estimator.estimate()
     }
 
@@ -252,28 +181,42 @@ impl Slave {
         self.playout.push(now, sample);
     }
 
+    /// Where the tool is before the first sample, m.
+    pub fn start_at(&mut self, hip: Vec2) {
+        self.playout.start_at(hip);
+    }
+
+    /// What a viewer sees; none before the first tick.
+    #[must_use]
+    pub fn scene(&self) -> Option<Scene> {
+        self.last.map(|tick| Scene {
+            answers: tick.stamp,
+            object: self.observer.pose(),
+            tool: tick.tool,
+            force: tick.f_s,
+        })
+    }
+
     /// One sample period. None before the first HIP sample is due.
     pub fn tick(&mut self, now: Time) -> Option<SlaveTick> {
         let played = self.playout.advance(now)?;
-        let tool = played.hip;
-        let tool_velocity = self.tool.map_or(Vec2::zeros(), |before| (tool - before) / TICK_S);
-        self.tool = Some(tool);
+        // every pose of a tick is the one that the tool met, before the object moves on
         let truth = self.environment.pose();
-        let contact = self.environment.step(tool, tool_velocity);
-        let sensed = self.sensing.measure(now, tool, contact.force, self.environment.pose());
+        let contact = self.environment.step(played.hip, played.velocity);
+        let sensed = self.sensing.sense(now, played.hip, contact.force, &truth);
         let in_contact = self.contact.step(sensed.force.norm());
         self.observer.step(now, sensed.tool, sensed.force, in_contact);
-        while let Some(vision) = self.sensing.poll_vision(now) {
+        if let Some(vision) = sensed.vision {
             self.observer.see(&vision);
         }
         self.estimate_from(sensed.tool, sensed.force);
-        let rendered = self.shadow.step(played.stamp, tool);
+        let rendered = self.shadow.step(played.stamp, played.hip);
         if let Some(f_m) = played.force {
             self.force.push(sensed.force, f_m);
         }
         let mut tick = SlaveTick {
             stamp: played.stamp,
-            tool,
+            tool: played.hip,
             f_s: sensed.force,
             f_shadow: rendered.force,
             f_m: played.force,
@@ -281,25 +224,58 @@ impl Slave {
             truth,
             update: None,
         };
-        tick.update = self.decide(now, &tick);
+        let cause = self.trigger.decide(now, &self.trigger_input(&tick));
+        tick.update = cause.map(|cause| self.send(cause, &tick));
         self.last = Some(tick);
         Some(tick)
     }
 
     fn estimate_from(&mut self, tool: Vec2, force: Vec2) {
         let normal = self.observer.touching().map(|touching| touching.inward);
-        self.estimator.step(&Measured { tool, force, normal });
-        let Estimate { m, b, c, .. } = self.estimator.estimate();
-        // The paper's model keeps the side it was given; otherwise the learned faces say how wide it is.
-        let side = match self.settings.correction {
-            mmt_shared::settings::PoseCorrection::Snap => self.start.side_m,
-            mmt_shared::settings::PoseCorrection::MatchedStamps => {
-                self.observer.footprint().mean_side()
-            }
-        };
+        let Estimate { m, b, c, .. } = self.estimator.step(&Measured { tool, force, normal });
+        // As wide as the faces say; the paper's never change.
+        let side = self.observer.footprint().mean_side();
         match ModelParams::of_square(m, b, c, side, &self.settings.coupling) {
             Ok(params) => self.params = params,
             Err(_) => self.refused_estimates += 1,
         }
+    }
+
+    fn trigger_input(&self, tick: &SlaveTick) -> TriggerInput {
+        let estimate = self.estimator.estimate();
+        TriggerInput {
+            f_s: tick.f_s,
+            f_m: tick.f_shadow,
+            slave_in_contact: tick.in_contact,
+            shadow_in_contact: self.shadow.rendered().in_contact(),
+            sticking: estimate.sticking,
+            speed: estimate.speed,
+            acceleration: estimate.acceleration,
+            candidate: Candidate { params: self.params, angle: self.observer.pose().angle },
+        }
+    }
+
+    /// Makes the update and applies it to the shadow, as the master will.
+    fn send(&mut self, cause: Cause, tick: &SlaveTick) -> Update {
+        if let (Cause::MasterOnlyContact, Some(touch)) = (cause, self.shadow.rendered().touch) {
+            self.observer.carve(tick.tool, touch.face);
+        }
+        self.sequence = self.sequence.saturating_add(1);
+        let state = ModelState {
+            params: self.params,
+            footprint: self.observer.footprint(),
+            pose: self.observer.pose(),
+            twist: self.observer.twist(),
+        };
+        let update = Update {
+            sequence: self.sequence,
+            cause,
+            answers: tick.stamp,
+            newest_command: 0,
+            slave_in_contact: tick.in_contact,
+            state,
+        };
+        self.shadow.apply(&update);
+        update
     }
 }

@@ -1,0 +1,90 @@
+//! What a slave is made of, and why it could not be.
+
+use mmt_shared::params::ParamsError;
+use mmt_shared::settings::Mode;
+use serde::{Deserialize, Serialize};
+
+use crate::environment::{EnvironmentConfig, EnvironmentError};
+use crate::playout::{PlayoutConfig, PlayoutError};
+use crate::sensing::{SensingConfig, SensingError};
+use crate::trigger::TriggerConfig;
+
+/// What the local model starts from before anything is known of the object.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct StartModel {
+    /// m, kg.
+    pub mass_kg: f64,
+    /// b, N s/m.
+    pub damping_ns_per_m: f64,
+    /// c, N.
+    pub friction_n: f64,
+    /// Side l of the model, m.
+    pub side_m: f64,
+}
+
+impl Default for StartModel {
+    /// Wrong on purpose, so that the estimator has something to do; the side is the paper's (IV-A).
+    fn default() -> Self {
+        Self { mass_kg: 0.4, damping_ns_per_m: 0.0, friction_n: 1.0, side_m: 0.40 }
+    }
+}
+
+/// Everything that a slave is made of.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct SlaveConfig {
+    /// Seed of the sensors' noise.
+    pub seed: u64,
+    /// The bundle of choices: paper or recommended.
+    pub mode: Mode,
+    /// The real object and its ground.
+    pub environment: EnvironmentConfig,
+    /// Noise, vision.
+    pub sensing: SensingConfig,
+    /// Buffer for the master's samples.
+    pub playout: PlayoutConfig,
+    /// When updates are sent.
+    pub trigger: TriggerConfig,
+    /// What the local model starts from.
+    pub start: StartModel,
+}
+
+impl SlaveConfig {
+    /// The default of a mode: the default scenario, with the mode's update scheme.
+    #[must_use]
+    pub fn of_mode(mode: Mode) -> Self {
+        Self {
+            seed: 1,
+            mode,
+            environment: EnvironmentConfig::default(),
+            sensing: SensingConfig::default(),
+            playout: PlayoutConfig::default(),
+            trigger: TriggerConfig::of_mode(mode),
+            start: StartModel::default(),
+        }
+    }
+}
+
+impl Default for SlaveConfig {
+    fn default() -> Self {
+        Self::of_mode(Mode::Recommended)
+    }
+}
+
+/// Why a slave could not be made.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum SlaveError {
+    /// The environment's numbers are wrong.
+    #[error(transparent)]
+    Environment(#[from] EnvironmentError),
+    /// The sensors' numbers are wrong.
+    #[error(transparent)]
+    Sensing(#[from] SensingError),
+    /// The play-out buffer's numbers are wrong.
+    #[error(transparent)]
+    Playout(#[from] PlayoutError),
+    /// The start model's numbers are not accepted.
+    #[error("start model: {0}")]
+    Start(#[from] ParamsError),
+}
