@@ -37,8 +37,8 @@ pub struct ReplayConfig {
     /// Contact ends below this force, N. Default 0.3.
     pub contact_off_n: f64,
     /// Friction believed before the first push, and the centre of the fit's weak prior. Default: 1 N, the
-    /// wrong value that every model of this project starts from, an arm of 50 mm (a uniformly loaded
-    /// triangle of this size has 51 mm), centred.
+    /// wrong value that every model of this project starts from, an arm of 50 mm (the block under uniform
+    /// pressure has 45 mm, under pressure towards its rim more), centred.
     pub start: Surface,
     /// Share of the pushes that the held-out prediction is fitted on. Default 0.75.
     pub fitted_share: f64,
