@@ -147,6 +147,16 @@ impl EstimatorConfig {
             Mode::Recommended => Self::Recommended(RecommendedConfig::new(coupling)),
         }
     }
+
+    /// The same with another prior of m (kg), b (N s/m), c (N).
+    #[must_use]
+    pub fn starting_at(mut self, prior: [f64; 3]) -> Self {
+        match &mut self {
+            Self::Paper(config) => config.prior = prior,
+            Self::Recommended(config) => config.recursive.prior = prior,
+        }
+        self
+    }
 }
 
 /// The slave's estimator of m, b and c.

@@ -20,11 +20,8 @@ pub const HEADER_BYTES: usize = 8;
 /// The longest datagram message, header included, bytes: fits QUIC's least path with room to spare.
 pub const DATAGRAM_MAX: usize = 1024;
 
-/// The longest stream message, header included and length prefix excluded, bytes.
+/// The longest stream message, header included and length prefix excluded, bytes: a bound for readers.
 pub const STREAM_MESSAGE_MAX: usize = 4096;
-
-/// Length of the prefix that says how long a stream message is, bytes.
-pub const PREFIX_BYTES: usize = 4;
 
 /// One of the two ends of a session.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

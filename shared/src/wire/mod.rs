@@ -23,8 +23,8 @@ pub use datagram::{
 };
 pub use error::{DecodeError, EncodeError, FieldError};
 pub use header::{
-    ALPN, Channel, DATAGRAM_MAX, HEADER_BYTES, Kind, MAGIC, PREFIX_BYTES, PROTOCOL_VERSION,
-    STREAM_MESSAGE_MAX, Side,
+    ALPN, Channel, DATAGRAM_MAX, HEADER_BYTES, Kind, MAGIC, PROTOCOL_VERSION, STREAM_MESSAGE_MAX,
+    Side,
 };
 pub use label::{LABEL_MAX, Label};
 pub use message::{
@@ -34,8 +34,8 @@ pub use message::{
 pub use raw::{HelloError, RawHello, RawUpdate, RawWelcome, WelcomeError};
 pub use samples::{PushError, SAMPLES_MAX, SampleBlock};
 pub use stream::{
-    STREAM_FRAME_MAX, StreamMessage, decode_stream, encode_hello, encode_master_farewell,
-    encode_refused, encode_slave_farewell, encode_welcome,
+    StreamMessage, decode_stream_message, encode_hello, encode_master_farewell, encode_refused,
+    encode_slave_farewell, encode_welcome,
 };
 pub use totals::{
     ForceTotals, Identified, KindCounts, LoopTotals, MasterTotals, Quantiles, SlaveTotals, Traffic,

@@ -1,17 +1,14 @@
 //! Messages on the one stream: hello, then welcome or refused, then a farewell from each side.
 //!
-//! Each is a length (four bytes, little endian) and a message of that length. A length beyond
-//! [`STREAM_MESSAGE_MAX`] is refused before a byte of the message is waited for.
+//! On the stream each stands behind its length (four bytes, little endian): framing is the transport's
+//! business, which reads no more than [`STREAM_MESSAGE_MAX`] bytes. Here a message is without that prefix.
 
 use super::body::{Body, read, write};
 use super::error::{DecodeError, EncodeError, FieldError};
-use super::header::{Channel, HEADER_BYTES, Kind, PREFIX_BYTES, STREAM_MESSAGE_MAX, Side, open};
+use super::header::{Channel, Kind, STREAM_MESSAGE_MAX, Side, open};
 use super::message::{Farewell, Hello, Refusal, Welcome};
 use super::raw::{RawHello, RawWelcome};
 use super::totals::{MasterTotals, SlaveTotals};
-
-/// Room for the longest message on the stream with its prefix, bytes.
-pub const STREAM_FRAME_MAX: usize = PREFIX_BYTES + STREAM_MESSAGE_MAX;
 
 /// A stream message that was read.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -42,32 +39,31 @@ impl StreamMessage {
     }
 }
 
-/// Writes prefix and hello to the front of `out`; returns how many bytes that took, at most
-/// [`STREAM_FRAME_MAX`].
+/// Writes a hello to the front of `out`; returns its length, at most [`STREAM_MESSAGE_MAX`].
 ///
 /// # Errors
 /// Says which field breaks a rule, or that `out` is too short; what is in `out` then must not be sent.
 pub fn encode_hello(hello: &Hello, out: &mut [u8]) -> Result<usize, EncodeError> {
-    frame(&RawHello::of(hello), out)
+    write(&RawHello::of(hello), out)
 }
 
-/// Writes prefix and welcome.
+/// Writes a welcome to the front of `out`; returns its length.
 ///
 /// # Errors
 /// As [`encode_hello`].
 pub fn encode_welcome(welcome: &Welcome, out: &mut [u8]) -> Result<usize, EncodeError> {
-    frame(&RawWelcome::of(welcome), out)
+    write(&RawWelcome::of(welcome), out)
 }
 
-/// Writes prefix and refusal.
+/// Writes a refusal to the front of `out`; returns its length.
 ///
 /// # Errors
 /// As [`encode_hello`].
 pub fn encode_refused(refusal: Refusal, out: &mut [u8]) -> Result<usize, EncodeError> {
-    frame(&refusal, out)
+    write(&refusal, out)
 }
 
-/// Writes prefix and the master's farewell.
+/// Writes the master's farewell to the front of `out`; returns its length.
 ///
 /// # Errors
 /// As [`encode_hello`].
@@ -75,10 +71,10 @@ pub fn encode_master_farewell(
     farewell: &Farewell<MasterTotals>,
     out: &mut [u8],
 ) -> Result<usize, EncodeError> {
-    frame(farewell, out)
+    write(farewell, out)
 }
 
-/// Writes prefix and the slave's farewell.
+/// Writes the slave's farewell to the front of `out`; returns its length.
 ///
 /// # Errors
 /// As [`encode_hello`].
@@ -86,39 +82,19 @@ pub fn encode_slave_farewell(
     farewell: &Farewell<SlaveTotals>,
     out: &mut [u8],
 ) -> Result<usize, EncodeError> {
-    frame(farewell, out)
+    write(farewell, out)
 }
 
-/// Reads the first message of what has arrived on the stream from `from`, and how many bytes it took;
-/// none if more must arrive first.
+/// Reads a message that `from` sent on the stream, its length prefix taken off.
 ///
 /// # Errors
-/// Says why the bytes do not begin with a message that `from` may send on the stream. The stream cannot
-/// be read any further then.
-pub fn decode_stream(
-    arrived: &[u8],
-    from: Side,
-) -> Result<Option<(StreamMessage, usize)>, DecodeError> {
-    let Some((prefix, rest)) = arrived.split_first_chunk::<PREFIX_BYTES>() else {
-        return Ok(None);
-    };
-    let length = usize::try_from(u32::from_le_bytes(*prefix)).unwrap_or(usize::MAX);
+/// Says why the bytes are not exactly one message that `from` may send on the stream. The stream must
+/// not be read any further then.
+pub fn decode_stream_message(message: &[u8], from: Side) -> Result<StreamMessage, DecodeError> {
+    let length = message.len();
     if length > STREAM_MESSAGE_MAX {
         return Err(DecodeError::TooLong { length });
     }
-    if length < HEADER_BYTES {
-        return Err(DecodeError::TooShort { length });
-    }
-    let Some(message) = rest.get(..length) else {
-        return Ok(None);
-    };
-    Ok(Some((
-        decode_message(message, from)?,
-        PREFIX_BYTES + length,
-    )))
-}
-
-fn decode_message(message: &[u8], from: Side) -> Result<StreamMessage, DecodeError> {
     let (kind, body) = open(message, from, Channel::Stream)?;
     match kind {
         Kind::Hello => read(body).map(StreamMessage::Hello),
@@ -130,17 +106,6 @@ fn decode_message(message: &[u8], from: Side) -> Result<StreamMessage, DecodeErr
             Err(DecodeError::WrongChannel { kind })
         }
     }
-}
-
-fn frame<B: Body>(body: &B, out: &mut [u8]) -> Result<usize, EncodeError> {
-    let (kind, length) = (B::KIND, out.len());
-    let too_small = EncodeError::BufferTooSmall { kind, length };
-    let (prefix, rest) = out
-        .split_first_chunk_mut::<PREFIX_BYTES>()
-        .ok_or(too_small)?;
-    let used = write(body, rest)?;
-    *prefix = u32::try_from(used).map_err(|_| too_small)?.to_le_bytes();
-    Ok(PREFIX_BYTES + used)
 }
 
 impl Body for RawHello {
@@ -187,10 +152,10 @@ impl Body for Farewell<SlaveTotals> {
 #[cfg(test)]
 pub(super) fn encode_read(read: &StreamMessage, out: &mut [u8]) -> Result<usize, EncodeError> {
     match read {
-        StreamMessage::Hello(hello) => frame(hello, out),
-        StreamMessage::Welcome(welcome) => frame(welcome, out),
-        StreamMessage::Refused(refusal) => frame(refusal, out),
-        StreamMessage::MasterFarewell(farewell) => frame(farewell, out),
-        StreamMessage::SlaveFarewell(farewell) => frame(farewell, out),
+        StreamMessage::Hello(hello) => write(hello, out),
+        StreamMessage::Welcome(welcome) => write(welcome, out),
+        StreamMessage::Refused(refusal) => write(refusal, out),
+        StreamMessage::MasterFarewell(farewell) => write(farewell, out),
+        StreamMessage::SlaveFarewell(farewell) => write(farewell, out),
     }
 }

@@ -98,7 +98,7 @@ fn master_farewell() -> Farewell<MasterTotals> {
 type Encoded = Result<usize, EncodeError>;
 
 fn written(encode: impl FnOnce(&mut [u8]) -> Encoded) -> Vec<u8> {
-    let mut buffer = [0xee; STREAM_FRAME_MAX];
+    let mut buffer = [0xee; STREAM_MESSAGE_MAX];
     let length = encode(&mut buffer).unwrap();
     assert!(buffer[length..].iter().all(|&byte| byte == 0xee));
     buffer[..length].to_vec()
@@ -180,11 +180,8 @@ fn reads_only_what_it_writes(bytes: &[u8], from: Side) -> Option<Datagram> {
 }
 
 fn stream_reads_only_what_it_writes(bytes: &[u8], from: Side) -> Option<StreamMessage> {
-    let (read, used) = decode_stream(bytes, from).ok()??;
-    assert_eq!(
-        written(|out| stream::encode_read(&read, out)),
-        bytes[..used]
-    );
+    let read = decode_stream_message(bytes, from).ok()?;
+    assert_eq!(written(|out| stream::encode_read(&read, out)), bytes);
     Some(read)
 }
 
@@ -207,11 +204,7 @@ fn every_datagram_reads_back_as_it_was_written() {
 
 #[test]
 fn every_stream_message_reads_back_as_it_was_written() {
-    let read = |(from, bytes): (Side, Vec<u8>)| {
-        let (message, used) = decode_stream(&bytes, from).unwrap().unwrap();
-        assert_eq!(used, bytes.len());
-        message
-    };
+    let read = |(from, bytes): (Side, Vec<u8>)| decode_stream_message(&bytes, from).unwrap();
     let messages: Vec<_> = stream_messages().into_iter().map(read).collect();
     let StreamMessage::Hello(raw) = messages[0] else {
         panic!("no hello");
@@ -234,49 +227,27 @@ fn every_stream_message_reads_back_as_it_was_written() {
 
 #[test]
 fn no_message_reads_when_cut_short_or_continued() {
-    for (from, bytes) in datagrams() {
+    let error = |on_stream: bool, bytes: &[u8], from| {
+        if on_stream {
+            decode_stream_message(bytes, from).unwrap_err()
+        } else {
+            decode_datagram(bytes, from).unwrap_err()
+        }
+    };
+    let all = [datagrams(), stream_messages()].concat();
+    for (from, bytes) in all {
+        let kind = Kind::from_number(bytes[5]).unwrap();
+        let on_stream = kind.channel() == Channel::Stream;
         for length in 0..bytes.len() {
-            assert!(decode_datagram(&bytes[..length], from).is_err(), "{length}");
+            error(on_stream, &bytes[..length], from);
         }
         for extra in [1, 2, 8] {
             let mut longer = bytes.clone();
             longer.resize(bytes.len() + extra, 0);
-            let kind = Kind::from_number(bytes[5]).unwrap();
             let expected = DecodeError::Trailing { kind, extra };
-            assert_eq!(decode_datagram(&longer, from), Err(expected));
+            assert_eq!(error(on_stream, &longer, from), expected);
         }
     }
-}
-
-#[test]
-fn a_stream_is_read_as_soon_as_and_only_as_far_as_a_message_is_complete() {
-    for (from, bytes) in stream_messages() {
-        for length in 0..bytes.len() {
-            assert_eq!(decode_stream(&bytes[..length], from), Ok(None), "{length}");
-        }
-        let mut two = bytes.clone();
-        two.extend_from_slice(&bytes);
-        let (_, used) = decode_stream(&two, from).unwrap().unwrap();
-        assert_eq!(used, bytes.len());
-        // a length one too long or too short is not made up for
-        for wrong in [-1, 1] {
-            let mut bad = two.clone();
-            bad[0] = bad[0].wrapping_add_signed(wrong);
-            assert!(decode_stream(&bad, from).is_err());
-        }
-    }
-}
-
-#[test]
-fn a_stream_message_too_long_or_too_short_is_refused_before_it_arrives() {
-    let claim = |length: u32| decode_stream(&length.to_le_bytes(), Side::Master);
-    let length = 4097;
-    assert_eq!(claim(4097), Err(DecodeError::TooLong { length }));
-    assert_eq!(claim(4096), Ok(None));
-    let length = u32::MAX as usize;
-    assert_eq!(claim(u32::MAX), Err(DecodeError::TooLong { length }));
-    assert_eq!(claim(7), Err(DecodeError::TooShort { length: 7 }));
-    assert_eq!(claim(8), Ok(None));
 }
 
 #[test]
@@ -320,12 +291,17 @@ fn an_over_long_varint_is_refused() {
 }
 
 #[test]
-fn a_datagram_longer_than_any_message_is_refused_unread() {
+fn bytes_longer_than_any_message_are_refused_unread() {
     let mut bytes = datagrams()[0].1.clone();
     bytes.resize(DATAGRAM_MAX + 1, 0);
     let length = bytes.len();
     let expected = Err(DecodeError::TooLong { length });
     assert_eq!(decode_datagram(&bytes, Side::Master), expected);
+    bytes = stream_messages()[0].1.clone();
+    bytes.resize(STREAM_MESSAGE_MAX + 1, 0);
+    let length = bytes.len();
+    let expected = Err(DecodeError::TooLong { length });
+    assert_eq!(decode_stream_message(&bytes, Side::Master), expected);
 }
 
 /// Every float on the wire made NaN, infinite or huge: not finite never reads, huge is never accepted.
@@ -377,7 +353,7 @@ fn an_update_below_the_stability_bound_is_not_accepted() {
 
 #[test]
 fn what_the_other_side_would_refuse_is_not_written() {
-    let mut out = [0; STREAM_FRAME_MAX];
+    let mut out = [0; STREAM_MESSAGE_MAX];
     let refused = |encoded: Encoded| assert!(matches!(encoded, Err(EncodeError::Field { .. })));
     let unnumbered = Envelope {
         number: 0,
@@ -570,8 +546,7 @@ fn a_text_too_long_or_with_control_characters_is_refused() {
         let mut bytes = good[..at - 1].to_vec();
         bytes.push(text.len() as u8);
         bytes.extend_from_slice(text);
-        bytes[0] = (bytes.len() - 4) as u8;
-        decode_stream(&bytes, *from)
+        decode_stream_message(&bytes, *from)
     };
     assert!(with(&[b'a'; 64]).is_ok());
     for bad in [&[b'a'; 65][..], b"a\x1b[2J", b"a\n", b"\xff\xfe"] {
@@ -582,7 +557,7 @@ fn a_text_too_long_or_with_control_characters_is_refused() {
 #[test]
 fn a_printed_hello_does_not_show_the_token() {
     let (from, bytes) = &stream_messages()[0];
-    let read = decode_stream(bytes, *from).unwrap();
+    let read = decode_stream_message(bytes, *from).unwrap();
     for shown in [format!("{read:?}"), format!("{:?}", hello())] {
         assert!(
             shown.contains("secret") && !shown.contains("7, 7"),
@@ -718,7 +693,7 @@ proptest! {
             ..hello()
         };
         let bytes = written(|out| encode_hello(&hello, out));
-        let Ok(Some((StreamMessage::Hello(raw), _))) = decode_stream(&bytes, Side::Master) else {
+        let Ok(StreamMessage::Hello(raw)) = decode_stream_message(&bytes, Side::Master) else {
             panic!("no hello")
         };
         prop_assert_eq!(raw.accept(), Ok(hello));
@@ -727,7 +702,7 @@ proptest! {
         let scheme = Label::clipped(&name);
         let welcome = Welcome { settings, scheme, state, ..welcome() };
         let bytes = written(|out| encode_welcome(&welcome, out));
-        let Ok(Some((StreamMessage::Welcome(raw), _))) = decode_stream(&bytes, Side::Slave) else {
+        let Ok(StreamMessage::Welcome(raw)) = decode_stream_message(&bytes, Side::Slave) else {
             panic!("no welcome")
         };
         prop_assert_eq!(raw.accept(&COUPLING), Ok(welcome));
@@ -764,12 +739,10 @@ proptest! {
     ) {
         for body in [body, small] {
             let message = [&header::header(Kind::ALL[kind])[..], &body[..]].concat();
-            let prefix = (message.len() as u32).to_le_bytes();
-            let framed = [&prefix[..], &message[..]].concat();
             for from in [Side::Master, Side::Slave] {
                 reads_only_what_it_writes(&message, from);
                 reads_only_what_it_writes(&body, from);
-                stream_reads_only_what_it_writes(&framed, from);
+                stream_reads_only_what_it_writes(&message, from);
                 stream_reads_only_what_it_writes(&body, from);
             }
         }
