@@ -48,7 +48,6 @@ pub struct SlaveTick {
 /// The slave between the link and the object.
 pub struct Slave {
     settings: ModelSettings,
-    learn: bool,
     playout: PlayoutBuffer,
     environment: Environment,
     sensing: Sensing,
@@ -100,7 +99,6 @@ impl Slave {
         let estimator = EstimatorConfig::of_mode(config.mode, coupling).starting_at([m, b, c]);
         Ok(Self {
             settings,
-            learn,
             playout: PlayoutBuffer::try_new(config.playout)?,
             environment,
             sensing: Sensing::try_new(sensing, config.seed)?,

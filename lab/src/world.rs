@@ -1,0 +1,366 @@
+//! A slave, a master and the two directions of a link in one struct, stepped in virtual time.
+//!
+//! Everything that decides anything is the live system's own core: the same slave, master, link ends and
+//! emulated link. A run is a pure function of its configuration; the digest of its event log says so.
+
+use std::time::Duration;
+
+use mmt_client::device::{DeviceError, DeviceProfile};
+use mmt_client::limiter::{ForceLimiter, LimitsError};
+use mmt_client::link::{FromSlave, MasterLink};
+use mmt_client::master::{Master, MasterTick};
+use mmt_client::operator::Operator;
+use mmt_client::operator::scripted::{Scripted, ScriptedConfig, ScriptedError, View};
+use mmt_netem::config::{ConfigError, LinkConfig};
+use mmt_netem::link::{Direction, LinkId};
+use mmt_netem::pipe::SimPath;
+use mmt_server::link::SlaveLink;
+use mmt_server::slave::{Slave, SlaveConfig, SlaveError, SlaveTick};
+use mmt_shared::contact::Coupling;
+use mmt_shared::geometry::Vec2;
+use mmt_shared::metrics::{
+    AgeOfInformation, ContactBreaks, ForcePeak, ForceSummary, PoseError, UpdateCounts,
+};
+use mmt_shared::settings::ModelSettings;
+use mmt_shared::time::{TICK, Time};
+use mmt_shared::wire::{DATAGRAM_MAX, Label, Update, Welcome};
+use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
+
+/// By how much the slave's clock is ahead of the master's: nothing may depend on it.
+const SLAVE_EPOCH: Duration = Duration::from_secs(3600);
+
+/// Everything that a run depends on.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct WorldConfig {
+    /// Seed of the network's draws; the slave's and the operator's seeds are their own.
+    pub seed: u64,
+    /// The slave.
+    pub slave: SlaveConfig,
+    /// How both run the local model; the mode's own if absent.
+    pub settings: Option<ModelSettings>,
+    /// Stiffness k_p of the device, N/m; the default profile's if absent.
+    pub stiffness_n_per_m: Option<f64>,
+    /// The scripted operator.
+    pub operator: ScriptedConfig,
+    /// Samples in a command.
+    pub samples_per_command: u8,
+    /// Network from master to slave.
+    pub up: LinkConfig,
+    /// Network from slave to master.
+    pub down: LinkConfig,
+}
+
+impl Default for WorldConfig {
+    /// The default scenario over a perfect network.
+    fn default() -> Self {
+        Self {
+            seed: 1,
+            slave: SlaveConfig::default(),
+            settings: None,
+            stiffness_n_per_m: None,
+            operator: ScriptedConfig::default(),
+            samples_per_command: 10,
+            up: LinkConfig::default(),
+            down: LinkConfig::default(),
+        }
+    }
+}
+
+impl WorldConfig {
+    /// This configuration with every seed derived from one.
+    #[must_use]
+    pub fn seeded(mut self, seed: u64) -> Self {
+        self.seed = seed;
+        self.slave.seed = seed;
+        self.operator.seed = seed;
+        self
+    }
+}
+
+/// Why a world could not be made.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum WorldError {
+    /// The slave's numbers are wrong.
+    #[error(transparent)]
+    Slave(#[from] SlaveError),
+    /// The device cannot do this.
+    #[error(transparent)]
+    Device(#[from] DeviceError),
+    /// The device's limits are wrong.
+    #[error(transparent)]
+    Limits(#[from] LimitsError),
+    /// The operator's numbers are wrong.
+    #[error(transparent)]
+    Operator(#[from] ScriptedError),
+    /// The network's numbers are wrong.
+    #[error(transparent)]
+    Network(#[from] ConfigError),
+}
+
+/// What one millisecond of the world gave.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct WorldTick {
+    /// Time since the start, by the master's clock.
+    pub now: Time,
+    /// The master's tick.
+    pub master: MasterTick,
+    /// The slave's tick; none before the first sample is played.
+    pub slave: Option<SlaveTick>,
+}
+
+/// The world.
+pub struct World {
+    now: Time,
+    slave: Slave,
+    slave_link: SlaveLink,
+    master: Master,
+    master_link: MasterLink,
+    operator: Operator,
+    hand_force: Vec2,
+    up: SimPath<Packet>,
+    down: SimPath<Packet>,
+    outcome: Outcome,
+    log: Sha256,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Packet {
+    bytes: [u8; DATAGRAM_MAX],
+    length: usize,
+}
+
+/// What a run came to.
+#[derive(Clone, Debug, Default)]
+pub struct Outcome {
+    /// Updates by cause, per second and per second of contact.
+    pub updates: UpdateCounts,
+    /// Updates that a newer one overtook before a tick could apply them.
+    pub superseded: u32,
+    /// Age of the news that the master's model rests on.
+    pub age: AgeOfInformation,
+    /// Error of the master's pose against the truth, at the same HIP sample.
+    pub pose: PoseError,
+    /// Breaks of contact at the master.
+    pub breaks: ContactBreaks,
+    /// Force on the hand.
+    pub on_hand: ForcePeak,
+    newest_answer: Option<Time>,
+}
+
+impl World {
+    /// A world at time zero with the scripted operator.
+    ///
+    /// # Errors
+    /// When a number of the configuration is not accepted.
+    pub fn try_new(config: &WorldConfig) -> Result<Self, WorldError> {
+        let device = DeviceProfile::default().used_with(config.stiffness_n_per_m, None)?;
+        let coupling: Coupling = device.coupling();
+        let settings =
+            config.settings.unwrap_or_else(|| config.slave.mode.model_settings(coupling));
+        let mut slave = Slave::with_settings(&config.slave, settings)?;
+        let welcome = Welcome {
+            settings,
+            state: *slave.state(),
+            scheme: Label::clipped(&config.slave.trigger.scheme.to_string()),
+            program: Label::clipped("lab"),
+        };
+        let master = Master::new(&welcome, ForceLimiter::try_new(device.limits())?);
+        let view: View = master.view();
+        let scripted = Scripted::try_new(config.operator, view)?;
+        let operator = Operator::Scripted(Box::new(scripted));
+        slave.start_at(operator.start());
+        let path = |link: LinkConfig, direction| {
+            SimPath::try_new(link, config.seed, LinkId::first(direction))
+        };
+        Ok(Self {
+            now: Time::ZERO,
+            slave,
+            slave_link: SlaveLink::new(Time::ZERO + SLAVE_EPOCH),
+            master,
+            master_link: MasterLink::new(
+                Time::ZERO,
+                settings.coupling,
+                config.samples_per_command,
+            ),
+            operator,
+            hand_force: Vec2::zeros(),
+            up: path(config.up.clone(), Direction::Up)?,
+            down: path(config.down.clone(), Direction::Down)?,
+            outcome: Outcome::default(),
+            log: Sha256::new(),
+        })
+    }
+
+    /// The slave.
+    #[must_use]
+    pub fn slave(&self) -> &Slave {
+        &self.slave
+    }
+
+    /// The slave, to change its environment in mid-run.
+    pub fn slave_mut(&mut self) -> &mut Slave {
+        &mut self.slave
+    }
+
+    /// The master.
+    #[must_use]
+    pub fn master(&self) -> &Master {
+        &self.master
+    }
+
+    /// The master's end of the link.
+    #[must_use]
+    pub fn master_link(&self) -> &MasterLink {
+        &self.master_link
+    }
+
+    /// The slave's end of the link.
+    #[must_use]
+    pub fn slave_link(&self) -> &SlaveLink {
+        &self.slave_link
+    }
+
+    /// The operator.
+    #[must_use]
+    pub fn operator(&self) -> &Operator {
+        &self.operator
+    }
+
+    /// What the run has come to so far.
+    #[must_use]
+    pub fn outcome(&self) -> &Outcome {
+        &self.outcome
+    }
+
+    /// The force metrics so far.
+    #[must_use]
+    pub fn force(&self) -> ForceSummary {
+        self.slave.force().summary()
+    }
+
+    /// SHA-256 of the event log so far, in hexadecimal digits: equal for equal configurations.
+    #[must_use]
+    pub fn digest(&self) -> String {
+        let hash = self.log.clone().finalize();
+        hash.iter().map(|byte| format!("{byte:02x}")).collect()
+    }
+
+    /// Runs for a duration and hands every tick to `watch`.
+    pub fn run(&mut self, duration: Duration, mut watch: impl FnMut(&WorldTick)) {
+        let end = self.now + duration;
+        while self.now < end {
+            let tick = self.step();
+            watch(&tick);
+        }
+    }
+
+    /// One millisecond: what has arrived at the master, the master's tick, what has arrived at the slave
+    /// by then, the slave's tick. On a perfect network a sample is played in the tick it was taken in,
+    /// and an update is applied in the next.
+    pub fn step(&mut self) -> WorldTick {
+        self.now += TICK;
+        self.deliver_down();
+        let master = self.master_tick();
+        self.deliver_up();
+        let slave = self.slave_tick();
+        self.log_tick(&master, slave.as_ref());
+        WorldTick { now: self.now, master, slave }
+    }
+
+    fn deliver_down(&mut self) {
+        let mut newest: Option<Update> = None;
+        while let Some(packet) = self.down.pop_due(self.now) {
+            let Packet { bytes, length } = packet.payload;
+            let bytes = bytes.get(..length).unwrap_or_default();
+            if let Some(FromSlave::Update(update)) = self.master_link.handle(packet.due, bytes) {
+                self.outcome.superseded += u32::from(newest.is_some());
+                newest = Some(update);
+            }
+        }
+        if let Some(update) = newest {
+            self.master.apply(&update);
+            self.outcome.newest_answer = Some(update.answers);
+        }
+        if let Some(answers) = self.outcome.newest_answer {
+            self.outcome.age.push(self.now, answers);
+        }
+    }
+
+    fn master_tick(&mut self) -> MasterTick {
+        let elapsed = self.now.saturating_since(Time::ZERO + TICK);
+        let reading = self.operator.step(elapsed, &self.master.view(), self.hand_force);
+        let silence = self.master_link.end().silence(self.now);
+        let tick = self.master.tick(self.now, reading, silence);
+        self.hand_force = tick.hand_force;
+        self.outcome.on_hand.push(tick.hand_force);
+        self.outcome.breaks.push(tick.rendered.in_contact());
+        let mut bytes = [0; DATAGRAM_MAX];
+        // a message that cannot be sealed is as good as lost; the ends count what they sent
+        if let Ok(Some(length)) = self.master_link.send(self.now, tick.sample, &mut bytes) {
+            self.up.push(self.now, length, Packet { bytes, length });
+        }
+        if let Ok(Some(length)) = self.master_link.heartbeat(self.now, &mut bytes) {
+            self.up.push(self.now, length, Packet { bytes, length });
+        }
+        tick
+    }
+
+    fn deliver_up(&mut self) {
+        while let Some(packet) = self.up.pop_due(self.now) {
+            let Packet { bytes, length } = packet.payload;
+            let bytes = bytes.get(..length).unwrap_or_default();
+            let arrived = packet.due + SLAVE_EPOCH;
+            if let Some(command) = self.slave_link.handle(arrived, bytes) {
+                for sample in command.samples.as_slice() {
+                    self.slave.handle_sample(arrived, sample);
+                }
+            }
+        }
+    }
+
+    fn slave_tick(&mut self) -> Option<SlaveTick> {
+        let now = self.now + SLAVE_EPOCH;
+        let tick = self.slave.tick(now);
+        let mut bytes = [0; DATAGRAM_MAX];
+        if let Some(tick) = &tick {
+            self.outcome.updates.tick(tick.in_contact);
+            if let Some(then) = self.master.model().history().at(tick.stamp) {
+                self.outcome.pose.push(&then.motion.pose, &tick.truth);
+            }
+            if let Some(update) = &tick.update {
+                self.outcome.updates.sent(update.cause);
+                if let Ok(length) = self.slave_link.send_update(now, update, &mut bytes) {
+                    self.down.push(self.now, length, Packet { bytes, length });
+                }
+            }
+        }
+        if let Ok(Some(length)) = self.slave_link.heartbeat(now, &mut bytes) {
+            self.down.push(self.now, length, Packet { bytes, length });
+        }
+        tick
+    }
+
+    /// Every number that either side felt or said goes into the log, bit by bit.
+    fn log_tick(&mut self, master: &MasterTick, slave: Option<&SlaveTick>) {
+        let mut number = |value: f64| self.log.update(value.to_bits().to_le_bytes());
+        [master.rendered.force, master.hand_force].iter().for_each(|f| {
+            number(f.x);
+            number(f.y);
+        });
+        if let Some(slave) = slave {
+            [slave.tool, slave.f_s, slave.f_shadow].iter().for_each(|v| {
+                number(v.x);
+                number(v.y);
+            });
+            if let Some(update) = &slave.update {
+                update.state.params.to_array().into_iter().for_each(number);
+                self.log.update(update.answers.as_nanos().to_le_bytes());
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;
