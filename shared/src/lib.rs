@@ -6,6 +6,8 @@
 
 pub mod contact;
 pub mod geometry;
+#[cfg(feature = "io")]
+pub mod io;
 pub mod params;
 pub mod rng;
 pub mod settings;
