@@ -14,6 +14,7 @@ pub mod congestion;
 pub mod connect;
 pub mod identity;
 pub mod identity_file;
+pub mod listen;
 pub mod quic;
 pub mod realtime;
 pub mod schedule;
@@ -23,4 +24,8 @@ pub mod spread;
 pub mod stream;
 pub mod ticker;
 pub mod tls;
+pub mod versions;
 pub mod wake;
+
+#[cfg(test)]
+mod loopback;

@@ -165,3 +165,6 @@ fn endpoint(
         config, server, socket, runtime,
     )?)
 }
+
+#[cfg(test)]
+mod tests;

@@ -115,3 +115,6 @@ impl From<ReadExactError> for ReadFrameError {
         }
     }
 }
+
+#[cfg(test)]
+mod tests;
