@@ -27,6 +27,14 @@ async fn connect_speaking(
     connecting.unwrap().await
 }
 
+/// An endpoint that serves what this program would not.
+fn serving(crypto: quinn::crypto::rustls::QuicServerConfig) -> Endpoint {
+    let config = quinn::ServerConfig::with_crypto(Arc::new(crypto));
+    let runtime = Arc::new(quinn::TokioRuntime);
+    let plain = quinn::EndpointConfig::default();
+    Endpoint::new_with_abstract_socket(plain, Some(config), open(), runtime).unwrap()
+}
+
 #[tokio::test]
 async fn the_right_pin_connects_and_datagrams_go_both_ways() {
     let (_endpoint, _slave, up, down) = pair().await;
@@ -56,6 +64,36 @@ async fn a_wrong_pin_is_refused_naming_both_keys() {
 }
 
 #[tokio::test]
+async fn an_impostor_with_a_copy_of_the_certificate_but_not_the_key_is_refused() {
+    let (slave, impostor) = (
+        Identity::ephemeral().unwrap(),
+        Identity::ephemeral().unwrap(),
+    );
+    let provider = rustls::crypto::ring::default_provider();
+    let key = provider
+        .key_provider
+        .load_private_key(impostor.key())
+        .unwrap();
+    let stolen = rustls::sign::CertifiedKey::new(vec![slave.certificate()], key);
+    let mut crypto = rustls::ServerConfig::builder_with_provider(Arc::new(provider))
+        .with_protocol_versions(&[&rustls::version::TLS13])
+        .unwrap()
+        .with_no_client_auth()
+        .with_cert_resolver(Arc::new(rustls::sign::SingleCertAndKey::from(stolen)));
+    crypto.alpn_protocols = vec![PROTOCOL.into()];
+    let crypto = quinn::crypto::rustls::QuicServerConfig::try_from(crypto).unwrap();
+    let server = serving(crypto);
+    let address = server.local_addr().unwrap();
+    let client = client_endpoint(open()).unwrap();
+    let (up, down) = tokio::join!(
+        connect(&client, address, slave.pin(), TRAFFIC, PATIENCE),
+        async { server.accept().await.unwrap().await },
+    );
+    assert!(matches!(up.unwrap_err(), ConnectError::Failed { .. }));
+    assert!(down.is_err());
+}
+
+#[tokio::test]
 async fn programs_of_other_versions_name_both_versions_on_both_sides() {
     let slave = slave();
     let newer = async {
@@ -75,15 +113,7 @@ async fn programs_of_other_versions_name_both_versions_on_both_sides() {
 async fn a_slave_of_another_version_is_named_to_the_master() {
     let identity = Identity::ephemeral().unwrap();
     let crypto = tls::server_speaking(&identity, &["mmt/7", VERSION_PROTOCOL]).unwrap();
-    let config = quinn::ServerConfig::with_crypto(Arc::new(crypto));
-    let runtime = Arc::new(quinn::TokioRuntime);
-    let endpoint = Endpoint::new_with_abstract_socket(
-        quinn::EndpointConfig::default(),
-        Some(config),
-        open(),
-        runtime,
-    );
-    let endpoint = endpoint.unwrap();
+    let endpoint = serving(crypto);
     let address = endpoint.local_addr().unwrap();
     let other = async {
         let connection = endpoint.accept().await.unwrap().await.unwrap();
