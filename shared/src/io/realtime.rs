@@ -103,11 +103,9 @@ fn set_fifo() -> io::Result<()> {
         sched_priority: libc::c_int::from(PRIORITY),
     };
     let policy = libc::SCHED_FIFO | libc::SCHED_RESET_ON_FORK;
-    #[allow(
-        unsafe_code,
-        reason = "no safe wrapper exists: thread 0 is the caller, and the kernel only reads a struct \
-                  that outlives the call"
-    )]
+    #[allow(unsafe_code, reason = "no safe wrapper of this call exists")]
+    // SAFETY: process 0 is the calling thread, and the kernel only reads `parameters`, which outlives the
+    // call.
     let status = unsafe { libc::sched_setscheduler(0, policy, &raw const parameters) };
     if status == 0 {
         Ok(())

@@ -44,6 +44,18 @@ impl Pin {
     pub fn of_public_key(spki_der: &[u8]) -> Self {
         Self(Sha256::digest(spki_der).into())
     }
+
+    /// A pin from its bytes, as a pairing string carries it.
+    #[must_use]
+    pub const fn from_bytes(bytes: [u8; 32]) -> Self {
+        Self(bytes)
+    }
+
+    /// The bytes.
+    #[must_use]
+    pub const fn bytes(&self) -> [u8; 32] {
+        self.0
+    }
 }
 
 impl fmt::Display for Pin {

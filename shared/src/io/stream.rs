@@ -41,9 +41,9 @@ pub enum ReadFrameError {
     #[error("the peer announced a message of {bytes} bytes, but {max} is the most")]
     TooLong {
         /// Length announced.
-        bytes: u32,
+        bytes: usize,
         /// Longest allowed.
-        max: u32,
+        max: usize,
     },
     /// The peer sent nothing for too long.
     #[error("the peer sent no message for {limit:?}: it hangs or the link is down")]
@@ -83,26 +83,26 @@ pub async fn write_frame(
 /// See [`ReadFrameError`]; after any but [`ReadFrameError::Finished`] the stream is of no use.
 pub async fn read_frame(
     stream: &mut RecvStream,
-    max: u32,
+    max: usize,
     limit: Duration,
 ) -> Result<Vec<u8>, ReadFrameError> {
     let read = timeout(limit, read_unlimited(stream, max)).await;
     read.map_err(|_| ReadFrameError::Slow { limit })?
 }
 
-async fn read_unlimited(stream: &mut RecvStream, max: u32) -> Result<Vec<u8>, ReadFrameError> {
+async fn read_unlimited(stream: &mut RecvStream, max: usize) -> Result<Vec<u8>, ReadFrameError> {
     let mut length = [0; 4];
     match stream.read_exact(&mut length).await {
         Ok(()) => {}
         Err(ReadExactError::FinishedEarly(0)) => return Err(ReadFrameError::Finished),
         Err(error) => return Err(error.into()),
     }
-    let bytes = u32::from_le_bytes(length);
+    let bytes = usize::try_from(u32::from_le_bytes(length)).unwrap_or(usize::MAX);
     if bytes > max {
         return Err(ReadFrameError::TooLong { bytes, max });
     }
     // `max` bounds it, and it is the caller's.
-    let mut message = vec![0; usize::try_from(bytes).unwrap_or(0)];
+    let mut message = vec![0; bytes];
     stream.read_exact(&mut message).await?;
     Ok(message)
 }

@@ -20,7 +20,7 @@ pub const CLOSE_OTHER_VERSION: VarInt = VarInt::from_u32(1);
 /// Peers that share no version have this long to tell each other theirs.
 const VERSIONS_MAX: Duration = Duration::from_secs(5);
 /// The longest name of a version that is believed, bytes.
-const VERSION_BYTES_MAX: u32 = 64;
+const VERSION_BYTES_MAX: usize = 64;
 /// Whether the handshake agreed on [`PROTOCOL`]; else it was [`VERSION_PROTOCOL`](super::tls::VERSION_PROTOCOL).
 pub(super) fn shares_version(connection: &Connection) -> bool {
     let data = connection.handshake_data();
@@ -56,7 +56,7 @@ pub(super) async fn version_of_master(connection: &Connection) -> String {
 }
 
 fn readable(name: &[u8]) -> String {
-    let name = name.get(..VERSION_BYTES_MAX as usize).unwrap_or(name);
+    let name = name.get(..VERSION_BYTES_MAX).unwrap_or(name);
     if name.is_empty() {
         "an unknown version".to_owned()
     } else {
