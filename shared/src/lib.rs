@@ -13,6 +13,8 @@ pub mod link_end;
 pub mod local_model;
 pub mod metrics;
 pub mod pairing;
+#[cfg(feature = "io")]
+pub mod io;
 pub mod params;
 pub mod peer;
 pub mod recording;

@@ -1,0 +1,144 @@
+//! The master's way from an endpoint to a connection with the slave of its pairing string.
+//!
+//! The handshake proves the slave to the master; the master's token comes later, in the hello. So
+//! [`connect`] succeeds before the slave has judged its master: only a welcome opens a session.
+
+use std::net::SocketAddr;
+use std::sync::Arc;
+use std::time::Duration;
+
+use quinn::{Connection, ConnectionError, Endpoint, TransportErrorCode};
+use tokio::time::timeout;
+
+use super::quic::{Traffic, client_config};
+use super::secret::Pin;
+use super::tls::{PROTOCOL, PinVerifier, TlsError};
+use super::versions::{shares_version, version_of_slave};
+
+/// Name given to the TLS library, which wants one; it is not sent.
+const SERVER_NAME: &str = "mmt";
+/// TLS alert `no_application_protocol` (RFC 7301, section 3.2).
+const ALERT_NO_PROTOCOL: u8 = 120;
+
+/// Why a master got no connection.
+#[derive(Debug, thiserror::Error)]
+pub enum ConnectError {
+    /// Nothing there.
+    #[error(
+        "nothing answered at {address} for {limit:?}: is the slave running there, is the port right, \
+         does a firewall let UDP through?"
+    )]
+    NoAnswer {
+        /// Where.
+        address: SocketAddr,
+        /// How long it was waited for.
+        limit: Duration,
+    },
+    /// Somebody else, or the slave with a new identity.
+    #[error(
+        "the slave at {address} has the key {offered}, but the pairing string pins {expected}: it is \
+         another slave or it made itself a new identity; take the pairing string that it prints"
+    )]
+    WrongKey {
+        /// Where.
+        address: SocketAddr,
+        /// The pin of the pairing string.
+        expected: Pin,
+        /// The pin of the key that was offered.
+        offered: Pin,
+    },
+    /// Another version of this program.
+    #[error(
+        "the slave at {address} speaks {theirs:?}, this program speaks {PROTOCOL:?}: install the same \
+         version on both hosts"
+    )]
+    OtherVersion {
+        /// Where.
+        address: SocketAddr,
+        /// What the slave speaks.
+        theirs: String,
+    },
+    /// QUIC, but not ours.
+    #[error("what answers at {address} speaks QUIC, but not {PROTOCOL:?}: is the port right?")]
+    OtherProtocol {
+        /// Where.
+        address: SocketAddr,
+    },
+    /// Too many handshakes at the slave.
+    #[error("the slave at {address} has too many handshakes under way: try again in some seconds")]
+    Crowded {
+        /// Where.
+        address: SocketAddr,
+    },
+    /// The endpoint cannot connect at all.
+    #[error("cannot connect to {address}: {source}")]
+    Impossible {
+        /// Where.
+        address: SocketAddr,
+        /// Why.
+        source: quinn::ConnectError,
+    },
+    /// TLS could not be set up.
+    #[error(transparent)]
+    Tls(#[from] TlsError),
+    /// The handshake failed otherwise.
+    #[error("the handshake with {address} failed: {source}")]
+    Failed {
+        /// Where.
+        address: SocketAddr,
+        /// What QUIC said.
+        source: ConnectionError,
+    },
+}
+
+/// Connects to the slave at `address` that holds the key of `pin`, within `limit`.
+///
+/// # Errors
+/// See [`ConnectError`].
+pub async fn connect(
+    endpoint: &Endpoint,
+    address: SocketAddr,
+    pin: Pin,
+    traffic: Traffic,
+    limit: Duration,
+) -> Result<Connection, ConnectError> {
+    let verifier = Arc::new(PinVerifier::new(pin));
+    let config = client_config(Arc::clone(&verifier), traffic)?;
+    let connecting = endpoint
+        .connect_with(config, address, SERVER_NAME)
+        .map_err(|source| ConnectError::Impossible { address, source })?;
+    let Ok(handshake) = timeout(limit, connecting).await else {
+        return Err(ConnectError::NoAnswer { address, limit });
+    };
+    let connection = handshake.map_err(|source| match verifier.refused() {
+        Some(offered) => ConnectError::WrongKey {
+            address,
+            expected: pin,
+            offered,
+        },
+        None => connect_error(address, limit, source),
+    })?;
+    if shares_version(&connection) {
+        return Ok(connection);
+    }
+    let theirs = version_of_slave(&connection, PROTOCOL).await;
+    Err(ConnectError::OtherVersion { address, theirs })
+}
+
+fn connect_error(address: SocketAddr, limit: Duration, source: ConnectionError) -> ConnectError {
+    let code = match &source {
+        ConnectionError::TimedOut => return ConnectError::NoAnswer { address, limit },
+        ConnectionError::ConnectionClosed(close) => close.error_code,
+        _ => return ConnectError::Failed { address, source },
+    };
+    if code == TransportErrorCode::crypto(ALERT_NO_PROTOCOL) {
+        ConnectError::OtherProtocol { address }
+    } else if code == TransportErrorCode::CONNECTION_REFUSED {
+        ConnectError::Crowded { address }
+    } else {
+        ConnectError::Failed { address, source }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,31 @@
+//! What both live shells need from the operating system and from QUIC: a clock, the 1 kHz deadline loop,
+//! real-time scheduling, a wake from that loop to tokio, an identity, endpoints, framed streams.
+//!
+//! Everything here may read a clock, start a wait or open a file or socket; nothing here knows a model, a
+//! message or a session. The haptic thread uses `clock`, `ticker`, `realtime` and `wake` only.
+
+#![allow(
+    clippy::disallowed_methods,
+    reason = "the shell: clocks, files and sockets are its business"
+)]
+
+pub mod clock;
+pub mod congestion;
+pub mod connect;
+pub mod identity;
+pub mod identity_file;
+pub mod listen;
+pub mod quic;
+pub mod realtime;
+pub mod schedule;
+pub mod secret;
+pub mod socket;
+pub mod spread;
+pub mod stream;
+pub mod ticker;
+pub mod tls;
+pub mod versions;
+pub mod wake;
+
+#[cfg(test)]
+mod loopback;
