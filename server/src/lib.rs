@@ -1,3 +1,4 @@
 //! placeholder
 
 pub mod estimator;
+pub mod trigger;
