@@ -151,10 +151,6 @@ impl EstimatorConfig {
 
 /// The slave's estimator of m, b and c.
 #[derive(Clone, Debug)]
-#[expect(
-    clippy::large_enum_variant,
-    reason = "one per slave, never moved in a tick"
-)]
 pub enum Estimator {
     /// Section II-A as printed.
     Paper(PaperEstimator),

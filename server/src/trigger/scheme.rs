@@ -268,7 +268,10 @@ impl fmt::Display for Whole {
         }
         let nanos = self.0.as_nanos();
         let units = [("s", 1_000_000_000), ("ms", 1_000_000), ("us", 1_000)];
-        match units.into_iter().find(|(_, unit)| nanos % unit == 0) {
+        match units
+            .into_iter()
+            .find(|(_, unit)| nanos.is_multiple_of(*unit))
+        {
             Some((name, unit)) => write!(f, "{}{name}", nanos / unit),
             None => write!(f, "{nanos}ns"),
         }
