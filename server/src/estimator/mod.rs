@@ -16,6 +16,7 @@ pub mod direction;
 pub mod filter;
 pub mod gate;
 pub mod kalman;
+pub mod limits;
 pub mod paper;
 #[cfg(test)]
 mod plant;
@@ -27,6 +28,7 @@ pub mod surface;
 mod tests;
 
 pub use direction::{DirectionConfig, ForceDirection};
+pub use limits::SettingOutOfRange;
 pub use paper::{PaperConfig, PaperEstimator};
 pub use recommended::{RecommendedConfig, RecommendedEstimator};
 
@@ -159,7 +161,7 @@ pub enum Estimator {
 }
 
 impl Estimator {
-    /// An estimator at its prior.
+    /// An estimator at its prior. Settings from outside pass [`EstimatorConfig::check`] first.
     #[must_use]
     pub fn new(config: &EstimatorConfig) -> Self {
         match config {

@@ -188,6 +188,11 @@ fn default_noise_leaves_1_percent_of_m_1_5_of_b_and_0_4_of_c() {
     let [m, b, c] = accuracy(0.02, || recommended(|_| {}));
     println!("recommended: median errors m {m:.4} b {b:.4} c {c:.4}");
     assert!(m < 0.01 && b < 0.015 && c < 0.004);
+    let shorter = accuracy(0.02, || {
+        recommended(|config| config.recursive.forgetting = 0.995)
+    });
+    println!("recommended with forgetting 0.995: {shorter:?}");
+    assert!(b < 0.75 * shorter[1] && c < 0.75 * shorter[2]);
 }
 
 #[test]
