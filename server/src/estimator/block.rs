@@ -150,8 +150,8 @@ mod tests {
     fn exact(k: u32) -> (Vec2, Vec2, Vec2) {
         let t = f64::from(k) * 1e-3;
         let along = |x: f64| rotate(0.5, Vec2::new(x, 0.0));
-        let v = 0.16 + 0.05 * (4.0 * t).sin() + 0.02 * (13.0 * t).cos();
-        let a = 0.2 * (4.0 * t).cos() - 0.26 * (13.0 * t).sin();
+        let v = 0.16 + 0.05 * libm::sin(4.0 * t) + 0.02 * libm::cos(13.0 * t);
+        let a = 0.2 * libm::cos(4.0 * t) - 0.26 * libm::sin(13.0 * t);
         (along(a), along(v), along(0.7 * a + 3.0 * v + 2.06))
     }
 

@@ -72,7 +72,8 @@ mod tests {
                 filter.restart();
             }
             let t = f64::from(k);
-            let regressor = Vector3::new((t * 0.01).sin(), 0.2 + 0.1 * (t * 0.017).cos(), 1.0);
+            let regressor =
+                Vector3::new(libm::sin(t * 0.01), 0.2 + 0.1 * libm::cos(t * 0.017), 1.0);
             let force = theta.dot(&regressor);
             let out = filter.step(Row { regressor, force });
             assert!((theta.dot(&out.regressor) - out.force).abs() < 1e-12);

@@ -16,6 +16,7 @@ pub mod direction;
 pub mod filter;
 pub mod gate;
 pub mod kalman;
+pub mod limits;
 pub mod paper;
 #[cfg(test)]
 mod plant;
@@ -27,6 +28,7 @@ pub mod surface;
 mod tests;
 
 pub use direction::{DirectionConfig, ForceDirection};
+pub use limits::SettingOutOfRange;
 pub use paper::{PaperConfig, PaperEstimator};
 pub use recommended::{RecommendedConfig, RecommendedEstimator};
 
@@ -161,10 +163,6 @@ impl EstimatorConfig {
 
 /// The slave's estimator of m, b and c.
 #[derive(Clone, Debug)]
-#[expect(
-    clippy::large_enum_variant,
-    reason = "one per slave, never moved in a tick"
-)]
 pub enum Estimator {
     /// Section II-A as printed.
     Paper(PaperEstimator),
@@ -173,7 +171,7 @@ pub enum Estimator {
 }
 
 impl Estimator {
-    /// An estimator at its prior.
+    /// An estimator at its prior. Settings from outside pass [`EstimatorConfig::check`] first.
     #[must_use]
     pub fn new(config: &EstimatorConfig) -> Self {
         match config {

@@ -48,8 +48,8 @@ impl Motion {
     }
 
     fn at(&self, t: f64) -> f64 {
-        let slow = self.slow.0 * (TAU * self.slow.1 * t + self.phase.0).sin();
-        let fast = self.fast.0 * (TAU * self.fast.1 * t + self.phase.1).sin();
+        let slow = self.slow.0 * libm::sin(TAU * self.slow.1 * t + self.phase.0);
+        let fast = self.fast.0 * libm::sin(TAU * self.fast.1 * t + self.phase.1);
         self.speed * (1.0 + slow + fast)
     }
 }

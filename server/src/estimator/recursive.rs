@@ -61,16 +61,18 @@ pub enum Verdict {
 /// Settings of [`Recursive`].
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RecursiveConfig {
-    /// Weight that a row keeps from tick to tick. 0.998, a memory of 500 ms: beside the change test it
-    /// beats 0.995 in accuracy and in following a change (both measured in the tests).
+    /// Weight that a row keeps from tick to tick. 0.998, a memory of 500 ms: half the error in b and c of
+    /// 0.995; a change is followed by the change test, not by short memory (measured in the tests).
     pub forgetting: f64,
     /// Watching for a change of friction; none: forgetting alone.
     pub change: Option<ChangeTest>,
     /// Values of m (kg), b (N s/m), c (N) before any data.
     pub prior: [f64; 3],
-    /// By how much (standard deviation, same units) b and c may have moved away from their last well
-    /// founded values when the data cannot tell them apart.
+    /// Standard deviation of the prior's b (N s/m) and c (N).
     pub prior_deviation: [f64; 2],
+    /// By how much (standard deviation, same units) b and c may have moved away from their last well
+    /// founded values while the data cannot tell them apart.
+    pub held_deviation: [f64; 2],
     /// How many times the power of the noise the acceleration must have for m to count as seen.
     pub excitation: f64,
     /// Largest force that the uncertainty of b may stand for at the present speed, N.
@@ -83,7 +85,8 @@ impl Default for RecursiveConfig {
             forgetting: 0.998,
             change: Some(ChangeTest::default()),
             prior: [0.4, 0.0, 1.0],
-            prior_deviation: [1.0, 1.0],
+            prior_deviation: [3.0, 3.0],
+            held_deviation: [1.0, 1.0],
             excitation: 20.0,
             damping_force_n: 0.05,
         }
@@ -260,11 +263,10 @@ impl Recursive {
     /// c as the prior deviations say. Before anything was well founded the held value is only the prior,
     /// and m is pulled just enough to outweigh the noise.
     fn pull(&self, variance: f64) -> Matrix3<f64> {
-        let [b, c] = self.config.prior_deviation;
-        let excitation = if self.founded {
-            self.config.excitation
+        let (excitation, [b, c]) = if self.founded {
+            (self.config.excitation, self.config.held_deviation)
         } else {
-            PRIOR_PULL
+            (PRIOR_PULL, self.config.prior_deviation)
         };
         let m = excitation * self.acceleration_noise * self.weight;
         Matrix3::from_diagonal(&Vector3::new(m, variance / (b * b), variance / (c * c)))

@@ -90,7 +90,7 @@ mod tests {
         let (mut pen_before, mut worst) = (0.0, 0.0_f64);
         for k in 0..2000 {
             let t = f64::from(k) * TICK_S;
-            let pen = 0.002 * (1.0 - (-t / 0.1).exp()) + 0.0005 * (12.0 * t).sin();
+            let pen = 0.002 * (1.0 - libm::exp(-t / 0.1)) + 0.0005 * libm::sin(12.0 * t);
             let truth = Vec2::new(0.1 * t, -0.03 * t);
             let force = normal * coupling.force(pen, (pen - pen_before) / TICK_S);
             pen_before = pen;

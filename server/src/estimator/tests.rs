@@ -177,7 +177,7 @@ fn m_with_force(filtered_alike: bool) -> f64 {
 fn filtering_the_motion_alone_would_bias_m() {
     let (alike, motion_alone) = (m_with_force(true), m_with_force(false));
     assert!(
-        (motion_alone / TRUTH[0] - 1.0).abs() > 0.10,
+        (motion_alone / TRUTH[0] - 1.0).abs() > 0.05,
         "{motion_alone}"
     );
     assert!((alike / TRUTH[0] - 1.0).abs() < 1e-6, "{alike}");
@@ -188,6 +188,11 @@ fn default_noise_leaves_1_percent_of_m_1_5_of_b_and_0_4_of_c() {
     let [m, b, c] = accuracy(0.02, || recommended(|_| {}));
     println!("recommended: median errors m {m:.4} b {b:.4} c {c:.4}");
     assert!(m < 0.01 && b < 0.015 && c < 0.004);
+    let shorter = accuracy(0.02, || {
+        recommended(|config| config.recursive.forgetting = 0.995)
+    });
+    println!("recommended with forgetting 0.995: {shorter:?}");
+    assert!(b < 0.75 * shorter[1] && c < 0.75 * shorter[2]);
 }
 
 #[test]
@@ -278,11 +283,11 @@ fn constant_speed_shows_nothing_so_the_values_are_held_and_it_says_so() {
             let estimate = estimator.step(&plant.push(&Motion::steady(0.15)));
             if k > 3000 {
                 assert!(!estimate.excited, "tick {k}");
-                assert!(estimate.condition > 100.0);
+                assert!(estimate.condition > 30.0);
             }
             let moved = errors(values(&estimate), before);
             assert!(
-                moved[0] < 0.04 && moved[1] < 0.25 && moved[2] < 0.04,
+                moved[0] < 0.04 && moved[1] < 0.25 && moved[2] < 0.06,
                 "{k} {moved:?}"
             );
         }

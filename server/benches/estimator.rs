@@ -1,0 +1,83 @@
+//! Time of one tick of the estimators and of the trigger.
+//!
+//! Budgets: estimator 0.5 µs an update in either mode; trigger 0.1 µs a decision. The ticks are those of
+//! a push, so that every tick reaches the regression.
+
+use std::hint::black_box;
+
+use criterion::{Criterion, criterion_group, criterion_main};
+use mmt_server::estimator::{Estimator, EstimatorConfig, Measured};
+use mmt_server::trigger::{Trigger, TriggerConfig, TriggerInput};
+use mmt_shared::contact::Coupling;
+use mmt_shared::geometry::{Pose, Vec2};
+use mmt_shared::params::ModelParams;
+use mmt_shared::settings::Mode;
+use mmt_shared::time::{TICK_S, Time};
+
+const TICKS: usize = 4000;
+
+/// Tool and force of a modulated push along x.
+fn push() -> Vec<Measured> {
+    let (mut position, mut measured) = (0.0, Vec::with_capacity(TICKS));
+    for k in 0..TICKS {
+        let t = k as f64 * TICK_S;
+        let (slow, fast) = (libm::sin(4.0 * t), libm::sin(13.0 * t));
+        let v = 0.16 * (1.0 + 0.3 * slow + 0.12 * fast);
+        let a = 0.16 * (1.2 * libm::cos(4.0 * t) + 1.56 * libm::cos(13.0 * t));
+        position += v * TICK_S;
+        let force = 0.7 * a + 3.0 * v + 2.06;
+        measured.push(Measured {
+            tool: Vec2::new(position + force / 1000.0, 0.0),
+            force: Vec2::new(force, 0.0),
+            normal: Some(Vec2::new(1.0, 0.0)),
+        });
+    }
+    measured
+}
+
+fn estimators(criterion: &mut Criterion) {
+    let ticks = push();
+    for (name, mode) in [("paper", Mode::Paper), ("recommended", Mode::Recommended)] {
+        let config = EstimatorConfig::of_mode(mode, Coupling::for_stiffness(1000.0));
+        let mut estimator = Estimator::new(&config);
+        let mut next = ticks.iter().cycle();
+        criterion.bench_function(&format!("estimator/{name}"), |bencher| {
+            bencher.iter(|| next.next().map(|tick| estimator.step(black_box(tick))));
+        });
+        assert!(estimator.estimate().samples > 0, "every tick must count");
+    }
+}
+
+fn trigger(criterion: &mut Criterion) {
+    let coupling = Coupling::for_stiffness(1000.0);
+    let Ok(params) = ModelParams::of_square(0.7, 3.0, 2.06, 0.4, &coupling) else {
+        return;
+    };
+    let input = TriggerInput {
+        f_s: Vec2::new(2.5, 0.1),
+        f_m: Vec2::new(2.0, 0.1),
+        slave_in_contact: true,
+        shadow_in_contact: true,
+        sticking: false,
+        speed: 0.16,
+        acceleration: 0.2,
+        candidate: params,
+        sent: params,
+        object: Pose::default(),
+        model: Pose::default(),
+    };
+    for text in ["hybrid 10% 150ms", "useful 10% 150ms"] {
+        let Ok(scheme) = text.parse() else { continue };
+        let mut trigger = Trigger::new(TriggerConfig::of_mode(Mode::Recommended, scheme));
+        let mut ms = 0;
+        criterion.bench_function(&format!("trigger/{text}"), |bencher| {
+            bencher.iter(|| {
+                ms += 1;
+                trigger.decide(Time::from_millis(ms), black_box(&input))
+            });
+        });
+    }
+}
+
+criterion_group!(benches, estimators, trigger);
+criterion_main!(benches);
