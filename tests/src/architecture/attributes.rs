@@ -97,12 +97,15 @@ fn liftings(code: &Code) -> impl Iterator<Item = (usize, &str)> {
         .filter(move |(_, attribute)| lifts(attribute))
 }
 
-/// `unsafe` outside the named files, and within them without a `SAFETY:` comment above.
+/// `unsafe` outside the named files, and within them without saying above why it is sound: in a `SAFETY:`
+/// comment or in the reason of the lifted lint.
 pub fn stray_unsafe(file: &File) -> Vec<Violation> {
     let lines: Vec<_> = file.text.lines().collect();
     let explained = |line: usize| {
         let above = lines.iter().take(line).rev().take(8);
-        above.into_iter().any(|text| text.contains("SAFETY:"))
+        above
+            .into_iter()
+            .any(|text| text.contains("SAFETY:") || text.contains("reason ="))
     };
     let judge = |line: usize| {
         if !may_be_unsafe(file) {
@@ -115,7 +118,7 @@ pub fn stray_unsafe(file: &File) -> Vec<Violation> {
             Some(Violation::at(
                 file,
                 line,
-                "`unsafe` without a `SAFETY:` comment above it",
+                "`unsafe` without saying above it why it is sound",
             ))
         } else {
             None
