@@ -45,6 +45,9 @@ fn named<'a>(attribute: &str, lints: &[&'a str]) -> Vec<&'a str> {
 
 /// Lints lifted where they must hold, and lifted anywhere without a reason.
 pub fn lifted_lints(file: &File) -> Vec<Violation> {
+    if !file.is_rust() {
+        return Vec::new();
+    }
     let code = Code::of(&file.text);
     let production = code.without_tests();
     let mut found = Vec::new();
@@ -100,6 +103,9 @@ fn liftings(code: &Code) -> impl Iterator<Item = (usize, &str)> {
 /// `unsafe` outside the named files, and within them without saying above why it is sound: in a `SAFETY:`
 /// comment or in the reason of the lifted lint.
 pub fn stray_unsafe(file: &File) -> Vec<Violation> {
+    if !file.is_rust() {
+        return Vec::new();
+    }
     let lines: Vec<_> = file.text.lines().collect();
     let explained = |line: usize| {
         let above = lines.iter().take(line).rev().take(8);

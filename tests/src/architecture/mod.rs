@@ -6,6 +6,7 @@
 
 pub mod attributes;
 pub mod code;
+pub mod documents;
 pub mod files;
 pub mod layers;
 pub mod manifest;
