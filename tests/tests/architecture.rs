@@ -6,7 +6,8 @@
 use std::error::Error;
 
 use mmt_tests::architecture::{
-    File, Violation, attributes, documents, files, layers, manifest, purity, repository, tree,
+    File, Violation, attributes, documents, equations, files, layers, manifest, purity, repository,
+    tree,
 };
 
 type Checked = Result<(), Box<dyn Error>>;
@@ -106,6 +107,12 @@ fn documents_name_only_files_that_exist() -> Checked {
     let files = repository::files()?;
     let dead = |file| documents::dead_references(file, &files);
     none(&files.iter().flat_map(dead).collect::<Vec<_>>());
+    Ok(())
+}
+
+#[test]
+fn every_equation_of_the_paper_is_cited_where_it_is_computed() -> Checked {
+    none(&equations::uncited(&repository::files()?));
     Ok(())
 }
 

@@ -7,6 +7,7 @@
 pub mod attributes;
 pub mod code;
 pub mod documents;
+pub mod equations;
 pub mod files;
 pub mod layers;
 pub mod manifest;
