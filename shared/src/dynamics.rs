@@ -67,9 +67,9 @@ fn sign_step(twist: &Twist, params: &ModelParams, force: Vec2, moment: f64) -> T
     } else {
         Vec2::zeros()
     };
-    // (5)
+    // (5), which is (1) solved for the acceleration
     let a = (force - v * params.b() - direction * params.c()) / params.m();
-    // (11); signum of a float is ±1 at zero, the equation's is 0
+    // (11), which is (7) solved likewise; signum of a float is ±1 at zero, the equation's is 0
     let sign = if twist.angular == 0.0 {
         0.0
     } else {

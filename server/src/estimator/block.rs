@@ -95,6 +95,7 @@ impl Block {
         } else {
             Vec2::zeros()
         };
+        // (2)
         let regressor = Matrix3x2::from_rows(&[a.transpose(), v.transpose(), sliding.transpose()]);
         let row = PlanarRow { regressor, force };
         let Some(slot) = self.ring.get_mut(self.next) else {

@@ -45,6 +45,9 @@ fn named<'a>(attribute: &str, lints: &[&'a str]) -> Vec<&'a str> {
 
 /// Lints lifted where they must hold, and lifted anywhere without a reason.
 pub fn lifted_lints(file: &File) -> Vec<Violation> {
+    if !file.is_rust() {
+        return Vec::new();
+    }
     let code = Code::of(&file.text);
     let production = code.without_tests();
     let mut found = Vec::new();
@@ -97,12 +100,18 @@ fn liftings(code: &Code) -> impl Iterator<Item = (usize, &str)> {
         .filter(move |(_, attribute)| lifts(attribute))
 }
 
-/// `unsafe` outside the named files, and within them without a `SAFETY:` comment above.
+/// `unsafe` outside the named files, and within them without saying above why it is sound: in a `SAFETY:`
+/// comment or in the reason of the lifted lint.
 pub fn stray_unsafe(file: &File) -> Vec<Violation> {
+    if !file.is_rust() {
+        return Vec::new();
+    }
     let lines: Vec<_> = file.text.lines().collect();
     let explained = |line: usize| {
         let above = lines.iter().take(line).rev().take(8);
-        above.into_iter().any(|text| text.contains("SAFETY:"))
+        above
+            .into_iter()
+            .any(|text| text.contains("SAFETY:") || text.contains("reason ="))
     };
     let judge = |line: usize| {
         if !may_be_unsafe(file) {
@@ -115,7 +124,7 @@ pub fn stray_unsafe(file: &File) -> Vec<Violation> {
             Some(Violation::at(
                 file,
                 line,
-                "`unsafe` without a `SAFETY:` comment above it",
+                "`unsafe` without saying above it why it is sound",
             ))
         } else {
             None

@@ -6,6 +6,8 @@
 
 pub mod attributes;
 pub mod code;
+pub mod documents;
+pub mod equations;
 pub mod files;
 pub mod layers;
 pub mod manifest;
@@ -41,7 +43,9 @@ impl File {
     /// Whether the file is test or bench code only: it may panic and unwrap.
     pub fn is_test(&self) -> bool {
         let mut parts = self.path.split('/').skip(1);
-        parts.any(|part| matches!(part, "tests" | "benches" | "tests.rs"))
+        parts.any(|part| {
+            matches!(part, "tests" | "benches" | "tests.rs") || part.ends_with("_tests.rs")
+        })
     }
 
     /// Whether the file belongs to a shell: it may read clocks and open sockets, threads and files.
@@ -106,6 +110,7 @@ mod tests {
         assert_eq!(role("tests/src/lib.rs"), (false, true, false));
         assert_eq!(role("tests/tests/architecture.rs"), (false, true, true));
         assert_eq!(role("netem/src/link/tests.rs"), (false, true, true));
+        assert_eq!(role("shared/src/io/connect_tests.rs"), (false, true, true));
         assert_eq!(role("server/benches/world.rs"), (false, true, true));
         assert_eq!(role("shared/src/audio/mod.rs"), (true, false, false));
     }

@@ -43,7 +43,7 @@ pub fn root() -> PathBuf {
     here.parent().unwrap_or(here).to_path_buf()
 }
 
-/// Every text file of the repository, in the order of their paths; files that are not UTF-8 are left out.
+/// Every file of the repository, in the order of their paths; one that is not UTF-8 comes without its text.
 ///
 /// # Errors
 /// A directory or file that cannot be read.
@@ -62,7 +62,8 @@ pub fn files() -> Result<Vec<File>, CollectError> {
             }
             if path.is_dir() {
                 waiting.push(path);
-            } else if let Some(text) = text_of(&path)? {
+            } else {
+                let text = text_of(&path)?;
                 let inner = path.strip_prefix(&root).unwrap_or(&path);
                 found.push(File {
                     path: inner.to_string_lossy().replace('\\', "/"),
@@ -87,13 +88,13 @@ fn entries(directory: &Path) -> Result<Vec<PathBuf>, CollectError> {
         .collect()
 }
 
-/// The text of a file, if it is text.
-fn text_of(path: &Path) -> Result<Option<String>, CollectError> {
+/// The text of a file; empty if it is none.
+fn text_of(path: &Path) -> Result<String, CollectError> {
     let bytes = std::fs::read(path).map_err(|source| CollectError::Unreadable {
         path: path.to_path_buf(),
         source,
     })?;
-    Ok(String::from_utf8(bytes).ok())
+    Ok(String::from_utf8(bytes).unwrap_or_default())
 }
 
 /// What `cargo tree` says of one crate of the workspace, built for this machine.
