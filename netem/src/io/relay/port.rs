@@ -111,3 +111,40 @@ impl Receiver {
         Ok(())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::net::Ipv4Addr;
+    use std::time::Duration;
+
+    use super::*;
+
+    #[test]
+    fn news_that_nobody_listened_costs_the_next_datagram_nothing() {
+        let any = (Ipv4Addr::LOCALHOST, 0);
+        let vacant = UdpSocket::bind(any).unwrap().local_addr().unwrap();
+        let socket = UdpSocket::bind(any).unwrap();
+        socket.connect(vacant).unwrap();
+        let port = Port::try_new(socket).unwrap();
+        let mut unreachable = 0;
+        let mut send = |contents: &[u8]| {
+            let transmit = Transmit {
+                destination: vacant,
+                ecn: None,
+                contents,
+                segment_size: None,
+                src_ip: None,
+            };
+            port.send(&transmit, &mut unreachable)
+        };
+        assert_eq!(send(b"to nobody"), Sent::Yes);
+        let target = UdpSocket::bind(vacant).unwrap();
+        assert_eq!(send(b"to you"), Sent::Yes);
+        assert_eq!(unreachable, 1);
+        let patience = Duration::from_secs(30);
+        target.set_read_timeout(Some(patience)).unwrap();
+        let mut buffer = [0; 100];
+        let len = target.recv(&mut buffer).unwrap();
+        assert_eq!(&buffer[..len], b"to you");
+    }
+}
