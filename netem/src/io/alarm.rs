@@ -85,13 +85,15 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_wait_ends_at_its_deadline_and_not_long_before() {
+    fn a_wait_ends_at_its_deadline_and_does_not_spin_until_then() {
         let alarm = Alarm::try_new().unwrap();
-        let deadline = now() + Duration::from_millis(5);
+        let deadline = now() + Duration::from_millis(20);
+        let mut waits = 0;
         while now() < deadline {
             alarm.wait(Some(deadline)).unwrap();
+            waits += 1;
         }
-        assert!(now() >= deadline);
+        assert!((1..10).contains(&waits), "{waits} waits");
     }
 
     #[test]

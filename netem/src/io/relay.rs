@@ -1,1 +1,240 @@
-//! placeholder
+//! The *relay* driver: a UDP relay with an emulated link in each direction.
+//!
+//! Clients send to the relay instead of to the target; each gets a socket of its own toward the target,
+//! so that the target sees one address per client. All clients share the two links, as they would share
+//! one path. Everything happens on one thread.
+
+use std::io;
+use std::net::{SocketAddr, UdpSocket};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex};
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+use serde::Serialize;
+
+use super::alarm::Alarm;
+use super::lateness::{Lateness, Recorder};
+use super::lock;
+use crate::config::{ConfigError, LinkConfig};
+use crate::counters::{LinkCounters, Tally};
+use crate::link::LinkId;
+use crate::pipe::Pipe;
+
+mod clients;
+mod port;
+#[cfg(test)]
+mod tests;
+mod worker;
+
+use clients::Clients;
+use port::Port;
+use worker::Worker;
+
+/// Clients at one time; datagrams of one more are dropped and counted. Each holds one descriptor.
+pub const CLIENTS_MAX: usize = 64;
+/// A client without a datagram in either direction for this long is forgotten: four times QUIC's own
+/// idle timeout in this project.
+pub const CLIENT_IDLE: Duration = Duration::from_secs(60);
+
+/// A relay could not be started, or broke.
+#[derive(Debug, thiserror::Error)]
+pub enum RelayError {
+    /// The settings of a link are out of range.
+    #[error(transparent)]
+    Config(#[from] ConfigError),
+    /// The target is no address to send to.
+    #[error("relay target {to}: give the address and the port of a host")]
+    Target {
+        /// The target given.
+        to: SocketAddr,
+    },
+    /// The relay would send to itself.
+    #[error("relay target {to} is the relay's own address: its packets would go round for ever")]
+    Loop {
+        /// The target given.
+        to: SocketAddr,
+    },
+    /// The address to listen on cannot be had.
+    #[error("relay cannot listen on {listen}: {source}")]
+    Listen {
+        /// The address given.
+        listen: SocketAddr,
+        /// What the system says.
+        source: io::Error,
+    },
+    /// The lateness histogram could not be made.
+    #[error("no histogram for the relay: {0}")]
+    Histogram(#[from] hdrhistogram::CreationError),
+    /// The system gave no event descriptor or no thread.
+    #[error("no thread for the relay: {0}")]
+    Thread(io::Error),
+    /// The relay's thread ended by itself.
+    #[error("the relay broke off: {0}")]
+    Broken(io::Error),
+}
+
+/// What the relay did so far. The counts of one snapshot are those of one moment.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct RelaySnapshot {
+    /// From the clients (masters) to the target (slave).
+    pub up: DirectionCounters,
+    /// From the target (slave) to the clients (masters).
+    pub down: DirectionCounters,
+    /// Clients that the relay knows now.
+    pub clients: u64,
+    /// Clients that the relay met since its start.
+    pub clients_met: u64,
+    /// Datagrams from clients beyond [`CLIENTS_MAX`], or without a socket to be had: never offered.
+    pub refused: Tally,
+    /// Times that the target's host said that nobody listens there (ICMP port unreachable).
+    pub unreachable: u64,
+    /// Other errors of receiving.
+    pub receive_errors: u64,
+    /// How late packets left, both directions.
+    pub lateness: Lateness,
+}
+
+/// One direction of the relay. Bytes are UDP payload.
+///
+/// `offered = dropped by the link + in_flight + forwarded + blocked + failed + orphaned`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct DirectionCounters {
+    /// What the link decided.
+    pub link: LinkCounters,
+    /// Packets on the link now.
+    pub in_flight: u64,
+    /// Packets really sent on.
+    pub forwarded: Tally,
+    /// Packets dropped because the socket was full.
+    pub blocked: Tally,
+    /// Packets that the socket refused with an error.
+    pub failed: Tally,
+    /// Packets whose client was forgotten while they were in flight.
+    pub orphaned: Tally,
+}
+
+/// The relay as such: [`Relay::bind`] starts one.
+#[derive(Debug)]
+pub struct Relay;
+
+impl Relay {
+    /// Starts a relay from `listen` to `to` on a thread of its own. `up` is the link from client (master)
+    /// to target (slave), `down` the way back; both draw from `seed`.
+    ///
+    /// # Errors
+    /// Settings out of range, a target that cannot be one, an address in use, no thread to be had.
+    pub fn bind(
+        listen: SocketAddr,
+        to: SocketAddr,
+        up: LinkConfig,
+        down: LinkConfig,
+        seed: u64,
+    ) -> Result<RelayHandle, RelayError> {
+        let (up, down) = (
+            Pipe::try_new(up, seed, LinkId::UP)?,
+            Pipe::try_new(down, seed, LinkId::DOWN)?,
+        );
+        if to.port() == 0 || to.ip().is_unspecified() {
+            return Err(RelayError::Target { to });
+        }
+        let (port, local) = listen_on(listen).map_err(|source| match listen == to {
+            true => RelayError::Loop { to },
+            false => RelayError::Listen { listen, source },
+        })?;
+        if local == to {
+            return Err(RelayError::Loop { to });
+        }
+        let shared = Arc::new(Shared {
+            alarm: Alarm::try_new().map_err(RelayError::Thread)?,
+            stopping: AtomicBool::new(false),
+            board: Mutex::new(RelaySnapshot::default()),
+            lateness: Recorder::try_new()?,
+        });
+        let worker = Worker::new(port, Clients::new(to), up, down, shared.clone());
+        let thread = std::thread::Builder::new()
+            .name("netem-relay".to_owned())
+            .spawn(move || worker.run())
+            .map_err(RelayError::Thread)?;
+        Ok(RelayHandle {
+            local,
+            shared,
+            thread: Some(thread),
+        })
+    }
+}
+
+fn listen_on(listen: SocketAddr) -> io::Result<(Port, SocketAddr)> {
+    let socket = UdpSocket::bind(listen)?;
+    let local = socket.local_addr()?;
+    Ok((Port::try_new(socket)?, local))
+}
+
+/// A running relay. Dropping it stops it; packets in flight are lost.
+#[derive(Debug)]
+pub struct RelayHandle {
+    local: SocketAddr,
+    shared: Arc<Shared>,
+    thread: Option<JoinHandle<io::Result<()>>>,
+}
+
+/// What the relay's thread and its handle share.
+#[derive(Debug)]
+struct Shared {
+    alarm: Alarm,
+    stopping: AtomicBool,
+    /// The counts as of the thread's last look around, without the lateness.
+    board: Mutex<RelaySnapshot>,
+    lateness: Recorder,
+}
+
+impl RelayHandle {
+    /// The address that the relay listens on, with the port that the system chose if none was given.
+    #[must_use]
+    pub fn local_addr(&self) -> SocketAddr {
+        self.local
+    }
+
+    /// What the relay did so far.
+    #[must_use]
+    pub fn snapshot(&self) -> RelaySnapshot {
+        RelaySnapshot {
+            lateness: self.shared.lateness.summary(),
+            ..*lock(&self.shared.board)
+        }
+    }
+
+    /// Whether the relay is at work; false after an error that [`Self::stop`] tells.
+    #[must_use]
+    pub fn is_running(&self) -> bool {
+        self.thread
+            .as_ref()
+            .is_some_and(|thread| !thread.is_finished())
+    }
+
+    /// Stops the relay and tells what it did. Packets in flight are lost and show as such.
+    ///
+    /// # Errors
+    /// The error by which the relay had ended before.
+    pub fn stop(mut self) -> Result<RelaySnapshot, RelayError> {
+        self.end().map_err(RelayError::Broken)?;
+        Ok(self.snapshot())
+    }
+
+    fn end(&mut self) -> io::Result<()> {
+        self.shared.stopping.store(true, Ordering::Release);
+        self.shared.alarm.ring();
+        match self.thread.take().map(JoinHandle::join) {
+            None => Ok(()),
+            Some(Ok(result)) => result,
+            Some(Err(_)) => Err(io::Error::other("its thread panicked")),
+        }
+    }
+}
+
+impl Drop for RelayHandle {
+    fn drop(&mut self) {
+        // Whoever wants to know the error calls `stop`.
+        let _ = self.end();
+    }
+}

@@ -18,6 +18,12 @@ fn packets_leave_at_their_time_and_not_before() {
     let just_before = Time::from_nanos(49_999_999);
     assert_eq!(pipe.next_due(), Some(Time::from_millis(50)));
     assert_eq!(pipe.pop_due(just_before), None);
+    assert_eq!(
+        pipe.clone()
+            .pop_due(Time::from_millis(50))
+            .map(|p| p.payload),
+        Some(7)
+    );
     // taken out late, it still carries its theoretical time
     let released = pipe.pop_due(Time::from_millis(80)).unwrap();
     assert_eq!((released.due, released.payload), (Time::from_millis(50), 7));

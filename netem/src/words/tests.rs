@@ -164,6 +164,19 @@ fn settings_print_in_the_words_they_are_written_in() {
     }
 }
 
+#[test]
+fn a_configuration_file_holds_a_link_as_its_words() {
+    let json = "\"delay 50ms 5ms loss 1%\"";
+    let config: LinkConfig = serde_json::from_str(json).unwrap();
+    assert_eq!(config, parsed("delay 50ms 5ms loss 1%"));
+    assert_eq!(serde_json::to_string(&config).unwrap(), json);
+    let error = serde_json::from_str::<LinkConfig>("\"lag 5ms\"").unwrap_err();
+    assert!(
+        error.to_string().contains("expected delay, loss"),
+        "{error}"
+    );
+}
+
 fn any_time() -> impl Strategy<Value = Duration> {
     prop_oneof![
         (0..=3_600_000_000_000_u64).prop_map(Duration::from_nanos),

@@ -1,1 +1,367 @@
-//! placeholder
+//! The wrapped socket against a pretended one, and between two real QUIC endpoints.
+
+use std::net::Ipv4Addr;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::task::Waker;
+use std::time::{Duration, Instant};
+
+use mmt_shared::time::Time;
+use quinn::{ClientConfig, Endpoint, EndpointConfig, Runtime, ServerConfig, TokioRuntime};
+
+use super::*;
+use crate::counters::Tally;
+use crate::io::alarm;
+
+const PATIENCE: Duration = Duration::from_secs(30);
+const PEER: SocketAddr = SocketAddr::new(IpAddr::V4(Ipv4Addr::LOCALHOST), 9);
+
+type Sent = (Time, Vec<u8>, Option<EcnCodepoint>);
+
+/// A socket that keeps what it is given.
+#[derive(Debug, Default)]
+struct Pretended {
+    sent: Mutex<Vec<Sent>>,
+    full: AtomicBool,
+    broken: AtomicBool,
+}
+
+impl Pretended {
+    fn contents(&self) -> Vec<Vec<u8>> {
+        let sent = self.sent.lock().unwrap();
+        sent.iter()
+            .map(|(_, contents, _)| contents.clone())
+            .collect()
+    }
+}
+
+#[derive(Debug)]
+struct NeverWritable;
+
+impl UdpPoller for NeverWritable {
+    fn poll_writable(self: Pin<&mut Self>, _: &mut Context<'_>) -> Poll<io::Result<()>> {
+        Poll::Pending
+    }
+}
+
+impl AsyncUdpSocket for Pretended {
+    fn create_io_poller(self: Arc<Self>) -> Pin<Box<dyn UdpPoller>> {
+        Box::pin(NeverWritable)
+    }
+
+    fn try_send(&self, transmit: &Transmit<'_>) -> io::Result<()> {
+        if self.full.load(Ordering::Relaxed) {
+            return Err(io::ErrorKind::WouldBlock.into());
+        }
+        if self.broken.load(Ordering::Relaxed) {
+            return Err(io::ErrorKind::NetworkUnreachable.into());
+        }
+        let contents = transmit.contents.to_owned();
+        self.sent
+            .lock()
+            .unwrap()
+            .push((alarm::now(), contents, transmit.ecn));
+        Ok(())
+    }
+
+    fn poll_recv(
+        &self,
+        _: &mut Context<'_>,
+        _: &mut [IoSliceMut<'_>],
+        meta: &mut [RecvMeta],
+    ) -> Poll<io::Result<usize>> {
+        // 2500 bytes in datagrams of 1000, one of 7, an empty one; the fourth slot is not used
+        for (slot, (len, stride)) in meta.iter_mut().zip([(2500, 1000), (7, 7), (0, 0), (9, 9)]) {
+            (slot.len, slot.stride) = (len, stride);
+        }
+        Poll::Ready(Ok(3))
+    }
+
+    fn local_addr(&self) -> io::Result<SocketAddr> {
+        Ok(PEER)
+    }
+
+    fn max_transmit_segments(&self) -> usize {
+        8
+    }
+}
+
+fn wrap(inner: &Arc<Pretended>, words: &str) -> EmulatedSocket {
+    EmulatedSocket::try_new(inner.clone(), words.parse().unwrap(), 1, LinkId::UP).unwrap()
+}
+
+fn transmit(contents: &[u8], segment_size: Option<usize>) -> Transmit<'_> {
+    Transmit {
+        destination: PEER,
+        ecn: Some(EcnCodepoint::Ect0),
+        contents,
+        segment_size,
+        src_ip: None,
+    }
+}
+
+/// Waits for something that must come, for as long as a slow machine may need.
+fn until(what: &str, mut holds: impl FnMut() -> bool) {
+    let start = Instant::now();
+    while !holds() {
+        assert!(start.elapsed() < PATIENCE, "it never came: {what}");
+        std::thread::sleep(Duration::from_millis(1));
+    }
+}
+
+fn offered_is_accounted_for(counters: &SocketCounters) {
+    let total = counters.dropped.total();
+    let packets = counters.sent_datagrams + total.packets + counters.in_flight();
+    assert_eq!(counters.offered_datagrams, packets);
+    if counters.in_flight() == 0 {
+        assert_eq!(counters.offered_bytes, counters.sent_bytes + total.bytes);
+    }
+}
+
+#[test]
+fn a_datagram_leaves_whole_marked_in_order_and_never_early() {
+    let inner = Arc::new(Pretended::default());
+    let socket = wrap(&inner, "delay 20ms 10ms");
+    let start = alarm::now();
+    for number in 0..50 {
+        socket.try_send(&transmit(&[number], None)).unwrap();
+    }
+    until("all sent", || inner.contents().len() == 50);
+    let in_order: Vec<Vec<u8>> = (0..50).map(|number| vec![number]).collect();
+    assert_eq!(inner.contents(), in_order);
+    for (at, _, ecn) in inner.sent.lock().unwrap().iter() {
+        assert!(at.saturating_since(start) >= Duration::from_millis(10));
+        assert_eq!(*ecn, Some(EcnCodepoint::Ect0));
+    }
+    let meter = socket.meter();
+    until("counted", || meter.snapshot().sent_datagrams == 50);
+    assert_eq!(meter.lateness().count, 50);
+}
+
+#[test]
+fn a_datagram_due_sooner_wakes_the_thread_that_waits_for_a_later_one() {
+    let inner = Arc::new(Pretended::default());
+    // J above the delay: some leave at once while others wait for most of an hour
+    let socket = wrap(&inner, "delay 1800s 3000s order free");
+    for number in 0..50 {
+        socket.try_send(&transmit(&[number], None)).unwrap();
+    }
+    until("the first", || !inner.contents().is_empty());
+    assert!(inner.contents().len() < 50);
+}
+
+#[test]
+fn dropping_the_socket_ends_its_thread_and_counts_what_was_in_flight() {
+    let inner = Arc::new(Pretended::default());
+    let socket = wrap(&inner, "delay 3600s");
+    socket.try_send(&transmit(b"late", None)).unwrap();
+    let meter = socket.meter();
+    assert_eq!(meter.snapshot().in_flight(), 1);
+    assert!(Arc::strong_count(&inner) > 2, "the thread holds the socket");
+    drop(socket);
+    assert_eq!(Arc::strong_count(&inner), 1);
+    let counters = meter.snapshot();
+    assert_eq!(
+        counters.dropped.abandoned,
+        Tally {
+            packets: 1,
+            bytes: 4
+        }
+    );
+    offered_is_accounted_for(&counters);
+}
+
+#[test]
+fn each_datagram_of_a_batch_has_its_own_fate() {
+    let inner = Arc::new(Pretended::default());
+    let socket = wrap(&inner, "delay 1ms loss 50%");
+    assert_eq!(socket.max_transmit_segments(), 1);
+    let batch: Vec<u8> = (0..=255).collect();
+    for _ in 0..4 {
+        socket.try_send(&transmit(&batch, Some(3))).unwrap();
+    }
+    let meter = socket.meter();
+    until("all judged and sent", || meter.snapshot().in_flight() == 0);
+    let counters = meter.snapshot();
+    // 85 datagrams of 3 bytes and one of 1 byte
+    assert_eq!(counters.offered_datagrams, 4 * 86);
+    assert_eq!(counters.offered_bytes, 4 * 256);
+    assert!(counters.dropped.loss.packets > 0 && counters.sent_datagrams > 0);
+    offered_is_accounted_for(&counters);
+    let longest = inner.contents().iter().map(Vec::len).max();
+    assert_eq!(longest, Some(3));
+}
+
+#[test]
+fn a_full_link_drops_and_counts_instead_of_blocking() {
+    let inner = Arc::new(Pretended::default());
+    let socket = wrap(&inner, "delay 3600s limit 10");
+    for _ in 0..15 {
+        socket.try_send(&transmit(b"x", None)).unwrap();
+    }
+    let counters = socket.meter().snapshot();
+    assert_eq!(counters.in_flight(), 10);
+    assert_eq!(
+        counters.dropped.limit,
+        Tally {
+            packets: 5,
+            bytes: 5
+        }
+    );
+}
+
+#[test]
+fn a_real_socket_that_is_full_or_broken_costs_the_datagram_and_a_count() {
+    let inner = Arc::new(Pretended::default());
+    let socket = wrap(&inner, "delay 1ms");
+    let meter = socket.meter();
+    inner.full.store(true, Ordering::Relaxed);
+    socket.try_send(&transmit(b"full", None)).unwrap();
+    until("given up", || meter.snapshot().dropped.blocked.packets == 1);
+    inner.full.store(false, Ordering::Relaxed);
+    inner.broken.store(true, Ordering::Relaxed);
+    socket.try_send(&transmit(b"broken", None)).unwrap();
+    until("failed", || meter.snapshot().dropped.failed.packets == 1);
+    inner.broken.store(false, Ordering::Relaxed);
+    socket.try_send(&transmit(b"well", None)).unwrap();
+    until("sent", || meter.snapshot().sent_datagrams == 1);
+    assert_eq!(inner.contents(), [b"well"]);
+    offered_is_accounted_for(&meter.snapshot());
+}
+
+#[test]
+fn without_emulation_the_socket_passes_straight_through_and_counts() {
+    let inner = Arc::new(Pretended::default());
+    let socket = wrap(&inner, "none");
+    assert_eq!(socket.max_transmit_segments(), 8);
+    assert_eq!(Arc::strong_count(&inner), 2, "no thread");
+    socket.try_send(&transmit(&[0; 2500], Some(1000))).unwrap();
+    assert_eq!(inner.contents(), [[0; 2500]]);
+    inner.full.store(true, Ordering::Relaxed);
+    let full = socket.try_send(&transmit(&[0; 10], None)).unwrap_err();
+    assert_eq!(full.kind(), io::ErrorKind::WouldBlock);
+    inner.full.store(false, Ordering::Relaxed);
+    inner.broken.store(true, Ordering::Relaxed);
+    socket.try_send(&transmit(&[0; 5], None)).unwrap_err();
+    let counters = socket.meter().snapshot();
+    assert_eq!(
+        (counters.offered_datagrams, counters.offered_bytes),
+        (4, 2505)
+    );
+    assert_eq!((counters.sent_datagrams, counters.sent_bytes), (3, 2500));
+    assert_eq!(
+        counters.dropped.failed,
+        Tally {
+            packets: 1,
+            bytes: 5
+        }
+    );
+}
+
+#[test]
+fn received_datagrams_are_counted_one_by_one() {
+    for words in ["none", "delay 5ms"] {
+        let socket = wrap(&Arc::new(Pretended::default()), words);
+        let mut meta = [RecvMeta::default(); 4];
+        let mut cx = Context::from_waker(Waker::noop());
+        assert!(socket.poll_recv(&mut cx, &mut [], &mut meta).is_ready());
+        let counters = socket.meter().snapshot();
+        assert_eq!(counters.received_datagrams, 3 + 1 + 1);
+        assert_eq!(counters.received_bytes, 2507);
+    }
+}
+
+#[test]
+fn settings_out_of_range_are_refused() {
+    let config = LinkConfig {
+        limit: 0,
+        ..LinkConfig::default()
+    };
+    let inner = Arc::new(Pretended::default());
+    let wrapped = EmulatedSocket::try_new(inner, config, 1, LinkId::UP);
+    assert!(matches!(wrapped, Err(WrapError::Config(_))));
+}
+
+fn endpoint(words: &str, id: LinkId, server: Option<ServerConfig>) -> (Endpoint, SocketMeter) {
+    let socket = std::net::UdpSocket::bind((Ipv4Addr::LOCALHOST, 0)).unwrap();
+    let inner = TokioRuntime.wrap_udp_socket(socket).unwrap();
+    let config = words.parse().unwrap();
+    let wrapped = EmulatedSocket::try_new(inner, config, 1, id).unwrap();
+    let meter = wrapped.meter();
+    let endpoint = Endpoint::new_with_abstract_socket(
+        EndpointConfig::default(),
+        server,
+        Arc::new(wrapped),
+        Arc::new(TokioRuntime),
+    );
+    (endpoint.unwrap(), meter)
+}
+
+fn identity() -> (ServerConfig, ClientConfig) {
+    let made = rcgen::generate_simple_self_signed(["localhost".to_owned()]).unwrap();
+    let key = rustls::pki_types::PrivatePkcs8KeyDer::from(made.signing_key.serialize_der());
+    let certificate = made.cert.der().clone();
+    let server = ServerConfig::with_single_cert(vec![certificate.clone()], key.into()).unwrap();
+    let mut roots = rustls::RootCertStore::empty();
+    roots.add(certificate).unwrap();
+    let client = ClientConfig::with_root_certificates(Arc::new(roots)).unwrap();
+    (server, client)
+}
+
+/// One question and one answer over QUIC: the time between them and the meters of both ends.
+async fn ask(words: &str) -> (Duration, SocketMeter, SocketMeter) {
+    let (server_config, client_config) = identity();
+    let (server, server_meter) = endpoint(words, LinkId::DOWN, Some(server_config));
+    let (client, client_meter) = endpoint(words, LinkId::UP, None);
+    let answering = {
+        let server = server.clone();
+        tokio::spawn(async move {
+            let connection = server.accept().await.unwrap().await.unwrap();
+            let (mut send, mut receive) = connection.accept_bi().await.unwrap();
+            let question = receive.read_to_end(100_000).await.unwrap();
+            send.write_all(&question).await.unwrap();
+            send.finish().unwrap();
+            connection.closed().await;
+        })
+    };
+    let connecting = client.connect_with(client_config, server.local_addr().unwrap(), "localhost");
+    let connection = connecting.unwrap().await.unwrap();
+    let start = Instant::now();
+    let (mut send, mut receive) = connection.open_bi().await.unwrap();
+    let question = vec![7; 50_000];
+    send.write_all(&question).await.unwrap();
+    send.finish().unwrap();
+    assert_eq!(receive.read_to_end(100_000).await.unwrap(), question);
+    let elapsed = start.elapsed();
+    connection.close(0_u32.into(), b"");
+    answering.await.unwrap();
+    client.wait_idle().await;
+    server.wait_idle().await;
+    (elapsed, client_meter, server_meter)
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn quic_works_over_the_emulated_link_and_pays_its_delay() {
+    let asked = tokio::time::timeout(PATIENCE, ask("delay 20ms 2ms loss 1%"));
+    let (elapsed, client, server) = asked.await.unwrap();
+    assert!(elapsed >= Duration::from_millis(2 * 18), "{elapsed:?}");
+    for meter in [client, server] {
+        until("the thread to end", || meter.snapshot().in_flight() == 0);
+        offered_is_accounted_for(&meter.snapshot());
+        assert!(meter.lateness().count > 0);
+    }
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn what_one_end_sends_is_what_the_other_receives() {
+    for words in ["none", "delay 2ms"] {
+        let asked = tokio::time::timeout(PATIENCE, ask(words));
+        let (_, client, server) = asked.await.unwrap();
+        let (client, server) = (client.snapshot(), server.snapshot());
+        for (from, to) in [(client, server), (server, client)] {
+            assert!(from.sent_bytes > 50_000, "{from:?}");
+            assert_eq!(from.sent_datagrams, to.received_datagrams, "{words}");
+            assert_eq!(from.sent_bytes, to.received_bytes, "{words}");
+        }
+    }
+}

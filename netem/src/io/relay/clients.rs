@@ -1,0 +1,171 @@
+//! The clients of a relay: bounded in number, each with its socket toward the target, forgotten when
+//! idle.
+
+use std::collections::BTreeMap;
+use std::io;
+use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr, UdpSocket};
+
+use mmt_shared::time::Time;
+
+use super::port::{Port, Received};
+use super::{CLIENT_IDLE, CLIENTS_MAX};
+
+/// Who sends to the relay.
+#[derive(Debug)]
+pub(super) struct Client {
+    pub(super) addr: SocketAddr,
+    /// The relay's address that the client uses.
+    pub(super) local_ip: Option<IpAddr>,
+    /// The socket toward the target.
+    pub(super) port: Port,
+    last_seen: Time,
+}
+
+impl Client {
+    pub(super) fn seen(&mut self, now: Time) {
+        self.last_seen = now;
+    }
+}
+
+/// The clients, by a number that is never used twice.
+#[derive(Debug)]
+pub(super) struct Clients {
+    to: SocketAddr,
+    by_number: BTreeMap<u64, Client>,
+    by_addr: BTreeMap<SocketAddr, u64>,
+    met: u64,
+}
+
+impl Clients {
+    pub(super) fn new(to: SocketAddr) -> Self {
+        Self {
+            to,
+            by_number: BTreeMap::new(),
+            by_addr: BTreeMap::new(),
+            met: 0,
+        }
+    }
+
+    /// Where all clients' packets go.
+    pub(super) fn target(&self) -> SocketAddr {
+        self.to
+    }
+
+    pub(super) fn get(&self, number: u64) -> Option<&Client> {
+        self.by_number.get(&number)
+    }
+
+    pub(super) fn get_mut(&mut self, number: u64) -> Option<&mut Client> {
+        self.by_number.get_mut(&number)
+    }
+
+    pub(super) fn iter(&self) -> impl Iterator<Item = (u64, &Client)> {
+        self.by_number
+            .iter()
+            .map(|(number, client)| (*number, client))
+    }
+
+    pub(super) fn len(&self) -> usize {
+        self.by_number.len()
+    }
+
+    /// Clients met since the start; also the next client's number.
+    pub(super) fn met(&self) -> u64 {
+        self.met
+    }
+
+    /// The number of the client that sent `datagram`, met now if need be; `None` if there is no room for
+    /// it or no socket to be had.
+    pub(super) fn meet(&mut self, datagram: &Received<'_>, now: Time) -> Option<u64> {
+        if let Some(number) = self.by_addr.get(&datagram.from) {
+            let client = self.by_number.get_mut(number)?;
+            client.local_ip = datagram.local_ip;
+            client.seen(now);
+            return Some(*number);
+        }
+        if self.by_number.len() >= CLIENTS_MAX {
+            return None;
+        }
+        let client = Client {
+            addr: datagram.from,
+            local_ip: datagram.local_ip,
+            port: port_toward(self.to).ok()?,
+            last_seen: now,
+        };
+        let number = self.met;
+        self.met = number.saturating_add(1);
+        self.by_addr.insert(client.addr, number);
+        self.by_number.insert(number, client);
+        Some(number)
+    }
+
+    /// Forgets the clients that were idle for too long.
+    pub(super) fn expire(&mut self, now: Time) {
+        self.by_number
+            .retain(|_, client| client.last_seen + CLIENT_IDLE > now);
+        let known = &self.by_number;
+        self.by_addr.retain(|_, number| known.contains_key(number));
+    }
+
+    /// When the next client could have been idle for too long.
+    pub(super) fn next_expiry(&self) -> Option<Time> {
+        let oldest = self.by_number.values().map(|client| client.last_seen).min();
+        oldest.map(|oldest| oldest + CLIENT_IDLE)
+    }
+}
+
+/// A socket connected to `to`: the kernel keeps strangers' datagrams out of it.
+fn port_toward(to: SocketAddr) -> io::Result<Port> {
+    let any: IpAddr = match to {
+        SocketAddr::V4(_) => Ipv4Addr::UNSPECIFIED.into(),
+        SocketAddr::V6(_) => Ipv6Addr::UNSPECIFIED.into(),
+    };
+    let socket = UdpSocket::bind((any, 0))?;
+    socket.connect(to)?;
+    Port::try_new(socket)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::Duration;
+
+    use super::*;
+
+    fn clients() -> Clients {
+        Clients::new((Ipv4Addr::LOCALHOST, 9).into())
+    }
+
+    fn from(port: u16) -> Received<'static> {
+        Received {
+            from: (Ipv4Addr::LOCALHOST, port).into(),
+            local_ip: None,
+            ecn: None,
+            contents: &[],
+        }
+    }
+
+    #[test]
+    fn a_client_keeps_its_number_while_it_is_heard_and_gets_another_after_a_silence() {
+        let mut clients = clients();
+        let soon = Time::ZERO + CLIENT_IDLE - Duration::from_nanos(1);
+        assert_eq!(clients.meet(&from(1), Time::ZERO), Some(0));
+        assert_eq!(clients.meet(&from(2), Time::ZERO), Some(1));
+        assert_eq!(clients.meet(&from(1), soon), Some(0));
+        clients.expire(soon);
+        assert_eq!(clients.len(), 2);
+        assert_eq!(clients.next_expiry(), Some(Time::ZERO + CLIENT_IDLE));
+        clients.expire(Time::ZERO + CLIENT_IDLE);
+        assert_eq!(clients.len(), 1);
+        assert_eq!(clients.meet(&from(2), soon), Some(2));
+    }
+
+    #[test]
+    fn one_client_too_many_is_turned_away_and_an_old_one_is_not() {
+        let mut clients = clients();
+        for port in 0..CLIENTS_MAX as u16 {
+            assert!(clients.meet(&from(port + 1), Time::ZERO).is_some());
+        }
+        assert_eq!(clients.meet(&from(1000), Time::ZERO), None);
+        assert_eq!(clients.meet(&from(1), Time::ZERO), Some(0));
+    }
+}

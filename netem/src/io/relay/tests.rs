@@ -1,0 +1,212 @@
+//! The relay on loopback: lower bounds of time only, and generous patience.
+
+use std::net::{IpAddr, Ipv4Addr, Ipv6Addr};
+use std::time::Instant;
+
+use super::*;
+
+const PATIENCE: Duration = Duration::from_secs(30);
+const LOCAL: IpAddr = IpAddr::V4(Ipv4Addr::LOCALHOST);
+const LOCAL6: IpAddr = IpAddr::V6(Ipv6Addr::LOCALHOST);
+
+fn socket(ip: IpAddr) -> UdpSocket {
+    let socket = UdpSocket::bind((ip, 0)).unwrap();
+    socket.set_read_timeout(Some(PATIENCE)).unwrap();
+    socket
+}
+
+fn relay(listen: IpAddr, to: SocketAddr, up: &str, down: &str) -> RelayHandle {
+    let (up, down) = (up.parse().unwrap(), down.parse().unwrap());
+    Relay::bind((listen, 0).into(), to, up, down, 1).unwrap()
+}
+
+fn receive(socket: &UdpSocket) -> (Vec<u8>, SocketAddr) {
+    let mut buffer = [0; 2000];
+    let (len, from) = socket.recv_from(&mut buffer).unwrap();
+    (buffer[..len].to_vec(), from)
+}
+
+/// Waits for something that must come, for as long as a slow machine may need.
+fn until(relay: &RelayHandle, holds: impl Fn(&RelaySnapshot) -> bool) -> RelaySnapshot {
+    let start = Instant::now();
+    loop {
+        let snapshot = relay.snapshot();
+        if holds(&snapshot) {
+            return snapshot;
+        }
+        assert!(start.elapsed() < PATIENCE, "it never came: {snapshot:?}");
+        std::thread::sleep(Duration::from_millis(1));
+    }
+}
+
+fn offered_is_accounted_for(counters: &DirectionCounters) {
+    let after = counters.link.dropped.total().packets
+        + counters.in_flight
+        + counters.forwarded.packets
+        + counters.blocked.packets
+        + counters.failed.packets
+        + counters.orphaned.packets;
+    assert_eq!(counters.link.offered.packets, after, "{counters:?}");
+}
+
+fn forwards_both_ways(listen: IpAddr, target: IpAddr) {
+    let server = socket(target);
+    let relay = relay(
+        listen,
+        server.local_addr().unwrap(),
+        "delay 20ms",
+        "delay 5ms",
+    );
+    let client = socket(listen);
+    let start = Instant::now();
+    client.send_to(b"up", relay.local_addr()).unwrap();
+    let (contents, from) = receive(&server);
+    assert_eq!(contents, b"up");
+    assert!(start.elapsed() >= Duration::from_millis(20));
+    let start = Instant::now();
+    server.send_to(b"down", from).unwrap();
+    assert_eq!(receive(&client), (b"down".to_vec(), relay.local_addr()));
+    assert!(start.elapsed() >= Duration::from_millis(5));
+
+    until(&relay, |seen| seen.down.forwarded.packets == 1);
+    let end = relay.stop().unwrap();
+    let tally = |packets, bytes| Tally { packets, bytes };
+    assert_eq!(end.up.forwarded, tally(1, 2));
+    assert_eq!(end.down.forwarded, tally(1, 4));
+    assert_eq!(
+        (end.clients, end.clients_met, end.lateness.count),
+        (1, 1, 2)
+    );
+}
+
+#[test]
+fn datagrams_pass_both_ways_and_never_early() {
+    forwards_both_ways(LOCAL, LOCAL);
+}
+
+#[test]
+fn ipv6_works_and_so_does_a_target_of_the_other_family() {
+    if UdpSocket::bind((LOCAL6, 0)).is_err() {
+        assert!(std::env::var_os("CI").is_none(), "no ::1 on a CI machine");
+        eprintln!("DID NOT RUN: this host has no ::1");
+        return;
+    }
+    forwards_both_ways(LOCAL6, LOCAL6);
+    forwards_both_ways(LOCAL6, LOCAL);
+    forwards_both_ways(LOCAL, LOCAL6);
+}
+
+#[test]
+fn clients_do_not_mix() {
+    let server = socket(LOCAL);
+    let relay = relay(
+        LOCAL,
+        server.local_addr().unwrap(),
+        "delay 1ms",
+        "delay 1ms",
+    );
+    let clients: Vec<UdpSocket> = (0..5).map(|_| socket(LOCAL)).collect();
+    for round in 0..10 {
+        for (number, client) in clients.iter().enumerate() {
+            let question = [round, number as u8];
+            client.send_to(&question, relay.local_addr()).unwrap();
+        }
+        for _ in &clients {
+            let (contents, from) = receive(&server);
+            server.send_to(&contents, from).unwrap();
+        }
+        for (number, client) in clients.iter().enumerate() {
+            assert_eq!(receive(client).0, [round, number as u8]);
+        }
+    }
+    assert_eq!(relay.stop().unwrap().clients_met, 5);
+}
+
+#[test]
+fn fifo_keeps_the_order_and_every_loss_has_its_count() {
+    let server = socket(LOCAL);
+    let to = server.local_addr().unwrap();
+    let relay = relay(LOCAL, to, "delay 10ms 10ms loss 20%", "none");
+    let client = socket(LOCAL);
+    for number in 0..200_u8 {
+        client.send_to(&[number], relay.local_addr()).unwrap();
+    }
+    let end = until(&relay, |seen| {
+        seen.up.link.offered.packets == 200 && seen.up.in_flight == 0
+    });
+    offered_is_accounted_for(&end.up);
+    assert!(end.up.link.dropped.loss.packets > 0);
+    let arrived: Vec<u8> = (0..end.up.forwarded.packets)
+        .map(|_| receive(&server).0[0])
+        .collect();
+    assert!(arrived.is_sorted(), "{arrived:?}");
+}
+
+#[test]
+fn the_relay_outlives_a_target_where_nobody_listens() {
+    let vacant = socket(LOCAL).local_addr().unwrap();
+    let relay = relay(LOCAL, vacant, "none", "none");
+    let client = socket(LOCAL);
+    let start = Instant::now();
+    while relay.snapshot().unreachable < 3 {
+        client.send_to(b"anybody?", relay.local_addr()).unwrap();
+        std::thread::sleep(Duration::from_millis(2));
+        assert!(start.elapsed() < PATIENCE, "{:?}", relay.snapshot());
+    }
+    // and serves once somebody does
+    let server = UdpSocket::bind(vacant).unwrap();
+    server.set_read_timeout(Some(PATIENCE)).unwrap();
+    client.send_to(b"you?", relay.local_addr()).unwrap();
+    while receive(&server).0 != b"you?" {}
+    assert!(relay.is_running());
+    let end = relay.stop().unwrap();
+    offered_is_accounted_for(&end.up);
+    assert_eq!(end.receive_errors, 0);
+}
+
+#[test]
+fn empty_and_large_datagrams_pass_whole() {
+    let server = socket(LOCAL);
+    let relay = relay(LOCAL, server.local_addr().unwrap(), "delay 1ms", "none");
+    let client = socket(LOCAL);
+    for len in [0, 1, 1472] {
+        client.send_to(&vec![3; len], relay.local_addr()).unwrap();
+        assert_eq!(receive(&server).0, vec![3; len]);
+    }
+}
+
+#[test]
+fn stopping_is_prompt_with_packets_in_flight_and_frees_the_address() {
+    let server = socket(LOCAL);
+    let relay = relay(LOCAL, server.local_addr().unwrap(), "delay 3600s", "none");
+    let client = socket(LOCAL);
+    client.send_to(b"late", relay.local_addr()).unwrap();
+    until(&relay, |seen| seen.up.in_flight == 1);
+    let address = relay.local_addr();
+    // would take an hour if it waited for the packet
+    let end = relay.stop().unwrap();
+    assert_eq!(end.up.in_flight, 1);
+    offered_is_accounted_for(&end.up);
+    UdpSocket::bind(address).unwrap();
+}
+
+#[test]
+fn what_cannot_work_is_refused_at_the_start() {
+    let config = LinkConfig::default;
+    let start = |listen, to| Relay::bind(listen, to, config(), config(), 1).unwrap_err();
+    let any = SocketAddr::from((LOCAL, 0));
+    assert!(matches!(start(any, any), RelayError::Target { .. }));
+    let taken = socket(LOCAL);
+    let address = taken.local_addr().unwrap();
+    assert!(matches!(
+        start(address, (LOCAL, 9).into()),
+        RelayError::Listen { .. }
+    ));
+    assert!(matches!(start(address, address), RelayError::Loop { .. }));
+    let bad = LinkConfig {
+        limit: 0,
+        ..config()
+    };
+    let refused = Relay::bind(any, address, config(), bad, 1);
+    assert!(matches!(refused, Err(RelayError::Config(_))));
+}

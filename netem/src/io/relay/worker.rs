@@ -1,0 +1,275 @@
+//! The thread of a relay: receive, let the links decide, send at the times they gave.
+
+use std::io;
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+
+use quinn::udp::{EcnCodepoint, Transmit};
+use rustix::event::{PollFd, PollFlags};
+
+use super::clients::Clients;
+use super::port::{Port, Receiver, Sent};
+use super::{DirectionCounters, RelaySnapshot, Shared};
+use crate::counters::Tally;
+use crate::io::alarm::{now, sharpen_deadlines, wait};
+use crate::io::lateness::Lateness;
+use crate::io::lock;
+use crate::pipe::{Pipe, Released};
+
+/// Batches taken from one socket before the times are looked at again.
+const BATCHES: usize = 16;
+
+/// A datagram on a link.
+#[derive(Clone, Debug)]
+pub(super) struct Parcel {
+    client: u64,
+    ecn: Option<EcnCodepoint>,
+    contents: Vec<u8>,
+}
+
+/// One direction: its link and what became of what left it.
+#[derive(Debug)]
+struct Lane {
+    pipe: Pipe<Parcel>,
+    sent: Outcome,
+}
+
+#[derive(Debug, Default)]
+struct Outcome {
+    forwarded: Tally,
+    blocked: Tally,
+    failed: Tally,
+    orphaned: Tally,
+}
+
+impl Outcome {
+    fn count(&mut self, sent: Option<Sent>, bytes: usize) {
+        match sent {
+            Some(Sent::Yes) => self.forwarded.count(bytes),
+            Some(Sent::Blocked) => self.blocked.count(bytes),
+            Some(Sent::Failed) => self.failed.count(bytes),
+            None => self.orphaned.count(bytes),
+        }
+    }
+}
+
+impl Lane {
+    fn new(pipe: Pipe<Parcel>) -> Self {
+        Self {
+            pipe,
+            sent: Outcome::default(),
+        }
+    }
+
+    fn counters(&self) -> DirectionCounters {
+        DirectionCounters {
+            link: self.pipe.counters(),
+            in_flight: self.pipe.in_flight() as u64,
+            forwarded: self.sent.forwarded,
+            blocked: self.sent.blocked,
+            failed: self.sent.failed,
+            orphaned: self.sent.orphaned,
+        }
+    }
+}
+
+/// Everything the thread owns.
+pub(super) struct Worker {
+    listen: Port,
+    clients: Clients,
+    receiver: Receiver,
+    up: Lane,
+    down: Lane,
+    refused: Tally,
+    unreachable: u64,
+    receive_errors: u64,
+    shared: Arc<Shared>,
+}
+
+/// The sockets with something to read.
+struct Ready {
+    listen: bool,
+    clients: Vec<u64>,
+}
+
+impl Worker {
+    pub(super) fn new(
+        listen: Port,
+        clients: Clients,
+        up: Pipe<Parcel>,
+        down: Pipe<Parcel>,
+        shared: Arc<Shared>,
+    ) -> Self {
+        Self {
+            listen,
+            clients,
+            receiver: Receiver::new(),
+            up: Lane::new(up),
+            down: Lane::new(down),
+            refused: Tally::default(),
+            unreachable: 0,
+            receive_errors: 0,
+            shared,
+        }
+    }
+
+    pub(super) fn run(mut self) -> io::Result<()> {
+        sharpen_deadlines();
+        while !self.shared.stopping.load(Ordering::Acquire) {
+            self.release_due();
+            self.clients.expire(now());
+            self.publish();
+            let ready = self.wait()?;
+            if ready.listen {
+                self.receive_up();
+            }
+            for number in ready.clients {
+                self.receive_down(number);
+            }
+        }
+        self.publish();
+        Ok(())
+    }
+
+    fn wait(&self) -> io::Result<Ready> {
+        let until = [
+            self.up.pipe.next_due(),
+            self.down.pipe.next_due(),
+            self.clients.next_expiry(),
+        ];
+        let mut fds = vec![self.shared.alarm.as_poll_fd(), self.listen.as_poll_fd()];
+        fds.extend(
+            self.clients
+                .iter()
+                .map(|(_, client)| client.port.as_poll_fd()),
+        );
+        wait(&mut fds, until.into_iter().flatten().min())?;
+        self.shared.alarm.silence();
+
+        // an error is a reason to read, too: reading tells and clears it
+        let readable = |fd: &PollFd<'_>| fd.revents() != PollFlags::empty();
+        let numbers = self.clients.iter().map(|(number, _)| number);
+        Ok(Ready {
+            listen: fds.get(1).is_some_and(readable),
+            clients: numbers
+                .zip(fds.iter().skip(2))
+                .filter(|(_, fd)| readable(fd))
+                .map(|(number, _)| number)
+                .collect(),
+        })
+    }
+
+    /// Takes what clients sent and puts it on the link up.
+    fn receive_up(&mut self) {
+        let Self {
+            listen,
+            clients,
+            receiver,
+            up,
+            refused,
+            ..
+        } = self;
+        let mut take = |received: super::port::Received<'_>| {
+            let now = now();
+            let bytes = received.contents.len();
+            let Some(client) = clients.meet(&received, now) else {
+                return refused.count(bytes);
+            };
+            let parcel = Parcel {
+                client,
+                ecn: received.ecn,
+                contents: received.contents.to_owned(),
+            };
+            up.pipe.push(now, bytes, parcel);
+        };
+        for _ in 0..BATCHES {
+            if let Err(error) = receiver.receive(listen, &mut take) {
+                return self.receive_error(&error);
+            }
+        }
+    }
+
+    /// Takes what the target sent to a client and puts it on the link down.
+    fn receive_down(&mut self, number: u64) {
+        let Some(client) = self.clients.get_mut(number) else {
+            return;
+        };
+        for _ in 0..BATCHES {
+            let down = &mut self.down.pipe;
+            let received = self.receiver.receive(&client.port, |received| {
+                let parcel = Parcel {
+                    client: number,
+                    ecn: received.ecn,
+                    contents: received.contents.to_owned(),
+                };
+                down.push(now(), received.contents.len(), parcel);
+            });
+            match received {
+                Ok(()) => client.seen(now()),
+                Err(error) => return self.receive_error(&error),
+            }
+        }
+    }
+
+    fn receive_error(&mut self, error: &io::Error) {
+        let counter = match error.kind() {
+            io::ErrorKind::WouldBlock | io::ErrorKind::Interrupted => return,
+            io::ErrorKind::ConnectionRefused => &mut self.unreachable,
+            _ => &mut self.receive_errors,
+        };
+        *counter = counter.saturating_add(1);
+    }
+
+    fn release_due(&mut self) {
+        while let Some(packet) = self.up.pipe.pop_due(now()) {
+            self.shared.lateness.record(packet.due, now());
+            let sent = self.send_up(&packet);
+            self.up.sent.count(sent, packet.bytes);
+        }
+        while let Some(packet) = self.down.pipe.pop_due(now()) {
+            self.shared.lateness.record(packet.due, now());
+            let sent = self.send_down(&packet);
+            self.down.sent.count(sent, packet.bytes);
+        }
+    }
+
+    /// Sends to the target; `None` if the client is forgotten.
+    fn send_up(&mut self, packet: &Released<Parcel>) -> Option<Sent> {
+        let client = self.clients.get(packet.payload.client)?;
+        let transmit = Transmit {
+            destination: self.clients.target(),
+            ecn: packet.payload.ecn,
+            contents: &packet.payload.contents,
+            segment_size: None,
+            src_ip: None,
+        };
+        Some(client.port.send(&transmit, &mut self.unreachable))
+    }
+
+    /// Sends to the client from the address that it knows; `None` if it is forgotten.
+    fn send_down(&mut self, packet: &Released<Parcel>) -> Option<Sent> {
+        let client = self.clients.get(packet.payload.client)?;
+        let transmit = Transmit {
+            destination: client.addr,
+            ecn: packet.payload.ecn,
+            contents: &packet.payload.contents,
+            segment_size: None,
+            src_ip: client.local_ip,
+        };
+        Some(self.listen.send(&transmit, &mut self.unreachable))
+    }
+
+    fn publish(&self) {
+        *lock(&self.shared.board) = RelaySnapshot {
+            up: self.up.counters(),
+            down: self.down.counters(),
+            clients: self.clients.len() as u64,
+            clients_met: self.clients.met(),
+            refused: self.refused,
+            unreachable: self.unreachable,
+            receive_errors: self.receive_errors,
+            // the handle reads the histogram itself
+            lateness: Lateness::default(),
+        };
+    }
+}
