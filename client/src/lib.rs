@@ -8,3 +8,6 @@ pub mod limiter;
 pub mod link;
 pub mod master;
 pub mod operator;
+
+#[cfg(feature = "io")]
+pub mod io;

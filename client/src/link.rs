@@ -6,9 +6,7 @@ use mmt_shared::contact::Coupling;
 use mmt_shared::link_end::{LinkEnd, Outgoing, SealError};
 use mmt_shared::peer::{Freshness, SequenceWindow};
 use mmt_shared::time::Time;
-use mmt_shared::wire::{
-    Command, HipSample, Matter, SampleBlock, Scene, Side, Update, UpdateDrops,
-};
+use mmt_shared::wire::{Command, HipSample, Matter, SampleBlock, Scene, Side, Update, UpdateDrops};
 
 /// What came from the slave.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -105,9 +103,14 @@ impl MasterLink {
         if self.block.len() < self.samples_per_command && !self.block.is_full() {
             return Ok(None);
         }
-        let command = Command { newest_update: self.window.newest(), samples: self.block };
+        let command = Command {
+            newest_update: self.window.newest(),
+            samples: self.block,
+        };
         self.block.clear();
-        self.end.seal(now, Outgoing::Command(&command), out).map(Some)
+        self.end
+            .seal(now, Outgoing::Command(&command), out)
+            .map(Some)
     }
 
     /// A heartbeat, if nothing has been sent for long enough.

@@ -126,9 +126,18 @@ impl Master {
         }
         let rendered = self.model.step(stamp, self.hip.metres());
         let force = ForceCounts::nearest(rendered.force);
-        let sample = HipSample { stamp, hip: self.hip, force };
+        let sample = HipSample {
+            stamp,
+            hip: self.hip,
+            force,
+        };
         let hand_force = self.limiter.limit(-rendered.force);
-        MasterTick { sample, rendered, hand_force, link: self.link }
+        MasterTick {
+            sample,
+            rendered,
+            hand_force,
+            link: self.link,
+        }
     }
 
     fn link_after(&self, silence: Duration) -> LinkState {

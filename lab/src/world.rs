@@ -157,8 +157,9 @@ impl World {
     pub fn try_new(config: &WorldConfig) -> Result<Self, WorldError> {
         let device = DeviceProfile::default().used_with(config.stiffness_n_per_m, None)?;
         let coupling: Coupling = device.coupling();
-        let settings =
-            config.settings.unwrap_or_else(|| config.slave.mode.model_settings(coupling));
+        let settings = config
+            .settings
+            .unwrap_or_else(|| config.slave.mode.model_settings(coupling));
         let mut slave = Slave::with_settings(&config.slave, settings)?;
         let welcome = Welcome {
             settings,
@@ -179,11 +180,7 @@ impl World {
             slave,
             slave_link: SlaveLink::new(Time::ZERO + SLAVE_EPOCH),
             master,
-            master_link: MasterLink::new(
-                Time::ZERO,
-                settings.coupling,
-                config.samples_per_command,
-            ),
+            master_link: MasterLink::new(Time::ZERO, settings.coupling, config.samples_per_command),
             operator,
             hand_force: Vec2::zeros(),
             up: path(config.up.clone(), Direction::Up)?,
@@ -266,7 +263,11 @@ impl World {
         self.deliver_up();
         let slave = self.slave_tick();
         self.log_tick(&master, slave.as_ref());
-        WorldTick { now: self.now, master, slave }
+        WorldTick {
+            now: self.now,
+            master,
+            slave,
+        }
     }
 
     fn deliver_down(&mut self) {
@@ -290,7 +291,9 @@ impl World {
 
     fn master_tick(&mut self) -> MasterTick {
         let elapsed = self.now.saturating_since(Time::ZERO + TICK);
-        let reading = self.operator.step(elapsed, &self.master.view(), self.hand_force);
+        let reading = self
+            .operator
+            .step(elapsed, &self.master.view(), self.hand_force);
         let silence = self.master_link.end().silence(self.now);
         let tick = self.master.tick(self.now, reading, silence);
         self.hand_force = tick.hand_force;
@@ -345,15 +348,19 @@ impl World {
     /// Every number that either side felt or said goes into the log, bit by bit.
     fn log_tick(&mut self, master: &MasterTick, slave: Option<&SlaveTick>) {
         let mut number = |value: f64| self.log.update(value.to_bits().to_le_bytes());
-        [master.rendered.force, master.hand_force].iter().for_each(|f| {
-            number(f.x);
-            number(f.y);
-        });
-        if let Some(slave) = slave {
-            [slave.tool, slave.f_s, slave.f_shadow].iter().for_each(|v| {
-                number(v.x);
-                number(v.y);
+        [master.rendered.force, master.hand_force]
+            .iter()
+            .for_each(|f| {
+                number(f.x);
+                number(f.y);
             });
+        if let Some(slave) = slave {
+            [slave.tool, slave.f_s, slave.f_shadow]
+                .iter()
+                .for_each(|v| {
+                    number(v.x);
+                    number(v.y);
+                });
             if let Some(update) = &slave.update {
                 update.state.params.to_array().into_iter().for_each(number);
                 self.log.update(update.answers.as_nanos().to_le_bytes());

@@ -7,9 +7,9 @@ use std::hint::black_box;
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use mmt_server::estimator::{Estimator, EstimatorConfig, Measured};
-use mmt_server::trigger::{Trigger, TriggerConfig, TriggerInput};
+use mmt_server::trigger::{Candidate, Trigger, TriggerConfig, TriggerInput};
 use mmt_shared::contact::Coupling;
-use mmt_shared::geometry::{Pose, Vec2};
+use mmt_shared::geometry::Vec2;
 use mmt_shared::params::ModelParams;
 use mmt_shared::settings::Mode;
 use mmt_shared::time::{TICK_S, Time};
@@ -61,14 +61,14 @@ fn trigger(criterion: &mut Criterion) {
         sticking: false,
         speed: 0.16,
         acceleration: 0.2,
-        candidate: params,
-        sent: params,
-        object: Pose::default(),
-        model: Pose::default(),
+        candidate: Candidate { params, angle: 0.1 },
     };
     for text in ["hybrid 10% 150ms", "useful 10% 150ms"] {
         let Ok(scheme) = text.parse() else { continue };
-        let mut trigger = Trigger::new(TriggerConfig::of_mode(Mode::Recommended, scheme));
+        let mut trigger = Trigger::new(TriggerConfig {
+            scheme,
+            ..TriggerConfig::of_mode(Mode::Recommended)
+        });
         let mut ms = 0;
         criterion.bench_function(&format!("trigger/{text}"), |bencher| {
             bencher.iter(|| {

@@ -11,3 +11,6 @@ pub mod pose_observer;
 pub mod sensing;
 pub mod slave;
 pub mod trigger;
+
+#[cfg(feature = "io")]
+pub mod io;

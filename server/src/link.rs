@@ -16,7 +16,11 @@ impl SlaveLink {
     /// A link from `now` on.
     #[must_use]
     pub fn new(now: Time) -> Self {
-        Self { end: LinkEnd::new(Side::Slave, now), newest_acknowledged: 0, samples: 0 }
+        Self {
+            end: LinkEnd::new(Side::Slave, now),
+            newest_acknowledged: 0,
+            samples: 0,
+        }
     }
 
     /// The end itself: round trip, loss, counts.
@@ -57,7 +61,10 @@ impl SlaveLink {
         update: &Update,
         out: &mut [u8],
     ) -> Result<usize, SealError> {
-        let update = Update { newest_command: self.end.peer().newest(), ..*update };
+        let update = Update {
+            newest_command: self.end.peer().newest(),
+            ..*update
+        };
         self.end.seal(now, Outgoing::Update(&update), out)
     }
 

@@ -86,8 +86,10 @@ impl PoseObserver {
     /// Starts from what vision said of pose and footprint.
     #[must_use]
     pub fn new(config: ObserverConfig, pose: Pose, footprint: BoxFootprint) -> Self {
-        let (shift_var, angle_var) =
-            (config.vision_noise_m.powi(2), config.vision_noise_rad.powi(2));
+        let (shift_var, angle_var) = (
+            config.vision_noise_m.powi(2),
+            config.vision_noise_rad.powi(2),
+        );
         Self {
             config,
             pose,
@@ -134,7 +136,11 @@ impl PoseObserver {
         } else {
             self.let_go();
         }
-        let past = Past { time: now, pose: self.pose, touching: self.touching };
+        let past = Past {
+            time: now,
+            pose: self.pose,
+            touching: self.touching,
+        };
         if let Some(slot) = self.past.get_mut(self.next) {
             *slot = past;
         }
@@ -146,7 +152,9 @@ impl PoseObserver {
         if self.touching.is_none() {
             self.penetration = size / self.config.coupling.stiffness_n_per_m;
         }
-        let face = self.touching.map_or_else(|| self.face_of(force), |touching| touching.face);
+        let face = self
+            .touching
+            .map_or_else(|| self.face_of(force), |touching| touching.face);
         self.follow_angle(face, force, size);
         let inward = -rotate(self.pose.angle, face.outward());
         self.follow_penetration(force.dot(&inward));
@@ -160,7 +168,11 @@ impl PoseObserver {
             self.twist.linear += (velocity - self.twist.linear) * (TICK_S / 0.020);
         }
         self.slide_var += SLIDE_DRIFT_M * SLIDE_DRIFT_M * TICK_S;
-        self.touching = Some(Touching { face, inward, surface });
+        self.touching = Some(Touching {
+            face,
+            inward,
+            surface,
+        });
     }
 
     fn face_of(&self, force: Vec2) -> Face {
@@ -177,7 +189,10 @@ impl PoseObserver {
 
     /// Inverts the force law: k_d d(pen)/dt + k_p pen = f, implicit.
     fn follow_penetration(&mut self, force: f64) {
-        let Coupling { stiffness_n_per_m: k_p, damping_ns_per_m: k_d } = self.config.coupling;
+        let Coupling {
+            stiffness_n_per_m: k_p,
+            damping_ns_per_m: k_d,
+        } = self.config.coupling;
         self.penetration = (k_d * self.penetration + force * TICK_S) / (k_d + k_p * TICK_S);
     }
 
@@ -186,8 +201,11 @@ impl PoseObserver {
         self.pose.angle += self.twist.angular * TICK_S;
         let [p, pc, q] = self.angle_cov;
         let noise = TURN_ACCELERATION * TURN_ACCELERATION * TICK_S;
-        self.angle_cov =
-            [p + 2.0 * pc * TICK_S + q * TICK_S * TICK_S, pc + q * TICK_S, q + noise * TICK_S];
+        self.angle_cov = [
+            p + 2.0 * pc * TICK_S + q * TICK_S * TICK_S,
+            pc + q * TICK_S,
+            q + noise * TICK_S,
+        ];
         if size < FORCE_MIN_N {
             return;
         }
@@ -206,7 +224,11 @@ impl PoseObserver {
         let (gain_angle, gain_rate) = (p / total, pc / total);
         self.pose.angle += gain_angle * innovation;
         self.twist.angular += gain_rate * innovation;
-        self.angle_cov = [p * (1.0 - gain_angle), pc * (1.0 - gain_angle), q - gain_rate * pc];
+        self.angle_cov = [
+            p * (1.0 - gain_angle),
+            pc * (1.0 - gain_angle),
+            q - gain_rate * pc,
+        ];
     }
 
     fn let_go(&mut self) {
@@ -230,13 +252,20 @@ impl PoseObserver {
         let turn = wrap_angle(vision.pose.angle - then.pose.angle);
         self.measure_angle(turn, self.config.vision_noise_rad.powi(2));
         let variance = self.config.vision_noise_m.powi(2);
-        let gain = if variance > 0.0 { self.slide_var / (self.slide_var + variance) } else { 1.0 };
+        let gain = if variance > 0.0 {
+            self.slide_var / (self.slide_var + variance)
+        } else {
+            1.0
+        };
         self.slide_var *= 1.0 - gain;
         match (then.touching, self.touching) {
             (Some(was), Some(is)) if was.face == is.face => {
                 let along = gone_by - is.inward * is.inward.dot(&gone_by);
                 self.pose.position += along * gain;
-                self.learn_offset(was.face, was.inward.dot(&(vision.pose.position - was.surface)));
+                self.learn_offset(
+                    was.face,
+                    was.inward.dot(&(vision.pose.position - was.surface)),
+                );
             }
             (None, None) => self.pose.position += gone_by * gain,
             _ => {}
@@ -271,13 +300,19 @@ impl PoseObserver {
 
     fn at(&self, time: Time) -> Option<Past> {
         // the newest that is not later; the ring is short and vision is slow
-        self.past.iter().filter(|past| past.time <= time && past.time > Time::ZERO).max_by_key(|past| past.time).copied()
+        self.past
+            .iter()
+            .filter(|past| past.time <= time && past.time > Time::ZERO)
+            .max_by_key(|past| past.time)
+            .copied()
     }
 
     /// Section III-A, case 1: the tool is inside the model and touches nothing. The face is where the
     /// tool is not: it is carved back (recommended mode), or the whole box is moved away (the paper).
     pub fn carve(&mut self, tool: Vec2, face: Face) {
-        let depth = -self.footprint.distance(face, self.pose.point_to_object(tool));
+        let depth = -self
+            .footprint
+            .distance(face, self.pose.point_to_object(tool));
         let depth = depth + CARVE_MARGIN_M;
         if depth <= 0.0 {
             return;

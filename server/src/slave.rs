@@ -77,11 +77,21 @@ impl Slave {
     ///
     /// # Errors
     /// As [`Slave::try_new`].
-    pub fn with_settings(config: &SlaveConfig, settings: ModelSettings) -> Result<Self, SlaveError> {
+    pub fn with_settings(
+        config: &SlaveConfig,
+        settings: ModelSettings,
+    ) -> Result<Self, SlaveError> {
         let coupling = settings.coupling;
-        let environment =
-            Environment::try_new(EnvironmentConfig { coupling, ..config.environment })?;
-        let StartModel { mass_kg: m, damping_ns_per_m: b, friction_n: c, side_m } = config.start;
+        let environment = Environment::try_new(EnvironmentConfig {
+            coupling,
+            ..config.environment
+        })?;
+        let StartModel {
+            mass_kg: m,
+            damping_ns_per_m: b,
+            friction_n: c,
+            side_m,
+        } = config.start;
         let params = ModelParams::of_square(m, b, c, side_m, &coupling)?;
         let footprint = BoxFootprint::square(side_m);
         // Vision has looked at the resting box for a while before the session: its noise has averaged out.
@@ -203,7 +213,8 @@ impl Slave {
         let contact = self.environment.step(played.hip, played.velocity);
         let sensed = self.sensing.sense(now, played.hip, contact.force, &truth);
         let in_contact = self.contact.step(sensed.force.norm());
-        self.observer.step(now, sensed.tool, sensed.force, in_contact);
+        self.observer
+            .step(now, sensed.tool, sensed.force, in_contact);
         if let Some(vision) = sensed.vision {
             self.observer.see(&vision);
         }
@@ -230,7 +241,11 @@ impl Slave {
 
     fn estimate_from(&mut self, tool: Vec2, force: Vec2) {
         let normal = self.observer.touching().map(|touching| touching.inward);
-        let Estimate { m, b, c, .. } = self.estimator.step(&Measured { tool, force, normal });
+        let Estimate { m, b, c, .. } = self.estimator.step(&Measured {
+            tool,
+            force,
+            normal,
+        });
         // As wide as the faces say; the paper's never change.
         let side = self.observer.footprint().mean_side();
         match ModelParams::of_square(m, b, c, side, &self.settings.coupling) {
@@ -249,7 +264,10 @@ impl Slave {
             sticking: estimate.sticking,
             speed: estimate.speed,
             acceleration: estimate.acceleration,
-            candidate: Candidate { params: self.params, angle: self.observer.pose().angle },
+            candidate: Candidate {
+                params: self.params,
+                angle: self.observer.pose().angle,
+            },
         }
     }
 

@@ -9,12 +9,12 @@ pub mod correction;
 pub mod dynamics;
 pub mod geometry;
 pub mod history;
+#[cfg(feature = "io")]
+pub mod io;
 pub mod link_end;
 pub mod local_model;
 pub mod metrics;
 pub mod pairing;
-#[cfg(feature = "io")]
-pub mod io;
 pub mod params;
 pub mod peer;
 pub mod recording;

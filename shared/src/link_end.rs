@@ -100,15 +100,15 @@ impl LinkEnd {
     ) -> Result<usize, SealError> {
         let envelope = self.peer.stamp(now)?;
         let (length, count) = match what {
-            Outgoing::Command(command) => {
-                (encode_command(&envelope, command, out)?, &mut self.sent.commands)
-            }
-            Outgoing::Update(update) => {
-                (encode_update(&envelope, update, out)?, &mut self.sent.updates)
-            }
-            Outgoing::Scene(scene) => {
-                (encode_scene(&envelope, scene, out)?, &mut self.sent.scenes)
-            }
+            Outgoing::Command(command) => (
+                encode_command(&envelope, command, out)?,
+                &mut self.sent.commands,
+            ),
+            Outgoing::Update(update) => (
+                encode_update(&envelope, update, out)?,
+                &mut self.sent.updates,
+            ),
+            Outgoing::Scene(scene) => (encode_scene(&envelope, scene, out)?, &mut self.sent.scenes),
             Outgoing::Heartbeat => (encode_heartbeat(&envelope, out)?, &mut self.sent.heartbeats),
         };
         *count = count.saturating_add(1);
@@ -167,8 +167,10 @@ mod tests {
 
     #[test]
     fn what_one_end_seals_the_other_opens_once_and_counts() {
-        let (mut up, mut down) =
-            (LinkEnd::new(Side::Master, Time::ZERO), LinkEnd::new(Side::Slave, Time::ZERO));
+        let (mut up, mut down) = (
+            LinkEnd::new(Side::Master, Time::ZERO),
+            LinkEnd::new(Side::Slave, Time::ZERO),
+        );
         let mut buffer = [0; DATAGRAM_MAX];
         let now = Time::from_millis(5);
         let length = up.seal(now, Outgoing::Heartbeat, &mut buffer).unwrap();
@@ -188,8 +190,12 @@ mod tests {
         let mut end = LinkEnd::new(Side::Slave, Time::from_millis(100));
         assert_eq!(end.heartbeat_due(), Time::from_millis(150));
         let mut buffer = [0; DATAGRAM_MAX];
-        end.seal(Time::from_millis(120), Outgoing::Heartbeat, &mut buffer).unwrap();
+        end.seal(Time::from_millis(120), Outgoing::Heartbeat, &mut buffer)
+            .unwrap();
         assert_eq!(end.heartbeat_due(), Time::from_millis(170));
-        assert_eq!(end.silence(Time::from_millis(130)), Duration::from_millis(30));
+        assert_eq!(
+            end.silence(Time::from_millis(130)),
+            Duration::from_millis(30)
+        );
     }
 }

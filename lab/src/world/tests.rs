@@ -1,3 +1,5 @@
+//! What a world promises.
+
 use super::*;
 use mmt_shared::settings::Mode;
 use mmt_shared::wire::Cause;
@@ -7,7 +9,12 @@ fn wan() -> LinkConfig {
 }
 
 fn over(link: LinkConfig, seed: u64) -> WorldConfig {
-    WorldConfig { up: link.clone(), down: link, ..WorldConfig::default() }.seeded(seed)
+    WorldConfig {
+        up: link.clone(),
+        down: link,
+        ..WorldConfig::default()
+    }
+    .seeded(seed)
 }
 
 fn run(config: &WorldConfig, seconds: u64) -> World {
@@ -25,9 +32,23 @@ fn probe() {
             let e = world.slave().estimate();
             println!(
                 "seed {seed} rel {:.3} pmse {:.4} jnd7 {:.3} rate {:.2} pushes {:?} breaks {:.2} pose {:.1} mm peak {:.1} m {:.3} b {:.3} c {:.3} {:?}",
-                f.relative_error.unwrap(), f.pmse.unwrap(), f.jnd7_share.unwrap(), o.updates.rate_hz().unwrap(), world.operator().pushes_completed(),
-                o.breaks.per_push(world.operator().pushes_completed().unwrap()).unwrap(), o.pose.position_rms_m().unwrap()*1e3, o.on_hand.largest_n().unwrap(), e.m, e.b, e.c,
-                o.updates.by_cause().map(|(c, n)| (c.name(), n)).collect::<Vec<_>>(),
+                f.relative_error.unwrap(),
+                f.pmse.unwrap(),
+                f.jnd7_share.unwrap(),
+                o.updates.rate_hz().unwrap(),
+                world.operator().pushes_completed(),
+                o.breaks
+                    .per_push(world.operator().pushes_completed().unwrap())
+                    .unwrap(),
+                o.pose.position_rms_m().unwrap() * 1e3,
+                o.on_hand.largest_n().unwrap(),
+                e.m,
+                e.b,
+                e.c,
+                o.updates
+                    .by_cause()
+                    .map(|(c, n)| (c.name(), n))
+                    .collect::<Vec<_>>(),
             );
         }
     }

@@ -26,7 +26,12 @@ pub struct StartModel {
 impl Default for StartModel {
     /// Wrong on purpose, so that the estimator has something to do; the side is the paper's (IV-A).
     fn default() -> Self {
-        Self { mass_kg: 0.4, damping_ns_per_m: 0.0, friction_n: 1.0, side_m: 0.40 }
+        Self {
+            mass_kg: 0.4,
+            damping_ns_per_m: 0.0,
+            friction_n: 1.0,
+            side_m: 0.40,
+        }
     }
 }
 

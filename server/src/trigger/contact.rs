@@ -16,7 +16,11 @@ pub struct ContactConfig {
 
 impl Default for ContactConfig {
     fn default() -> Self {
-        Self { on_n: 0.10, off_n: 0.05, samples: 3 }
+        Self {
+            on_n: 0.10,
+            off_n: 0.05,
+            samples: 3,
+        }
     }
 }
 
@@ -32,14 +36,25 @@ impl ContactDetector {
     /// Not in contact.
     #[must_use]
     pub fn new(config: ContactConfig) -> Self {
-        Self { config, in_contact: false, against: 0 }
+        Self {
+            config,
+            in_contact: false,
+            against: 0,
+        }
     }
 
     /// One sample of |f_s| (N); returns whether the slave is in contact.
     pub fn step(&mut self, force: f64) -> bool {
-        let says =
-            if self.in_contact { force >= self.config.off_n } else { force >= self.config.on_n };
-        self.against = if says == self.in_contact { 0 } else { self.against + 1 };
+        let says = if self.in_contact {
+            force >= self.config.off_n
+        } else {
+            force >= self.config.on_n
+        };
+        self.against = if says == self.in_contact {
+            0
+        } else {
+            self.against + 1
+        };
         if self.against >= self.config.samples.max(1) {
             self.in_contact = says;
             self.against = 0;

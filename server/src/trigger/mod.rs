@@ -127,13 +127,21 @@ impl Trigger {
     /// A trigger that has sent nothing.
     #[must_use]
     pub fn new(config: TriggerConfig) -> Self {
-        Self { config, last: None, began: None, was_in_contact: false, mismatch: None }
+        Self {
+            config,
+            last: None,
+            began: None,
+            was_in_contact: false,
+            mismatch: None,
+        }
     }
 
     /// Whether an update is to be sent now, and why. An answer counts as sent.
     pub fn decide(&mut self, now: Time, input: &TriggerInput) -> Option<Cause> {
         self.began.get_or_insert(now);
-        let cause = self.geometry(now, input).or_else(|| self.scheme(now, input));
+        let cause = self
+            .geometry(now, input)
+            .or_else(|| self.scheme(now, input));
         if cause.is_some() {
             self.last = Some((now, input.candidate));
         }
@@ -153,33 +161,51 @@ impl Trigger {
             self.mismatch = None;
             return lost.then_some(Cause::ContactLost);
         };
-        let fresh = Mismatch { cause, since: now, told: None };
-        let mismatch = self.mismatch.filter(|old| old.cause == cause).unwrap_or(fresh);
+        let fresh = Mismatch {
+            cause,
+            since: now,
+            told: None,
+        };
+        let mismatch = self
+            .mismatch
+            .filter(|old| old.cause == cause)
+            .unwrap_or(fresh);
         let due = match mismatch.told {
             None => now >= mismatch.since + self.config.mismatch_debounce,
             Some(told) => now >= told + self.config.mismatch_repeat,
         };
         let told = if due { Some(now) } else { mismatch.told };
         self.mismatch = Some(Mismatch { told, ..mismatch });
-        if due { Some(cause) } else { lost.then_some(Cause::ContactLost) }
+        if due {
+            Some(cause)
+        } else {
+            lost.then_some(Cause::ContactLost)
+        }
     }
 
     fn scheme(&self, now: Time, input: &TriggerInput) -> Option<Cause> {
         match self.config.scheme {
             Scheme::Deadband { delta } => self.violated(input, delta),
-            Scheme::Hybrid { delta, t_update } => {
-                self.violated(input, delta).or_else(|| self.timed(now, t_update))
-            }
+            Scheme::Hybrid { delta, t_update } => self
+                .violated(input, delta)
+                .or_else(|| self.timed(now, t_update)),
             Scheme::Timer { t_update } => self.timed(now, t_update),
             Scheme::EverySample => Some(Cause::EverySample),
-            Scheme::Dis { threshold_n, heartbeat } => {
+            Scheme::Dis {
+                threshold_n,
+                heartbeat,
+            } => {
                 let beyond = self.judged(input) && (input.f_s - input.f_m).norm() > threshold_n;
-                beyond.then_some(Cause::Deadband).or_else(|| self.timed(now, heartbeat))
+                beyond
+                    .then_some(Cause::Deadband)
+                    .or_else(|| self.timed(now, heartbeat))
             }
             Scheme::Useful { delta, t_update } => {
                 let in_contact = input.slave_in_contact && input.shadow_in_contact;
                 let timed = || self.timed(now, t_update).filter(|_| in_contact);
-                self.violated(input, delta).or_else(timed).filter(|_| self.useful(now, input))
+                self.violated(input, delta)
+                    .or_else(timed)
+                    .filter(|_| self.useful(now, input))
             }
         }
     }

@@ -8,7 +8,11 @@ use serde::{Deserialize, Serialize};
 
 /// When updates are sent.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case", rename_all_fields = "snake_case", tag = "name")]
+#[serde(
+    rename_all = "kebab-case",
+    rename_all_fields = "snake_case",
+    tag = "name"
+)]
 pub enum Scheme {
     /// (12) alone.
     Deadband {
@@ -115,7 +119,10 @@ impl fmt::Display for Scheme {
             }
             Self::Timer { t_update } => write!(f, "timer {}ms", ms(t_update)),
             Self::EverySample => f.write_str("every-sample"),
-            Self::Dis { threshold_n, heartbeat } => {
+            Self::Dis {
+                threshold_n,
+                heartbeat,
+            } => {
                 write!(f, "dis {threshold_n}N {}ms", ms(heartbeat))
             }
             Self::Useful { delta, t_update } => {
@@ -135,20 +142,31 @@ impl FromStr for Scheme {
 
     fn from_str(text: &str) -> Result<Self, SchemeError> {
         let words: Vec<&str> = text.split_whitespace().collect();
-        let wrong = |scheme, usage| SchemeError::Words { scheme, usage, text: text.to_owned() };
+        let wrong = |scheme, usage| SchemeError::Words {
+            scheme,
+            usage,
+            text: text.to_owned(),
+        };
         match words.as_slice() {
-            ["deadband", delta] => Ok(Self::Deadband { delta: share(delta)? }),
-            ["hybrid", delta, t] => {
-                Ok(Self::Hybrid { delta: share(delta)?, t_update: period(t)? })
-            }
-            ["timer", t] => Ok(Self::Timer { t_update: period(t)? }),
+            ["deadband", delta] => Ok(Self::Deadband {
+                delta: share(delta)?,
+            }),
+            ["hybrid", delta, t] => Ok(Self::Hybrid {
+                delta: share(delta)?,
+                t_update: period(t)?,
+            }),
+            ["timer", t] => Ok(Self::Timer {
+                t_update: period(t)?,
+            }),
             ["every-sample"] => Ok(Self::EverySample),
-            ["dis", threshold, t] => {
-                Ok(Self::Dis { threshold_n: newtons(threshold)?, heartbeat: period(t)? })
-            }
-            ["useful", delta, t] => {
-                Ok(Self::Useful { delta: share(delta)?, t_update: period(t)? })
-            }
+            ["dis", threshold, t] => Ok(Self::Dis {
+                threshold_n: newtons(threshold)?,
+                heartbeat: period(t)?,
+            }),
+            ["useful", delta, t] => Ok(Self::Useful {
+                delta: share(delta)?,
+                t_update: period(t)?,
+            }),
             ["deadband", ..] => Err(wrong("deadband", "deadband 10%")),
             ["hybrid", ..] => Err(wrong("hybrid", "hybrid 10% 150ms")),
             ["timer", ..] => Err(wrong("timer", "timer 150ms")),
@@ -170,15 +188,31 @@ fn number(
     (min, max): (f64, f64),
     unit: &'static str,
 ) -> Result<f64, SchemeError> {
-    let value = digits.and_then(|digits| digits.parse::<f64>().ok()).map(|value| value * factor);
+    let value = digits
+        .and_then(|digits| digits.parse::<f64>().ok())
+        .map(|value| value * factor);
     value
         .filter(|value| (min..=max).contains(value))
-        .ok_or_else(|| SchemeError::Number { word: word.to_owned(), what, min, max, unit })
+        .ok_or_else(|| SchemeError::Number {
+            word: word.to_owned(),
+            what,
+            min,
+            max,
+            unit,
+        })
 }
 
 fn share(word: &str) -> Result<f64, SchemeError> {
     let (min, max) = (DELTA.0 * 100.0, DELTA.1 * 100.0);
-    number(word, word.strip_suffix('%'), 1.0, "deadband", (min, max), "%").map(|p| p / 100.0)
+    number(
+        word,
+        word.strip_suffix('%'),
+        1.0,
+        "deadband",
+        (min, max),
+        "%",
+    )
+    .map(|p| p / 100.0)
 }
 
 fn period(word: &str) -> Result<Duration, SchemeError> {
@@ -225,8 +259,14 @@ mod tests {
             error("hybrid 10%"),
             "the scheme 'hybrid' is written 'hybrid 10% 150ms', not 'hybrid 10%'"
         );
-        assert_eq!(error("deadband 10"), "'10' is not a deadband from 0.1 to 100 %");
-        assert_eq!(error("timer nans"), "'nans' is not a time from 1 to 60000 ms");
+        assert_eq!(
+            error("deadband 10"),
+            "'10' is not a deadband from 0.1 to 100 %"
+        );
+        assert_eq!(
+            error("timer nans"),
+            "'nans' is not a time from 1 to 60000 ms"
+        );
         assert_eq!(error("timer 0ms"), "'0ms' is not a time from 1 to 60000 ms");
     }
 }

@@ -1,10 +1,15 @@
+//! What the trigger promises.
+
 use super::*;
 use mmt_shared::contact::Coupling;
 use mmt_shared::rng::Substream;
 
 fn candidate(m: f64, c: f64, angle: f64) -> Candidate {
     let coupling = Coupling::for_stiffness(1000.0);
-    Candidate { params: ModelParams::of_square(m, 3.0, c, 0.36, &coupling).unwrap(), angle }
+    Candidate {
+        params: ModelParams::of_square(m, 3.0, c, 0.36, &coupling).unwrap(),
+        angle,
+    }
 }
 
 fn input(f_s: f64, f_m: f64) -> TriggerInput {
@@ -21,7 +26,10 @@ fn input(f_s: f64, f_m: f64) -> TriggerInput {
 }
 
 fn trigger(scheme: &str, mode: Mode) -> Trigger {
-    Trigger::new(TriggerConfig { scheme: scheme.parse().unwrap(), ..TriggerConfig::of_mode(mode) })
+    Trigger::new(TriggerConfig {
+        scheme: scheme.parse().unwrap(),
+        ..TriggerConfig::of_mode(mode)
+    })
 }
 
 /// Causes by tick of a random but seeded run with contact and without.
@@ -36,7 +44,11 @@ fn run(scheme: &str) -> Vec<(u64, Cause)> {
             shadow_in_contact: contact,
             ..input(2.0, 2.0 + 0.1 * random.normal())
         };
-        sent.extend(trigger.decide(Time::from_millis(n), &sample).map(|cause| (n, cause)));
+        sent.extend(
+            trigger
+                .decide(Time::from_millis(n), &sample)
+                .map(|cause| (n, cause)),
+        );
     }
     sent
 }
@@ -47,15 +59,24 @@ fn a_violation_exactly_at_delta_does_not_fire_and_the_next_number_does() {
     let mut trigger = trigger("deadband 25%", Mode::Paper);
     assert_eq!(trigger.decide(Time::ZERO, &input(2.0, 2.5)), None);
     let above = f64::from_bits(2.5f64.to_bits() + 1);
-    assert_eq!(trigger.decide(Time::ZERO, &input(2.0, above)), Some(Cause::Deadband));
+    assert_eq!(
+        trigger.decide(Time::ZERO, &input(2.0, above)),
+        Some(Cause::Deadband)
+    );
 }
 
 #[test]
 fn small_forces_are_divided_by_the_floor() {
     // |f_s − f_m| = 0.008 of a floor of 0.04 is 20 %; of |f_s| = 0.01 it would be 80 %
-    assert_eq!(trigger("deadband 25%", Mode::Paper).decide(Time::ZERO, &input(0.01, 0.018)), None);
+    assert_eq!(
+        trigger("deadband 25%", Mode::Paper).decide(Time::ZERO, &input(0.01, 0.018)),
+        None
+    );
     let mut narrow = trigger("deadband 15%", Mode::Paper);
-    assert_eq!(narrow.decide(Time::ZERO, &input(0.01, 0.018)), Some(Cause::Deadband));
+    assert_eq!(
+        narrow.decide(Time::ZERO, &input(0.01, 0.018)),
+        Some(Cause::Deadband)
+    );
 }
 
 #[test]
@@ -84,7 +105,10 @@ fn every_update_resets_the_timer() {
     let mut trigger = trigger("hybrid 10% 50ms", Mode::Paper);
     let at = |n| Time::from_millis(n);
     assert_eq!(trigger.decide(at(0), &input(2.0, 2.0)), None);
-    assert_eq!(trigger.decide(at(30), &input(2.0, 3.0)), Some(Cause::Deadband));
+    assert_eq!(
+        trigger.decide(at(30), &input(2.0, 3.0)),
+        Some(Cause::Deadband)
+    );
     assert_eq!(trigger.decide(at(79), &input(2.0, 2.0)), None);
     assert_eq!(trigger.decide(at(80), &input(2.0, 2.0)), Some(Cause::Timer));
 }
@@ -105,7 +129,10 @@ fn noise_in_free_space_never_fires() {
 
 #[test]
 fn a_contact_of_one_side_counts_after_the_debounce_and_is_told_again_at_intervals() {
-    for (slave, cause) in [(false, Cause::MasterOnlyContact), (true, Cause::SlaveOnlyContact)] {
+    for (slave, cause) in [
+        (false, Cause::MasterOnlyContact),
+        (true, Cause::SlaveOnlyContact),
+    ] {
         let mut trigger = trigger("deadband 10%", Mode::Recommended);
         let one = TriggerInput {
             slave_in_contact: slave,
@@ -122,15 +149,25 @@ fn a_contact_of_one_side_counts_after_the_debounce_and_is_told_again_at_interval
 #[test]
 fn a_lost_contact_is_told_once() {
     let mut trigger = trigger("deadband 10%", Mode::Recommended);
-    let free = TriggerInput { slave_in_contact: false, shadow_in_contact: false, ..input(0.0, 0.0) };
+    let free = TriggerInput {
+        slave_in_contact: false,
+        shadow_in_contact: false,
+        ..input(0.0, 0.0)
+    };
     assert_eq!(trigger.decide(Time::ZERO, &input(2.0, 2.0)), None);
-    assert_eq!(trigger.decide(Time::from_millis(1), &free), Some(Cause::ContactLost));
+    assert_eq!(
+        trigger.decide(Time::from_millis(1), &free),
+        Some(Cause::ContactLost)
+    );
     assert_eq!(trigger.decide(Time::from_millis(2), &free), None);
 }
 
 #[test]
 fn a_sticking_box_is_no_mismatch_in_recommended_mode() {
-    let sticking = TriggerInput { sticking: true, ..input(1.0, 2.0) };
+    let sticking = TriggerInput {
+        sticking: true,
+        ..input(1.0, 2.0)
+    };
     let decide = |mode| trigger("deadband 10%", mode).decide(Time::ZERO, &sticking);
     assert_eq!(decide(Mode::Paper), Some(Cause::Deadband));
     assert_eq!(decide(Mode::Recommended), None);
@@ -141,14 +178,31 @@ fn useful_sends_only_what_would_be_felt_and_not_twice_within_ten_milliseconds() 
     let mut trigger = trigger("useful 10% 150ms", Mode::Recommended);
     let at = |n| Time::from_millis(n);
     let violating = input(2.0, 3.0);
-    assert_eq!(trigger.decide(at(0), &violating), Some(Cause::Deadband), "the first is news");
-    assert_eq!(trigger.decide(at(20), &violating), None, "it would say the same again");
-    let changed = TriggerInput { candidate: candidate(0.7, 2.2, 0.0), ..violating };
+    assert_eq!(
+        trigger.decide(at(0), &violating),
+        Some(Cause::Deadband),
+        "the first is news"
+    );
+    assert_eq!(
+        trigger.decide(at(20), &violating),
+        None,
+        "it would say the same again"
+    );
+    let changed = TriggerInput {
+        candidate: candidate(0.7, 2.2, 0.0),
+        ..violating
+    };
     assert_eq!(trigger.decide(at(21), &changed), Some(Cause::Deadband));
-    let again = TriggerInput { candidate: candidate(0.7, 2.4, 0.0), ..violating };
+    let again = TriggerInput {
+        candidate: candidate(0.7, 2.4, 0.0),
+        ..violating
+    };
     assert_eq!(trigger.decide(at(30), &again), None);
     assert_eq!(trigger.decide(at(31), &again), Some(Cause::Deadband));
-    let turned = TriggerInput { candidate: candidate(0.7, 2.4, 0.011), ..input(2.0, 2.0) };
+    let turned = TriggerInput {
+        candidate: candidate(0.7, 2.4, 0.011),
+        ..input(2.0, 2.0)
+    };
     assert_eq!(trigger.decide(at(180), &turned), None);
     assert_eq!(trigger.decide(at(181), &turned), Some(Cause::Timer));
 }
@@ -162,6 +216,12 @@ fn every_sample_means_every_sample() {
 fn dis_fires_beyond_an_absolute_error_or_at_its_heartbeat() {
     let mut trigger = trigger("dis 0.25N 1s", Mode::Paper);
     assert_eq!(trigger.decide(Time::ZERO, &input(2.0, 2.25)), None);
-    assert_eq!(trigger.decide(Time::ZERO, &input(2.0, 2.26)), Some(Cause::Deadband));
-    assert_eq!(trigger.decide(Time::from_millis(1000), &input(2.0, 2.0)), Some(Cause::Timer));
+    assert_eq!(
+        trigger.decide(Time::ZERO, &input(2.0, 2.26)),
+        Some(Cause::Deadband)
+    );
+    assert_eq!(
+        trigger.decide(Time::from_millis(1000), &input(2.0, 2.0)),
+        Some(Cause::Timer)
+    );
 }

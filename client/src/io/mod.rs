@@ -1,0 +1,109 @@
+//! The master as a host on the network: QUIC endpoint and the haptic thread.
+//!
+//! Nothing is decided here that `master` or `link` could decide.
+
+#![allow(
+    clippy::disallowed_methods,
+    reason = "the shell: clocks, threads and sockets are its business"
+)]
+
+use std::time::Duration;
+
+use mmt_netem::LinkConfig;
+use mmt_shared::geometry::{BoxFootprint, Pose, Vec2};
+use mmt_shared::pairing::Pairing;
+use mmt_shared::report::RunReport;
+use serde::Serialize;
+
+use crate::device::DeviceProfile;
+use crate::failsafe::LinkState;
+use crate::operator::scripted::ScriptedConfig;
+use crate::operator::trace::Trace;
+
+/// Who operates.
+#[derive(Clone, Debug)]
+pub enum OperatorChoice {
+    /// The scripted operator.
+    Scripted(ScriptedConfig),
+    /// A recorded path, with the name it is reported by.
+    Trace {
+        /// The path.
+        trace: Trace,
+        /// Its name.
+        name: String,
+    },
+}
+
+/// How a master host runs.
+#[derive(Clone, Debug)]
+pub struct MasterOptions {
+    /// Where the slave is, and its secrets.
+    pub pairing: Pairing,
+    /// The device.
+    pub device: DeviceProfile,
+    /// Who operates.
+    pub operator: OperatorChoice,
+    /// How long; until the operator has finished or a person ends it if absent.
+    pub duration: Option<Duration>,
+    /// Samples in a command.
+    pub samples_per_command: u8,
+    /// Emulated network on what the master sends.
+    pub netem: LinkConfig,
+    /// Seed of the emulated network.
+    pub netem_seed: u64,
+}
+
+/// A look at a running master, for a screen.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct MasterLive {
+    /// Seconds since the session began.
+    pub elapsed_s: f64,
+    /// The HIP, m.
+    pub hip: Vec2,
+    /// f_m, N, on the object.
+    pub f_m: Vec2,
+    /// Force on the hand after the limiter, N.
+    pub hand_force: Vec2,
+    /// The local model's pose.
+    pub model: Pose,
+    /// The local model's footprint.
+    pub footprint: Option<BoxFootprint>,
+    /// m, b, c in use.
+    pub params: [f64; 3],
+    /// Whether the HIP touches the model.
+    pub in_contact: bool,
+    /// Updates applied.
+    pub updates_applied: u64,
+    /// Pushes completed.
+    pub pushes: Option<u64>,
+    /// The link.
+    pub link: LinkState,
+    /// Median round trip, ms.
+    pub rtt_ms: Option<f64>,
+    /// Loss up and down, 0 to 1.
+    pub loss: (Option<f64>, Option<f64>),
+    /// Late wake-ups of the haptic loop so far: p99, µs.
+    pub lateness_p99_us: f64,
+    /// Ticks skipped.
+    pub skipped: u64,
+}
+
+/// The configuration as the report tells it.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct MasterConfiguration {
+    /// The slave's address.
+    pub slave: String,
+    /// The device.
+    pub device: DeviceProfile,
+    /// `scripted` or the trace's name.
+    pub operator: String,
+    /// The scripted operator's numbers.
+    pub scripted: Option<ScriptedConfig>,
+    /// Samples in a command.
+    pub samples_per_command: u8,
+    /// Emulated network on what the master sends.
+    pub netem: String,
+}
+
+/// The report of a master host's session.
+pub type MasterReport = RunReport<MasterConfiguration>;

@@ -1,0 +1,79 @@
+//! The slave as a host on the network: QUIC endpoint, one session at a time, the 1 kHz thread.
+//!
+//! Nothing is decided here that `slave` or `link` could decide.
+
+#![allow(
+    clippy::disallowed_methods,
+    reason = "the shell: clocks, threads and sockets are its business"
+)]
+
+use std::net::SocketAddr;
+
+use mmt_netem::LinkConfig;
+use mmt_shared::geometry::{BoxFootprint, Pose, Vec2};
+use mmt_shared::io::identity::Identity;
+use mmt_shared::report::RunReport;
+use mmt_shared::wire::Cause;
+use serde::Serialize;
+
+use crate::slave::SlaveConfig;
+
+/// How a slave host runs.
+#[derive(Debug)]
+pub struct SlaveOptions {
+    /// Where to listen.
+    pub listen: SocketAddr,
+    /// Certificate, key and token.
+    pub identity: Identity,
+    /// The slave of every session.
+    pub config: SlaveConfig,
+    /// Emulated network on what the slave sends.
+    pub netem: LinkConfig,
+    /// Seed of the emulated network.
+    pub netem_seed: u64,
+    /// End after the first session.
+    pub once: bool,
+}
+
+/// A look at a running slave, for a screen.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct SlaveLive {
+    /// Whether a master is connected.
+    pub connected: bool,
+    /// Seconds since the session began.
+    pub elapsed_s: f64,
+    /// f_s, N.
+    pub f_s: Vec2,
+    /// f_m of the shadow, N.
+    pub f_shadow: Vec2,
+    /// Updates sent, by cause, in the order of [`Cause::ALL`].
+    pub updates: [u64; Cause::ALL.len()],
+    /// m, b, c as estimated.
+    pub estimate: [f64; 3],
+    /// The tool, m.
+    pub tool: Vec2,
+    /// The object's true pose.
+    pub truth: Pose,
+    /// The object's true footprint.
+    pub footprint: Option<BoxFootprint>,
+    /// Whether the slave is in contact.
+    pub in_contact: bool,
+    /// Median round trip, ms.
+    pub rtt_ms: Option<f64>,
+    /// Loss up, 0 to 1.
+    pub loss_up: Option<f64>,
+}
+
+/// The configuration as the report tells it.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct SlaveConfiguration {
+    /// Where it listened.
+    pub listen: String,
+    /// The slave.
+    pub slave: SlaveConfig,
+    /// Emulated network on what the slave sends.
+    pub netem: String,
+}
+
+/// The report of the last session of a slave host.
+pub type SlaveReport = RunReport<SlaveConfiguration>;
