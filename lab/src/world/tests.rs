@@ -26,8 +26,12 @@ fn run(config: &WorldConfig, seconds: u64) -> World {
 #[test]
 fn probe() {
     for seed in 1..=6 {
-        for link in [LinkConfig::default(), wan()] {
-            let world = run(&over(link, seed), 20);
+        for ms in [16.0, 21.0, 26.0] {
+            let mut config = over(wan(), seed);
+            config.slave.playout.delay_ms = ms;
+            let world = run(&config, 20);
+            let b = &world.slave().playout();
+            println!("{ms} {:?}", b.counts());
             let (f, o) = (world.force(), world.outcome());
             let e = world.slave().estimate();
             println!(
