@@ -23,7 +23,7 @@ use mmt_server::estimator::{Estimator, EstimatorConfig, Measured};
 use mmt_server::link::SlaveLink;
 use mmt_server::playout::{PlayoutBuffer, PlayoutConfig};
 use mmt_server::slave::{Slave, SlaveConfig, SlaveTick};
-use mmt_server::trigger::{Candidate, Trigger, TriggerConfig, TriggerInput};
+use mmt_server::trigger::{Trigger, TriggerConfig, TriggerInput};
 use mmt_shared::geometry::Vec2;
 use mmt_shared::local_model::LocalModel;
 use mmt_shared::settings::Mode;
@@ -287,10 +287,8 @@ impl Parts {
             sticking: estimate.sticking,
             speed: estimate.speed,
             acceleration: estimate.acceleration,
-            candidate: Candidate {
-                params: self.shadow.state().params,
-                angle: 0.0,
-            },
+            params: self.shadow.state().params,
+            turn: 0.0,
         };
         self.decided += u64::from(self.trigger.decide(now, &input).is_some());
         let update = met.update?;
