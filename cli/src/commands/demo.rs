@@ -1,0 +1,1 @@
+//! `mmt demo`: slave, emulated network and master in this process.
