@@ -67,6 +67,12 @@ impl MasterLink {
         self.samples_refused
     }
 
+    /// Samples that wait for the command to be full.
+    #[must_use]
+    pub fn pending(&self) -> usize {
+        self.block.len()
+    }
+
     /// Takes in a datagram that arrived at `now`.
     pub fn handle(&mut self, now: Time, bytes: &[u8]) -> Option<FromSlave> {
         match self.end.open(now, bytes)? {

@@ -4,51 +4,16 @@
 //! Pin and token are 32 bytes each, in 64 hexadecimal digits: a pin can be compared by eye with what
 //! other tools print. The token must never appear in a debug print, a log or an error.
 
+mod secret;
+
 use std::fmt;
-use std::hint::black_box;
 use std::net::{Ipv4Addr, Ipv6Addr};
 use std::str::FromStr;
 
-use serde::{Deserialize, Serialize};
-
-/// Length of pin and token, bytes.
-pub const SECRET_BYTES: usize = 32;
+pub use secret::{HexError, Pin, SECRET_BYTES, Token};
 
 const SCHEME: &str = "mmt://";
 const PORT_RULE: &str = "a number from 1 to 65535";
-
-/// The secret that lets a master in. Compared in a time that does not depend on its bytes.
-#[derive(Clone, Copy, Eq, Serialize, Deserialize)]
-#[serde(transparent)]
-pub struct Token([u8; SECRET_BYTES]);
-
-impl Token {
-    /// A token of these bytes; they must come from the system's source of randomness.
-    #[must_use]
-    pub const fn new(bytes: [u8; SECRET_BYTES]) -> Self {
-        Self(bytes)
-    }
-
-    /// The bytes, for the wire and for the file that keeps them.
-    #[must_use]
-    pub const fn expose(&self) -> &[u8; SECRET_BYTES] {
-        &self.0
-    }
-}
-
-impl PartialEq for Token {
-    fn eq(&self, other: &Self) -> bool {
-        let pairs = self.0.iter().zip(&other.0);
-        let differing = pairs.fold(0, |bits, (a, b)| black_box(bits | (a ^ b)));
-        black_box(differing) == 0
-    }
-}
-
-impl fmt::Debug for Token {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str("Token(secret)")
-    }
-}
 
 /// The host in an address.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -92,25 +57,15 @@ pub struct Pairing {
     /// Where the slave listens.
     pub address: Address,
     /// SHA-256 of the `SubjectPublicKeyInfo` (DER) in the slave's certificate.
-    pub pin: [u8; SECRET_BYTES],
+    pub pin: Pin,
     /// The secret.
     pub token: Token,
 }
 
 impl fmt::Display for Pairing {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (address, pin) = (&self.address, Hex(&self.pin));
-        let token = Hex(self.token.expose());
+        let (address, pin, token) = (&self.address, self.pin, self.token.reveal());
         write!(f, "{SCHEME}{address}?pin={pin}&token={token}")
-    }
-}
-
-/// Bytes as lower-case hexadecimal digits.
-struct Hex<'a>(&'a [u8]);
-
-impl fmt::Display for Hex<'_> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        self.0.iter().try_for_each(|byte| write!(f, "{byte:02x}"))
     }
 }
 
@@ -196,6 +151,15 @@ pub enum PairingError {
     },
 }
 
+impl PairingError {
+    fn of(key: &'static str, error: HexError) -> Self {
+        match error {
+            HexError::WrongLength { found } => Self::WrongLength { key, found },
+            HexError::NotHex { position } => Self::NotHex { key, position },
+        }
+    }
+}
+
 impl FromStr for Address {
     type Err = AddressError;
 
@@ -247,12 +211,18 @@ impl FromStr for Pairing {
         let (mut pin, mut token) = (None, None);
         let parts = query.split('&').filter(|part| !part.is_empty());
         for (index, part) in parts.enumerate() {
-            let (slot, key, digits) = match part.split_once('=') {
-                Some(("pin", digits)) => (&mut pin, "pin", digits),
-                Some(("token", digits)) => (&mut token, "token", digits),
+            let twice = match part.split_once('=') {
+                Some(("pin", digits)) => {
+                    let read = digits.parse().map_err(|e| PairingError::of("pin", e))?;
+                    pin.replace(read).is_some().then_some("pin")
+                }
+                Some(("token", digits)) => {
+                    let read = digits.parse().map_err(|e| PairingError::of("token", e))?;
+                    token.replace(read).is_some().then_some("token")
+                }
                 _ => return Err(PairingError::Unknown { part: index + 1 }),
             };
-            if slot.replace(parse_hex(key, digits)?).is_some() {
+            if let Some(key) = twice {
                 return Err(PairingError::Twice { key });
             }
         }
@@ -262,27 +232,9 @@ impl FromStr for Pairing {
         Ok(Self {
             address: address.parse()?,
             pin,
-            token: Token(token),
+            token,
         })
     }
-}
-
-fn parse_hex(key: &'static str, digits: &str) -> Result<[u8; SECRET_BYTES], PairingError> {
-    let mut values = [0; 2 * SECRET_BYTES];
-    let found = digits.chars().count();
-    if found != values.len() {
-        return Err(PairingError::WrongLength { key, found });
-    }
-    for (position, (digit, value)) in digits.chars().zip(&mut values).enumerate() {
-        let position = position + 1;
-        let number = digit.to_digit(16).and_then(|n| u8::try_from(n).ok());
-        *value = number.ok_or(PairingError::NotHex { key, position })?;
-    }
-    let mut bytes = [0; SECRET_BYTES];
-    for (byte, pair) in bytes.iter_mut().zip(values.chunks_exact(2)) {
-        *byte = pair.iter().fold(0, |high, low| high << 4 | low);
-    }
-    Ok(bytes)
 }
 
 #[cfg(test)]
@@ -293,7 +245,7 @@ mod tests {
     fn pairing(address: &str) -> Pairing {
         Pairing {
             address: address.parse().unwrap(),
-            pin: [0x0f; 32],
+            pin: Pin::new([0x0f; 32]),
             token: Token::new([0xa5; 32]),
         }
     }
@@ -411,24 +363,11 @@ mod tests {
         }
     }
 
-    #[test]
-    fn tokens_are_equal_only_if_every_bit_is() {
-        let token = Token::new([7; 32]);
-        assert_eq!(token, Token::new([7; 32]));
-        for byte in 0..32 {
-            for bit in 0..8 {
-                let mut other = [7; 32];
-                other[byte] ^= 1 << bit;
-                assert_ne!(token, Token::new(other));
-            }
-        }
-    }
-
     proptest! {
         #[test]
         fn any_pin_and_token_read_back(pin: [u8; 32], token: [u8; 32], port in 1..=u16::MAX) {
             let address = Address { host: Host::Name(String::from("host")), port };
-            let token = Token::new(token);
+            let (pin, token) = (Pin::new(pin), Token::new(token));
             let pairing = Pairing { address, pin, token };
             prop_assert_eq!(pairing.to_string().parse(), Ok(pairing));
         }

@@ -145,9 +145,8 @@ fn of_stream_message(message: &StreamMessage) -> Decoded {
         StreamMessage::Hello(raw) => {
             let hello = raw.accept().unwrap();
             let Role::Operator = hello.role;
-            let hex = hello.token.expose().map(|byte| format!("{byte:02x}"));
             let fields = json!({
-                "token": hex.concat(), "role": "operator",
+                "token": hello.token.reveal().to_string(), "role": "operator",
                 "stiffness_n_per_m": hello.coupling.stiffness_n_per_m,
                 "damping_ns_per_m": hello.coupling.damping_ns_per_m,
                 "samples_per_command": hello.samples_per_command,

@@ -7,6 +7,18 @@
     reason = "the shell: clocks, threads and sockets are its business"
 )]
 
+mod close;
+mod end;
+mod error;
+pub mod haptic;
+mod open;
+mod pump;
+mod report;
+mod session;
+#[cfg(test)]
+mod tests;
+mod thread;
+
 use std::time::Duration;
 
 use mmt_netem::LinkConfig;
@@ -17,8 +29,13 @@ use serde::Serialize;
 
 use crate::device::DeviceProfile;
 use crate::failsafe::LinkState;
-use crate::operator::scripted::ScriptedConfig;
+use crate::operator::Operator;
+use crate::operator::scripted::{Scripted, ScriptedConfig, ScriptedError, View};
 use crate::operator::trace::Trace;
+
+pub use end::SessionEnd;
+pub use error::MasterHostError;
+pub use session::run;
 
 /// Who operates.
 #[derive(Clone, Debug)]
@@ -32,6 +49,27 @@ pub enum OperatorChoice {
         /// Its name.
         name: String,
     },
+}
+
+impl OperatorChoice {
+    /// The operator at its start, looking at `view`.
+    ///
+    /// # Errors
+    /// Names the first number of the scripted operator that is out of its range.
+    pub fn begin(&self, view: View) -> Result<Operator, ScriptedError> {
+        match self {
+            Self::Scripted(config) => Scripted::try_new(*config, view)
+                .map(|scripted| Operator::Scripted(Box::new(scripted))),
+            Self::Trace { trace, .. } => Ok(Operator::Trace(trace.clone())),
+        }
+    }
+
+    fn name(&self) -> &str {
+        match self {
+            Self::Scripted(_) => "scripted",
+            Self::Trace { name, .. } => name,
+        }
+    }
 }
 
 /// How a master host runs.
@@ -86,6 +124,8 @@ pub struct MasterLive {
     pub lateness_p99_us: f64,
     /// Ticks skipped.
     pub skipped: u64,
+    /// Why the session ended; none while it runs.
+    pub ended: Option<SessionEnd>,
 }
 
 /// The configuration as the report tells it.

@@ -11,9 +11,10 @@ use quinn::{Connection, ConnectionError, Endpoint, TransportErrorCode};
 use tokio::time::timeout;
 
 use super::quic::{Traffic, client_config};
-use super::secret::Pin;
-use super::tls::{PROTOCOL, PinVerifier, TlsError};
+use super::tls::{PinVerifier, TlsError};
 use super::versions::{shares_version, version_of_slave};
+use crate::pairing::Pin;
+use crate::wire::ALPN;
 
 /// Name given to the TLS library, which wants one; it is not sent.
 const SERVER_NAME: &str = "mmt";
@@ -49,7 +50,7 @@ pub enum ConnectError {
     },
     /// Another version of this program.
     #[error(
-        "the slave at {address} speaks {theirs:?}, this program speaks {PROTOCOL:?}: install the same \
+        "the slave at {address} speaks {theirs:?}, this program speaks {ALPN:?}: install the same \
          version on both hosts"
     )]
     OtherVersion {
@@ -59,7 +60,7 @@ pub enum ConnectError {
         theirs: String,
     },
     /// QUIC, but not ours.
-    #[error("what answers at {address} speaks QUIC, but not {PROTOCOL:?}: is the port right?")]
+    #[error("what answers at {address} speaks QUIC, but not {ALPN:?}: is the port right?")]
     OtherProtocol {
         /// Where.
         address: SocketAddr,
@@ -121,7 +122,7 @@ pub async fn connect(
     if shares_version(&connection) {
         return Ok(connection);
     }
-    let theirs = version_of_slave(&connection, PROTOCOL).await;
+    let theirs = version_of_slave(&connection, ALPN).await;
     Err(ConnectError::OtherVersion { address, theirs })
 }
 

@@ -203,7 +203,7 @@ mod tests {
         let first = load_or_create(&directory).unwrap();
         let second = load_or_create(&directory).unwrap();
         assert_eq!(first.pin(), second.pin());
-        assert!(first.token().matches(&second.token().bytes()));
+        assert_eq!(first.token(), second.token());
     }
 
     #[test]

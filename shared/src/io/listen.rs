@@ -12,8 +12,8 @@ use quinn::{Connecting, Connection, ConnectionError, Endpoint, Incoming};
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 use tokio::time::timeout;
 
-use super::tls::PROTOCOL;
 use super::versions::{CLOSE_OTHER_VERSION, shares_version, version_of_master};
+use crate::wire::ALPN;
 
 /// Handshakes at once. More are refused: a slave has one master, and a flood must not cost it its ticks.
 const HANDSHAKES_MAX: usize = 8;
@@ -26,7 +26,7 @@ const HANDSHAKE_MAX: Duration = Duration::from_secs(10);
 #[derive(Debug, thiserror::Error)]
 pub enum AcceptError {
     /// Another version of this program.
-    #[error("the master at {address} speaks {theirs:?}, this program speaks {PROTOCOL:?}")]
+    #[error("the master at {address} speaks {theirs:?}, this program speaks {ALPN:?}")]
     OtherVersion {
         /// Where.
         address: SocketAddr,
@@ -183,7 +183,7 @@ impl Handshake {
             return Ok(connection);
         }
         let theirs = version_of_master(&connection).await;
-        connection.close(CLOSE_OTHER_VERSION, PROTOCOL.as_bytes());
+        connection.close(CLOSE_OTHER_VERSION, ALPN.as_bytes());
         Err(AcceptError::OtherVersion { address, theirs })
     }
 }

@@ -15,11 +15,10 @@ use rustls::{
 };
 
 use super::identity::Identity;
-use super::secret::Pin;
+use crate::pairing::Pin;
+use crate::wire::ALPN;
 
-/// The protocol that this program speaks, as both sides name it in the handshake (ALPN, RFC 7301).
-pub const PROTOCOL: &str = "mmt/1";
-/// Offered and accepted beside [`PROTOCOL`] by every version: two programs with nothing else in common meet
+/// Offered and accepted beside [`ALPN`] by every version: two programs with nothing else in common meet
 /// here, only to tell each other what they speak.
 pub const VERSION_PROTOCOL: &str = "mmt/version";
 
@@ -49,7 +48,7 @@ pub fn public_key_of(
 /// # Errors
 /// The identity's key does not fit its certificate.
 pub fn server(identity: &Identity) -> Result<QuicServerConfig, TlsError> {
-    server_speaking(identity, &[PROTOCOL, VERSION_PROTOCOL])
+    server_speaking(identity, &[ALPN, VERSION_PROTOCOL])
 }
 
 /// The master's side: trusts the key of `verifier`'s pin and nothing else.
@@ -57,7 +56,7 @@ pub fn server(identity: &Identity) -> Result<QuicServerConfig, TlsError> {
 /// # Errors
 /// The provider has no TLS 1.3.
 pub fn client(verifier: Arc<PinVerifier>) -> Result<QuicClientConfig, TlsError> {
-    client_speaking(verifier, &[PROTOCOL, VERSION_PROTOCOL])
+    client_speaking(verifier, &[ALPN, VERSION_PROTOCOL])
 }
 
 pub(super) fn server_speaking(

@@ -10,7 +10,7 @@ use quinn::{Connection, ConnectionError, VarInt};
 use tokio::time::timeout;
 
 use super::stream::{read_frame, write_frame};
-use super::tls::PROTOCOL;
+use crate::wire::ALPN;
 
 /// Close code: the session is over.
 pub const CLOSE_FINISHED: VarInt = VarInt::from_u32(0);
@@ -21,12 +21,12 @@ pub const CLOSE_OTHER_VERSION: VarInt = VarInt::from_u32(1);
 const VERSIONS_MAX: Duration = Duration::from_secs(5);
 /// The longest name of a version that is believed, bytes.
 const VERSION_BYTES_MAX: usize = 64;
-/// Whether the handshake agreed on [`PROTOCOL`]; else it was [`VERSION_PROTOCOL`](super::tls::VERSION_PROTOCOL).
+/// Whether the handshake agreed on [`ALPN`]; else it was [`VERSION_PROTOCOL`](super::tls::VERSION_PROTOCOL).
 pub(super) fn shares_version(connection: &Connection) -> bool {
     let data = connection.handshake_data();
     let data = data.and_then(|data| data.downcast::<HandshakeData>().ok());
     data.and_then(|data| data.protocol)
-        .is_some_and(|protocol| protocol == PROTOCOL.as_bytes())
+        .is_some_and(|protocol| protocol == ALPN.as_bytes())
 }
 
 /// The master's half of `mmt/version`: says `ours` in a frame on the stream, and learns the slave's

@@ -12,7 +12,7 @@ pub const MAGIC: [u8; 4] = *b"MMTP";
 pub const PROTOCOL_VERSION: u8 = 1;
 
 /// The protocol's name in the TLS handshake (ALPN, RFC 7301); it carries the version.
-pub const ALPN: &[u8] = b"mmt/1";
+pub const ALPN: &str = "mmt/1";
 
 /// Length of the header, bytes.
 pub const HEADER_BYTES: usize = 8;
@@ -209,7 +209,7 @@ mod tests {
     #[test]
     fn header_is_readable_by_eye() {
         assert_eq!(&header(Kind::Welcome), b"MMTP\x01\x11\x00\x00");
-        assert!(ALPN.ends_with(PROTOCOL_VERSION.to_string().as_bytes()));
+        assert!(ALPN.ends_with(&PROTOCOL_VERSION.to_string()));
     }
 
     #[test]

@@ -80,7 +80,7 @@ async fn an_impostor_with_a_copy_of_the_certificate_but_not_the_key_is_refused()
         .unwrap()
         .with_no_client_auth()
         .with_cert_resolver(Arc::new(rustls::sign::SingleCertAndKey::from(stolen)));
-    crypto.alpn_protocols = vec![PROTOCOL.into()];
+    crypto.alpn_protocols = vec![ALPN.into()];
     let crypto = quinn::crypto::rustls::QuicServerConfig::try_from(crypto).unwrap();
     let server = serving(crypto);
     let address = server.local_addr().unwrap();
@@ -152,7 +152,7 @@ async fn a_foreign_protocol_is_refused_in_the_handshake() {
 #[tokio::test]
 async fn a_peer_that_offers_this_version_alone_gets_in() {
     let slave = slave();
-    let (up, down) = tokio::join!(connect_speaking(&slave, &[PROTOCOL]), slave.accept());
+    let (up, down) = tokio::join!(connect_speaking(&slave, &[ALPN]), slave.accept());
     assert!(up.is_ok() && down.is_ok());
 }
 

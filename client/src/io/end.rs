@@ -1,0 +1,60 @@
+//! Why a session ends, in the order of who noticed.
+
+use std::fmt;
+
+use mmt_shared::wire::Ending;
+
+/// Why a session ended, as the master saw it. The first cause counts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SessionEnd {
+    /// The duration that was asked for is over.
+    DurationOver,
+    /// The operator has nothing more to do: its trace has ended.
+    OperatorFinished,
+    /// A person or the system asked for it here.
+    Stopped,
+    /// The slave said farewell first.
+    SlaveEnded(Ending),
+    /// Nothing was heard of the slave for so long that the hand was released.
+    LinkSilent,
+    /// The connection broke or was closed.
+    ConnectionLost,
+    /// The slave sent on the stream what it must not send there, or closed it.
+    StreamBroken,
+}
+
+impl SessionEnd {
+    /// What the farewell and the report say.
+    #[must_use]
+    pub fn ending(self) -> Ending {
+        match self {
+            Self::DurationOver | Self::OperatorFinished => Ending::Finished,
+            Self::Stopped => Ending::Interrupted,
+            Self::SlaveEnded(ending) => ending,
+            Self::LinkSilent | Self::ConnectionLost | Self::StreamBroken => Ending::Failed,
+        }
+    }
+}
+
+impl fmt::Display for SessionEnd {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::DurationOver => "the duration is over",
+            Self::OperatorFinished => "the operator has finished",
+            Self::Stopped => "it was asked to end",
+            Self::SlaveEnded(Ending::Finished) => "the slave has finished",
+            Self::SlaveEnded(Ending::Interrupted) => "the slave was asked to end",
+            Self::SlaveEnded(Ending::Failed) => "the slave failed: its own log says why",
+            Self::LinkSilent => {
+                "nothing was heard of the slave for 1 s and the hand was released: see whether the \
+                 slave and the network are alive, and start again"
+            }
+            Self::ConnectionLost => {
+                "the connection to the slave was lost: see whether it still runs, and start again"
+            }
+            Self::StreamBroken => {
+                "the slave broke the protocol on the stream: run the same version of mmt on both hosts"
+            }
+        })
+    }
+}

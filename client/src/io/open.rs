@@ -1,0 +1,223 @@
+//! From a pairing string to a session: look up, connect, hello, welcome.
+
+use std::net::{Ipv4Addr, Ipv6Addr, SocketAddr};
+use std::sync::Arc;
+use std::time::Duration;
+
+use mmt_netem::LinkId;
+use mmt_netem::io::socket::{EmulatedSocket, SocketMeter};
+use mmt_shared::geometry::Vec2;
+use mmt_shared::io::congestion::RateCap;
+use mmt_shared::io::connect::{ConnectError, connect};
+use mmt_shared::io::quic::{Traffic, client_endpoint};
+use mmt_shared::io::secret::Pin;
+use mmt_shared::io::socket;
+use mmt_shared::io::stream::{read_frame, write_frame};
+use mmt_shared::wire::{
+    DATAGRAM_MAX, Hello, Label, Refusal, Role, STREAM_MESSAGE_MAX, Side, StreamMessage, Welcome,
+    decode_stream_message, encode_hello,
+};
+use quinn::{Connection, Endpoint, RecvStream, SendStream};
+use tokio::time::timeout;
+
+use super::{MasterHostError, MasterOptions};
+
+/// How the program names itself to the slave.
+pub(super) const PROGRAM: &str = concat!("mmt ", env!("CARGO_PKG_VERSION"));
+
+/// How long the host waits, for what.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Patience {
+    /// For a name to be looked up.
+    pub(super) lookup: Duration,
+    /// For a handshake.
+    pub(super) connect: Duration,
+    /// For the hello to be taken, and for its answer.
+    pub(super) welcome: Duration,
+    /// For the slave's farewell.
+    pub(super) farewell: Duration,
+    /// For the last packets.
+    pub(super) idle: Duration,
+}
+
+/// Three round trips of 2 s and a lost packet for all that opens a session; what ends one must not keep
+/// a person waiting (1 s, docs/protocol.md section 2).
+pub(super) const PATIENCE: Patience = Patience {
+    lookup: Duration::from_secs(10),
+    connect: Duration::from_secs(10),
+    welcome: Duration::from_secs(10),
+    farewell: Duration::from_secs(1),
+    idle: Duration::from_secs(1),
+};
+
+/// A session that the slave has welcomed.
+#[derive(Debug)]
+pub(super) struct Opened {
+    pub(super) endpoint: Endpoint,
+    pub(super) connection: Connection,
+    pub(super) send: SendStream,
+    pub(super) receive: RecvStream,
+    pub(super) meter: SocketMeter,
+    pub(super) address: SocketAddr,
+    pub(super) welcome: Welcome,
+}
+
+/// Opens a session for an operator that starts at `hip`.
+pub(super) async fn open(
+    options: &MasterOptions,
+    hip: Vec2,
+    patience: &Patience,
+) -> Result<Opened, MasterHostError> {
+    let addresses = look_up(options, patience.lookup).await?;
+    let mut first_error = None;
+    for address in addresses {
+        match open_at(options, address, hip, patience).await {
+            Ok(opened) => return Ok(opened),
+            // a name can have an address that leads nowhere: the next may be the one
+            Err(error) if leads_nowhere(&error) => {
+                first_error.get_or_insert(error);
+            }
+            Err(error) => return Err(error),
+        }
+    }
+    Err(first_error.unwrap_or_else(|| MasterHostError::NoAddress {
+        address: options.pairing.address.to_string(),
+    }))
+}
+
+async fn look_up(
+    options: &MasterOptions,
+    limit: Duration,
+) -> Result<Vec<SocketAddr>, MasterHostError> {
+    let address = options.pairing.address.to_string();
+    let found = timeout(limit, tokio::net::lookup_host(address.clone())).await;
+    let found = match found {
+        Ok(Ok(found)) => found,
+        Ok(Err(source)) => return Err(MasterHostError::Lookup { address, source }),
+        Err(_) => return Err(MasterHostError::LookupSlow { address, limit }),
+    };
+    let mut addresses: Vec<SocketAddr> = Vec::new();
+    for one in found {
+        if !addresses.contains(&one) {
+            addresses.push(one);
+        }
+    }
+    Ok(addresses)
+}
+
+fn leads_nowhere(error: &MasterHostError) -> bool {
+    matches!(
+        error,
+        MasterHostError::Bind(_)
+            | MasterHostError::Connect(
+                ConnectError::NoAnswer { .. } | ConnectError::Impossible { .. }
+            )
+    )
+}
+
+async fn open_at(
+    options: &MasterOptions,
+    address: SocketAddr,
+    hip: Vec2,
+    patience: &Patience,
+) -> Result<Opened, MasterHostError> {
+    let local: SocketAddr = match address {
+        SocketAddr::V4(_) => (Ipv4Addr::UNSPECIFIED, 0).into(),
+        SocketAddr::V6(_) => (Ipv6Addr::UNSPECIFIED, 0).into(),
+    };
+    let plain = socket::for_quic(socket::bind(local)?).map_err(MasterHostError::Socket)?;
+    let netem = options.netem.clone();
+    let wrapped = EmulatedSocket::try_new(plain, netem, options.netem_seed, LinkId::UP)?;
+    let meter = wrapped.meter();
+    let endpoint = client_endpoint(Arc::new(wrapped))?;
+    let pin = Pin::from_bytes(options.pairing.pin);
+    let traffic = traffic(options.samples_per_command);
+    let connection = connect(&endpoint, address, pin, traffic, patience.connect).await?;
+    let (send, receive, welcome) = greet(options, &connection, hip, patience.welcome).await?;
+    Ok(Opened {
+        endpoint,
+        connection,
+        send,
+        receive,
+        meter,
+        address,
+        welcome,
+    })
+}
+
+/// What a master sends at the most. A command has up to 70 bytes of its own and, at any speed of a hand,
+/// at most 16 a sample; QUIC adds 30. The cap is twice that, with room for handshake and heartbeats.
+fn traffic(samples_per_command: u8) -> Traffic {
+    let samples = usize::from(samples_per_command.max(1));
+    let datagram_max = (70 + 16 * samples).min(DATAGRAM_MAX);
+    let commands_per_s = 1000_u64.div_ceil(samples as u64) + 20;
+    Traffic {
+        datagram_max,
+        rate_cap: RateCap {
+            bytes_per_s: 2 * commands_per_s * (datagram_max as u64 + 30),
+        },
+    }
+}
+
+async fn greet(
+    options: &MasterOptions,
+    connection: &Connection,
+    hip: Vec2,
+    limit: Duration,
+) -> Result<(SendStream, RecvStream, Welcome), MasterHostError> {
+    let address = connection.remote_address();
+    let (mut send, mut receive) =
+        connection
+            .open_bi()
+            .await
+            .map_err(|error| MasterHostError::HelloUnsent {
+                address,
+                source: quinn::WriteError::from(error).into(),
+            })?;
+    let coupling = options.device.coupling();
+    let hello = Hello {
+        token: options.pairing.token,
+        role: Role::Operator,
+        coupling,
+        samples_per_command: options.samples_per_command,
+        hip,
+        program: Label::clipped(PROGRAM),
+    };
+    let mut message = [0; STREAM_MESSAGE_MAX];
+    let length = encode_hello(&hello, &mut message)?;
+    let message = message.get(..length).unwrap_or_default();
+    write_frame(&mut send, message, limit)
+        .await
+        .map_err(|source| MasterHostError::HelloUnsent { address, source })?;
+    let answer = read_frame(&mut receive, STREAM_MESSAGE_MAX, limit)
+        .await
+        .map_err(|source| MasterHostError::NoWelcome { address, source })?;
+    let answer = decode_stream_message(&answer, Side::Slave)
+        .map_err(|source| MasterHostError::Unreadable { address, source })?;
+    match answer {
+        StreamMessage::Welcome(raw) => match raw.accept(&coupling) {
+            Ok(welcome) => Ok((send, receive, welcome)),
+            Err(source) => Err(MasterHostError::Welcome { address, source }),
+        },
+        StreamMessage::Refused(refusal) => Err(refused(refusal, address, &hello)),
+        other => Err(MasterHostError::Unexpected {
+            address,
+            kind: other.kind(),
+        }),
+    }
+}
+
+fn refused(refusal: Refusal, address: SocketAddr, hello: &Hello) -> MasterHostError {
+    match refusal {
+        Refusal::Busy => MasterHostError::Busy { address },
+        Refusal::WrongToken => MasterHostError::WrongToken { address },
+        Refusal::BadHello => MasterHostError::BadHello {
+            address,
+            x: hello.hip.x,
+            y: hello.hip.y,
+            samples: hello.samples_per_command,
+            stiffness_n_per_m: hello.coupling.stiffness_n_per_m,
+        },
+        Refusal::Ending => MasterHostError::Ending { address },
+    }
+}

@@ -1,0 +1,188 @@
+//! The network task of a session: datagrams to the haptic loop, its samples to the slave.
+//!
+//! It decides nothing about the model: updates pass the link's own checks, then the latest-wins cell.
+
+use std::pin::Pin;
+use std::time::Duration;
+
+use bytes::Bytes;
+use mmt_shared::io::clock::Clock;
+use mmt_shared::io::wake::Wakeup;
+use mmt_shared::wire::{DATAGRAM_MAX, Farewell, SlaveTotals};
+use quinn::Connection;
+use tokio::sync::watch;
+use tokio::time::{MissedTickBehavior, interval};
+
+use super::close::FarewellError;
+use super::haptic::HapticPort;
+use super::{MasterLive, SessionEnd};
+use crate::failsafe::LinkState;
+use crate::link::{FromSlave, MasterLink};
+
+/// How often the task looks whether a heartbeat is due: a fifth of a heartbeat's period.
+const BEAT: Duration = Duration::from_millis(10);
+/// A screen gets a look every so many beats: 25 a second.
+const LOOK_BEATS: u32 = 4;
+
+/// What the task counted besides what the link counts.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct PumpCounts {
+    /// Datagrams that QUIC took.
+    pub(super) given: u64,
+    /// Datagrams that QUIC did not take.
+    pub(super) unsent: u64,
+    /// Datagrams read.
+    pub(super) read: u64,
+    /// Messages that could not be sealed.
+    pub(super) unsealed: u64,
+}
+
+/// The network task's state.
+pub(super) struct Pump<'a> {
+    pub(super) clock: Clock,
+    pub(super) connection: &'a Connection,
+    pub(super) link: MasterLink,
+    pub(super) port: HapticPort,
+    pub(super) live: &'a watch::Sender<MasterLive>,
+    pub(super) counts: PumpCounts,
+    /// Why the session ends, if this task noticed first.
+    pub(super) end: Option<SessionEnd>,
+    /// Whether the connection is up.
+    pub(super) connected: bool,
+    /// The slave's farewell, if it came.
+    pub(super) told: Option<Farewell<SlaveTotals>>,
+    pub(super) shown: LinkState,
+}
+
+/// Waits until somebody wants the session to end.
+pub(super) async fn stopped(stop: &mut watch::Receiver<bool>) {
+    if stop.wait_for(|stop| *stop).await.is_err() {
+        // nobody is left who could ask
+        std::future::pending::<()>().await;
+    }
+}
+
+impl Pump<'_> {
+    /// Runs until the haptic loop has ended. `farewell` is the read of the slave's farewell.
+    pub(super) async fn run<F>(
+        &mut self,
+        wakeup: &mut Wakeup,
+        stop: &mut watch::Receiver<bool>,
+        mut farewell: Pin<&mut F>,
+    ) where
+        F: Future<Output = Result<Farewell<SlaveTotals>, FarewellError>>,
+    {
+        let mut beat = interval(BEAT);
+        beat.set_missed_tick_behavior(MissedTickBehavior::Delay);
+        let (mut beats, mut listening, mut waking, mut asked) = (0_u32, true, true, false);
+        while !self.port.ended() {
+            tokio::select! {
+                woken = wakeup.wait(), if waking => waking = woken.is_ok(),
+                datagram = self.connection.read_datagram(), if self.connected => match datagram {
+                    Ok(bytes) => self.take(&bytes),
+                    Err(error) => self.lose(&error),
+                },
+                said = farewell.as_mut(), if listening => {
+                    listening = false;
+                    self.hear(said);
+                }
+                () = stopped(stop), if !asked => {
+                    asked = true;
+                    self.end(SessionEnd::Stopped);
+                }
+                _ = beat.tick() => {
+                    beats = beats.wrapping_add(1);
+                    self.beat(beats.is_multiple_of(LOOK_BEATS));
+                }
+            }
+            self.send_samples();
+        }
+        self.send_samples();
+    }
+
+    /// Shows the newest look, with what only the network knows.
+    pub(super) fn show(&mut self, ended: Option<SessionEnd>) {
+        let peer = self.link.end().peer();
+        let rtt = peer.round_trip().histogram().quantile(0.5);
+        let loss = (peer.outgoing().share(), peer.incoming().share());
+        let look = self.port.look();
+        if look.link != self.shown {
+            self.shown = look.link;
+            tracing::info!(link = look.link.name(), "the link");
+        }
+        self.live.send_replace(MasterLive {
+            rtt_ms: rtt.map(|rtt| rtt.as_secs_f64() * 1e3),
+            loss,
+            ended: ended.or(look.ended),
+            ..look
+        });
+    }
+
+    fn end(&mut self, why: SessionEnd) {
+        self.end.get_or_insert(why);
+        self.port.release();
+    }
+
+    fn lose(&mut self, error: &quinn::ConnectionError) {
+        self.connected = false;
+        if self.told.is_none() {
+            tracing::warn!(%error, "the connection to the slave is gone");
+        }
+        self.end(SessionEnd::ConnectionLost);
+    }
+
+    fn hear(&mut self, said: Result<Farewell<SlaveTotals>, FarewellError>) {
+        match said {
+            Ok(farewell) => {
+                self.told = Some(farewell);
+                self.end(SessionEnd::SlaveEnded(farewell.ending));
+            }
+            Err(error) if error.is_loss() => self.end(SessionEnd::ConnectionLost),
+            Err(error) => {
+                tracing::error!(%error, "the slave's farewell");
+                self.end(SessionEnd::StreamBroken);
+            }
+        }
+    }
+
+    fn take(&mut self, bytes: &[u8]) {
+        self.counts.read += 1;
+        match self.link.handle(self.clock.now(), bytes) {
+            Some(FromSlave::Update(update)) => self.port.offer(&update),
+            // a scene is for a viewer, and this host has none
+            Some(FromSlave::Scene(_)) | None => {}
+        }
+        self.port.heard(self.link.end().last_heard());
+    }
+
+    fn send_samples(&mut self) {
+        let mut buffer = [0; DATAGRAM_MAX];
+        while let Some(sample) = self.port.pop() {
+            match self.link.send(self.clock.now(), sample, &mut buffer) {
+                Ok(length) => self.give(length.and_then(|length| buffer.get(..length))),
+                Err(_) => self.counts.unsealed += 1,
+            }
+        }
+    }
+
+    fn beat(&mut self, look: bool) {
+        let mut buffer = [0; DATAGRAM_MAX];
+        match self.link.heartbeat(self.clock.now(), &mut buffer) {
+            Ok(length) => self.give(length.and_then(|length| buffer.get(..length))),
+            Err(_) => self.counts.unsealed += 1,
+        }
+        if look {
+            self.show(None);
+        }
+    }
+
+    fn give(&mut self, datagram: Option<&[u8]>) {
+        let Some(bytes) = datagram else {
+            return;
+        };
+        match self.connection.send_datagram(Bytes::copy_from_slice(bytes)) {
+            Ok(()) => self.counts.given += 1,
+            Err(_) => self.counts.unsent += 1,
+        }
+    }
+}

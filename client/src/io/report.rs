@@ -1,0 +1,267 @@
+//! What a session came to: the totals of the farewell and the report.
+//!
+//! What only the slave counted is taken from its farewell and is absent without one, never guessed.
+
+use std::net::SocketAddr;
+use std::time::Duration;
+
+use mmt_netem::io::socket::SocketCounters;
+use mmt_shared::io::spread::Quantiles as Spread;
+use mmt_shared::report::{
+    Counts, EstimateReport, ForceReport, LinkReport, LoopReport, MessagesReport, ModelReport,
+    Number, PushesReport, QuantilesReport, RttReport, UpDown, UpdatesReport, WireReport,
+    ending_name,
+};
+use mmt_shared::wire::{
+    Cause, Farewell, Identified, LoopTotals, MasterTotals, Quantiles, SlaveTotals, Traffic,
+    UpdateDrops,
+};
+use quinn::ConnectionStats;
+
+use super::haptic::HapticOutcome;
+use super::pump::PumpCounts;
+use super::{MasterConfiguration, MasterOptions, MasterReport, OperatorChoice, SessionEnd};
+use crate::link::MasterLink;
+
+/// A session that has ended.
+#[derive(Debug)]
+pub(super) struct Ended {
+    pub(super) end: SessionEnd,
+    pub(super) haptic: HapticOutcome,
+    /// From the welcome to the farewell.
+    pub(super) duration: Duration,
+    /// Updates that arrived and were not applied.
+    pub(super) updates: UpdateDrops,
+    pub(super) counts: PumpCounts,
+    pub(super) told: Option<Farewell<SlaveTotals>>,
+    pub(super) sockets: SocketCounters,
+    pub(super) quic: ConnectionStats,
+    pub(super) address: SocketAddr,
+}
+
+impl Ended {
+    /// What the master tells the slave.
+    pub(super) fn totals(&self, link: &MasterLink) -> MasterTotals {
+        let timing = &self.haptic.timing;
+        MasterTotals {
+            duration_ns: u64::try_from(self.duration.as_nanos()).unwrap_or(u64::MAX),
+            traffic: Traffic {
+                udp_datagrams_sent: self.sockets.sent_datagrams,
+                udp_bytes_sent: self.sockets.sent_bytes,
+                udp_datagrams_received: self.sockets.received_datagrams,
+                udp_bytes_received: self.sockets.received_bytes,
+                ..link.end().traffic()
+            },
+            updates_applied: self.haptic.applied,
+            updates_dropped: self.updates,
+            haptic_loop: LoopTotals {
+                ticks: timing.ticks,
+                skipped: timing.skipped,
+                cpu_us: microseconds(&timing.cpu),
+                lateness_us: microseconds(&timing.lateness),
+            },
+        }
+    }
+
+    /// The report.
+    pub(super) fn report(&self, options: &MasterOptions, link: &MasterLink) -> MasterReport {
+        let version = env!("CARGO_PKG_VERSION");
+        let mut report = MasterReport::new(version, "master", configuration(options));
+        report.seed = Some(options.netem_seed);
+        report.duration_s = self.haptic.duration.as_secs_f64().into();
+        report.ending = Some(ending_name(self.end.ending()).to_owned());
+        if let Some(completed) = self.haptic.pushes {
+            report.pushes = PushesReport::new(completed, &self.haptic.breaks);
+        }
+        report.updates = self.updates();
+        report.messages = messages(link);
+        report.wire = self.wire();
+        report.force = self.force();
+        if let Some(slave) = self.slave() {
+            report.model = ModelReport {
+                mass_kg: estimate(&slave.mass_kg),
+                damping_ns_per_m: estimate(&slave.damping_ns_per_m),
+                friction_n: estimate(&slave.friction_n),
+            };
+        }
+        report.link = link_report(link);
+        report.haptic_loop = LoopReport {
+            ticks: Some(self.haptic.timing.ticks),
+            skipped: Some(self.haptic.timing.skipped),
+            cpu_us: quantiles(&self.haptic.timing.cpu),
+            lateness_us: quantiles(&self.haptic.timing.lateness),
+        };
+        report.drops = Some(self.drops(link));
+        report
+    }
+
+    fn slave(&self) -> Option<&SlaveTotals> {
+        self.told.as_ref().map(|farewell| &farewell.totals)
+    }
+
+    fn updates(&self) -> UpdatesReport {
+        let mut report = UpdatesReport {
+            applied: Some(u64::from(self.haptic.applied)),
+            dropped: Some(update_counts(&self.updates)),
+            age_ms: (&self.haptic.age).into(),
+            ..UpdatesReport::default()
+        };
+        if let Some(slave) = self.slave() {
+            let by_cause = Cause::ALL.iter().zip(slave.updates_by_cause);
+            let named = by_cause.map(|(cause, n)| (cause.name().to_owned(), u64::from(n)));
+            let named: Counts = named.collect();
+            let sent: u64 = named.values().sum();
+            let duration_s = Duration::from_nanos(slave.duration_ns).as_secs_f64();
+            report.sent = Some(sent);
+            report.rate_hz = Number::rate(sent as f64, duration_s);
+            report.by_cause = Some(named);
+        }
+        report
+    }
+
+    fn wire(&self) -> UpDown<WireReport> {
+        let header_bytes = match self.address {
+            SocketAddr::V4(_) => 28,
+            SocketAddr::V6(_) => 48,
+        };
+        let duration_s = self.duration.as_secs_f64();
+        let report = |datagrams, bytes| WireReport::new(datagrams, bytes, header_bytes, duration_s);
+        UpDown {
+            up: report(self.sockets.sent_datagrams, self.sockets.sent_bytes),
+            down: report(self.sockets.received_datagrams, self.sockets.received_bytes),
+        }
+    }
+
+    fn force(&self) -> ForceReport {
+        let judged = self.slave().map(|slave| slave.force).unwrap_or_default();
+        ForceReport {
+            pmse: judged.pmse.into(),
+            pmse_x: judged.pmse_x.into(),
+            pmse_y: judged.pmse_y.into(),
+            pmse_magnitude: judged.pmse_magnitude.into(),
+            relative_error: judged.relative_error.into(),
+            jnd7_share: judged.jnd7_share.into(),
+            largest_n: self.haptic.on_hand.largest_n().into(),
+            largest_step_n: self.haptic.on_hand.largest_step_n().into(),
+            ..ForceReport::default()
+        }
+    }
+
+    fn drops(&self, link: &MasterLink) -> Counts {
+        let (traffic, peer) = (link.end().traffic(), link.end().peer());
+        let socket = &self.sockets.dropped;
+        let queued = self.counts.given;
+        [
+            ("bad_echoes", u64::from(peer.bad_echoes())),
+            ("bad_readings", self.haptic.bad_readings),
+            ("datagrams_duplicate", u64::from(traffic.duplicates)),
+            ("datagrams_malformed", u64::from(traffic.malformed)),
+            (
+                "datagrams_overtaken_in_queue",
+                queued.saturating_sub(self.quic.frame_tx.datagram),
+            ),
+            ("datagrams_too_old", u64::from(traffic.too_old)),
+            (
+                "datagrams_unread",
+                self.quic.frame_rx.datagram.saturating_sub(self.counts.read),
+            ),
+            ("datagrams_unsealed", self.counts.unsealed),
+            ("datagrams_unsent", self.counts.unsent),
+            ("forces_not_finite", self.haptic.forces_rejected),
+            ("netem_abandoned", socket.abandoned.packets),
+            ("netem_limit", socket.limit.packets),
+            ("netem_loss", socket.loss.packets),
+            ("samples_off_grid", u64::from(link.samples_refused())),
+            ("samples_ring_full", self.haptic.samples_dropped),
+            ("samples_unsent", link.pending() as u64),
+            ("socket_blocked", socket.blocked.packets),
+            ("socket_failed", socket.failed.packets),
+        ]
+        .into_iter()
+        .map(|(name, n)| (name.to_owned(), n))
+        .collect()
+    }
+}
+
+fn configuration(options: &MasterOptions) -> MasterConfiguration {
+    MasterConfiguration {
+        slave: options.pairing.address.to_string(),
+        device: options.device,
+        operator: options.operator.name().to_owned(),
+        scripted: match &options.operator {
+            OperatorChoice::Scripted(config) => Some(*config),
+            OperatorChoice::Trace { .. } => None,
+        },
+        samples_per_command: options.samples_per_command,
+        netem: options.netem.to_string(),
+    }
+}
+
+fn update_counts(drops: &UpdateDrops) -> Counts {
+    [
+        ("duplicate", drops.duplicate),
+        ("stale", drops.stale),
+        ("rejected", drops.rejected),
+        ("superseded", drops.superseded),
+        ("frozen", drops.frozen),
+    ]
+    .into_iter()
+    .map(|(name, n)| (name.to_owned(), u64::from(n)))
+    .collect()
+}
+
+fn messages(link: &MasterLink) -> UpDown<MessagesReport> {
+    let traffic = link.end().traffic();
+    let (sent, received) = (traffic.sent, traffic.received);
+    UpDown {
+        up: MessagesReport {
+            commands: Some(u64::from(sent.commands)),
+            heartbeats: Some(u64::from(sent.heartbeats)),
+            ..MessagesReport::default()
+        },
+        down: MessagesReport {
+            commands: None,
+            updates: Some(u64::from(received.updates)),
+            scenes: Some(u64::from(received.scenes)),
+            heartbeats: Some(u64::from(received.heartbeats)),
+        },
+    }
+}
+
+fn link_report(link: &MasterLink) -> LinkReport {
+    let peer = link.end().peer();
+    let rtt = |q| {
+        let found = peer.round_trip().histogram().quantile(q);
+        Number::from(found.map(|rtt| rtt.as_secs_f64() * 1e3))
+    };
+    LinkReport {
+        rtt_ms: RttReport {
+            p50: rtt(0.5),
+            p99: rtt(0.99),
+        },
+        loss_up: peer.outgoing().share().into(),
+        loss_down: peer.incoming().share().into(),
+    }
+}
+
+fn estimate(found: &Identified) -> EstimateReport {
+    EstimateReport::new(found.estimate, found.truth)
+}
+
+fn microseconds(spread: &Spread) -> Option<Quantiles> {
+    let us = |time: Duration| time.as_secs_f64() * 1e6;
+    (spread.count > 0).then(|| Quantiles {
+        p50: us(spread.p50),
+        p99: us(spread.p99),
+        p999: us(spread.p999),
+    })
+}
+
+fn quantiles(spread: &Spread) -> QuantilesReport {
+    let found = microseconds(spread);
+    QuantilesReport {
+        p50: found.map(|q| q.p50).into(),
+        p99: found.map(|q| q.p99).into(),
+        p999: found.map(|q| q.p999).into(),
+    }
+}

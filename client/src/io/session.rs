@@ -1,0 +1,204 @@
+//! A session from the first packet to the report.
+
+use std::pin::pin;
+
+use mmt_shared::geometry::{BoxFootprint, Pose};
+use mmt_shared::io::clock::Clock;
+use mmt_shared::io::realtime::RealTime;
+use mmt_shared::io::versions::CLOSE_FINISHED;
+use mmt_shared::io::wake;
+use mmt_shared::wire::{Farewell, SlaveTotals, UpdateDrops};
+use tokio::sync::{oneshot, watch};
+use tokio::time::{error::Elapsed, timeout};
+
+use super::close::{FarewellError, delivered, read_farewell, send_farewell};
+use super::haptic::{HapticLoop, HapticOutcome, HapticParts, HapticPort};
+use super::open::{Opened, PATIENCE, Patience, open};
+use super::pump::{Pump, PumpCounts, stopped};
+use super::report::Ended;
+use super::{MasterHostError, MasterLive, MasterOptions, MasterReport, SessionEnd, thread};
+use crate::failsafe::LinkState;
+use crate::limiter::ForceLimiter;
+use crate::link::MasterLink;
+use crate::master::Master;
+use crate::operator::scripted::View;
+
+/// Runs a master against the slave of a pairing string until its duration is over, its operator has
+/// finished, `stop` becomes true, or the other side or the link ends it. `live` gets a look 25 times a
+/// second; the last one says why the session ended.
+///
+/// A session that began always gives a report: one that the link or the slave broke has the ending
+/// `failed`, and what only the slave could have told is absent from it.
+///
+/// Call it inside of a tokio runtime with I/O and time.
+///
+/// # Errors
+/// There was no session, or the haptic loop broke; see [`MasterHostError`].
+pub async fn run(
+    options: MasterOptions,
+    stop: watch::Receiver<bool>,
+    live: watch::Sender<MasterLive>,
+) -> Result<MasterReport, MasterHostError> {
+    run_with(options, stop, live, PATIENCE).await
+}
+
+/// The box as every slave of this project shows it at first; what the hello's start goes by.
+fn first_view() -> View {
+    View {
+        pose: Pose::default(),
+        footprint: BoxFootprint::square(0.40),
+        in_contact: false,
+    }
+}
+
+pub(super) async fn run_with(
+    options: MasterOptions,
+    mut stop: watch::Receiver<bool>,
+    live: watch::Sender<MasterLive>,
+    patience: Patience,
+) -> Result<MasterReport, MasterHostError> {
+    let limiter = ForceLimiter::try_new(options.device.limits())?;
+    let start = options.operator.begin(first_view())?.start();
+    let opened = tokio::select! {
+        opened = open(&options, start, &patience) => opened?,
+        () = stopped(&mut stop) => return Err(MasterHostError::Interrupted),
+    };
+    let welcome = &opened.welcome;
+    tracing::info!(
+        slave = %opened.address, program = %welcome.program, scheme = %welcome.scheme,
+        "the session begins"
+    );
+    let master = Master::new(welcome, limiter);
+    let operator = options.operator.begin(master.view())?;
+    let parts = HapticParts {
+        master,
+        operator,
+        duration: options.duration,
+        samples_per_wake: options.samples_per_command,
+    };
+    operate(&options, opened, parts, stop, live, &patience).await
+}
+
+async fn operate(
+    options: &MasterOptions,
+    opened: Opened,
+    parts: HapticParts,
+    mut stop: watch::Receiver<bool>,
+    live: watch::Sender<MasterLive>,
+    patience: &Patience,
+) -> Result<MasterReport, MasterHostError> {
+    let Opened {
+        endpoint,
+        connection,
+        mut send,
+        mut receive,
+        meter,
+        address,
+        ..
+    } = opened;
+    let clock = Clock::start();
+    let began = clock.now();
+    let (waker, mut wakeup) = wake::pair().map_err(MasterHostError::Thread)?;
+    let (haptic, port) = HapticLoop::new(parts, began, waker);
+    let (granted, granted_to) = oneshot::channel();
+    let thread = thread::spawn(haptic, clock, granted).map_err(MasterHostError::Thread)?;
+    tokio::spawn(tell(granted_to));
+    let coupling = options.device.coupling();
+    let mut pump = Pump {
+        clock,
+        connection: &connection,
+        link: MasterLink::new(began, coupling, options.samples_per_command),
+        port,
+        live: &live,
+        counts: PumpCounts::default(),
+        end: None,
+        connected: true,
+        told: None,
+        shown: LinkState::default(),
+    };
+    let mut farewell = pin!(read_farewell(&mut receive));
+    pump.run(&mut wakeup, &mut stop, farewell.as_mut()).await;
+    // the thread has left its loop: this does not wait
+    let haptic = match thread.join() {
+        Ok(finished) => finished.map_err(MasterHostError::Loop),
+        Err(_) => Err(MasterHostError::Panicked),
+    };
+    let haptic = haptic.inspect_err(|_| {
+        connection.close(CLOSE_FINISHED, b"the master's haptic loop failed");
+    })?;
+    let end = first_cause(&haptic, pump.end);
+    tracing::info!("the session ends: {end}");
+    let mut ended = Ended {
+        end,
+        haptic,
+        duration: clock.now().saturating_since(began),
+        updates: update_drops(&pump.link, &pump.port, &haptic),
+        counts: pump.counts,
+        told: pump.told,
+        sockets: meter.snapshot(),
+        quic: connection.stats(),
+        address,
+    };
+    if pump.connected {
+        let last = Farewell {
+            ending: end.ending(),
+            totals: ended.totals(&pump.link),
+        };
+        send_farewell(&mut send, &last, patience.farewell).await;
+        match ended.told {
+            Some(_) => delivered(&send, patience.farewell).await,
+            None => ended.told = answer(timeout(patience.farewell, farewell).await),
+        }
+    }
+    ended.quic = connection.stats();
+    connection.close(CLOSE_FINISHED, end.to_string().as_bytes());
+    // it takes three more round trips at the most; nobody needs to wait longer for them
+    let _ = timeout(patience.idle, endpoint.wait_idle()).await;
+    ended.sockets = meter.snapshot();
+    pump.show(Some(end));
+    Ok(ended.report(options, &pump.link))
+}
+
+/// Logs what the host granted the haptic thread.
+async fn tell(granted: oneshot::Receiver<RealTime>) {
+    if let Ok(granted) = granted.await {
+        let all = granted.fifo.granted() && granted.memory.granted() && granted.slack.granted();
+        match all {
+            true => tracing::info!("haptic loop: {granted}"),
+            false => tracing::warn!("haptic loop: {granted}"),
+        }
+    }
+}
+
+/// What ended the session: the loop knows its own reasons, the network task the others.
+fn first_cause(haptic: &HapticOutcome, noticed: Option<SessionEnd>) -> SessionEnd {
+    // a loop that ended without a reason of its own was asked to
+    haptic.end.or(noticed).unwrap_or(SessionEnd::Stopped)
+}
+
+/// Updates that arrived and were not applied. One that still waits when the loop has ended came too
+/// late for any tick.
+fn update_drops(link: &MasterLink, port: &HapticPort, haptic: &HapticOutcome) -> UpdateDrops {
+    UpdateDrops {
+        superseded: port.superseded(),
+        frozen: haptic.frozen.saturating_add(u32::from(port.untaken())),
+        ..link.drops()
+    }
+}
+
+/// The slave's answer to the master's farewell, if it came in time and could be read.
+fn answer(
+    said: Result<Result<Farewell<SlaveTotals>, FarewellError>, Elapsed>,
+) -> Option<Farewell<SlaveTotals>> {
+    match said {
+        Ok(Ok(farewell)) => Some(farewell),
+        Ok(Err(error)) => {
+            tracing::warn!(%error, "the slave gave no farewell: the report lacks what it counted");
+            None
+        }
+        Err(_) => {
+            tracing::warn!("the slave gave no farewell in time: the report lacks what it counted");
+            None
+        }
+    }
+}
