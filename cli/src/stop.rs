@@ -7,7 +7,6 @@ use tokio::signal::unix::{SignalKind, signal};
 use tokio::sync::watch;
 
 use crate::failure::{Failure, INTERRUPTED_TWICE};
-use crate::output::note;
 use crate::view::restore_terminal;
 
 /// The wish that the run ends. Copies are the same wish.
@@ -71,7 +70,7 @@ impl Stop {
             restore_terminal();
             std::process::exit(INTERRUPTED_TWICE);
         }
-        note("ending; once more to quit at once");
+        tracing::info!("ending; once more to quit at once");
         self.wanted.send_replace(true);
     }
 
