@@ -10,7 +10,6 @@ use mmt_shared::geometry::Vec2;
 use mmt_shared::io::congestion::RateCap;
 use mmt_shared::io::connect::{ConnectError, connect};
 use mmt_shared::io::quic::{Traffic, client_endpoint};
-use mmt_shared::io::secret::Pin;
 use mmt_shared::io::socket;
 use mmt_shared::io::stream::{read_frame, write_frame};
 use mmt_shared::wire::{
@@ -130,9 +129,15 @@ async fn open_at(
     let wrapped = EmulatedSocket::try_new(plain, netem, options.netem_seed, LinkId::UP)?;
     let meter = wrapped.meter();
     let endpoint = client_endpoint(Arc::new(wrapped))?;
-    let pin = Pin::from_bytes(options.pairing.pin);
     let traffic = traffic(options.samples_per_command);
-    let connection = connect(&endpoint, address, pin, traffic, patience.connect).await?;
+    let connection = connect(
+        &endpoint,
+        address,
+        options.pairing.pin,
+        traffic,
+        patience.connect,
+    )
+    .await?;
     let (send, receive, welcome) = greet(options, &connection, hip, patience.welcome).await?;
     Ok(Opened {
         endpoint,

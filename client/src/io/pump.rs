@@ -49,6 +49,8 @@ pub(super) struct Pump<'a> {
     pub(super) end: Option<SessionEnd>,
     /// Whether the connection is up.
     pub(super) connected: bool,
+    /// Whether the read of the slave's farewell still waits; once it has ended it must not be asked again.
+    pub(super) listening: bool,
     /// The slave's farewell, if it came.
     pub(super) told: Option<Farewell<SlaveTotals>>,
     pub(super) shown: LinkState,
@@ -74,7 +76,7 @@ impl Pump<'_> {
     {
         let mut beat = interval(BEAT);
         beat.set_missed_tick_behavior(MissedTickBehavior::Delay);
-        let (mut beats, mut listening, mut waking, mut asked) = (0_u32, true, true, false);
+        let (mut beats, mut waking, mut asked) = (0_u32, true, false);
         while !self.port.ended() {
             tokio::select! {
                 woken = wakeup.wait(), if waking => waking = woken.is_ok(),
@@ -82,8 +84,8 @@ impl Pump<'_> {
                     Ok(bytes) => self.take(&bytes),
                     Err(error) => self.lose(&error),
                 },
-                said = farewell.as_mut(), if listening => {
-                    listening = false;
+                said = farewell.as_mut(), if self.listening => {
+                    self.listening = false;
                     self.hear(said);
                 }
                 () = stopped(stop), if !asked => {

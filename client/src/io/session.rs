@@ -113,6 +113,7 @@ async fn operate(
         counts: PumpCounts::default(),
         end: None,
         connected: true,
+        listening: true,
         told: None,
         shown: LinkState::default(),
     };
@@ -145,9 +146,10 @@ async fn operate(
             totals: ended.totals(&pump.link),
         };
         send_farewell(&mut send, &last, patience.farewell).await;
-        match ended.told {
-            Some(_) => delivered(&send, patience.farewell).await,
-            None => ended.told = answer(timeout(patience.farewell, farewell).await),
+        if pump.listening {
+            ended.told = answer(timeout(patience.farewell, farewell).await);
+        } else {
+            delivered(&send, patience.farewell).await;
         }
     }
     ended.quic = connection.stats();

@@ -1,1 +1,370 @@
+//! What a master host promises, against a slave that the test plays.
 
+use std::time::Duration;
+
+use mmt_netem::LinkConfig;
+use mmt_shared::contact::Coupling;
+use mmt_shared::geometry::{Twist, Vec2};
+use mmt_shared::io::connect::ConnectError;
+use mmt_shared::pairing::{Pin, Token};
+use mmt_shared::params::{ModelParams, ModelState};
+use mmt_shared::time::TICK;
+use mmt_shared::wire::{Cause, Ending, ForceTotals, Identified, Refusal, SlaveTotals};
+use tokio::sync::watch;
+use tokio::time::{Instant, sleep, timeout};
+
+use super::open::{PATIENCE, Patience};
+use super::session::run_with;
+use super::*;
+use fake::{Fake, Session};
+
+mod fake;
+mod haptic;
+
+/// Longer than any healthy test needs on any host.
+const FOR_EVER: Duration = Duration::from_secs(60);
+
+fn scripted(fake: &Fake) -> MasterOptions {
+    MasterOptions {
+        pairing: fake.pairing(),
+        device: DeviceProfile::default(),
+        operator: OperatorChoice::Scripted(ScriptedConfig::default()),
+        duration: Some(Duration::from_millis(400)),
+        samples_per_command: 10,
+        netem: LinkConfig::default(),
+        netem_seed: 1,
+    }
+}
+
+/// A running master: its end, the switch that stops it, and what a screen sees.
+struct Running {
+    done: tokio::task::JoinHandle<Result<MasterReport, MasterHostError>>,
+    stop: watch::Sender<bool>,
+    live: watch::Receiver<MasterLive>,
+}
+
+fn start(options: MasterOptions, patience: Patience) -> Running {
+    let (stop, stop_to) = watch::channel(false);
+    let (live_from, live) = watch::channel(MasterLive::default());
+    let done = tokio::spawn(run_with(options, stop_to, live_from, patience));
+    Running { done, stop, live }
+}
+
+impl Running {
+    async fn end(&mut self) -> Result<MasterReport, MasterHostError> {
+        timeout(FOR_EVER, &mut self.done).await.unwrap().unwrap()
+    }
+
+    async fn error(&mut self) -> MasterHostError {
+        self.end().await.unwrap_err()
+    }
+}
+
+fn totals() -> SlaveTotals {
+    SlaveTotals {
+        duration_ns: 2_000_000_000,
+        updates_by_cause: [3, 5, 0, 0, 1, 0],
+        force: ForceTotals {
+            pmse: Some(0.125),
+            pmse_x: Some(0.25),
+            relative_error: Some(0.1),
+            ..ForceTotals::default()
+        },
+        mass_kg: Identified {
+            estimate: Some(0.75),
+            truth: Some(0.7),
+        },
+        ..SlaveTotals::default()
+    }
+}
+
+#[tokio::test]
+async fn a_session_goes_from_hello_to_farewell_and_both_sides_are_in_the_report() {
+    let fake = Fake::new();
+    let mut master = start(scripted(&fake), PATIENCE);
+    let mut slave = Session::welcomed(&fake).await;
+    let told = slave.serve().await;
+    slave.say_farewell(Ending::Finished, totals()).await;
+    let report = master.end().await.unwrap();
+
+    assert_eq!(told.ending, Ending::Finished);
+    let stamps = &slave.stamps;
+    let on_grid = |pair: &[u64]| pair[1] > pair[0] && (pair[1] - pair[0]).is_multiple_of(1_000_000);
+    assert!(stamps.len() > 100, "{}", stamps.len());
+    assert!(stamps.windows(2).all(on_grid), "{stamps:?}");
+    assert_eq!(stamps.len() % 10, 0, "ten samples a command");
+
+    assert_eq!(report.ending.as_deref(), Some("finished"));
+    let applied = report.updates.applied.unwrap();
+    let dropped: u64 = report.updates.dropped.as_ref().unwrap().values().sum();
+    assert!(applied > 0);
+    assert_eq!(Some(applied + dropped), report.messages.down.updates);
+    assert_eq!(u64::from(told.totals.updates_applied), applied);
+    assert!(report.updates.age_ms.mean.get().unwrap() > 0.0);
+    assert_eq!(report.updates.sent, Some(9));
+    assert_eq!(report.updates.rate_hz.get(), Some(4.5));
+    assert_eq!(report.updates.by_cause.as_ref().unwrap()["timer"], 5);
+    assert_eq!(report.force.pmse.get(), Some(0.125));
+    assert_eq!(report.force.pmse_y.get(), None);
+    assert_eq!(report.model.mass_kg.estimate.get(), Some(0.75));
+    assert!(report.force.largest_n.get().is_some());
+    let ticks = report.haptic_loop.ticks.unwrap();
+    assert_eq!(told.totals.haptic_loop.ticks, ticks);
+    assert!(report.duration_s.get().unwrap() >= 0.4);
+    assert!(report.haptic_loop.cpu_us.p50.get().unwrap() > 0.0);
+    assert_eq!(report.slave_loop, Default::default());
+    assert_eq!(report.seed, Some(1));
+    let up = report.messages.up.commands.unwrap() + report.messages.up.heartbeats.unwrap();
+    assert!(report.wire.up.datagrams.unwrap() >= up);
+    assert!(report.link.rtt_ms.p50.get().unwrap() > 0.0);
+    let drops = report.drops.as_ref().unwrap();
+    let sent = stamps.len() as u64;
+    let kept = drops["samples_unsent"] + drops["samples_ring_full"];
+    assert!(sent + kept <= ticks, "a sample a tick and no more");
+
+    let last = *master.live.borrow_and_update();
+    assert_eq!(last.ended, Some(SessionEnd::DurationOver));
+    assert_eq!(last.hand_force, Vec2::zeros(), "the force is off");
+    assert!(last.rtt_ms.is_some() && last.footprint.is_some());
+}
+
+#[tokio::test]
+async fn each_refusal_has_its_own_error() {
+    for refusal in [
+        Refusal::Busy,
+        Refusal::WrongToken,
+        Refusal::BadHello,
+        Refusal::Ending,
+    ] {
+        let fake = Fake::new();
+        let mut master = start(scripted(&fake), PATIENCE);
+        let mut slave = Session::knocked(&fake).await;
+        slave.refuse(refusal).await;
+        let error = master.error().await;
+        let right = match refusal {
+            Refusal::Busy => matches!(error, MasterHostError::Busy { .. }),
+            Refusal::WrongToken => matches!(error, MasterHostError::WrongToken { .. }),
+            Refusal::BadHello => matches!(error, MasterHostError::BadHello { samples: 10, .. }),
+            Refusal::Ending => matches!(error, MasterHostError::Ending { .. }),
+        };
+        assert!(right, "{refusal:?}: {error}");
+        let text = error.to_string();
+        assert!(text.contains(&fake.address.to_string()), "{text}");
+    }
+}
+
+#[tokio::test]
+async fn no_error_shows_the_token() {
+    let fake = Fake::new();
+    let options = scripted(&fake);
+    let secret = options.pairing.token.reveal().to_string();
+    let mut master = start(options, PATIENCE);
+    let mut slave = Session::knocked(&fake).await;
+    slave.refuse(Refusal::WrongToken).await;
+    let error = master.error().await;
+    assert!(!format!("{error} {error:?}").contains(&secret[..8]));
+}
+
+#[tokio::test]
+async fn another_slaves_key_is_refused_before_the_token_is_sent() {
+    let fake = Fake::new();
+    let mut options = scripted(&fake);
+    options.pairing.pin = Pin::new([7; 32]);
+    let mut master = start(options, PATIENCE);
+    let handshake = timeout(FOR_EVER, fake.listener.next()).await.unwrap();
+    assert!(handshake.unwrap().finish().await.is_err());
+    let error = master.error().await;
+    let wrong_key = matches!(
+        error,
+        MasterHostError::Connect(ConnectError::WrongKey { .. })
+    );
+    assert!(wrong_key, "{error}");
+}
+
+#[tokio::test]
+async fn nobody_there_is_said_within_the_limit() {
+    let deaf = std::net::UdpSocket::bind("127.0.0.1:0").unwrap();
+    let fake = Fake::new();
+    let mut options = scripted(&fake);
+    options.pairing.address.port = deaf.local_addr().unwrap().port();
+    let patience = Patience {
+        connect: Duration::from_millis(300),
+        ..PATIENCE
+    };
+    let error = start(options, patience).error().await;
+    let no_answer = matches!(
+        error,
+        MasterHostError::Connect(ConnectError::NoAnswer { .. })
+    );
+    assert!(no_answer, "{error}");
+}
+
+#[tokio::test]
+async fn a_slave_that_accepts_and_says_nothing_is_given_up() {
+    let fake = Fake::new();
+    let patience = Patience {
+        welcome: Duration::from_millis(200),
+        ..PATIENCE
+    };
+    let mut master = start(scripted(&fake), patience);
+    let _silent = Session::knocked(&fake).await;
+    let error = master.error().await;
+    assert!(
+        matches!(error, MasterHostError::NoWelcome { .. }),
+        "{error}"
+    );
+}
+
+#[tokio::test]
+async fn a_welcome_for_another_device_is_refused() {
+    let fake = Fake::new();
+    let mut master = start(scripted(&fake), PATIENCE);
+    let mut slave = Session::knocked(&fake).await;
+    slave.welcome(Coupling::for_stiffness(2000.0)).await;
+    let error = master.error().await;
+    assert!(matches!(error, MasterHostError::Welcome { .. }), "{error}");
+}
+
+#[tokio::test]
+async fn a_stop_before_the_session_ends_the_attempt() {
+    let fake = Fake::new();
+    let mut master = start(scripted(&fake), PATIENCE);
+    master.stop.send_replace(true);
+    let error = master.error().await;
+    assert!(matches!(error, MasterHostError::Interrupted), "{error}");
+}
+
+#[tokio::test]
+async fn a_stop_in_the_session_releases_the_hand_and_says_farewell() {
+    let fake = Fake::new();
+    let mut options = scripted(&fake);
+    options.duration = None;
+    let mut master = start(options, PATIENCE);
+    let mut slave = Session::welcomed(&fake).await;
+    slave.serve_for(Duration::from_millis(100)).await;
+    master.stop.send_replace(true);
+    let told = slave.serve().await;
+    slave.say_farewell(Ending::Interrupted, totals()).await;
+    let report = master.end().await.unwrap();
+    assert_eq!(told.ending, Ending::Interrupted);
+    assert_eq!(report.ending.as_deref(), Some("interrupted"));
+    let last = *master.live.borrow_and_update();
+    assert_eq!(last.ended, Some(SessionEnd::Stopped));
+    assert_eq!(last.hand_force, Vec2::zeros());
+}
+
+#[tokio::test]
+async fn a_slave_that_ends_first_gets_the_masters_farewell() {
+    let fake = Fake::new();
+    let mut options = scripted(&fake);
+    options.duration = None;
+    let mut master = start(options, PATIENCE);
+    let mut slave = Session::welcomed(&fake).await;
+    slave.serve_for(Duration::from_millis(100)).await;
+    slave.say_farewell(Ending::Interrupted, totals()).await;
+    let told = slave.serve().await;
+    let report = master.end().await.unwrap();
+    assert_eq!(told.ending, Ending::Interrupted);
+    assert_eq!(report.ending.as_deref(), Some("interrupted"));
+    assert_eq!(report.updates.sent, Some(9), "the slave's totals are in");
+    let ended = master.live.borrow_and_update().ended;
+    assert_eq!(ended, Some(SessionEnd::SlaveEnded(Ending::Interrupted)));
+}
+
+#[tokio::test]
+async fn a_silent_slave_releases_the_hand_and_what_it_counted_stays_unknown() {
+    let fake = Fake::new();
+    let mut options = scripted(&fake);
+    options.duration = None;
+    let patience = Patience {
+        farewell: Duration::from_millis(100),
+        ..PATIENCE
+    };
+    let mut master = start(options, patience);
+    let mut slave = Session::welcomed(&fake).await;
+    slave.serve_for(Duration::from_millis(100)).await;
+    let silent_since = Instant::now();
+    let report = master.end().await.unwrap();
+    assert!(silent_since.elapsed() >= Duration::from_millis(900));
+    assert_eq!(report.ending.as_deref(), Some("failed"));
+    let last = *master.live.borrow_and_update();
+    assert_eq!(last.ended, Some(SessionEnd::LinkSilent));
+    assert_eq!(last.link, LinkState::Released);
+    assert_eq!(last.hand_force, Vec2::zeros());
+    assert_eq!(report.updates.sent, None);
+    assert_eq!(report.updates.by_cause, None);
+    assert_eq!(report.force.pmse.get(), None);
+    assert_eq!(report.model, Default::default());
+    assert!(report.updates.applied.is_some() && report.haptic_loop.ticks.is_some());
+}
+
+#[tokio::test]
+async fn a_lost_connection_ends_the_session_with_a_report() {
+    let fake = Fake::new();
+    let mut options = scripted(&fake);
+    options.duration = None;
+    let mut master = start(options, PATIENCE);
+    let mut slave = Session::welcomed(&fake).await;
+    slave.serve_for(Duration::from_millis(50)).await;
+    slave.connection.close(9u32.into(), b"gone");
+    let report = master.end().await.unwrap();
+    assert_eq!(report.ending.as_deref(), Some("failed"));
+    assert_eq!(report.updates.sent, None);
+    let last = *master.live.borrow_and_update();
+    assert_eq!(last.ended, Some(SessionEnd::ConnectionLost));
+    assert_eq!(last.hand_force, Vec2::zeros());
+}
+
+#[tokio::test]
+async fn a_second_welcome_breaks_the_protocol_and_ends_the_session() {
+    let fake = Fake::new();
+    let mut options = scripted(&fake);
+    options.duration = None;
+    let mut master = start(options, PATIENCE);
+    let mut slave = Session::welcomed(&fake).await;
+    slave.welcome(slave.hello.coupling).await;
+    slave.serve().await;
+    let report = master.end().await.unwrap();
+    assert_eq!(report.ending.as_deref(), Some("failed"));
+    let ended = master.live.borrow_and_update().ended;
+    assert_eq!(ended, Some(SessionEnd::StreamBroken));
+}
+
+#[tokio::test]
+async fn a_trace_ends_the_session_when_it_is_over() {
+    let fake = Fake::new();
+    let path = Trace::from_csv("t_s,x_m,y_m\n0,-0.3,0.1\n0.2,-0.2,0.1\n").unwrap();
+    let mut options = scripted(&fake);
+    options.duration = None;
+    options.operator = OperatorChoice::Trace {
+        trace: path,
+        name: "a path".to_owned(),
+    };
+    let mut master = start(options, PATIENCE);
+    let mut slave = Session::welcomed(&fake).await;
+    assert!((slave.hello.hip - Vec2::new(-0.3, 0.1)).norm() < 1e-9);
+    slave.serve().await;
+    slave.say_farewell(Ending::Finished, totals()).await;
+    let report = master.end().await.unwrap();
+    assert_eq!(report.ending.as_deref(), Some("finished"));
+    assert_eq!(report.pushes.completed, None);
+    assert_eq!(report.configuration.operator, "a path");
+    let ended = master.live.borrow_and_update().ended;
+    assert_eq!(ended, Some(SessionEnd::OperatorFinished));
+}
+
+#[tokio::test]
+async fn the_emulated_link_loses_what_it_is_told_to_and_says_so() {
+    let fake = Fake::new();
+    let mut options = scripted(&fake);
+    options.samples_per_command = 1;
+    options.netem = "loss 20%".parse().unwrap();
+    let mut master = start(options, PATIENCE);
+    let mut slave = Session::welcomed(&fake).await;
+    slave.serve().await;
+    slave.say_farewell(Ending::Finished, totals()).await;
+    let report = master.end().await.unwrap();
+    assert!(report.drops.as_ref().unwrap()["netem_loss"] > 0);
+    assert!(report.link.loss_up.get().unwrap() > 0.05);
+    assert_eq!(report.configuration.netem, "loss 20%");
+}

@@ -1,0 +1,210 @@
+//! A slave as small as the protocol allows.
+
+use std::net::SocketAddr;
+
+use mmt_shared::geometry::{BoxFootprint, Pose};
+use mmt_shared::io::clock::Clock;
+use mmt_shared::io::congestion::RateCap;
+use mmt_shared::io::identity::Identity;
+use mmt_shared::io::listen::Listener;
+use mmt_shared::io::quic::{Traffic, server_endpoint};
+use mmt_shared::io::socket;
+use mmt_shared::io::stream::{read_frame, write_frame};
+use mmt_shared::link_end::{LinkEnd, Outgoing};
+use mmt_shared::settings::Mode;
+use mmt_shared::time::Time;
+use mmt_shared::wire::{
+    DATAGRAM_MAX, Farewell, Hello, Label, MasterTotals, Matter, STREAM_MESSAGE_MAX, Side,
+    StreamMessage, Update, Welcome, decode_stream_message, encode_refused, encode_slave_farewell,
+    encode_welcome,
+};
+use quinn::{Connection, RecvStream, SendStream};
+
+use super::*;
+
+/// A slave's endpoint.
+pub(super) struct Fake {
+    pub(super) identity: Identity,
+    pub(super) address: SocketAddr,
+    pub(super) listener: Listener,
+}
+
+impl Fake {
+    pub(super) fn new() -> Self {
+        let identity = Identity::ephemeral().unwrap();
+        let socket = socket::bind("127.0.0.1:0".parse().unwrap()).unwrap();
+        let traffic = Traffic {
+            datagram_max: 300,
+            rate_cap: RateCap {
+                bytes_per_s: 250_000,
+            },
+        };
+        let socket = socket::for_quic(socket).unwrap();
+        let endpoint = server_endpoint(socket, &identity, traffic).unwrap();
+        Self {
+            address: endpoint.local_addr().unwrap(),
+            identity,
+            listener: Listener::new(endpoint),
+        }
+    }
+
+    pub(super) fn pairing(&self) -> Pairing {
+        let token: Token = *self.identity.token();
+        Pairing {
+            address: self.address.to_string().parse().unwrap(),
+            pin: self.identity.pin(),
+            token,
+        }
+    }
+}
+
+/// The slave's end of a session.
+pub(super) struct Session {
+    pub(super) connection: Connection,
+    pub(super) hello: Hello,
+    /// Stamps of all samples, in the order of their arrival.
+    pub(super) stamps: Vec<u64>,
+    send: SendStream,
+    receive: Option<RecvStream>,
+    link: LinkEnd,
+    clock: Clock,
+    sequence: u32,
+}
+
+pub(super) fn state(coupling: &Coupling) -> ModelState {
+    let params = ModelParams::of_square(0.7, 3.0, 2.0, 0.4, coupling).unwrap();
+    let (footprint, pose) = (BoxFootprint::square(0.4), Pose::default());
+    ModelState::try_new(params, footprint, pose, Twist::default()).unwrap()
+}
+
+pub(super) fn welcome_for(coupling: Coupling) -> Welcome {
+    Welcome {
+        settings: Mode::Recommended.model_settings(coupling),
+        state: state(&coupling),
+        scheme: Label::clipped("none"),
+        program: Label::clipped("fake"),
+    }
+}
+
+impl Session {
+    /// A master that has said hello.
+    pub(super) async fn knocked(fake: &Fake) -> Self {
+        let handshake = timeout(FOR_EVER, fake.listener.next()).await.unwrap();
+        let connection = handshake.unwrap().finish().await.unwrap();
+        let (send, mut receive) = connection.accept_bi().await.unwrap();
+        let message = read_frame(&mut receive, STREAM_MESSAGE_MAX, FOR_EVER).await;
+        let message = decode_stream_message(&message.unwrap(), Side::Master).unwrap();
+        let StreamMessage::Hello(hello) = message else {
+            panic!("{message:?} instead of a hello");
+        };
+        let hello = hello.accept().unwrap();
+        assert_eq!(&hello.token, fake.identity.token());
+        let clock = Clock::start();
+        Self {
+            connection,
+            hello,
+            stamps: Vec::new(),
+            send,
+            receive: Some(receive),
+            link: LinkEnd::new(Side::Slave, clock.now()),
+            clock,
+            sequence: 0,
+        }
+    }
+
+    /// A master that has been welcomed.
+    pub(super) async fn welcomed(fake: &Fake) -> Self {
+        let mut session = Self::knocked(fake).await;
+        session.welcome(session.hello.coupling).await;
+        session
+    }
+
+    pub(super) async fn welcome(&mut self, coupling: Coupling) {
+        let mut out = [0; STREAM_MESSAGE_MAX];
+        let length = encode_welcome(&welcome_for(coupling), &mut out).unwrap();
+        self.write(&out[..length]).await;
+    }
+
+    pub(super) async fn refuse(&mut self, refusal: Refusal) {
+        let mut out = [0; STREAM_MESSAGE_MAX];
+        let length = encode_refused(refusal, &mut out).unwrap();
+        self.write(&out[..length]).await;
+    }
+
+    pub(super) async fn say_farewell(&mut self, ending: Ending, totals: SlaveTotals) {
+        let mut out = [0; STREAM_MESSAGE_MAX];
+        let farewell = Farewell { ending, totals };
+        let length = encode_slave_farewell(&farewell, &mut out).unwrap();
+        self.write(&out[..length]).await;
+    }
+
+    async fn write(&mut self, message: &[u8]) {
+        write_frame(&mut self.send, message, FOR_EVER)
+            .await
+            .unwrap();
+    }
+
+    /// Takes samples in and sends an update every 20 ms, until the master says farewell.
+    pub(super) async fn serve(&mut self) -> Farewell<MasterTotals> {
+        timeout(FOR_EVER, self.serve_until_farewell())
+            .await
+            .unwrap()
+    }
+
+    /// The same for a time.
+    pub(super) async fn serve_for(&mut self, time: Duration) {
+        let end = Instant::now() + time;
+        while Instant::now() < end {
+            self.turn(Duration::from_millis(20)).await;
+        }
+    }
+
+    async fn serve_until_farewell(&mut self) -> Farewell<MasterTotals> {
+        let mut receive = self.receive.take().unwrap();
+        let message =
+            tokio::spawn(
+                async move { read_frame(&mut receive, STREAM_MESSAGE_MAX, FOR_EVER).await },
+            );
+        while !message.is_finished() {
+            self.turn(Duration::from_millis(20)).await;
+        }
+        let message = message.await.unwrap().unwrap();
+        match decode_stream_message(&message, Side::Master).unwrap() {
+            StreamMessage::MasterFarewell(farewell) => farewell,
+            other => panic!("{other:?} instead of a farewell"),
+        }
+    }
+
+    async fn turn(&mut self, time: Duration) {
+        let end = Instant::now() + time;
+        while let Ok(Ok(bytes)) =
+            tokio::time::timeout_at(end, self.connection.read_datagram()).await
+        {
+            if let Some(Matter::Command(command)) = self.link.open(self.clock.now(), &bytes) {
+                let stamps = command.samples.as_slice().iter();
+                self.stamps
+                    .extend(stamps.map(|sample| sample.stamp.as_nanos()));
+            }
+        }
+        sleep(Duration::from_millis(1)).await;
+        self.update();
+    }
+
+    fn update(&mut self) {
+        self.sequence += 1;
+        let update = Update {
+            sequence: self.sequence,
+            cause: Cause::Timer,
+            answers: Time::from_nanos(self.stamps.last().copied().unwrap_or(0)),
+            newest_command: self.link.peer().newest(),
+            slave_in_contact: false,
+            state: state(&self.hello.coupling),
+        };
+        let mut out = [0; DATAGRAM_MAX];
+        let now = self.clock.now();
+        let length = self.link.seal(now, Outgoing::Update(&update), &mut out);
+        let bytes = out[..length.unwrap()].to_vec();
+        // a master that has gone does not matter here
+        let _ = self.connection.send_datagram(bytes.into());
+    }
+}
