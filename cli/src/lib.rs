@@ -1,1 +1,74 @@
-//! placeholder
+//! The command `mmt`: arguments become a configuration, the configuration becomes a run.
+//!
+//! Thin: nothing is computed here that a core or a host could compute. Data goes to stdout, messages go to
+//! stderr; what is wrong is told with what, where and what to do, and an exit code (`docs/commands.md`).
+
+#![allow(
+    clippy::disallowed_methods,
+    reason = "the command is the shell: arguments, files, terminal, clocks and threads are its business"
+)]
+
+mod args;
+mod commands;
+mod config;
+mod failure;
+mod input;
+mod log;
+mod output;
+mod stop;
+mod view;
+
+use std::process::ExitCode;
+
+use clap::Parser;
+
+use args::{Arguments, Command};
+use failure::Failure;
+use log::Messages;
+
+/// Runs the command line of this process.
+#[must_use]
+pub fn run() -> ExitCode {
+    restore_terminal_on_panic();
+    let arguments = match Arguments::try_parse() {
+        Ok(arguments) => arguments,
+        Err(error) => return answer(&error),
+    };
+    match execute(arguments.command) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => {
+            output::note(&failure);
+            ExitCode::from(failure.exit().code())
+        }
+    }
+}
+
+fn execute(command: Command) -> Result<(), Failure> {
+    let messages = Messages::install()?;
+    match command {
+        Command::Demo(arguments) => commands::demo::run(arguments, &messages),
+        Command::Slave(arguments) => commands::slave::run(arguments, &messages),
+        Command::Master(arguments) => commands::master::run(arguments, &messages),
+        Command::Netem(arguments) => commands::netem::run(&arguments),
+        Command::Replay(arguments) => commands::replay::run(&arguments),
+    }
+}
+
+/// Prints help, the version or what is wrong with the arguments.
+fn answer(error: &clap::Error) -> ExitCode {
+    // whoever closed the stream does not want to read it
+    let _ = error.print();
+    match error.use_stderr() {
+        true => ExitCode::from(failure::Exit::Usage.code()),
+        false => ExitCode::SUCCESS,
+    }
+}
+
+/// A panic is a bug and is told as one, but on a terminal that can be read.
+fn restore_terminal_on_panic() {
+    let tell = std::panic::take_hook();
+    std::panic::set_hook(Box::new(move |panic| {
+        view::restore_terminal();
+        tell(panic);
+    }));
+}

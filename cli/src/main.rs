@@ -1,2 +1,7 @@
-//! placeholder
-fn main() {}
+//! The command `mmt`.
+
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    mmt_cli::run()
+}

@@ -1,0 +1,67 @@
+//! The prose and the examples of `--help`.
+
+/// One line on the whole.
+pub(super) const ABOUT: &str =
+    "Model-mediated teleoperation: feel a box that stands far away without the network in your hand";
+
+/// Below the list of commands.
+pub(super) const AFTER: &str = "\
+Examples:
+  mmt demo                                     20 s on this machine, real sockets, emulated network
+  mmt slave --listen 0.0.0.0:4433              on the host with the object: prints a pairing string
+  mmt master 'mmt://HOST:4433?pin=…&token=…'   on the host with the hand
+
+Data goes to stdout, messages to stderr. MMT_LOG=debug shows more messages.
+Exit codes: 0 ok, 1 failed, 2 wrong input, 3 refused, 4 no answer, 5 address not to be had,
+130 interrupted twice.";
+
+/// Examples of `mmt demo`.
+pub(super) const DEMO: &str = "\
+Examples:
+  mmt demo
+  mmt demo --duration 60s --netem \"delay 200ms 20ms distribution normal loss 5%\"
+  mmt demo --mode paper --scheme \"hybrid 10% 150ms\"
+  mmt demo --json > report.json
+
+q or Ctrl-C ends it; the table comes at the end.";
+
+/// Examples of `mmt slave`.
+pub(super) const SLAVE: &str = "\
+Examples:
+  mmt slave --listen 0.0.0.0:4433 --advertise robot.example.org
+  mmt slave --listen 127.0.0.1:0 --once --json
+  mmt slave --listen [::]:4433 --mode paper --scheme \"deadband 10%\" --netem \"delay 50ms 5ms loss 1%\"
+
+stdout: the pairing string, alone on the first line; with --json the report after the last session.
+The pairing string is a secret: whoever has it can operate this slave.
+
+Schemes: \"deadband 10%\", \"hybrid 10% 150ms\", \"timer 150ms\", every-sample, \"dis 0.3N 1s\",
+\"useful 10% 150ms\".";
+
+/// Examples of `mmt master`.
+pub(super) const MASTER: &str = "\
+Examples:
+  mmt master 'mmt://192.0.2.1:4433?pin=…&token=…' --duration 20s
+  mmt master - < pairing.txt
+  mmt master 'mmt://…' --operator trace:path.csv --device falcon
+  mmt master 'mmt://…' --operator trace:black-patch.txt --push 3
+
+A trace ends in .csv (t_s,x_m,y_m) or holds recorded pushes; it is carried to start in front of the
+object's west face. Quotes around the pairing string keep the shell from ending the command at the &.";
+
+/// Examples of `mmt netem`.
+pub(super) const NETEM: &str = "\
+Examples:
+  mmt netem --listen 0.0.0.0:4434 --to 192.0.2.1:4433 --up \"delay 50ms\" --down \"delay 50ms loss 1%\"
+  mmt netem --listen 127.0.0.1:0 --to localhost:4433 --up \"delay 80ms 10ms distribution normal\" --json
+
+Masters use the slave's pairing string with the relay's address in it.
+Words: delay TIME [JITTER [distribution normal]], loss PERCENT, order free, limit PACKETS, none.
+stdout: the address that the relay listens on, alone on the first line; at the end the counters.";
+
+/// Examples of `mmt replay`.
+pub(super) const REPLAY: &str = "\
+Examples:
+  mmt replay black-patch.txt
+  mmt replay --deadband 5% --t-update none *.txt
+  mmt replay --json wood-patch.txt > report.json";

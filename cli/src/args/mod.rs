@@ -1,0 +1,206 @@
+//! The arguments of every command, as clap takes them, with help and examples.
+
+mod help;
+mod values;
+
+use std::net::SocketAddr;
+use std::path::PathBuf;
+use std::time::Duration;
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use mmt_client::device::DeviceProfile;
+use mmt_netem::LinkConfig;
+use mmt_server::trigger::Scheme;
+use mmt_shared::pairing::{Address, Host};
+use mmt_shared::settings::Mode;
+
+pub(crate) use values::{OperatorWords, PairingWords, Period};
+
+/// The command line.
+#[derive(Debug, Parser)]
+#[command(name = "mmt", version, about = help::ABOUT, after_help = help::AFTER, arg_required_else_help = true)]
+pub(crate) struct Arguments {
+    /// What to do.
+    #[command(subcommand)]
+    pub(crate) command: Command,
+}
+
+/// What to do.
+#[derive(Debug, Subcommand)]
+pub(crate) enum Command {
+    /// Show it at work: slave, emulated network and master on this machine
+    #[command(after_help = help::DEMO)]
+    Demo(DemoArguments),
+    /// Be the slave: the host with the object
+    #[command(after_help = help::SLAVE)]
+    Slave(SlaveArguments),
+    /// Be the master: the host with the hand
+    #[command(after_help = help::MASTER)]
+    Master(MasterArguments),
+    /// Emulate a network between two hosts: a UDP relay
+    #[command(after_help = help::NETEM)]
+    Netem(NetemArguments),
+    /// Replay recorded pushes of a real object through estimator and trigger
+    #[command(after_help = help::REPLAY)]
+    Replay(ReplayArguments),
+}
+
+/// Arguments of `mmt demo`.
+#[derive(Debug, Args)]
+pub(crate) struct DemoArguments {
+    /// How long the operator works
+    #[arg(long, value_name = "TIME", default_value = "20s", value_parser = values::duration)]
+    pub(crate) duration: Duration,
+    /// Seed of operator, sensors and network
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub(crate) seed: u64,
+    /// Emulated network in each direction
+    #[arg(long, value_name = "WORDS", default_value = "delay 50ms 5ms loss 1%", value_parser = values::netem)]
+    pub(crate) netem: LinkConfig,
+    /// The bundle of choices
+    #[arg(long, value_enum, default_value_t = ModeName::Recommended)]
+    pub(crate) mode: ModeName,
+    /// When updates are sent [default: the mode's]
+    #[arg(long, value_name = "WORDS", value_parser = values::scheme)]
+    pub(crate) scheme: Option<Scheme>,
+    /// Print the report as one JSON document; plain lines instead of the live view
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// Arguments of `mmt slave`.
+#[derive(Debug, Args)]
+pub(crate) struct SlaveArguments {
+    /// Address and UDP port to listen on; port 0 lets the system choose
+    #[arg(long, value_name = "ADDR:PORT", value_parser = values::listen)]
+    pub(crate) listen: SocketAddr,
+    /// The bundle of choices [default: the file's, else recommended]
+    #[arg(long, value_enum)]
+    pub(crate) mode: Option<ModeName>,
+    /// When updates are sent, such as "hybrid 10% 150ms" [default: the file's, else the mode's]
+    #[arg(long, value_name = "WORDS", value_parser = values::scheme)]
+    pub(crate) scheme: Option<Scheme>,
+    /// Configuration of the slave, TOML
+    #[arg(long, value_name = "FILE")]
+    pub(crate) config: Option<PathBuf>,
+    /// Emulated network on what the slave sends
+    #[arg(long, value_name = "WORDS", default_value = "none", value_parser = values::netem)]
+    pub(crate) netem: LinkConfig,
+    /// Seed of sensors and network [default: the file's, else 1]
+    #[arg(long, value_name = "N")]
+    pub(crate) seed: Option<u64>,
+    /// Directory that keeps certificate, key and token [default: $XDG_STATE_HOME/mmt]
+    #[arg(long, value_name = "DIR")]
+    pub(crate) identity: Option<PathBuf>,
+    /// End after the first session
+    #[arg(long)]
+    pub(crate) once: bool,
+    /// Print the report of the last session as JSON, after the pairing string
+    #[arg(long)]
+    pub(crate) json: bool,
+    /// Host name or address that the pairing string tells masters [default: the address listened on]
+    #[arg(long, value_name = "HOST", value_parser = values::host)]
+    pub(crate) advertise: Option<Host>,
+}
+
+/// Arguments of `mmt master`.
+#[derive(Debug, Args)]
+pub(crate) struct MasterArguments {
+    /// What `mmt slave` printed, in quotes; - reads it from stdin
+    #[arg(value_name = "PAIRING")]
+    pub(crate) pairing: PairingWords,
+    /// Who moves the hand: scripted, or trace:FILE
+    #[arg(long, value_name = "WHO", default_value = "scripted", value_parser = values::operator)]
+    pub(crate) operator: OperatorWords,
+    /// Of recorded pushes only this one, from 0 [default: all, joined]
+    #[arg(long, value_name = "N")]
+    pub(crate) push: Option<usize>,
+    /// How long [default: until the operator has finished, or Ctrl-C]
+    #[arg(long, value_name = "TIME", value_parser = values::duration)]
+    pub(crate) duration: Option<Duration>,
+    /// The haptic device: default or falcon
+    #[arg(long, value_name = "NAME", default_value = "default", value_parser = values::device)]
+    pub(crate) device: DeviceProfile,
+    /// Virtual stiffness k_p, N/m [default: the device's]
+    #[arg(long, value_name = "N_PER_M")]
+    pub(crate) stiffness: Option<f64>,
+    /// Emulated network on what the master sends
+    #[arg(long, value_name = "WORDS", default_value = "none", value_parser = values::netem)]
+    pub(crate) netem: LinkConfig,
+    /// Seed of operator and network
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub(crate) seed: u64,
+    /// HIP samples (1 a millisecond) in a datagram
+    #[arg(long, value_name = "N", default_value_t = 10, value_parser = values::samples_per_command())]
+    pub(crate) samples_per_command: u8,
+    /// Print the report as one JSON document
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// Arguments of `mmt netem`.
+#[derive(Debug, Args)]
+pub(crate) struct NetemArguments {
+    /// Address and UDP port to listen on for masters; port 0 lets the system choose
+    #[arg(long, value_name = "ADDR:PORT", value_parser = values::listen)]
+    pub(crate) listen: SocketAddr,
+    /// The slave: host and UDP port
+    #[arg(long, value_name = "HOST:PORT", value_parser = values::address)]
+    pub(crate) to: Address,
+    /// Network from master to slave
+    #[arg(long, value_name = "WORDS", default_value = "none", value_parser = values::netem)]
+    pub(crate) up: LinkConfig,
+    /// Network from slave to master
+    #[arg(long, value_name = "WORDS", default_value = "none", value_parser = values::netem)]
+    pub(crate) down: LinkConfig,
+    /// Seed of both
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub(crate) seed: u64,
+    /// How long [default: until Ctrl-C]
+    #[arg(long, value_name = "TIME", value_parser = values::duration)]
+    pub(crate) duration: Option<Duration>,
+    /// Print the counters as JSON, after the address
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// Arguments of `mmt replay`.
+#[derive(Debug, Args)]
+pub(crate) struct ReplayArguments {
+    /// Recorded pushes
+    #[arg(value_name = "FILE", required = true)]
+    pub(crate) files: Vec<PathBuf>,
+    /// Delta of (12): the force error that calls for an update
+    #[arg(long, value_name = "PERCENT", default_value = "10%", value_parser = values::deadband)]
+    pub(crate) deadband: f64,
+    /// Longest time without an update in contact; none for the pure deadband
+    #[arg(long, value_name = "TIME", default_value = "150ms", value_parser = values::period)]
+    pub(crate) t_update: Period,
+    /// Seed of the splits into fitted and held-out pushes
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub(crate) seed: u64,
+    /// Print one JSON document instead of tables
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// The bundles of choices by name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum ModeName {
+    /// The paper to the letter
+    Paper,
+    /// What the design study found better
+    Recommended,
+}
+
+impl From<ModeName> for Mode {
+    fn from(name: ModeName) -> Self {
+        match name {
+            ModeName::Paper => Self::Paper,
+            ModeName::Recommended => Self::Recommended,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

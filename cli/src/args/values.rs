@@ -1,0 +1,167 @@
+//! The values of arguments: what is wrong with one is told with the place and what would be right.
+
+use std::convert::Infallible;
+use std::fmt;
+use std::net::SocketAddr;
+use std::path::PathBuf;
+use std::str::FromStr;
+use std::time::Duration;
+
+use clap::builder::RangedI64ValueParser;
+use mmt_client::device::DeviceProfile;
+use mmt_netem::LinkConfig;
+use mmt_server::trigger::Scheme;
+use mmt_shared::pairing::{Address, AddressError, Host};
+use mmt_shared::wire::SAMPLES_MAX;
+
+/// The longest duration accepted: a week.
+const DURATION_MAX: Duration = Duration::from_secs(7 * 24 * 3600);
+/// The shortest duration accepted: a tick.
+const DURATION_MIN: Duration = Duration::from_millis(1);
+/// The units of a duration, in ms.
+const UNITS: [(&str, f64); 5] = [
+    ("ms", 1.0),
+    ("min", 60e3),
+    ("s", 1e3),
+    ("m", 60e3),
+    ("h", 3600e3),
+];
+
+/// Who moves the hand, in words.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) enum OperatorWords {
+    /// The scripted operator.
+    Scripted,
+    /// A recorded path in a file.
+    Trace(PathBuf),
+}
+
+/// A pairing string not looked at yet. It holds a secret: neither shown nor part of an error.
+#[derive(Clone)]
+pub(crate) struct PairingWords(String);
+
+impl PairingWords {
+    /// The words.
+    pub(crate) fn reveal(&self) -> &str {
+        &self.0
+    }
+}
+
+impl fmt::Debug for PairingWords {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("PairingWords(secret)")
+    }
+}
+
+impl FromStr for PairingWords {
+    type Err = Infallible;
+
+    fn from_str(words: &str) -> Result<Self, Infallible> {
+        Ok(Self(words.to_owned()))
+    }
+}
+
+/// T_update, or none.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Period(pub(crate) Option<Duration>);
+
+/// A time with its unit: `20s`, `1.5min`, `500ms`, `1h`.
+pub(super) fn duration(text: &str) -> Result<Duration, String> {
+    let wrong = || {
+        format!(
+            "write a time with its unit (ms, s, min, h), such as 20s, from {DURATION_MIN:?} to {} h",
+            DURATION_MAX.as_secs() / 3600
+        )
+    };
+    let digits = text.trim_end_matches(|c: char| c.is_ascii_alphabetic());
+    let unit = text.strip_prefix(digits).unwrap_or_default();
+    let factor = UNITS.iter().find(|(name, _)| *name == unit);
+    let plain = digits
+        .chars()
+        .all(|c| c.is_ascii_digit() || c == '.');
+    let number = digits.parse::<f64>().ok().filter(|_| plain);
+    let (number, (_, factor)) = number.zip(factor).ok_or_else(wrong)?;
+    let time = Duration::try_from_secs_f64(number * factor * 1e-3).map_err(|_| wrong())?;
+    match (DURATION_MIN..=DURATION_MAX).contains(&time) {
+        true => Ok(time),
+        false => Err(wrong()),
+    }
+}
+
+/// A link in netem's words; a caret line points at the wrong one.
+pub(super) fn netem(text: &str) -> Result<LinkConfig, String> {
+    text.parse().map_err(|error: mmt_netem::words::ParseError| {
+        let pointer = error.pointer(text).replace('\n', "\n    ");
+        format!("{error}\n\n    {pointer}\n\nwrite it as \"delay 50ms 5ms loss 1%\", or none")
+    })
+}
+
+/// An update scheme in its words.
+pub(super) fn scheme(text: &str) -> Result<Scheme, String> {
+    text.parse().map_err(|error: mmt_server::trigger::SchemeError| {
+        format!("{error}; write it as \"hybrid 10% 150ms\"")
+    })
+}
+
+/// Delta of (12) in per cent.
+pub(super) fn deadband(text: &str) -> Result<f64, String> {
+    match format!("deadband {text}").parse() {
+        Ok(Scheme::Deadband { delta }) => Ok(delta),
+        _ => Err("write a share from 0.1% to 100%, such as 10%".to_owned()),
+    }
+}
+
+/// T_update, or `none`.
+pub(super) fn period(text: &str) -> Result<Period, String> {
+    if text == "none" {
+        return Ok(Period(None));
+    }
+    match format!("timer {text}").parse() {
+        Ok(Scheme::Timer { t_update }) => Ok(Period(Some(t_update))),
+        _ => Err("write a time from 1ms to 60s, such as 150ms, or none".to_owned()),
+    }
+}
+
+/// An address to listen on.
+pub(super) fn listen(text: &str) -> Result<SocketAddr, String> {
+    text.parse().map_err(|_| {
+        "write address and port: 0.0.0.0:4433 for all of this host's IPv4 addresses, [::]:4433 for \
+         IPv6, 127.0.0.1:0 for this host alone and any free port"
+            .to_owned()
+    })
+}
+
+/// A host and a port to send to.
+pub(super) fn address(text: &str) -> Result<Address, String> {
+    text.parse().map_err(|error: AddressError| error.to_string())
+}
+
+/// A host without a port.
+pub(super) fn host(text: &str) -> Result<Host, String> {
+    let wrong = |error: AddressError| match error {
+        AddressError::BadHost { .. } => format!("{error}; the port is added by itself"),
+        _ => error.to_string(),
+    };
+    // any port will do: only the host counts
+    let address = format!("{text}:1").parse::<Address>().map_err(wrong)?;
+    Ok(address.host)
+}
+
+/// Who moves the hand.
+pub(super) fn operator(text: &str) -> Result<OperatorWords, String> {
+    match (text, text.strip_prefix("trace:")) {
+        ("scripted", _) => Ok(OperatorWords::Scripted),
+        (_, Some(file)) if !file.is_empty() => Ok(OperatorWords::Trace(file.into())),
+        _ => Err("write scripted, or trace:FILE with the path of a recorded tool path".to_owned()),
+    }
+}
+
+/// A device profile by its name.
+pub(super) fn device(name: &str) -> Result<DeviceProfile, String> {
+    DeviceProfile::by_name(name).map_err(|error| error.to_string())
+}
+
+/// 1 to [`SAMPLES_MAX`].
+pub(super) fn samples_per_command() -> RangedI64ValueParser<u8> {
+    RangedI64ValueParser::new().range(1..=SAMPLES_MAX as i64)
+}

@@ -1,0 +1,151 @@
+//! `mmt demo`: real slave, real master, real QUIC sockets on loopback, an emulated network between them.
+
+use std::net::{Ipv4Addr, SocketAddr};
+use std::time::{Duration, Instant};
+
+use mmt_client::device::DeviceProfile;
+use mmt_client::io::{MasterOptions, OperatorChoice};
+use mmt_client::operator::scripted::ScriptedConfig;
+use mmt_netem::{Delay, LinkConfig};
+use mmt_server::io::SlaveOptions;
+use mmt_server::playout::PlayoutConfig;
+use mmt_server::slave::SlaveConfig;
+use mmt_shared::io::identity::Identity;
+use mmt_shared::pairing::Pairing;
+use mmt_shared::settings::Mode;
+
+use super::viewer::Viewer;
+use super::{master, slave};
+use crate::args::DemoArguments;
+use crate::failure::Failure;
+use crate::log::Messages;
+use crate::output::{print, print_json};
+use crate::stop::Stop;
+use crate::view::{Caption, Snapshot};
+
+mod joined;
+
+/// Samples in a command.
+const SAMPLES_PER_COMMAND: u8 = 10;
+/// How long the slave may take to notice that the master has ended before it is asked to end as well.
+const FAREWELL: Duration = Duration::from_secs(3);
+
+/// Runs `mmt demo`.
+///
+/// # Errors
+/// A host could not start, or the session broke.
+pub(crate) fn run(arguments: DemoArguments, messages: &Messages) -> Result<(), Failure> {
+    let config = slave_config(&arguments);
+    let caption = caption(&arguments, &config);
+    let (stop, stop_slave) = (Stop::on_signals()?, Stop::new());
+    let options = slave_options(&arguments, config)?;
+    let (slave, started) = slave::start(options, None, stop_slave.receiver())?;
+    let Ok(started) = started.recv() else {
+        return slave.join().map(|_| ());
+    };
+    let options = master_options(&arguments, started.pairing);
+    let (master, master_live) = master::start(options, stop.receiver())?;
+
+    let mut viewer = Viewer::new(caption, !arguments.json, messages, &stop);
+    let mut master_ended = None;
+    while master.is_running() || slave.is_running() {
+        viewer.look(Snapshot {
+            slave: Some(started.live.get()).filter(|slave| slave.connected),
+            master: Some(*master_live.borrow()),
+        });
+        if !master.is_running() {
+            let since = *master_ended.get_or_insert_with(Instant::now);
+            if since.elapsed() > FAREWELL {
+                stop_slave.end();
+            }
+        }
+    }
+    drop(viewer);
+    let (master, slave) = (master.join(), slave.join());
+    let report = joined::join(&master?, slave?.as_ref())?;
+    match arguments.json {
+        true => print_json(&report)?,
+        false => print(&report)?,
+    }
+    master::judge(master_live.borrow().ended)
+}
+
+fn slave_config(arguments: &DemoArguments) -> SlaveConfig {
+    let mut config = SlaveConfig::of_mode(arguments.mode.into());
+    config.seed = arguments.seed;
+    config.playout =
+        PlayoutConfig::for_packing_and_jitter(SAMPLES_PER_COMMAND, jitter(&arguments.netem));
+    if let Some(scheme) = arguments.scheme {
+        config.trigger.scheme = scheme;
+    }
+    config
+}
+
+/// The jitter that the play-out has to take, peak to peak; of the normal distribution 99 % of it.
+fn jitter(netem: &LinkConfig) -> Duration {
+    let (_, jitter) = netem.delay.parts();
+    match netem.delay {
+        Delay::Constant { .. } => Duration::ZERO,
+        Delay::Uniform { .. } => jitter.saturating_mul(2),
+        Delay::Normal { .. } => jitter.saturating_mul(5),
+    }
+}
+
+fn caption(arguments: &DemoArguments, config: &SlaveConfig) -> Caption {
+    let environment = &config.environment;
+    let m = environment.mass_kg;
+    let c = environment.friction_coefficient * m * environment.gravity_m_per_s2;
+    let mode = match config.mode {
+        Mode::Paper => "paper",
+        Mode::Recommended => "recommended",
+    };
+    let (scheme, netem, seed) = (config.trigger.scheme, &arguments.netem, arguments.seed);
+    Caption {
+        command: "demo",
+        duration_s: Some(arguments.duration.as_secs_f64()),
+        setting: format!("{mode}, {scheme}; network each way: {netem}; seed {seed}"),
+        truth: Some([m, environment.damping_ns_per_m, c]),
+    }
+}
+
+fn slave_options(arguments: &DemoArguments, config: SlaveConfig) -> Result<SlaveOptions, Failure> {
+    Ok(SlaveOptions {
+        listen: SocketAddr::from((Ipv4Addr::LOCALHOST, 0)),
+        identity: Identity::ephemeral().map_err(Failure::failed)?,
+        config,
+        netem: arguments.netem.clone(),
+        netem_seed: arguments.seed,
+        once: true,
+    })
+}
+
+fn master_options(arguments: &DemoArguments, pairing: Pairing) -> MasterOptions {
+    MasterOptions {
+        pairing,
+        device: DeviceProfile::default(),
+        operator: OperatorChoice::Scripted(ScriptedConfig {
+            seed: arguments.seed,
+            ..ScriptedConfig::default()
+        }),
+        duration: Some(arguments.duration),
+        samples_per_command: SAMPLES_PER_COMMAND,
+        netem: arguments.netem.clone(),
+        netem_seed: arguments.seed,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_play_out_waits_for_packing_and_the_whole_jitter() {
+        let peak_to_peak = |text: &str| jitter(&text.parse().unwrap());
+        assert_eq!(peak_to_peak("delay 50ms"), Duration::ZERO);
+        assert_eq!(peak_to_peak("delay 50ms 5ms"), Duration::from_millis(10));
+        let normal = peak_to_peak("delay 50ms 4ms distribution normal");
+        assert_eq!(normal, Duration::from_millis(20));
+        let playout = PlayoutConfig::for_packing_and_jitter(10, peak_to_peak("delay 50ms 5ms"));
+        assert_eq!(playout.delay_ms, 21.0);
+    }
+}

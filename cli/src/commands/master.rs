@@ -1,0 +1,262 @@
+//! `mmt master`: the host with the hand.
+
+use std::io::BufRead;
+use std::path::Path;
+
+use mmt_client::io::{
+    MasterHostError, MasterLive, MasterOptions, MasterReport, OperatorChoice, SessionEnd,
+};
+use mmt_client::operator::scripted::ScriptedConfig;
+use mmt_client::operator::trace::Trace;
+use mmt_shared::geometry::Vec2;
+use mmt_shared::io::connect::ConnectError;
+use mmt_shared::pairing::Pairing;
+use tokio::sync::watch;
+
+use super::host::{Host, spawn};
+use super::viewer::Viewer;
+use crate::args::{MasterArguments, OperatorWords, PairingWords};
+use crate::failure::{Exit, Failure};
+use crate::input::read_text;
+use crate::log::Messages;
+use crate::output::{print, print_json};
+use crate::stop::Stop;
+use crate::view::{Caption, Snapshot};
+
+/// Where a recorded path is carried to start, m: 5 cm before the west face of the model at its start, which
+/// is 20 cm from the origin.
+const TRACE_START_M: (f64, f64) = (-0.25, 0.0);
+
+/// Runs `mmt master`.
+///
+/// # Errors
+/// Wrong input, no session, or a session that broke.
+pub(crate) fn run(arguments: MasterArguments, messages: &Messages) -> Result<(), Failure> {
+    let options = options(&arguments)?;
+    let caption = Caption {
+        command: "master",
+        duration_s: options.duration.map(|time| time.as_secs_f64()),
+        setting: format!("slave at {}, {}", options.pairing.address, arguments.netem),
+        truth: None,
+    };
+    let stop = Stop::on_signals()?;
+    let (host, live) = start(options, stop.receiver())?;
+    let mut viewer = Viewer::new(caption, !arguments.json, messages, &stop);
+    while host.is_running() {
+        let master = Some(*live.borrow());
+        viewer.look(Snapshot { slave: None, master });
+    }
+    drop(viewer);
+    let report = host.join()?;
+    match arguments.json {
+        true => print_json(&report)?,
+        false => print(&report)?,
+    }
+    judge(live.borrow().ended)
+}
+
+/// A master host at work and the looks at it.
+type Started = (Host<MasterReport>, watch::Receiver<MasterLive>);
+
+/// Starts a master host.
+///
+/// # Errors
+/// No thread; what the host fails of is told when it is joined.
+pub(super) fn start(options: MasterOptions, stop: watch::Receiver<bool>) -> Result<Started, Failure> {
+    let (live, looks) = watch::channel(MasterLive::default());
+    let work = async move { mmt_client::io::run(options, stop, live).await };
+    let host = spawn("master", |runtime| {
+        runtime.block_on(work).map_err(|error| host_failure(&error))
+    })?;
+    Ok((host, looks))
+}
+
+/// Whether the session ended as it should.
+///
+/// # Errors
+/// It did not.
+pub(super) fn judge(end: Option<SessionEnd>) -> Result<(), Failure> {
+    use mmt_shared::wire::Ending;
+    match end.map(|end| (end, end.ending())) {
+        Some((end, Ending::Failed)) => {
+            Err(Failure::failed(format!("the session ended early: {end}")))
+        }
+        _ => Ok(()),
+    }
+}
+
+fn options(arguments: &MasterArguments) -> Result<MasterOptions, Failure> {
+    let device = arguments.device.used_with(arguments.stiffness, None);
+    Ok(MasterOptions {
+        pairing: pairing(&arguments.pairing)?,
+        device: device.map_err(|error| Failure::usage(format!("--stiffness: {error}")))?,
+        operator: operator(arguments)?,
+        duration: arguments.duration,
+        samples_per_command: arguments.samples_per_command,
+        netem: arguments.netem.clone(),
+        netem_seed: arguments.seed,
+    })
+}
+
+fn pairing(words: &PairingWords) -> Result<Pairing, Failure> {
+    let mut line = String::new();
+    let text = match words.reveal() {
+        "-" => {
+            let read = std::io::stdin().lock().read_line(&mut line);
+            read.map_err(|error| Failure::usage(format!("cannot read stdin: {error}")))?;
+            line.as_str()
+        }
+        text => text,
+    };
+    // The error holds nothing of the secret.
+    text.parse().map_err(|error| Failure::usage(format!("PAIRING: {error}")))
+}
+
+fn operator(arguments: &MasterArguments) -> Result<OperatorChoice, Failure> {
+    match &arguments.operator {
+        OperatorWords::Scripted if arguments.push.is_some() => {
+            Err(Failure::usage("--push goes with recorded pushes only")
+                .remedy("add --operator trace:FILE, or leave --push out"))
+        }
+        OperatorWords::Scripted => Ok(OperatorChoice::Scripted(ScriptedConfig {
+            seed: arguments.seed,
+            ..ScriptedConfig::default()
+        })),
+        OperatorWords::Trace(path) => Ok(OperatorChoice::Trace {
+            trace: trace(path, arguments.push)?,
+            name: format!("trace:{}", path.display()),
+        }),
+    }
+}
+
+fn trace(path: &Path, push: Option<usize>) -> Result<Trace, Failure> {
+    let text = read_text(path, "the trace")?;
+    let is_csv = path.extension().is_some_and(|end| end.eq_ignore_ascii_case("csv"));
+    if is_csv && push.is_some() {
+        return Err(Failure::usage("--push: a .csv trace has no pushes to choose from")
+            .remedy("leave --push out"));
+    }
+    let trace = match is_csv {
+        true => Trace::from_csv(&text),
+        false => Trace::from_cmu(&text, push),
+    };
+    let (x, y) = TRACE_START_M;
+    trace
+        .map(|trace| trace.starting_at(Vec2::new(x, y)))
+        .map_err(|error| {
+            let what = format!("the trace {}: {error}", path.display());
+            Failure::usage(what).remedy(
+                "give a .csv file with the header t_s,x_m,y_m, or a file of recorded pushes",
+            )
+        })
+}
+
+/// The host's own words, and the exit code that belongs to them.
+fn host_failure(error: &MasterHostError) -> Failure {
+    use MasterHostError as E;
+    let exit = match error {
+        E::Operator(_) | E::Limits(_) | E::Lookup { .. } | E::NoAddress { .. } => Exit::Usage,
+        E::Connect(ConnectError::NoAnswer { .. }) | E::LookupSlow { .. } | E::NoWelcome { .. } => {
+            Exit::NoAnswer
+        }
+        E::Connect(
+            ConnectError::WrongKey { .. }
+            | ConnectError::OtherVersion { .. }
+            | ConnectError::OtherProtocol { .. }
+            | ConnectError::Crowded { .. },
+        )
+        | E::Busy { .. }
+        | E::WrongToken { .. }
+        | E::BadHello { .. }
+        | E::Ending { .. }
+        | E::Unexpected { .. }
+        | E::Welcome { .. } => Exit::Refused,
+        _ => Exit::Failed,
+    };
+    Failure::new(exit, error)
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser;
+    use mmt_shared::wire::Ending;
+
+    use super::*;
+    use crate::args::{Arguments, Command};
+
+    fn arguments(words: &[&str]) -> MasterArguments {
+        let all = ["mmt", "master"].iter().chain(words);
+        match Arguments::parse_from(all).command {
+            Command::Master(arguments) => arguments,
+            _ => panic!("not a master"),
+        }
+    }
+
+    fn pairing_string() -> String {
+        let (pin, token) = ("0f".repeat(32), "a5".repeat(32));
+        format!("mmt://localhost:4433?pin={pin}&token={token}")
+    }
+
+    fn complaint(words: &[&str]) -> String {
+        let failure = options(&arguments(words)).unwrap_err();
+        assert_eq!(failure.exit(), Exit::Usage);
+        failure.to_string()
+    }
+
+    #[test]
+    fn the_options_say_what_the_arguments_said() {
+        let pairing = pairing_string();
+        let words = [&pairing, "--device", "falcon", "--stiffness", "2000", "--seed", "7"];
+        let options = options(&arguments(&words)).unwrap();
+        assert_eq!(options.pairing.to_string(), pairing);
+        assert_eq!(options.device.stiffness_n_per_m(), 2000.0);
+        assert_eq!((options.netem_seed, options.samples_per_command), (7, 10));
+        assert_eq!(options.duration, None);
+        let OperatorChoice::Scripted(scripted) = options.operator else {
+            panic!("not scripted");
+        };
+        assert_eq!(scripted.seed, 7);
+    }
+
+    #[test]
+    fn a_csv_trace_starts_in_front_of_the_face() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("path.csv");
+        std::fs::write(&path, "t_s,x_m,y_m\n0,1,1\n1,1.5,1\n").unwrap();
+        let trace = trace(&path, None).unwrap();
+        let (_, first) = trace.samples()[0];
+        assert_eq!((first.x, first.y), TRACE_START_M);
+        assert!(super::trace(&path, Some(0)).is_err());
+    }
+
+    #[test]
+    fn each_wrong_input_is_named_with_what_to_do() {
+        let pairing = pairing_string();
+        let cut = complaint(&[&pairing[..60]]);
+        assert!(cut.contains("PAIRING") && cut.contains("copy the whole line"), "{cut}");
+        let soft = complaint(&[&pairing, "--stiffness", "1e9"]);
+        assert!(soft.contains("--stiffness") && soft.contains("3000"), "{soft}");
+        let lone = complaint(&[&pairing, "--push", "1"]);
+        assert!(lone.contains("--push") && lone.contains("what to do"), "{lone}");
+        let none = complaint(&[&pairing, "--operator", "trace:no-such.csv"]);
+        assert!(none.contains("no-such.csv") && none.contains("check the path"), "{none}");
+    }
+
+    #[test]
+    fn a_session_that_broke_is_a_failure_and_one_that_was_ended_is_not() {
+        assert!(judge(Some(SessionEnd::LinkSilent)).is_err());
+        assert!(judge(Some(SessionEnd::SlaveEnded(Ending::Failed))).is_err());
+        for fine in [None, Some(SessionEnd::Stopped), Some(SessionEnd::DurationOver)] {
+            assert_eq!(judge(fine), Ok(()));
+        }
+    }
+
+    #[test]
+    fn a_refusal_and_silence_have_exit_codes_of_their_own() {
+        let address = std::net::SocketAddr::from(([127, 0, 0, 1], 1));
+        assert_eq!(host_failure(&MasterHostError::Busy { address }).exit(), Exit::Refused);
+        let limit = std::time::Duration::from_secs(5);
+        let silent = MasterHostError::from(ConnectError::NoAnswer { address, limit });
+        assert_eq!(host_failure(&silent).exit(), Exit::NoAnswer);
+    }
+}

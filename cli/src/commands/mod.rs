@@ -1,0 +1,9 @@
+//! The commands, one file each: arguments to configuration to run.
+
+pub(crate) mod demo;
+mod host;
+pub(crate) mod master;
+pub(crate) mod netem;
+pub(crate) mod replay;
+pub(crate) mod slave;
+mod viewer;

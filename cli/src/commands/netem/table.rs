@@ -1,0 +1,75 @@
+//! The counters of a relay as a table.
+
+use std::fmt;
+
+use mmt_netem::counters::Tally;
+use mmt_netem::io::relay::DirectionCounters;
+
+use super::NetemReport;
+
+/// What a row counts in a direction.
+type Count = fn(&DirectionCounters) -> Tally;
+
+/// The rows; those below the first two are left out while they are zero.
+const ROWS: [(&str, Count); 7] = [
+    ("offered", |direction| direction.link.offered),
+    ("forwarded", |direction| direction.forwarded),
+    ("lost on the link", |direction| direction.link.dropped.loss),
+    ("over the limit", |direction| direction.link.dropped.limit),
+    ("socket full", |direction| direction.blocked),
+    ("socket error", |direction| direction.failed),
+    ("client forgotten", |direction| direction.orphaned),
+];
+/// Rows that are always there.
+const ALWAYS: usize = 2;
+
+impl fmt::Display for NetemReport {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let counters = &self.counters;
+        writeln!(
+            f,
+            "mmt {} {}, seed {}, {:.1} s, {}",
+            self.command, self.version, self.seed, self.duration_s, self.ending
+        )?;
+        writeln!(f, "\n{:20} {:>12} {:>12} {:>12} {:>12}", "", "up", "bytes", "down", "bytes")?;
+        for (number, (label, count)) in ROWS.into_iter().enumerate() {
+            let (up, down) = (count(&counters.up), count(&counters.down));
+            if number < ALWAYS || up.packets > 0 || down.packets > 0 {
+                writeln!(
+                    f,
+                    "{label:20} {:>12} {:>12} {:>12} {:>12}",
+                    up.packets, up.bytes, down.packets, down.bytes
+                )?;
+            }
+        }
+        self.rest(f)
+    }
+}
+
+impl NetemReport {
+    fn rest(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let counters = &self.counters;
+        let (up, down) = (counters.up.in_flight, counters.down.in_flight);
+        writeln!(f, "{:20} {up:>12} {:>12} {down:>12}", "in flight", "")?;
+        writeln!(f, "\nclients met          {:>12}", counters.clients_met)?;
+        for (label, count) in [
+            ("refused", counters.refused.packets),
+            ("target unreachable", counters.unreachable),
+            ("receive errors", counters.receive_errors),
+        ] {
+            if count > 0 {
+                writeln!(f, "{label:20} {count:>12}")?;
+            }
+        }
+        let late = &counters.lateness;
+        write!(
+            f,
+            "released late        p50 {:.0} us, p99 {:.0} us, max {:.0} us",
+            late.p50_us, late.p99_us, late.max_us
+        )?;
+        match late.degraded() {
+            true => write!(f, "\nthis host was too slow for the emulation: do not trust its delays"),
+            false => Ok(()),
+        }
+    }
+}

@@ -1,0 +1,73 @@
+//! `mmt replay`: recorded real pushes through `mmt_lab::replay`.
+
+use std::path::Path;
+
+use indicatif::{ProgressBar, ProgressStyle};
+use mmt_lab::replay::{ReplayConfig, replay};
+use mmt_shared::recording::Recording;
+
+use crate::args::ReplayArguments;
+use crate::failure::Failure;
+use crate::input::read_text;
+use crate::output::{print, print_json};
+
+mod document;
+
+use document::{Document, Replayed};
+
+/// Runs `mmt replay`.
+///
+/// # Errors
+/// A file cannot be read or is no recording; stdout cannot be written to.
+pub(crate) fn run(arguments: &ReplayArguments) -> Result<(), Failure> {
+    let config = ReplayConfig {
+        deadband: arguments.deadband,
+        t_update_s: arguments.t_update.0.map(|period| period.as_secs_f64()),
+        seed: arguments.seed,
+        ..ReplayConfig::default()
+    };
+    // All are read before the first is replayed: a slip in the last name costs no time.
+    let paths = arguments.files.iter();
+    let recordings: Vec<_> = paths
+        .map(|path| Ok((path, recording(path)?)))
+        .collect::<Result<_, Failure>>()?;
+    let mut replayed = Vec::new();
+    for (path, recording) in &recordings {
+        let bar = progress_bar(path);
+        let mut progress = |done: usize, whole: usize| {
+            bar.set_length(whole as u64);
+            bar.set_position(done as u64);
+        };
+        let report = replay(recording, &config, &mut progress);
+        bar.finish_and_clear();
+        let file = path.display().to_string();
+        if !arguments.json {
+            print(format_args!("{file}\n{report}"))?;
+        }
+        replayed.push(Replayed { file, report });
+    }
+    match arguments.json {
+        true => print_json(&Document::new(&config, replayed)),
+        false => Ok(()),
+    }
+}
+
+fn recording(path: &Path) -> Result<Recording, Failure> {
+    let text = read_text(path, "the recording")?;
+    Recording::parse(&text).map_err(|error| {
+        let what = format!("the recording {}: {error}", path.display());
+        Failure::usage(what).remedy(
+            "give a file of recorded pushes; shared/src/recording/mod.rs tells its grammar",
+        )
+    })
+}
+
+/// A bar on stderr; nothing where stderr is no terminal.
+fn progress_bar(path: &Path) -> ProgressBar {
+    let bar = ProgressBar::new(0);
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let style = ProgressStyle::with_template("{msg} [{wide_bar}] {pos}/{len} {eta}");
+    bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+    bar.set_message(name.into_owned());
+    bar
+}

@@ -1,0 +1,109 @@
+//! The document of a replay: the report of a run, as far as its keys have a meaning here, and every table.
+
+use mmt_lab::replay::{HeldOut, Law, LawReport, PushReport, ReplayConfig, ReplayReport};
+use mmt_shared::report::{Counts, Number, RunReport};
+use mmt_shared::wire::Cause;
+use serde::Serialize;
+
+/// The law that the keys of the run report speak of; all laws are in the section `replay`.
+const LAW: Law = Law::LimitSurface;
+
+/// A file and what its replay found.
+#[derive(Debug)]
+pub(super) struct Replayed {
+    /// Its path as it was given.
+    pub(super) file: String,
+    /// What was found.
+    pub(super) report: ReplayReport,
+}
+
+/// `{ ...RunReport, "replay": { … } }`.
+#[derive(Debug, Serialize)]
+pub(super) struct Document {
+    #[serde(flatten)]
+    run: RunReport<Configuration>,
+    replay: Section,
+}
+
+#[derive(Debug, Serialize)]
+struct Configuration {
+    files: Vec<String>,
+    replay: ReplayConfig,
+}
+
+#[derive(Debug, Serialize)]
+struct Section {
+    /// The law of the run report's own keys.
+    law: Law,
+    files: Vec<FileSection>,
+}
+
+#[derive(Debug, Serialize)]
+struct FileSection {
+    file: String,
+    duration_s: f64,
+    contact_s: f64,
+    laws: Vec<LawReport>,
+    held_out: Vec<HeldOut>,
+    pushes: Vec<PushReport>,
+}
+
+impl From<Replayed> for FileSection {
+    fn from(replayed: Replayed) -> Self {
+        let report = replayed.report;
+        Self {
+            file: replayed.file,
+            duration_s: report.duration_s,
+            contact_s: report.contact_s,
+            laws: report.laws,
+            held_out: report.held_out,
+            pushes: report.pushes,
+        }
+    }
+}
+
+impl Document {
+    /// The document of these replays, all run by `config`.
+    pub(super) fn new(config: &ReplayConfig, replayed: Vec<Replayed>) -> Self {
+        let configuration = Configuration {
+            files: replayed.iter().map(|one| one.file.clone()).collect(),
+            replay: *config,
+        };
+        let mut run = RunReport::new(env!("CARGO_PKG_VERSION"), "replay", configuration);
+        run.seed = Some(config.seed);
+        run.ending = Some("finished".to_owned());
+        let sum = |of: fn(&ReplayReport) -> f64| replayed.iter().map(|one| of(&one.report)).sum();
+        let (duration_s, contact_s): (f64, f64) =
+            (sum(|report| report.duration_s), sum(|report| report.contact_s));
+        run.duration_s = duration_s.into();
+        let pushes: usize = replayed.iter().map(|one| one.report.pushes.len()).sum();
+        run.pushes.completed = Some(pushes as u64);
+        set_updates(&mut run, &replayed, duration_s, contact_s);
+        // one estimate has a meaning for one object only
+        if let [only] = replayed.as_slice() {
+            let law = only.report.law(LAW);
+            run.model.friction_n.estimate = law.map(|law| law.friction_n).into();
+        }
+        let files = replayed.into_iter().map(FileSection::from).collect();
+        Self {
+            run,
+            replay: Section { law: LAW, files },
+        }
+    }
+}
+
+fn set_updates<C>(run: &mut RunReport<C>, replayed: &[Replayed], duration_s: f64, contact_s: f64) {
+    let laws = || replayed.iter().filter_map(|one| one.report.law(LAW));
+    let sent: u64 = laws().map(|law| law.updates.sent).sum();
+    let by = |cause| match cause {
+        Cause::Deadband => laws().map(|law| law.updates.packets.deadband).sum(),
+        Cause::Timer => laws().map(|law| law.updates.packets.timer).sum(),
+        // the replay's trigger has no other cause
+        _ => 0,
+    };
+    let named = Cause::ALL.map(|cause| (cause.name().to_owned(), by(cause)));
+    run.updates.sent = Some(sent);
+    run.updates.rate_hz = Number::rate(sent as f64, duration_s);
+    run.updates.contact_rate_hz = Number::rate(sent as f64, contact_s);
+    run.updates.by_cause = Some(Counts::from(named));
+}

@@ -1,0 +1,187 @@
+//! `mmt slave`: the host with the object.
+
+use std::sync::Arc;
+use std::sync::mpsc;
+
+use mmt_server::io::{
+    SlaveConfiguration, SlaveHost, SlaveHostError, SlaveLive, SlaveOptions, SlaveReport,
+};
+use mmt_server::slave::SlaveConfig;
+use mmt_shared::io::identity_file::{default_directory, load_or_create};
+use mmt_shared::io::live::LiveCell;
+use mmt_shared::pairing::{Host as HostName, Pairing};
+use mmt_shared::report::RunReport;
+use tokio::runtime::Runtime;
+use tokio::sync::watch;
+
+use super::host::{Host, spawn};
+use super::viewer::Viewer;
+use crate::args::SlaveArguments;
+use crate::config::slave_config;
+use crate::failure::{Exit, Failure};
+use crate::log::Messages;
+use crate::output::{print, print_json};
+use crate::stop::Stop;
+use crate::view::{Caption, Snapshot};
+
+/// Runs `mmt slave`.
+///
+/// # Errors
+/// Wrong input, an address that cannot be had, a host that failed.
+pub(crate) fn run(arguments: SlaveArguments, messages: &Messages) -> Result<(), Failure> {
+    let options = options(&arguments)?;
+    let unserved = unserved(&options);
+    let stop = Stop::on_signals()?;
+    let (host, started) = start(options, arguments.advertise, stop.receiver())?;
+    // If it could not start the reason is in the host.
+    if let Ok(started) = started.recv() {
+        print(&started.pairing)?;
+        watch_sessions(&host, &started.live, messages, &stop);
+    }
+    let report = host.join()?;
+    match (arguments.json, report) {
+        (true, report) => print_json(&report.unwrap_or(unserved)),
+        (false, Some(report)) => print(report),
+        (false, None) => Ok(()),
+    }
+}
+
+/// Plain lines while a master is connected.
+fn watch_sessions(
+    host: &Host<Option<SlaveReport>>,
+    live: &LiveCell<SlaveLive>,
+    messages: &Messages,
+    stop: &Stop,
+) {
+    let mut viewer = Viewer::new(Caption::default(), false, messages, stop);
+    while host.is_running() {
+        let slave = Some(live.get()).filter(|slave| slave.connected);
+        viewer.look(Snapshot { slave, master: None });
+    }
+}
+
+/// A slave that listens.
+pub(super) struct Listening {
+    /// What a master needs.
+    pub(super) pairing: Pairing,
+    /// Looks at it.
+    pub(super) live: Arc<LiveCell<SlaveLive>>,
+}
+
+/// A slave host and, once it listens, its pairing.
+type Started = (Host<Option<SlaveReport>>, mpsc::Receiver<Listening>);
+
+/// Starts a slave host. If it cannot listen, the receiver gives nothing and joining the host tells why.
+///
+/// # Errors
+/// No thread.
+pub(super) fn start(
+    options: SlaveOptions,
+    advertise: Option<HostName>,
+    stop: watch::Receiver<bool>,
+) -> Result<Started, Failure> {
+    let (tell, told) = mpsc::channel();
+    let work = move |runtime: &Runtime| {
+        let _inside = runtime.enter();
+        let host = SlaveHost::bind(options).map_err(|error| host_failure(&error))?;
+        let live = Arc::new(LiveCell::default());
+        let listening = Listening {
+            pairing: host.pairing(advertise),
+            live: Arc::clone(&live),
+        };
+        // Whoever started it waits for this.
+        let _ = tell.send(listening);
+        let served = runtime.block_on(host.run(stop, live));
+        served.map_err(|error| host_failure(&error))
+    };
+    Ok((spawn("slave", work)?, told))
+}
+
+fn options(arguments: &SlaveArguments) -> Result<SlaveOptions, Failure> {
+    let mode = arguments.mode.map(Into::into);
+    let mut config: SlaveConfig = slave_config(arguments.config.as_deref(), mode)?;
+    if let Some(scheme) = arguments.scheme {
+        config.trigger.scheme = scheme;
+    }
+    config.seed = arguments.seed.unwrap_or(config.seed);
+    let directory = match &arguments.identity {
+        Some(directory) => directory.clone(),
+        None => default_directory().map_err(Failure::usage)?,
+    };
+    Ok(SlaveOptions {
+        listen: arguments.listen,
+        identity: load_or_create(&directory).map_err(Failure::usage)?,
+        netem_seed: config.seed,
+        config,
+        netem: arguments.netem.clone(),
+        once: arguments.once,
+    })
+}
+
+/// The report of a slave that no master came to.
+fn unserved(options: &SlaveOptions) -> SlaveReport {
+    let configuration = SlaveConfiguration {
+        listen: options.listen.to_string(),
+        slave: options.config.clone(),
+        netem: options.netem.to_string(),
+    };
+    let mut report = RunReport::new(env!("CARGO_PKG_VERSION"), "slave", configuration);
+    report.seed = Some(options.config.seed);
+    report.ending = Some("interrupted".to_owned());
+    report
+}
+
+fn host_failure(error: &SlaveHostError) -> Failure {
+    match error {
+        SlaveHostError::Bind(_) | SlaveHostError::Socket { .. } => {
+            Failure::new(Exit::Address, error)
+                .remedy("give another --listen address, or port 0 for any free port")
+        }
+        SlaveHostError::Slave(_) => {
+            Failure::usage(error).remedy("change that number in the configuration")
+        }
+        SlaveHostError::Netem(_) => Failure::usage(error).remedy("change --netem"),
+        _ => Failure::failed(error),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser;
+    use mmt_shared::settings::Mode;
+
+    use super::*;
+    use crate::args::{Arguments, Command};
+
+    fn options_of(words: &[&str]) -> SlaveOptions {
+        let home = tempfile::tempdir().unwrap();
+        let identity = home.path().display().to_string();
+        let all = ["mmt", "slave", "--listen", "127.0.0.1:0", "--identity", &identity];
+        match Arguments::parse_from(all.iter().chain(words)).command {
+            Command::Slave(arguments) => options(&arguments).unwrap(),
+            _ => panic!("not a slave"),
+        }
+    }
+
+    #[test]
+    fn the_command_line_comes_before_the_file_and_the_file_before_the_mode() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("slave.toml");
+        std::fs::write(&path, "seed = 5\nmode = \"paper\"\n").unwrap();
+        let file = path.display().to_string();
+        let from_file = options_of(&["--config", &file]);
+        assert_eq!((from_file.config.seed, from_file.config.mode), (5, Mode::Paper));
+        assert_eq!(from_file.netem_seed, 5);
+        let scheme = ["--scheme", "timer 50ms", "--seed", "6", "--mode", "recommended"];
+        let both = options_of(&[&["--config", file.as_str()], &scheme[..]].concat());
+        assert_eq!((both.config.seed, both.config.mode), (6, Mode::Recommended));
+        assert_eq!(both.config.trigger.scheme.to_string(), "timer 50ms");
+    }
+
+    #[test]
+    fn a_slave_that_nobody_came_to_still_has_a_report() {
+        let report = unserved(&options_of(&["--once"]));
+        assert_eq!(report.ending.as_deref(), Some("interrupted"));
+        assert_eq!(report.seed, Some(1));
+    }
+}

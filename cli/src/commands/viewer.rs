@@ -1,0 +1,63 @@
+//! Shows a run while it goes on: the dashboard on a terminal, else a plain line a second on stderr.
+
+use std::time::{Duration, Instant};
+
+use crate::log::Messages;
+use crate::output::note;
+use crate::stop::Stop;
+use crate::view::{Caption, History, Screen, Snapshot, line};
+
+/// Time between two looks: 20 a second are as much as an eye can use.
+const LOOK: Duration = Duration::from_millis(50);
+/// Time between two plain lines.
+const LINE: Duration = Duration::from_secs(1);
+
+/// Who shows it.
+pub(super) struct Viewer {
+    caption: Caption,
+    history: History,
+    screen: Option<Screen>,
+    next_line: Instant,
+    stop: Stop,
+}
+
+impl Viewer {
+    /// A viewer; with a dashboard if `dashboard` and if there is a terminal for it.
+    pub(super) fn new(caption: Caption, dashboard: bool, messages: &Messages, stop: &Stop) -> Self {
+        Self {
+            caption,
+            history: History::default(),
+            screen: dashboard.then(|| Screen::take(messages)).flatten(),
+            next_line: Instant::now() + LINE,
+            stop: stop.clone(),
+        }
+    }
+
+    /// Shows what is seen now, hears the keys, and returns when it is time for the next look.
+    pub(super) fn look(&mut self, snapshot: Snapshot) {
+        self.history.push(snapshot);
+        let Some(screen) = &mut self.screen else {
+            std::thread::sleep(LOOK);
+            self.line();
+            return;
+        };
+        let drawn = screen.draw(&self.caption, &self.history);
+        match drawn.and_then(|()| screen.wants_end(LOOK)) {
+            Ok(true) => self.stop.ask(),
+            Ok(false) => {}
+            Err(error) => {
+                self.screen = None;
+                tracing::warn!("the live view ends: {error}");
+            }
+        }
+    }
+
+    fn line(&mut self) {
+        let now = Instant::now();
+        if now >= self.next_line {
+            // after a pause of this process there is no burst of lines
+            self.next_line = now + LINE;
+            note(line(&self.history));
+        }
+    }
+}

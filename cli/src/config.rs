@@ -1,0 +1,110 @@
+//! The configuration file of a slave: TOML, unknown keys are errors with line and caret.
+//!
+//! What the file leaves out is the mode's, and the mode is the command line's before the file's.
+
+use std::path::Path;
+
+use mmt_server::slave::SlaveConfig;
+use mmt_shared::settings::Mode;
+use toml::{Table, Value};
+
+use crate::failure::Failure;
+use crate::input::read_text;
+
+/// Keys whose tables name a choice: they are taken whole, not key by key.
+const CHOICES: [&str; 1] = ["scheme"];
+
+/// The slave of a file, if there is one, in a mode, if one is given.
+///
+/// # Errors
+/// The file cannot be read, is no TOML, or is no configuration.
+pub(crate) fn slave_config(
+    path: Option<&Path>,
+    mode: Option<Mode>,
+) -> Result<SlaveConfig, Failure> {
+    let Some(path) = path else {
+        return Ok(SlaveConfig::of_mode(mode.unwrap_or(Mode::Recommended)));
+    };
+    let text = read_text(path, "the configuration")?;
+    parse(&text, mode).map_err(|error| {
+        let what = format!("the configuration {}: {}", path.display(), error.to_string().trim_end());
+        Failure::usage(what).remedy("correct that line; docs/commands.md lists every key")
+    })
+}
+
+fn parse(text: &str, mode: Option<Mode>) -> Result<SlaveConfig, toml::de::Error> {
+    // First as it stands, for errors with their place.
+    let alone: SlaveConfig = toml::from_str(text)?;
+    let given: Table = toml::from_str(text)?;
+    let mode = mode.unwrap_or(alone.mode);
+    let Ok(mut whole) = Table::try_from(SlaveConfig::of_mode(mode)) else {
+        return Ok(alone);
+    };
+    lay_over(&mut whole, given);
+    let merged: SlaveConfig = whole.try_into()?;
+    Ok(SlaveConfig { mode, ..merged })
+}
+
+/// Puts the given keys over the ones that are there, table by table.
+fn lay_over(whole: &mut Table, given: Table) {
+    for (key, value) in given {
+        match (whole.get_mut(&key), value) {
+            (Some(Value::Table(inner)), Value::Table(given)) if !CHOICES.contains(&key.as_str()) => {
+                lay_over(inner, given);
+            }
+            (_, value) => {
+                whole.insert(key, value);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use mmt_server::trigger::{Scheme, TriggerConfig};
+
+    use super::*;
+
+    #[test]
+    fn an_empty_file_is_the_default_and_a_mode_alone_is_that_mode() {
+        assert_eq!(parse("", None), Ok(SlaveConfig::default()));
+        let paper = SlaveConfig::of_mode(Mode::Paper);
+        assert_eq!(parse("mode = \"paper\"", None), Ok(paper.clone()));
+        assert_eq!(parse("mode = \"recommended\"", Some(Mode::Paper)), Ok(paper));
+    }
+
+    #[test]
+    fn what_a_table_leaves_out_is_the_modes() {
+        let text = "mode = \"paper\"\n[trigger]\nforce_floor_n = 0.1\n[environment]\nmass_kg = 1.5\n";
+        let config = parse(text, None).unwrap();
+        assert_eq!(config.environment.mass_kg, 1.5);
+        let paper = TriggerConfig::of_mode(Mode::Paper);
+        let expected = TriggerConfig { force_floor_n: 0.1, ..paper };
+        assert_eq!(config.trigger, expected);
+    }
+
+    #[test]
+    fn a_scheme_is_taken_whole() {
+        let text = "[trigger.scheme]\nname = \"deadband\"\ndelta = 0.05\n";
+        assert_eq!(parse(text, None).unwrap().trigger.scheme, Scheme::Deadband { delta: 0.05 });
+    }
+
+    #[test]
+    fn an_unknown_key_is_an_error_with_line_and_caret() {
+        let error = parse("seed = 1\n[environment]\nmas_kg = 1.0\n", None).unwrap_err();
+        let text = error.to_string();
+        assert!(text.contains("line 3") && text.contains("^^^^^^"), "{text}");
+        assert!(text.contains("mas_kg") && text.contains("mass_kg"), "{text}");
+    }
+
+    #[test]
+    fn a_file_that_is_wrong_is_named() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("slave.toml");
+        std::fs::write(&path, "seed = \"one\"").unwrap();
+        let text = slave_config(Some(&path), None).unwrap_err().to_string();
+        for part in ["slave.toml", "line 1", "^", "what to do"] {
+            assert!(text.contains(part), "{text}");
+        }
+    }
+}

@@ -1,0 +1,113 @@
+//! Why a command ended without success: what, where, what to do, and the exit code.
+
+use std::fmt;
+
+/// The exit codes; `docs/commands.md` lists them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Exit {
+    /// The run failed.
+    Failed,
+    /// Arguments, a configuration, a pairing string or a file are wrong.
+    Usage,
+    /// The slave refused the master, or is not the slave of the pairing string.
+    Refused,
+    /// Nobody answered.
+    NoAnswer,
+    /// The address to listen on cannot be had.
+    Address,
+}
+
+impl Exit {
+    /// The code that the process ends with.
+    pub(crate) fn code(self) -> u8 {
+        match self {
+            Self::Failed => 1,
+            Self::Usage => 2,
+            Self::Refused => 3,
+            Self::NoAnswer => 4,
+            Self::Address => 5,
+        }
+    }
+}
+
+/// The code after a second Ctrl-C: 128 + SIGINT.
+pub(crate) const INTERRUPTED_TWICE: i32 = 130;
+
+/// A failure as it is told to a person.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct Failure {
+    exit: Exit,
+    what: String,
+    remedy: Option<String>,
+}
+
+impl Failure {
+    /// A failure of this kind; `what` says what is wrong and where.
+    pub(crate) fn new(exit: Exit, what: impl fmt::Display) -> Self {
+        Self {
+            exit,
+            what: what.to_string(),
+            remedy: None,
+        }
+    }
+
+    /// Wrong input.
+    pub(crate) fn usage(what: impl fmt::Display) -> Self {
+        Self::new(Exit::Usage, what)
+    }
+
+    /// A run that failed.
+    pub(crate) fn failed(what: impl fmt::Display) -> Self {
+        Self::new(Exit::Failed, what)
+    }
+
+    /// Adds what to do about it.
+    #[must_use]
+    pub(crate) fn remedy(mut self, remedy: impl fmt::Display) -> Self {
+        self.remedy = Some(remedy.to_string());
+        self
+    }
+
+    /// How the process ends.
+    pub(crate) fn exit(&self) -> Exit {
+        self.exit
+    }
+}
+
+impl fmt::Display for Failure {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "error: {}", self.what)?;
+        match &self.remedy {
+            Some(remedy) => write!(f, "\n  what to do: {remedy}"),
+            None => Ok(()),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_failure_says_what_and_what_to_do() {
+        let failure = Failure::usage("no file x").remedy("check the path");
+        assert_eq!(
+            failure.to_string(),
+            "error: no file x\n  what to do: check the path"
+        );
+        assert_eq!(failure.exit().code(), 2);
+    }
+
+    #[test]
+    fn every_kind_has_a_code_of_its_own_and_none_is_success() {
+        let all = [
+            Exit::Failed,
+            Exit::Usage,
+            Exit::Refused,
+            Exit::NoAnswer,
+            Exit::Address,
+        ];
+        let codes: std::collections::BTreeSet<u8> = all.map(Exit::code).into_iter().collect();
+        assert_eq!(codes, (1..=5).collect());
+    }
+}

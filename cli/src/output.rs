@@ -1,0 +1,64 @@
+//! stdout is data, stderr is messages. A reader that has gone away is no error and no panic.
+
+use std::fmt::Display;
+use std::io::{self, ErrorKind, Write};
+
+use serde::Serialize;
+
+use crate::failure::Failure;
+
+/// Writes a message and a line end to stderr; if nobody can read it there is nobody to tell.
+pub(crate) fn note(message: impl Display) {
+    let _ = writeln!(io::stderr().lock(), "{message}");
+}
+
+/// Writes data and a line end to stdout at once.
+///
+/// # Errors
+/// stdout cannot be written to, for another reason than that its reader has gone.
+pub(crate) fn print(data: impl Display) -> Result<(), Failure> {
+    print_to(&mut io::stdout().lock(), data)
+}
+
+/// Writes a document as JSON to stdout.
+///
+/// # Errors
+/// As [`print`].
+pub(crate) fn print_json(document: &impl Serialize) -> Result<(), Failure> {
+    let text = serde_json::to_string_pretty(document);
+    print(text.map_err(|error| Failure::failed(format!("the report is no JSON: {error}")))?)
+}
+
+fn print_to(out: &mut impl Write, data: impl Display) -> Result<(), Failure> {
+    match writeln!(out, "{data}").and_then(|()| out.flush()) {
+        Err(error) if error.kind() != ErrorKind::BrokenPipe => Err(Failure::failed(format!(
+            "cannot write to stdout: {error}"
+        ))
+        .remedy("check where stdout goes: is the disk full?")),
+        _ => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    struct Full(ErrorKind);
+
+    impl Write for Full {
+        fn write(&mut self, _: &[u8]) -> io::Result<usize> {
+            Err(self.0.into())
+        }
+
+        fn flush(&mut self) -> io::Result<()> {
+            Ok(())
+        }
+    }
+
+    #[test]
+    fn a_reader_that_went_away_is_no_failure_and_a_full_disk_is_one() {
+        assert_eq!(print_to(&mut Full(ErrorKind::BrokenPipe), "x"), Ok(()));
+        let full = print_to(&mut Full(ErrorKind::StorageFull), "x").unwrap_err();
+        assert!(full.to_string().contains("what to do"), "{full}");
+    }
+}

@@ -1,0 +1,46 @@
+//! A run in one plain line, for logs and pipes.
+
+use std::fmt::Write;
+
+use mmt_client::failsafe::LinkState;
+
+use super::{History, Snapshot};
+
+/// What is known now; a number that is not known is left out.
+pub(crate) fn line(history: &History) -> String {
+    let now = history.newest();
+    let mut text = format!("{:6.1} s", now.elapsed_s());
+    let mut add = |label: &str, value: Option<f64>, decimals: usize, unit: &str| {
+        if let Some(value) = value {
+            // writing into a string cannot fail
+            let _ = write!(text, "  {label} {value:.decimals$}{unit}");
+        }
+    };
+    add("f_s", now.f_s(), 2, " N");
+    add("f_m", now.f_m(), 2, " N");
+    add("error", now.error(), 2, " N");
+    add("updates", sent(&now), 0, "");
+    add("rate", history.rates_hz().map(|rates| rates.iter().sum()), 1, " /s");
+    add("rtt", now.rtt_ms(), 0, " ms");
+    let (up, down) = now.loss();
+    add("loss up", up.map(|share| share * 100.0), 1, " %");
+    add("loss down", down.map(|share| share * 100.0), 1, " %");
+    add("mass", now.slave.map(|slave| mass(slave.estimate)), 3, " kg");
+    add("pushes", now.master.and_then(|master| master.pushes).map(|n| n as f64), 0, "");
+    let silent = now.master.map(|master| master.link);
+    if let Some(state) = silent.filter(|state| *state != LinkState::Fresh) {
+        let _ = write!(text, "  link {}", state.name());
+    }
+    text
+}
+
+fn mass([mass, _, _]: [f64; 3]) -> f64 {
+    mass
+}
+
+/// Updates sent, or applied where only the master is known.
+fn sent(now: &Snapshot) -> Option<f64> {
+    let sent = now.slave.map(|slave| slave.updates.iter().sum());
+    let applied = now.master.map(|master| master.updates_applied);
+    sent.or(applied).map(|count: u64| count as f64)
+}

@@ -1,0 +1,77 @@
+//! Looking at a run: a dashboard on a terminal, plain lines elsewhere. Shows snapshots; computes nothing
+//! that a report would tell.
+
+mod dashboard;
+mod history;
+mod lines;
+mod panels;
+mod screen;
+
+use mmt_client::io::MasterLive;
+use mmt_server::io::SlaveLive;
+
+pub(crate) use history::History;
+pub(crate) use lines::line;
+pub(crate) use screen::{Screen, restore_terminal};
+
+/// What does not change during a run.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Caption {
+    /// The command.
+    pub(crate) command: &'static str,
+    /// How long it runs, s; none if until somebody ends it.
+    pub(crate) duration_s: Option<f64>,
+    /// Mode, scheme, network in words.
+    pub(crate) setting: String,
+    /// True m, b, c where this process knows them.
+    pub(crate) truth: Option<[f64; 3]>,
+}
+
+/// Both sides at one moment, as far as this process has them.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Snapshot {
+    /// The slave.
+    pub(crate) slave: Option<SlaveLive>,
+    /// The master.
+    pub(crate) master: Option<MasterLive>,
+}
+
+impl Snapshot {
+    /// Seconds since the session began.
+    pub(crate) fn elapsed_s(&self) -> f64 {
+        let master = self.master.map(|master| master.elapsed_s);
+        let slave = self.slave.map(|slave| slave.elapsed_s);
+        master.or(slave).unwrap_or(0.0)
+    }
+
+    /// |f_s|, N.
+    fn f_s(&self) -> Option<f64> {
+        self.slave.map(|slave| slave.f_s.norm())
+    }
+
+    /// |f_m|, N: as the master renders it, or else as the slave's shadow computes it.
+    fn f_m(&self) -> Option<f64> {
+        let shadow = self.slave.map(|slave| slave.f_shadow.norm());
+        self.master.map(|master| master.f_m.norm()).or(shadow)
+    }
+
+    /// |f_s − f_m|, N, both of the same HIP sample: what the slave's trigger sees.
+    fn error(&self) -> Option<f64> {
+        self.slave.map(|slave| (slave.f_s - slave.f_shadow).norm())
+    }
+
+    /// Median round trip, ms.
+    fn rtt_ms(&self) -> Option<f64> {
+        let slave = self.slave.and_then(|slave| slave.rtt_ms);
+        self.master.and_then(|master| master.rtt_ms).or(slave)
+    }
+
+    /// Loss up and down, 0 to 1.
+    fn loss(&self) -> (Option<f64>, Option<f64>) {
+        let (up, down) = self.master.map_or((None, None), |master| master.loss);
+        (up.or(self.slave.and_then(|slave| slave.loss_up)), down)
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,95 @@
+//! What is on the screen and in the plain line.
+
+use mmt_client::failsafe::LinkState;
+use mmt_shared::geometry::Vec2;
+use ratatui::Terminal;
+use ratatui::backend::TestBackend;
+
+use super::*;
+
+fn snapshot(elapsed_s: f64) -> Snapshot {
+    let slave = SlaveLive {
+        connected: true,
+        elapsed_s,
+        f_s: Vec2::new(3.0, 4.0),
+        f_shadow: Vec2::new(3.0, 3.5),
+        updates: [7, 11, 0, 1, 2, 0],
+        estimate: [0.701, 2.95, 2.06],
+        in_contact: true,
+        ..SlaveLive::default()
+    };
+    let master = MasterLive {
+        elapsed_s,
+        f_m: Vec2::new(0.0, 2.5),
+        params: [0.699, 2.9, 2.05],
+        updates_applied: 20,
+        pushes: Some(3),
+        link: LinkState::Late,
+        rtt_ms: Some(101.5),
+        loss: (Some(0.011), Some(0.009)),
+        lateness_p99_us: 63.0,
+        skipped: 4,
+        ..MasterLive::default()
+    };
+    Snapshot {
+        slave: Some(slave),
+        master: Some(master),
+    }
+}
+
+fn caption() -> Caption {
+    Caption {
+        command: "demo",
+        duration_s: Some(20.0),
+        setting: "recommended, useful 10% 150ms, each way delay 50ms".to_owned(),
+        truth: Some([0.7, 3.0, 2.06]),
+    }
+}
+
+fn screen(width: u16, height: u16, history: &History, messages: &[String]) -> String {
+    let mut terminal = Terminal::new(TestBackend::new(width, height)).unwrap();
+    let draw = |frame: &mut ratatui::Frame<'_>| {
+        dashboard::render(frame, &caption(), history, messages);
+    };
+    terminal.draw(draw).unwrap();
+    terminal.backend().to_string()
+}
+
+#[test]
+fn the_dashboard_shows_every_label_and_number_on_a_small_terminal() {
+    let mut history = History::default();
+    (0..100_u32).for_each(|tick| history.push(snapshot(f64::from(tick) * 0.05)));
+    let shown = screen(80, 24, &history, &["a message".to_owned()]);
+    for part in [
+        "mmt demo", "of 20 s", "slave touches", "master free", "q ends it", "recommended",
+        "|f_s|", "5.00 N", "|f_m|", "2.50 N", "|error|", "0.50 N",
+        "deadband", "timer", "master only contact", "slave only contact", "contact lost",
+        "every sample", "11", "applied", "20", "per s",
+        "estimate", "truth", "0.701", "0.700", "0.699", "m kg", "b N s/m", "c N",
+        "pushes", "late", "101.5 ms", "loss up 1.1 %", "loss down 0.9 %",
+        "lateness p99 63 us", "skipped 4", "a message",
+    ] {
+        assert!(shown.contains(part), "{part}\n{shown}");
+    }
+}
+
+#[test]
+fn what_is_not_known_yet_is_a_dash_and_no_size_of_terminal_is_too_small() {
+    let history = History::default();
+    assert!(screen(80, 24, &history, &[]).contains("lateness p99 -"));
+    for (width, height) in [(1, 1), (10, 5), (40, 10), (300, 100)] {
+        screen(width, height, &history, &["x".repeat(200)]);
+    }
+}
+
+#[test]
+fn the_plain_line_has_the_same_numbers_and_leaves_out_what_is_not_known() {
+    let mut history = History::default();
+    history.push(snapshot(1.0));
+    let text = line(&history);
+    for part in ["1.0 s", "f_s 5.00 N", "error 0.50 N", "updates 21", "rtt 102 ms", "mass 0.701 kg", "pushes 3", "link late"] {
+        assert!(text.contains(part), "{part}: {text}");
+    }
+    let text = line(&History::default());
+    assert!(!text.contains("f_s") && !text.contains("link"), "{text}");
+}
