@@ -5,10 +5,12 @@
 
 mod traffic;
 
+use std::io;
 use std::time::Duration;
 
 use bytes::Bytes;
 use mmt_netem::io::socket::SocketCounters;
+use mmt_shared::io::clock::Clock;
 use mmt_shared::io::live::LiveCell;
 use mmt_shared::io::stream::{ReadFrameError, WriteFrameError, read_frame, write_frame};
 use mmt_shared::io::versions::CLOSE_FINISHED;
@@ -68,7 +70,7 @@ pub(super) enum End {
     #[error("this side was asked to end")]
     Asked,
     #[error("the master said farewell ({:?})", .0.ending)]
-    Farewell(Farewell<MasterTotals>),
+    Farewell(Box<Farewell<MasterTotals>>),
     #[error("the master was not heard for {SILENCE_MAX:?}")]
     Silence,
     #[error("the connection was lost: {0}")]
@@ -113,6 +115,17 @@ pub(super) async fn serve(
     stop: &mut watch::Receiver<bool>,
     live: &LiveCell<SlaveLive>,
 ) -> Result<Option<SlaveReport>, SlaveHostError> {
+    serve_with(shared, admitted, stop, live, Worker::start).await
+}
+
+/// Serves with a thread of the caller's making.
+pub(super) async fn serve_with(
+    shared: &Shared,
+    admitted: Admitted,
+    stop: &mut watch::Receiver<bool>,
+    live: &LiveCell<SlaveLive>,
+    start: impl FnOnce(Clock, Slave) -> io::Result<Worker>,
+) -> Result<Option<SlaveReport>, SlaveHostError> {
     let Admitted {
         connection,
         mut send,
@@ -144,7 +157,7 @@ pub(super) async fn serve(
         return Ok(None);
     }
     announce(&connection, &hello);
-    let worker = Worker::start(shared.clock, slave)?;
+    let worker = start(shared.clock, slave)?;
     let session = Session::new(shared, config, connection, send, worker, socket_before);
     session.operate(receive, stop, live).await.map(Some)
 }
@@ -251,7 +264,7 @@ impl<'a> Session<'a> {
         let outcome = self.outcome(ending, finished);
         let said = self.say_farewell(ending, &outcome.totals()).await;
         let theirs = match end {
-            End::Farewell(theirs) => Some(theirs),
+            End::Farewell(theirs) => Some(*theirs),
             // Nothing can come any more.
             End::Stream(_) => None,
             _ if said.is_err() => None,
