@@ -46,7 +46,7 @@ impl Session<'_> {
             // In this order, so that a flood of datagrams holds up nothing else.
             tokio::select! {
                 biased;
-                told = &mut farewell => return Err(End::Farewell(told?)),
+                told = &mut farewell => return Err(End::Farewell(Box::new(told?))),
                 () = stopped(stop) => return Err(End::Asked),
                 _ = &mut self.worker.finished => return Err(End::Panicked),
                 woken = self.worker.wakeup.wait() => {
@@ -62,7 +62,7 @@ impl Session<'_> {
     }
 
     /// Takes in a datagram; its stamp is that of this moment.
-    fn take(&mut self, datagram: &Bytes) {
+    pub(super) fn take(&mut self, datagram: &Bytes) {
         self.lost.read += 1;
         let now = self.shared.clock.now();
         let Some(command) = self.link.handle(now, datagram) else {
