@@ -4,9 +4,9 @@
 //! latest-wins cell, samples leave through a bounded ring, a screen's look through another cell. No
 //! thread is started here, so a test can tick it by hand.
 
+mod port;
+
 use std::ops::ControlFlow;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::Duration;
 
 use mmt_shared::geometry::Vec2;
@@ -15,17 +15,17 @@ use mmt_shared::io::ticker::TickerReport;
 use mmt_shared::io::wake::Waker;
 use mmt_shared::metrics::{AgeOfInformation, ContactBreaks, ForcePeak};
 use mmt_shared::time::Time;
-use mmt_shared::wire::{HipSample, Update};
-use triple_buffer::{Input, Output, triple_buffer};
+use mmt_shared::wire::HipSample;
 
 use super::{MasterLive, SessionEnd};
 use crate::failsafe::LinkState;
 use crate::master::{Master, MasterTick};
 use crate::operator::Operator;
 
-/// Samples that may wait for the network task: a quarter of a second. Older ones the slave would not
-/// play any more; when the ring is full the new one is dropped and counted.
-pub const RING_SAMPLES: usize = 256;
+pub(super) use port::Gone;
+use port::LoopEnd;
+pub use port::{HapticPort, RING_SAMPLES};
+
 /// A look for a screen every so many ticks: 50 a second.
 const LOOK_TICKS: u64 = 20;
 
@@ -40,14 +40,6 @@ pub struct HapticParts {
     pub duration: Option<Duration>,
     /// The network task is woken once for so many samples.
     pub samples_per_wake: u8,
-}
-
-/// What both ends look at.
-#[derive(Debug)]
-struct Signals {
-    last_heard_ns: AtomicU64,
-    release: AtomicBool,
-    ended: AtomicBool,
 }
 
 /// What the loop did, once it has ended.
@@ -87,11 +79,7 @@ pub struct HapticLoop {
     duration: Option<Duration>,
     samples_per_wake: u8,
     unwoken: u8,
-    updates: Output<Option<Update>>,
-    samples: rtrb::Producer<HipSample>,
-    look: Input<MasterLive>,
-    signals: Arc<Signals>,
-    waker: Waker,
+    port: LoopEnd,
     first: Option<Time>,
     elapsed: Duration,
     ticks: u64,
@@ -107,61 +95,19 @@ pub struct HapticLoop {
     age: AgeOfInformation,
 }
 
-/// The network task's end.
-#[derive(Debug)]
-pub struct HapticPort {
-    updates: Input<Option<Update>>,
-    samples: rtrb::Consumer<HipSample>,
-    look: Output<MasterLive>,
-    signals: Arc<Signals>,
-    superseded: u32,
-}
-
-/// Tells the network task that the loop is no more, however it ended: also by a panic.
-#[derive(Debug)]
-pub(super) struct Gone {
-    signals: Arc<Signals>,
-    waker: Waker,
-}
-
-impl Drop for Gone {
-    fn drop(&mut self) {
-        self.signals.ended.store(true, Ordering::Release);
-        self.waker.wake();
-    }
-}
-
 impl HapticLoop {
     /// A loop and the network task's end of it. The slave counts as heard at `began`; `waker` wakes the
     /// network task.
     #[must_use]
     pub fn new(parts: HapticParts, began: Time, waker: Waker) -> (Self, HapticPort) {
-        let signals = Arc::new(Signals {
-            last_heard_ns: AtomicU64::new(began.as_nanos()),
-            release: AtomicBool::new(false),
-            ended: AtomicBool::new(false),
-        });
-        let (updates_in, updates) = triple_buffer(&None);
-        let (samples, samples_out) = rtrb::RingBuffer::new(RING_SAMPLES);
-        let (look, look_out) = triple_buffer(&MasterLive::default());
-        let port = HapticPort {
-            updates: updates_in,
-            samples: samples_out,
-            look: look_out,
-            signals: Arc::clone(&signals),
-            superseded: 0,
-        };
+        let (loop_end, port) = port::ends(began, waker);
         let haptic = Self {
             master: parts.master,
             operator: parts.operator,
             duration: parts.duration,
             samples_per_wake: parts.samples_per_wake.max(1),
             unwoken: 0,
-            updates,
-            samples,
-            look,
-            signals,
-            waker,
+            port: loop_end,
             first: None,
             elapsed: Duration::ZERO,
             ticks: 0,
@@ -191,7 +137,7 @@ impl HapticLoop {
         self.consider_end();
         let view = self.master.view();
         let hip = self.operator.step(self.elapsed, &view, self.hand_force);
-        let done = self.master.tick(stamp, hip, self.signals.silence(stamp));
+        let done = self.master.tick(stamp, hip, self.port.silence(stamp));
         self.hand_force = done.hand_force;
         self.on_hand.push(done.hand_force);
         self.breaks.push(done.rendered.in_contact());
@@ -240,16 +186,11 @@ impl HapticLoop {
     }
 
     pub(super) fn gone(&self) -> Gone {
-        Gone {
-            signals: Arc::clone(&self.signals),
-            waker: self.waker.clone(),
-        }
+        self.port.gone()
     }
 
     fn take_update(&mut self, now: Time) {
-        if self.updates.update()
-            && let Some(update) = self.updates.output_buffer()
-        {
+        if let Some(update) = self.port.newest() {
             let before = self.master.applied();
             self.master.apply(update);
             if self.master.applied() != before {
@@ -272,27 +213,27 @@ impl HapticLoop {
         } else if self.operator.finished(self.elapsed) {
             self.end.get_or_insert(SessionEnd::OperatorFinished);
         }
-        if self.end.is_some() || self.signals.release.load(Ordering::Acquire) {
+        if self.end.is_some() || self.port.asked_to_release() {
             self.releasing = true;
             self.master.release();
         }
     }
 
     fn give(&mut self, sample: HipSample) {
-        if self.samples.push(sample).is_err() {
+        if !self.port.give(sample) {
             self.samples_dropped = self.samples_dropped.saturating_add(1);
         }
         self.unwoken = self.unwoken.saturating_add(1);
         if self.unwoken >= self.samples_per_wake {
             self.unwoken = 0;
-            self.waker.wake();
+            self.port.wake();
         }
     }
 
     fn show(&mut self, done: &MasterTick) {
         let state = self.master.model().state();
         let params = &state.params;
-        *self.look.input_buffer_mut() = MasterLive {
+        self.port.show(MasterLive {
             elapsed_s: self.elapsed.as_secs_f64(),
             hip: done.sample.hip.metres(),
             f_m: done.rendered.force,
@@ -309,63 +250,6 @@ impl HapticLoop {
             lateness_p99_us: self.timing.lateness.p99.as_secs_f64() * 1e6,
             skipped: self.skipped,
             ended: self.end,
-        };
-        self.look.publish();
-    }
-}
-
-impl Signals {
-    fn silence(&self, now: Time) -> Duration {
-        let heard = Time::from_nanos(self.last_heard_ns.load(Ordering::Acquire));
-        now.saturating_since(heard)
-    }
-}
-
-impl HapticPort {
-    /// Puts an update into the cell; one that no tick has taken yet is superseded.
-    pub fn offer(&mut self, update: &Update) {
-        *self.updates.input_buffer_mut() = Some(*update);
-        let overtook = self.updates.publish();
-        self.superseded = self.superseded.saturating_add(u32::from(overtook));
-    }
-
-    /// Says when the slave was last heard.
-    pub fn heard(&self, at: Time) {
-        self.signals
-            .last_heard_ns
-            .store(at.as_nanos(), Ordering::Release);
-    }
-
-    /// Asks the loop to release the hand and to end.
-    pub fn release(&self) {
-        self.signals.release.store(true, Ordering::Release);
-    }
-
-    /// Whether the loop's thread has ended.
-    #[must_use]
-    pub fn ended(&self) -> bool {
-        self.signals.ended.load(Ordering::Acquire)
-    }
-
-    /// The oldest sample that waits.
-    pub fn pop(&mut self) -> Option<HipSample> {
-        self.samples.pop().ok()
-    }
-
-    /// The newest look, without what only the network knows.
-    pub fn look(&mut self) -> MasterLive {
-        *self.look.read()
-    }
-
-    /// Updates that a newer one overtook before a tick could take them.
-    #[must_use]
-    pub fn superseded(&self) -> u32 {
-        self.superseded
-    }
-
-    /// Whether an update waits that no tick has taken: once the loop has ended, none will.
-    #[must_use]
-    pub fn untaken(&self) -> bool {
-        !self.updates.consumed()
+        });
     }
 }

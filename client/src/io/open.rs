@@ -12,6 +12,7 @@ use mmt_shared::io::connect::{ConnectError, connect};
 use mmt_shared::io::quic::{Traffic, client_endpoint};
 use mmt_shared::io::socket;
 use mmt_shared::io::stream::{read_frame, write_frame};
+use mmt_shared::io::versions::CLOSE_FINISHED;
 use mmt_shared::wire::{
     DATAGRAM_MAX, Hello, Label, Refusal, Role, STREAM_MESSAGE_MAX, Side, StreamMessage, Welcome,
     decode_stream_message, encode_hello,
@@ -49,15 +50,30 @@ pub(super) const PATIENCE: Patience = Patience {
     idle: Duration::from_secs(1),
 };
 
+/// A connection, with all that is below it.
+#[derive(Debug)]
+pub(super) struct Line {
+    pub(super) endpoint: Endpoint,
+    pub(super) connection: Connection,
+    pub(super) meter: SocketMeter,
+    pub(super) address: SocketAddr,
+}
+
+impl Line {
+    /// Closes with a reason for people, and waits until that has gone out, at most `limit`.
+    pub(super) async fn close(&self, reason: &str, limit: Duration) {
+        self.connection.close(CLOSE_FINISHED, reason.as_bytes());
+        // it takes three more round trips; nobody needs to wait longer for them
+        let _ = timeout(limit, self.endpoint.wait_idle()).await;
+    }
+}
+
 /// A session that the slave has welcomed.
 #[derive(Debug)]
 pub(super) struct Opened {
-    pub(super) endpoint: Endpoint,
-    pub(super) connection: Connection,
+    pub(super) line: Line,
     pub(super) send: SendStream,
     pub(super) receive: RecvStream,
-    pub(super) meter: SocketMeter,
-    pub(super) address: SocketAddr,
     pub(super) welcome: Welcome,
 }
 
@@ -101,6 +117,8 @@ async fn look_up(
             addresses.push(one);
         }
     }
+    // a slave listens on IPv4 unless told otherwise, and a wrong first address costs the whole wait
+    addresses.sort_by_key(SocketAddr::is_ipv6);
     Ok(addresses)
 }
 
@@ -138,16 +156,25 @@ async fn open_at(
         patience.connect,
     )
     .await?;
-    let (send, receive, welcome) = greet(options, &connection, hip, patience.welcome).await?;
-    Ok(Opened {
+    let line = Line {
         endpoint,
         connection,
-        send,
-        receive,
         meter,
         address,
-        welcome,
-    })
+    };
+    match greet(options, &line.connection, hip, patience.welcome).await {
+        Ok((send, receive, welcome)) => Ok(Opened {
+            line,
+            send,
+            receive,
+            welcome,
+        }),
+        Err(error) => {
+            // the slave must not take this master for one that went silent
+            line.close("no session", patience.idle).await;
+            Err(error)
+        }
+    }
 }
 
 /// What a master sends at the most. A command has up to 70 bytes of its own and, at any speed of a hand,
@@ -171,40 +198,43 @@ async fn greet(
     limit: Duration,
 ) -> Result<(SendStream, RecvStream, Welcome), MasterHostError> {
     let address = connection.remote_address();
+    let unsent = |source| MasterHostError::HelloUnsent { address, source };
+    let opened = connection.open_bi().await;
     let (mut send, mut receive) =
-        connection
-            .open_bi()
-            .await
-            .map_err(|error| MasterHostError::HelloUnsent {
-                address,
-                source: quinn::WriteError::from(error).into(),
-            })?;
-    let coupling = options.device.coupling();
-    let hello = Hello {
-        token: options.pairing.token,
-        role: Role::Operator,
-        coupling,
-        samples_per_command: options.samples_per_command,
-        hip,
-        program: Label::clipped(PROGRAM),
-    };
+        opened.map_err(|error| unsent(quinn::WriteError::from(error).into()))?;
+    let hello = hello(options, hip);
     let mut message = [0; STREAM_MESSAGE_MAX];
     let length = encode_hello(&hello, &mut message)?;
     let message = message.get(..length).unwrap_or_default();
-    write_frame(&mut send, message, limit)
-        .await
-        .map_err(|source| MasterHostError::HelloUnsent { address, source })?;
+    let written = write_frame(&mut send, message, limit).await;
+    written.map_err(unsent)?;
     let answer = read_frame(&mut receive, STREAM_MESSAGE_MAX, limit)
         .await
         .map_err(|source| MasterHostError::NoWelcome { address, source })?;
-    let answer = decode_stream_message(&answer, Side::Slave)
+    let welcome = judge(&answer, address, &hello)?;
+    Ok((send, receive, welcome))
+}
+
+fn hello(options: &MasterOptions, hip: Vec2) -> Hello {
+    Hello {
+        token: options.pairing.token,
+        role: Role::Operator,
+        coupling: options.device.coupling(),
+        samples_per_command: options.samples_per_command,
+        hip,
+        program: Label::clipped(PROGRAM),
+    }
+}
+
+/// What the slave's answer to the hello comes to.
+fn judge(answer: &[u8], address: SocketAddr, hello: &Hello) -> Result<Welcome, MasterHostError> {
+    let answer = decode_stream_message(answer, Side::Slave)
         .map_err(|source| MasterHostError::Unreadable { address, source })?;
     match answer {
-        StreamMessage::Welcome(raw) => match raw.accept(&coupling) {
-            Ok(welcome) => Ok((send, receive, welcome)),
-            Err(source) => Err(MasterHostError::Welcome { address, source }),
-        },
-        StreamMessage::Refused(refusal) => Err(refused(refusal, address, &hello)),
+        StreamMessage::Welcome(raw) => raw
+            .accept(&hello.coupling)
+            .map_err(|source| MasterHostError::Welcome { address, source }),
+        StreamMessage::Refused(refusal) => Err(refused(refusal, address, hello)),
         other => Err(MasterHostError::Unexpected {
             address,
             kind: other.kind(),

@@ -39,11 +39,11 @@ pub(super) struct PumpCounts {
 
 /// The network task's state.
 pub(super) struct Pump<'a> {
-    pub(super) clock: Clock,
-    pub(super) connection: &'a Connection,
+    clock: Clock,
+    connection: &'a Connection,
     pub(super) link: MasterLink,
     pub(super) port: HapticPort,
-    pub(super) live: &'a watch::Sender<MasterLive>,
+    live: &'a watch::Sender<MasterLive>,
     pub(super) counts: PumpCounts,
     /// Why the session ends, if this task noticed first.
     pub(super) end: Option<SessionEnd>,
@@ -53,7 +53,7 @@ pub(super) struct Pump<'a> {
     pub(super) listening: bool,
     /// The slave's farewell, if it came.
     pub(super) told: Option<Farewell<SlaveTotals>>,
-    pub(super) shown: LinkState,
+    shown: LinkState,
 }
 
 /// Waits until somebody wants the session to end.
@@ -64,7 +64,30 @@ pub(super) async fn stopped(stop: &mut watch::Receiver<bool>) {
     }
 }
 
-impl Pump<'_> {
+impl<'a> Pump<'a> {
+    /// The network task of a session that begins.
+    pub(super) fn new(
+        clock: Clock,
+        connection: &'a Connection,
+        link: MasterLink,
+        port: HapticPort,
+        live: &'a watch::Sender<MasterLive>,
+    ) -> Self {
+        Self {
+            clock,
+            connection,
+            link,
+            port,
+            live,
+            counts: PumpCounts::default(),
+            end: None,
+            connected: true,
+            listening: true,
+            told: None,
+            shown: LinkState::default(),
+        }
+    }
+
     /// Runs until the haptic loop has ended. `farewell` is the read of the slave's farewell.
     pub(super) async fn run<F>(
         &mut self,

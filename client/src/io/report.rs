@@ -41,7 +41,14 @@ pub(super) struct Ended {
 
 impl Ended {
     /// What the master tells the slave.
-    pub(super) fn totals(&self, link: &MasterLink) -> MasterTotals {
+    pub(super) fn farewell(&self, link: &MasterLink) -> Farewell<MasterTotals> {
+        Farewell {
+            ending: self.end.ending(),
+            totals: self.totals(link),
+        }
+    }
+
+    fn totals(&self, link: &MasterLink) -> MasterTotals {
         let timing = &self.haptic.timing;
         MasterTotals {
             duration_ns: u64::try_from(self.duration.as_nanos()).unwrap_or(u64::MAX),

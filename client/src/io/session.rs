@@ -1,11 +1,11 @@
 //! A session from the first packet to the report.
 
 use std::pin::pin;
+use std::thread::JoinHandle;
 
 use mmt_shared::geometry::{BoxFootprint, Pose};
 use mmt_shared::io::clock::Clock;
 use mmt_shared::io::realtime::RealTime;
-use mmt_shared::io::versions::CLOSE_FINISHED;
 use mmt_shared::io::wake;
 use mmt_shared::wire::{Farewell, SlaveTotals, UpdateDrops};
 use tokio::sync::{oneshot, watch};
@@ -13,11 +13,11 @@ use tokio::time::{error::Elapsed, timeout};
 
 use super::close::{FarewellError, delivered, read_farewell, send_farewell};
 use super::haptic::{HapticLoop, HapticOutcome, HapticParts, HapticPort};
-use super::open::{Opened, PATIENCE, Patience, open};
-use super::pump::{Pump, PumpCounts, stopped};
+use super::open::{Line, Opened, PATIENCE, Patience, open};
+use super::pump::{Pump, stopped};
 use super::report::Ended;
+use super::thread::Finished;
 use super::{MasterHostError, MasterLive, MasterOptions, MasterReport, SessionEnd, thread};
-use crate::failsafe::LinkState;
 use crate::limiter::ForceLimiter;
 use crate::link::MasterLink;
 use crate::master::Master;
@@ -65,7 +65,7 @@ pub(super) async fn run_with(
     };
     let welcome = &opened.welcome;
     tracing::info!(
-        slave = %opened.address, program = %welcome.program, scheme = %welcome.scheme,
+        slave = %opened.line.address, program = %welcome.program, scheme = %welcome.scheme,
         "the session begins"
     );
     let master = Master::new(welcome, limiter);
@@ -88,77 +88,72 @@ async fn operate(
     patience: &Patience,
 ) -> Result<MasterReport, MasterHostError> {
     let Opened {
-        endpoint,
-        connection,
+        line,
         mut send,
         mut receive,
-        meter,
-        address,
         ..
     } = opened;
     let clock = Clock::start();
     let began = clock.now();
     let (waker, mut wakeup) = wake::pair().map_err(MasterHostError::Thread)?;
     let (haptic, port) = HapticLoop::new(parts, began, waker);
-    let (granted, granted_to) = oneshot::channel();
-    let thread = thread::spawn(haptic, clock, granted).map_err(MasterHostError::Thread)?;
-    tokio::spawn(tell(granted_to));
+    let thread = start(haptic, clock)?;
     let coupling = options.device.coupling();
-    let mut pump = Pump {
-        clock,
-        connection: &connection,
-        link: MasterLink::new(began, coupling, options.samples_per_command),
-        port,
-        live: &live,
-        counts: PumpCounts::default(),
-        end: None,
-        connected: true,
-        listening: true,
-        told: None,
-        shown: LinkState::default(),
-    };
+    let link = MasterLink::new(began, coupling, options.samples_per_command);
+    let mut pump = Pump::new(clock, &line.connection, link, port, &live);
     let mut farewell = pin!(read_farewell(&mut receive));
     pump.run(&mut wakeup, &mut stop, farewell.as_mut()).await;
-    // the thread has left its loop: this does not wait
-    let haptic = match thread.join() {
-        Ok(finished) => finished.map_err(MasterHostError::Loop),
-        Err(_) => Err(MasterHostError::Panicked),
-    };
-    let haptic = haptic.inspect_err(|_| {
-        connection.close(CLOSE_FINISHED, b"the master's haptic loop failed");
-    })?;
-    let end = first_cause(&haptic, pump.end);
-    tracing::info!("the session ends: {end}");
+    let haptic = join(thread, &line, patience).await?;
     let mut ended = Ended {
-        end,
+        end: first_cause(&haptic, pump.end),
         haptic,
         duration: clock.now().saturating_since(began),
         updates: update_drops(&pump.link, &pump.port, &haptic),
         counts: pump.counts,
         told: pump.told,
-        sockets: meter.snapshot(),
-        quic: connection.stats(),
-        address,
+        sockets: line.meter.snapshot(),
+        quic: line.connection.stats(),
+        address: line.address,
     };
+    tracing::info!("the session ends: {}", ended.end);
     if pump.connected {
-        let last = Farewell {
-            ending: end.ending(),
-            totals: ended.totals(&pump.link),
-        };
-        send_farewell(&mut send, &last, patience.farewell).await;
+        send_farewell(&mut send, &ended.farewell(&pump.link), patience.farewell).await;
         if pump.listening {
             ended.told = answer(timeout(patience.farewell, farewell).await);
         } else {
             delivered(&send, patience.farewell).await;
         }
     }
-    ended.quic = connection.stats();
-    connection.close(CLOSE_FINISHED, end.to_string().as_bytes());
-    // it takes three more round trips at the most; nobody needs to wait longer for them
-    let _ = timeout(patience.idle, endpoint.wait_idle()).await;
-    ended.sockets = meter.snapshot();
-    pump.show(Some(end));
+    ended.quic = line.connection.stats();
+    line.close(&ended.end.to_string(), patience.idle).await;
+    ended.sockets = line.meter.snapshot();
+    pump.show(Some(ended.end));
     Ok(ended.report(options, &pump.link))
+}
+
+/// Starts the haptic thread, and has logged what the host granted it.
+fn start(haptic: HapticLoop, clock: Clock) -> Result<JoinHandle<Finished>, MasterHostError> {
+    let (granted, granted_to) = oneshot::channel();
+    let thread = thread::spawn(haptic, clock, granted).map_err(MasterHostError::Thread)?;
+    tokio::spawn(tell(granted_to));
+    Ok(thread)
+}
+
+/// What the haptic thread came to. It has left its loop, so this does not wait for it; without an
+/// outcome the connection is closed.
+pub(super) async fn join(
+    thread: JoinHandle<Finished>,
+    line: &Line,
+    patience: &Patience,
+) -> Result<HapticOutcome, MasterHostError> {
+    let error = match thread.join() {
+        Ok(Ok(outcome)) => return Ok(outcome),
+        Ok(Err(reason)) => MasterHostError::Loop(reason),
+        Err(_) => MasterHostError::Panicked,
+    };
+    line.close("the master's haptic loop failed", patience.idle)
+        .await;
+    Err(error)
 }
 
 /// Logs what the host granted the haptic thread.

@@ -13,8 +13,8 @@ use mmt_shared::wire::{Cause, Ending, ForceTotals, Identified, Refusal, SlaveTot
 use tokio::sync::watch;
 use tokio::time::{Instant, sleep, timeout};
 
-use super::open::{PATIENCE, Patience};
-use super::session::run_with;
+use super::open::{PATIENCE, Patience, open};
+use super::session::{join, run_with};
 use super::*;
 use fake::{Fake, Session};
 
@@ -200,6 +200,27 @@ async fn nobody_there_is_said_within_the_limit() {
 }
 
 #[tokio::test]
+async fn a_name_is_looked_up_and_one_that_nobody_has_is_named_in_the_error() {
+    let fake = Fake::new();
+    let port = fake.address.port();
+    let mut options = scripted(&fake);
+    options.pairing.address = format!("localhost:{port}").parse().unwrap();
+    let mut master = start(options.clone(), PATIENCE);
+    let mut slave = Session::knocked(&fake).await;
+    slave.refuse(Refusal::Ending).await;
+    let error = master.error().await;
+    assert!(matches!(error, MasterHostError::Ending { .. }), "{error}");
+
+    options.pairing.address = "nobody.invalid:1".parse().unwrap();
+    let patience = Patience {
+        lookup: Duration::from_secs(2),
+        ..PATIENCE
+    };
+    let error = start(options, patience).error().await;
+    assert!(error.to_string().contains("nobody.invalid:1"), "{error}");
+}
+
+#[tokio::test]
 async fn a_slave_that_accepts_and_says_nothing_is_given_up() {
     let fake = Fake::new();
     let patience = Patience {
@@ -367,4 +388,18 @@ async fn the_emulated_link_loses_what_it_is_told_to_and_says_so() {
     assert!(report.drops.as_ref().unwrap()["netem_loss"] > 0);
     assert!(report.link.loss_up.get().unwrap() > 0.05);
     assert_eq!(report.configuration.netem, "loss 20%");
+}
+
+#[tokio::test]
+async fn a_panic_in_the_haptic_thread_is_an_error_and_closes_the_connection() {
+    let fake = Fake::new();
+    let options = scripted(&fake);
+    let (opened, slave) = tokio::join!(
+        open(&options, Vec2::new(-0.45, 0.0), &PATIENCE),
+        Session::welcomed(&fake)
+    );
+    let thread = std::thread::spawn(|| panic!("meant to happen in this test"));
+    let error = join(thread, &opened.unwrap().line, &PATIENCE).await;
+    assert!(matches!(error, Err(MasterHostError::Panicked)));
+    timeout(FOR_EVER, slave.connection.closed()).await.unwrap();
 }

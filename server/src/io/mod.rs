@@ -7,6 +7,14 @@
     reason = "the shell: clocks, threads and sockets are its business"
 )]
 
+mod door;
+mod host;
+mod report;
+mod session;
+#[cfg(test)]
+mod tests;
+mod worker;
+
 use std::net::SocketAddr;
 
 use mmt_netem::LinkConfig;
@@ -17,6 +25,11 @@ use mmt_shared::wire::Cause;
 use serde::Serialize;
 
 use crate::slave::SlaveConfig;
+
+pub use host::{SlaveHost, SlaveHostError};
+
+/// Name and version of this program, as it tells them to the other side.
+const PROGRAM: &str = concat!("mmt ", env!("CARGO_PKG_VERSION"));
 
 /// How a slave host runs.
 #[derive(Debug)]

@@ -15,6 +15,7 @@ pub mod connect;
 pub mod identity;
 pub mod identity_file;
 pub mod listen;
+pub mod live;
 pub mod quic;
 pub mod realtime;
 pub mod schedule;

@@ -32,6 +32,17 @@ impl UpdateCounts {
         }
     }
 
+    /// Both counts together: one side counted the ticks, the other what was sent.
+    #[must_use]
+    pub fn plus(mut self, other: &Self) -> Self {
+        for (slot, more) in self.by_cause.iter_mut().zip(other.by_cause) {
+            *slot += more;
+        }
+        self.ticks += other.ticks;
+        self.contact_ticks += other.contact_ticks;
+        self
+    }
+
     /// Updates sent for a cause.
     #[must_use]
     pub fn of(&self, cause: Cause) -> u64 {
@@ -93,6 +104,20 @@ mod tests {
         assert_eq!((counts.total(), counts.of(Cause::Deadband)), (6, 5));
         assert!((counts.rate_hz().unwrap() - 1.5).abs() < 1e-12);
         assert!((counts.contact_rate_hz().unwrap() - 6.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn what_two_counted_apart_is_what_one_would_have_counted() {
+        let [mut ticks, mut sent, mut all] = [UpdateCounts::default(); 3];
+        for tick in 0..100 {
+            ticks.tick(tick < 40);
+            all.tick(tick < 40);
+        }
+        for cause in Cause::ALL {
+            sent.sent(cause);
+            all.sent(cause);
+        }
+        assert_eq!(ticks.plus(&sent), all);
     }
 
     #[test]

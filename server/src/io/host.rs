@@ -1,0 +1,248 @@
+//! The host: an endpoint, the door, and one session after the other.
+
+use std::io;
+use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr, UdpSocket};
+use std::sync::Arc;
+use std::time::Duration;
+
+use mmt_netem::io::socket::{EmulatedSocket, SocketMeter, WrapError};
+use mmt_netem::link::LinkId;
+use mmt_shared::contact::Coupling;
+use mmt_shared::io::clock::Clock;
+use mmt_shared::io::congestion::RateCap;
+use mmt_shared::io::listen::Listener;
+use mmt_shared::io::live::LiveCell;
+use mmt_shared::io::quic::{EndpointError, Traffic, server_endpoint};
+use mmt_shared::io::socket::{self, BindError};
+use mmt_shared::io::versions::CLOSE_FINISHED;
+use mmt_shared::pairing::{Address, Host, Pairing};
+use quinn::Endpoint;
+use tokio::sync::{mpsc, watch};
+use tokio::time::timeout;
+
+use super::door::{Admitted, Door, Refusals};
+use super::session;
+use super::{SlaveConfiguration, SlaveLive, SlaveOptions, SlaveReport};
+use crate::slave::{Slave, SlaveConfig, SlaveError};
+
+/// Updates are the longest datagrams of a slave, 196 bytes at most; at one per tick, with QUIC's 30 bytes
+/// each, heartbeats and acknowledgements they stay below 300 kB/s.
+const TRAFFIC: Traffic = Traffic {
+    datagram_max: 200,
+    rate_cap: RateCap {
+        bytes_per_s: 300_000,
+    },
+};
+/// k_p of the default device, N/m: the configuration is tried with it before anybody connects.
+const TRIAL_STIFFNESS: f64 = 1000.0;
+/// How long closed connections may take to say so.
+const CLOSING: Duration = Duration::from_secs(1);
+
+/// Why a slave host could not start or go on.
+#[derive(Debug, thiserror::Error)]
+pub enum SlaveHostError {
+    /// The port is taken or the address is not this host's.
+    #[error("cannot listen: {0}")]
+    Bind(#[from] BindError),
+    /// The socket cannot be used.
+    #[error("cannot listen on {address}: {source}")]
+    Socket {
+        /// Where.
+        address: SocketAddr,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// The emulated network cannot be made.
+    #[error("cannot emulate the network: {0}")]
+    Netem(#[from] WrapError),
+    /// QUIC cannot start.
+    #[error("cannot start QUIC: {0}")]
+    Endpoint(#[from] EndpointError),
+    /// The configuration's numbers are not accepted.
+    #[error("the slave's configuration: {0}")]
+    Slave(#[from] SlaveError),
+    /// The 1 kHz thread cannot start.
+    #[error("cannot start the 1 kHz thread: {0}; see the limits on threads and descriptors")]
+    Thread(#[from] io::Error),
+    /// The 1 kHz thread panicked: a bug.
+    #[error("the slave's 1 kHz thread panicked: please report this with what was printed above")]
+    Panicked,
+}
+
+/// A slave that listens. One session at a time; others are refused meanwhile.
+pub struct SlaveHost {
+    endpoint: Endpoint,
+    address: SocketAddr,
+    pairing: Pairing,
+    pub(super) shared: Shared,
+    once: bool,
+}
+
+/// What every session needs of its host.
+pub(super) struct Shared {
+    pub(super) clock: Clock,
+    pub(super) config: SlaveConfig,
+    pub(super) listen: String,
+    pub(super) netem: String,
+    pub(super) meter: SocketMeter,
+    pub(super) listener: Arc<Listener>,
+    pub(super) refusals: Arc<Refusals>,
+}
+
+impl Shared {
+    pub(super) fn configuration(&self, slave: &SlaveConfig) -> SlaveConfiguration {
+        SlaveConfiguration {
+            listen: self.listen.clone(),
+            slave: slave.clone(),
+            netem: self.netem.clone(),
+        }
+    }
+}
+
+impl SlaveHost {
+    /// Listens. Call it inside of a tokio runtime with I/O and time.
+    ///
+    /// # Errors
+    /// The configuration is not accepted, the address cannot be listened on, the identity is unusable.
+    pub fn bind(options: SlaveOptions) -> Result<Self, SlaveHostError> {
+        Slave::try_new(&options.config, Coupling::for_stiffness(TRIAL_STIFFNESS))?;
+        let unusable = |source| SlaveHostError::Socket {
+            address: options.listen,
+            source,
+        };
+        let inner = socket::for_quic(socket::bind(options.listen)?).map_err(unusable)?;
+        let netem = options.netem.to_string();
+        let emulated =
+            EmulatedSocket::try_new(inner, options.netem, options.netem_seed, LinkId::DOWN)?;
+        let meter = emulated.meter();
+        let endpoint = server_endpoint(Arc::new(emulated), &options.identity, TRAFFIC)?;
+        let address = endpoint.local_addr().map_err(unusable)?;
+        let pairing = Pairing {
+            address: Address {
+                host: host_of(address.ip()),
+                port: address.port(),
+            },
+            pin: options.identity.pin(),
+            token: *options.identity.token(),
+        };
+        let shared = Shared {
+            clock: Clock::start(),
+            config: options.config,
+            listen: address.to_string(),
+            netem,
+            meter,
+            listener: Arc::new(Listener::new(endpoint.clone())),
+            refusals: Arc::new(Refusals::default()),
+        };
+        Ok(Self {
+            endpoint,
+            address,
+            pairing,
+            shared,
+            once: options.once,
+        })
+    }
+
+    /// Where it listens, with the port that the system chose if it was asked to.
+    #[must_use]
+    pub fn address(&self) -> SocketAddr {
+        self.address
+    }
+
+    /// What a master needs. Without `host` it names the address listened on; if that is a wildcard, the
+    /// address that this machine reaches the world with, or loopback if it reaches none.
+    #[must_use]
+    pub fn pairing(&self, host: Option<Host>) -> Pairing {
+        let mut pairing = self.pairing.clone();
+        if let Some(host) = host {
+            pairing.address.host = host;
+        }
+        pairing
+    }
+
+    /// Serves masters until `stop` becomes true or its sender is gone, or, with `once`, until the first session
+    /// is over. The report is that of the last session, none if there was none.
+    ///
+    /// # Errors
+    /// The 1 kHz thread could not be started or panicked; the session's master has been told.
+    pub async fn run(
+        self,
+        mut stop: watch::Receiver<bool>,
+        live: Arc<LiveCell<SlaveLive>>,
+    ) -> Result<Option<SlaveReport>, SlaveHostError> {
+        let (token, refusals) = (self.pairing.token, Arc::clone(&self.shared.refusals));
+        let (door, masters) = Door::new(token, refusals, stop.clone());
+        let listener = Arc::clone(&self.shared.listener);
+        let (served, ()) = tokio::join!(
+            async {
+                let served = self.serve(masters, &mut stop, &live).await;
+                self.endpoint.close(CLOSE_FINISHED, b"the slave has ended");
+                served
+            },
+            door.keep(listener),
+        );
+        live.set(SlaveLive::default());
+        // Whoever does not answer is left alone.
+        let _ = timeout(CLOSING, self.endpoint.wait_idle()).await;
+        served
+    }
+
+    async fn serve(
+        &self,
+        mut masters: mpsc::Receiver<Admitted>,
+        stop: &mut watch::Receiver<bool>,
+        live: &LiveCell<SlaveLive>,
+    ) -> Result<Option<SlaveReport>, SlaveHostError> {
+        let mut last = None;
+        loop {
+            let admitted = tokio::select! {
+                biased;
+                () = stopped(stop) => return Ok(last),
+                admitted = masters.recv() => admitted,
+            };
+            let Some(admitted) = admitted else {
+                return Ok(last);
+            };
+            let report = session::serve(&self.shared, admitted, stop, live).await?;
+            live.set(SlaveLive::default());
+            let served = report.is_some();
+            last = report.or(last);
+            if served && self.once {
+                return Ok(last);
+            }
+        }
+    }
+}
+
+/// Returns once the host is asked to stop. Cancel-safe.
+pub(super) async fn stopped(stop: &mut watch::Receiver<bool>) {
+    // An error means that nobody can ask any more.
+    let _ = stop.wait_for(|stop| *stop).await;
+}
+
+fn host_of(address: IpAddr) -> Host {
+    let address = address.to_canonical();
+    match if address.is_unspecified() {
+        primary_address()
+    } else {
+        address
+    } {
+        IpAddr::V4(address) => Host::V4(address),
+        IpAddr::V6(address) => Host::V6(address),
+    }
+}
+
+/// The address that this machine would use towards the world; no packet is sent to find out.
+fn primary_address() -> IpAddr {
+    // Documentation addresses (RFC 5737, RFC 3849): routed like any other, and nobody's.
+    let v4 = local_address_towards((Ipv4Addr::UNSPECIFIED, 0), (Ipv4Addr::new(192, 0, 2, 1), 9));
+    let world = Ipv6Addr::new(0x2001, 0xdb8, 0, 0, 0, 0, 0, 1);
+    let v6 = || local_address_towards((Ipv6Addr::UNSPECIFIED, 0), (world, 9));
+    v4.or_else(v6).unwrap_or(Ipv4Addr::LOCALHOST.into())
+}
+
+fn local_address_towards(from: impl Into<SocketAddr>, to: impl Into<SocketAddr>) -> Option<IpAddr> {
+    let socket = UdpSocket::bind(from.into()).ok()?;
+    socket.connect(to.into()).ok()?;
+    socket.local_addr().ok().map(|address| address.ip())
+}

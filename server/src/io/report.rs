@@ -1,0 +1,323 @@
+//! What a session came to: the totals of the farewell and the report.
+//!
+//! Up is what this side received, down is what it sent: `wire.up` counts the datagrams that reached the slave's
+//! socket, `wire.down` those that its socket really sent after the emulated network. What only the master knows
+//! comes from its farewell and is absent without it.
+
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Duration;
+
+use mmt_netem::io::socket::SocketCounters;
+use mmt_shared::io::spread;
+use mmt_shared::metrics::{ForceSummary, UpdateCounts};
+use mmt_shared::report::{
+    Counts, EstimateReport, ForceReport, LinkReport, LoopReport, MessagesReport, ModelReport,
+    QuantilesReport, RttReport, UpDown, UpdatesReport, WireReport, ending_name,
+};
+use mmt_shared::wire::{
+    Ending, Farewell, ForceTotals, Identified, LoopTotals, MasterTotals, SlaveTotals, Traffic,
+    UpdateDrops,
+};
+
+use super::SlaveReport;
+use super::host::Shared;
+use super::session::Lost;
+use super::worker::Finished;
+use crate::link::SlaveLink;
+use crate::slave::{Slave, SlaveConfig};
+
+/// IP and UDP headers of a datagram, bytes.
+const HEADERS_IPV4: u64 = 28;
+const HEADERS_IPV6: u64 = 48;
+
+/// Everything that a session left behind.
+pub(super) struct Outcome {
+    pub(super) ending: Ending,
+    /// From the welcome to the farewell.
+    pub(super) duration: Duration,
+    /// None if the thread panicked.
+    pub(super) finished: Option<Finished>,
+    /// Updates sent, by cause.
+    pub(super) sent: UpdateCounts,
+    pub(super) link: SlaveLink,
+    pub(super) lost: Lost,
+    /// Datagrams that QUIC displaced by newer ones, or still held at the end.
+    pub(super) unsent: u64,
+    /// Datagrams that QUIC received and nobody read.
+    pub(super) unread: u64,
+    /// The socket at the welcome and at the farewell.
+    pub(super) before: SocketCounters,
+    pub(super) after: SocketCounters,
+    pub(super) over_ipv4: bool,
+}
+
+impl Outcome {
+    /// What the farewell tells.
+    pub(super) fn totals(&self) -> SlaveTotals {
+        let slave = self.finished.as_ref().map(|finished| &finished.slave);
+        let [mass_kg, damping_ns_per_m, friction_n] = slave.map(identified).unwrap_or_default();
+        let mut updates_by_cause = SlaveTotals::default().updates_by_cause;
+        for (slot, (_, count)) in updates_by_cause.iter_mut().zip(self.sent.by_cause()) {
+            *slot = u32::try_from(count).unwrap_or(u32::MAX);
+        }
+        let force = slave.map(|slave| force_totals(&slave.force().summary()));
+        SlaveTotals {
+            duration_ns: u64::try_from(self.duration.as_nanos()).unwrap_or(u64::MAX),
+            traffic: self.traffic(),
+            updates_by_cause,
+            samples_received: self.link.samples_received(),
+            force: force.unwrap_or_default(),
+            mass_kg,
+            damping_ns_per_m,
+            friction_n,
+        }
+    }
+
+    fn traffic(&self) -> Traffic {
+        let (before, after) = (&self.before, &self.after);
+        let since = |after: u64, before| after.saturating_sub(before);
+        Traffic {
+            udp_datagrams_sent: since(after.sent_datagrams, before.sent_datagrams),
+            udp_bytes_sent: since(after.sent_bytes, before.sent_bytes),
+            udp_datagrams_received: since(after.received_datagrams, before.received_datagrams),
+            udp_bytes_received: since(after.received_bytes, before.received_bytes),
+            ..self.link.end().traffic()
+        }
+    }
+}
+
+/// The report of a session.
+pub(super) fn report(
+    shared: &Shared,
+    config: &SlaveConfig,
+    outcome: &Outcome,
+    theirs: Option<&Farewell<MasterTotals>>,
+) -> SlaveReport {
+    let version = env!("CARGO_PKG_VERSION");
+    let mut report = SlaveReport::new(version, "slave", shared.configuration(config));
+    let traffic = outcome.traffic();
+    report.seed = Some(config.seed);
+    report.duration_s = outcome.duration.as_secs_f64().into();
+    report.ending = Some(ending_name(outcome.ending).to_owned());
+    report.updates = updates(outcome, theirs);
+    report.messages = messages(&traffic);
+    report.wire = wire(outcome, &traffic);
+    report.link = link(&outcome.link);
+    report.drops = Some(drops(shared, outcome, &traffic));
+    if let Some(theirs) = theirs {
+        report.haptic_loop = loop_of_master(&theirs.totals.haptic_loop);
+    }
+    if let Some(finished) = &outcome.finished {
+        report.force = ForceReport::new(&finished.slave.force().summary(), None);
+        report.model = model(&finished.slave);
+        report.slave_loop = slave_loop(finished);
+    }
+    report
+}
+
+fn updates(outcome: &Outcome, theirs: Option<&Farewell<MasterTotals>>) -> UpdatesReport {
+    let ticks = outcome.finished.as_ref().map(|finished| finished.ticks);
+    let mut updates = UpdatesReport::default();
+    updates.set_sent(&outcome.sent.plus(&ticks.unwrap_or_default()));
+    if let Some(Farewell { totals, .. }) = theirs {
+        updates.applied = Some(totals.updates_applied.into());
+        updates.dropped = Some(dropped(&totals.updates_dropped));
+    }
+    updates
+}
+
+fn dropped(drops: &UpdateDrops) -> Counts {
+    named([
+        ("duplicate", drops.duplicate.into()),
+        ("stale", drops.stale.into()),
+        ("rejected", drops.rejected.into()),
+        ("superseded", drops.superseded.into()),
+        ("frozen", drops.frozen.into()),
+    ])
+}
+
+fn messages(traffic: &Traffic) -> UpDown<MessagesReport> {
+    let (received, sent) = (&traffic.received, &traffic.sent);
+    UpDown {
+        up: MessagesReport {
+            commands: Some(received.commands.into()),
+            heartbeats: Some(received.heartbeats.into()),
+            ..MessagesReport::default()
+        },
+        down: MessagesReport {
+            updates: Some(sent.updates.into()),
+            scenes: Some(sent.scenes.into()),
+            heartbeats: Some(sent.heartbeats.into()),
+            ..MessagesReport::default()
+        },
+    }
+}
+
+fn wire(outcome: &Outcome, traffic: &Traffic) -> UpDown<WireReport> {
+    let headers = match outcome.over_ipv4 {
+        true => HEADERS_IPV4,
+        false => HEADERS_IPV6,
+    };
+    let of = |datagrams, bytes| {
+        WireReport::new(datagrams, bytes, headers, outcome.duration.as_secs_f64())
+    };
+    UpDown {
+        up: of(traffic.udp_datagrams_received, traffic.udp_bytes_received),
+        down: of(traffic.udp_datagrams_sent, traffic.udp_bytes_sent),
+    }
+}
+
+fn link(link: &SlaveLink) -> LinkReport {
+    let peer = link.end().peer();
+    let quantile = |q| peer.round_trip().histogram().quantile(q);
+    let ms = |rtt: Option<Duration>| rtt.map(|rtt| rtt.as_secs_f64() * 1e3).into();
+    LinkReport {
+        rtt_ms: RttReport {
+            p50: ms(quantile(0.5)),
+            p99: ms(quantile(0.99)),
+        },
+        loss_up: peer.incoming().share().into(),
+        loss_down: peer.outgoing().share().into(),
+    }
+}
+
+/// m, b, c: absent as long as the estimator has seen nothing that counts.
+fn identified(slave: &Slave) -> [Identified; 3] {
+    let (estimate, truth) = (slave.estimate(), slave.environment().truth());
+    let [m, b, c, ..] = truth.to_array();
+    [(estimate.m, m), (estimate.b, b), (estimate.c, c)].map(|(estimated, truth)| Identified {
+        estimate: (slave.estimate().samples > 0)
+            .then_some(estimated)
+            .filter(|x| x.is_finite()),
+        truth: Some(truth),
+    })
+}
+
+fn model(slave: &Slave) -> ModelReport {
+    let [mass_kg, damping_ns_per_m, friction_n] =
+        identified(slave).map(|of| EstimateReport::new(of.estimate, of.truth));
+    ModelReport {
+        mass_kg,
+        damping_ns_per_m,
+        friction_n,
+    }
+}
+
+fn force_totals(summary: &ForceSummary) -> ForceTotals {
+    let finite = |value: Option<f64>| value.filter(|value| value.is_finite());
+    ForceTotals {
+        pmse: finite(summary.pmse),
+        pmse_x: finite(summary.pmse_x),
+        pmse_y: finite(summary.pmse_y),
+        pmse_magnitude: finite(summary.pmse_magnitude),
+        relative_error: finite(summary.relative_error),
+        jnd7_share: finite(summary.jnd7_share),
+    }
+}
+
+fn slave_loop(finished: &Finished) -> LoopReport {
+    let us = |duration: Duration| (duration.as_secs_f64() * 1e6).into();
+    let quantiles = |spread: &spread::Quantiles| QuantilesReport {
+        p50: us(spread.p50),
+        p99: us(spread.p99),
+        p999: us(spread.p999),
+    };
+    let ticker = &finished.ticker;
+    LoopReport {
+        ticks: Some(ticker.ticks),
+        skipped: Some(ticker.skipped),
+        cpu_us: quantiles(&ticker.cpu),
+        lateness_us: quantiles(&ticker.lateness),
+    }
+}
+
+fn loop_of_master(totals: &LoopTotals) -> LoopReport {
+    let quantiles = |of: Option<mmt_shared::wire::Quantiles>| {
+        of.map_or_else(QuantilesReport::default, |of| QuantilesReport {
+            p50: of.p50.into(),
+            p99: of.p99.into(),
+            p999: of.p999.into(),
+        })
+    };
+    LoopReport {
+        ticks: Some(totals.ticks),
+        skipped: Some(totals.skipped),
+        cpu_us: quantiles(totals.cpu_us),
+        lateness_us: quantiles(totals.lateness_us),
+    }
+}
+
+/// Every drop of the session by name; who was turned away at the door is counted from the host's start on.
+fn drops(shared: &Shared, outcome: &Outcome, traffic: &Traffic) -> Counts {
+    let read = |counter: &AtomicU64| counter.load(Ordering::Relaxed);
+    let (lost, refusals) = (&outcome.lost, &shared.refusals);
+    let (netem, before) = (outcome.after.dropped, outcome.before.dropped);
+    let away = shared.listener.turned_away();
+    let mut drops = named([
+        ("datagrams_malformed", traffic.malformed.into()),
+        ("datagrams_duplicate", traffic.duplicates.into()),
+        ("datagrams_too_old", traffic.too_old.into()),
+        ("datagrams_unread", outcome.unread),
+        ("datagrams_displaced", outcome.unsent),
+        (
+            "echoes_implausible",
+            outcome.link.end().peer().bad_echoes().into(),
+        ),
+        ("samples_dropped", lost.samples),
+        ("updates_unsealed", lost.unsealed),
+        ("send_too_large", lost.too_large),
+        ("send_unsupported", lost.unsupported),
+        ("send_disconnected", lost.disconnected),
+        (
+            "netem_loss",
+            netem.loss.packets.saturating_sub(before.loss.packets),
+        ),
+        (
+            "netem_limit",
+            netem.limit.packets.saturating_sub(before.limit.packets),
+        ),
+        (
+            "socket_blocked",
+            netem.blocked.packets.saturating_sub(before.blocked.packets),
+        ),
+        (
+            "socket_failed",
+            netem.failed.packets.saturating_sub(before.failed.packets),
+        ),
+        ("masters_busy", read(&refusals.busy)),
+        ("masters_wrong_token", read(&refusals.wrong_token)),
+        ("masters_bad_hello", read(&refusals.bad_hello)),
+        ("masters_ending", read(&refusals.ending)),
+        ("masters_no_hello", read(&refusals.no_hello)),
+        ("masters_crowded", read(&refusals.crowded)),
+        ("handshakes_failed", read(&refusals.handshake)),
+        ("handshakes_refused", away.refused),
+        ("handshakes_unreadable", away.unreadable),
+    ]);
+    if let Some(finished) = &outcome.finished {
+        drops.extend(slave_drops(finished));
+    }
+    drops
+}
+
+fn slave_drops(finished: &Finished) -> Counts {
+    let slave = &finished.slave;
+    let playout = slave.playout().counts();
+    named([
+        ("updates_superseded", finished.superseded),
+        ("samples_late", playout.late),
+        ("samples_duplicate", playout.duplicate),
+        ("samples_overflow", playout.overflow),
+        ("samples_implausible", playout.implausible),
+        ("estimates_refused", slave.refused_estimates()),
+        ("wrenches_refused", slave.environment().refused()),
+        ("forces_not_finite", slave.force().rejected()),
+    ])
+}
+
+fn named<const N: usize>(counts: [(&str, u64); N]) -> Counts {
+    let named = counts
+        .into_iter()
+        .map(|(name, count)| (name.to_owned(), count));
+    named.collect()
+}

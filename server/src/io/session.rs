@@ -1,0 +1,365 @@
+//! One session: from the welcome to the farewells, on tokio's side.
+//!
+//! Begins with the slave that the hello asks for, ends with the report; what happens in between is
+//! `traffic`'s. It decides nothing about the model.
+
+mod traffic;
+
+use std::io;
+use std::time::Duration;
+
+use bytes::Bytes;
+use mmt_netem::io::socket::SocketCounters;
+use mmt_shared::io::clock::Clock;
+use mmt_shared::io::live::LiveCell;
+use mmt_shared::io::stream::{ReadFrameError, WriteFrameError, read_frame, write_frame};
+use mmt_shared::io::versions::CLOSE_FINISHED;
+use mmt_shared::metrics::UpdateCounts;
+use mmt_shared::peer::NumbersSpent;
+use mmt_shared::wire::{
+    DATAGRAM_MAX, DecodeError, Ending, Farewell, Hello, Label, MasterTotals, Refusal,
+    STREAM_MESSAGE_MAX, Side, SlaveTotals, StreamMessage, Welcome, decode_stream_message,
+    encode_slave_farewell, encode_welcome,
+};
+use quinn::{Connection, ConnectionError, RecvStream, SendStream};
+use tokio::sync::watch;
+use tokio::time::timeout;
+
+use super::door::{Admitted, refuse};
+use super::host::{Shared, SlaveHostError};
+use super::report::{self, Outcome};
+use super::worker::{Finished, Worker};
+use super::{PROGRAM, SlaveLive, SlaveReport};
+use crate::link::SlaveLink;
+use crate::playout::PlayoutConfig;
+use crate::slave::{Slave, SlaveConfig};
+
+/// A master that has not been heard for this long has lost its lease (reliability.md, section 1).
+const SILENCE_MAX: Duration = Duration::from_secs(10);
+/// How long each side waits for the other's farewell (protocol.md, section 2).
+const FAREWELL_WAIT: Duration = Duration::from_secs(1);
+/// How long the stream may take to take a message of ours.
+const WRITE_WAIT: Duration = Duration::from_secs(2);
+/// More datagrams than QUIC's queue holds.
+const WAITING_MAX: usize = 4096;
+/// How long the thread may take to end: a tick, or what a stopped or crowded host makes of it.
+const WORKER_WAIT: Duration = Duration::from_secs(5);
+
+/// What was lost on tokio's side of a session, by name.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Lost {
+    /// The 1 kHz thread did not take its samples.
+    pub(super) samples: u64,
+    /// Updates that break a rule of the wire.
+    pub(super) unsealed: u64,
+    /// Longer than the path takes.
+    pub(super) too_large: u64,
+    /// The peer takes no datagrams, or QUIC sends none.
+    pub(super) unsupported: u64,
+    /// The connection was gone.
+    pub(super) disconnected: u64,
+    /// Not lost, but read from the connection: tells what it dropped unread.
+    pub(super) read: u64,
+    /// Not lost, but given to the connection: tells what it dropped unsent.
+    pub(super) given: u64,
+}
+
+/// Why a session ended.
+#[derive(Debug, thiserror::Error)]
+pub(super) enum End {
+    #[error("this side was asked to end")]
+    Asked,
+    #[error("the master said farewell ({:?})", .0.ending)]
+    Farewell(Box<Farewell<MasterTotals>>),
+    #[error("the master was not heard for {SILENCE_MAX:?}")]
+    Silence,
+    #[error("the connection was lost: {0}")]
+    Disconnected(#[from] ConnectionError),
+    #[error("the stream ended: {0}")]
+    Stream(#[from] StreamError),
+    #[error(transparent)]
+    Numbers(#[from] NumbersSpent),
+    #[error("the 1 kHz thread panicked")]
+    Panicked,
+}
+
+/// Why no farewell could be read.
+#[derive(Debug, thiserror::Error)]
+pub(super) enum StreamError {
+    #[error(transparent)]
+    Frame(#[from] ReadFrameError),
+    #[error(transparent)]
+    Message(#[from] DecodeError),
+    #[error("a message that is no farewell")]
+    NoFarewell,
+}
+
+/// A session that has begun.
+pub(super) struct Session<'a> {
+    shared: &'a Shared,
+    config: SlaveConfig,
+    connection: Connection,
+    send: SendStream,
+    worker: Worker,
+    link: SlaveLink,
+    sent: UpdateCounts,
+    lost: Lost,
+    socket_before: SocketCounters,
+    buffer: [u8; DATAGRAM_MAX],
+}
+
+/// Serves an admitted master. No report if no session came about.
+pub(super) async fn serve(
+    shared: &Shared,
+    admitted: Admitted,
+    stop: &mut watch::Receiver<bool>,
+    live: &LiveCell<SlaveLive>,
+) -> Result<Option<SlaveReport>, SlaveHostError> {
+    serve_with(shared, admitted, stop, live, Worker::start).await
+}
+
+/// Serves with a thread of the caller's making.
+pub(super) async fn serve_with(
+    shared: &Shared,
+    admitted: Admitted,
+    stop: &mut watch::Receiver<bool>,
+    live: &LiveCell<SlaveLive>,
+    start: impl FnOnce(Clock, Slave) -> io::Result<Worker>,
+) -> Result<Option<SlaveReport>, SlaveHostError> {
+    let Admitted {
+        connection,
+        mut send,
+        receive,
+        hello,
+        lease: _lease,
+    } = admitted;
+    let config = SlaveConfig {
+        playout: playout_for(shared.config.playout, hello.samples_per_command),
+        ..shared.config.clone()
+    };
+    let mut slave = match Slave::try_new(&config, hello.coupling) {
+        Ok(slave) => slave,
+        Err(error) => {
+            tracing::warn!("no slave for a device of {:?}: {error}", hello.coupling);
+            refuse(&connection, send, Refusal::BadHello).await;
+            return Ok(None);
+        }
+    };
+    slave.start_at(hello.hip);
+    let socket_before = shared.meter.snapshot();
+    // Datagrams from before the welcome belong to no session.
+    drain(&connection, |_| ()).await;
+    if let Err(error) = welcome(&mut send, &config, &slave).await {
+        tracing::warn!(
+            "{} left before its welcome: {error}",
+            connection.remote_address()
+        );
+        return Ok(None);
+    }
+    announce(&connection, &hello);
+    let worker = start(shared.clock, slave)?;
+    let session = Session::new(shared, config, connection, send, worker, socket_before);
+    session.operate(receive, stop, live).await.map(Some)
+}
+
+/// The configured play-out; if its delay is the default, with the delay that the master's packing needs
+/// instead of the default's ten samples. The jitter that it has room for stays.
+fn playout_for(configured: PlayoutConfig, samples_per_command: u8) -> PlayoutConfig {
+    let default = PlayoutConfig::default();
+    if configured.delay_ms != default.delay_ms {
+        return configured;
+    }
+    let delay = |samples| PlayoutConfig::for_packing_and_jitter(samples, Duration::ZERO).delay_ms;
+    // the default is made for ten samples
+    let jitter_ms = default.delay_ms - delay(10);
+    PlayoutConfig {
+        delay_ms: delay(samples_per_command) + jitter_ms,
+        ..configured
+    }
+}
+
+/// Takes the datagrams that have arrived and were not read, without waiting for more.
+async fn drain(connection: &Connection, mut take: impl FnMut(&Bytes)) {
+    for _ in 0..WAITING_MAX {
+        match timeout(Duration::ZERO, connection.read_datagram()).await {
+            Ok(Ok(datagram)) => take(&datagram),
+            _ => break,
+        }
+    }
+}
+
+async fn welcome(
+    send: &mut SendStream,
+    config: &SlaveConfig,
+    slave: &Slave,
+) -> Result<(), WriteFrameError> {
+    let welcome = Welcome {
+        settings: *slave.settings(),
+        state: *slave.state(),
+        scheme: Label::clipped(&config.trigger.scheme.to_string()),
+        program: Label::clipped(PROGRAM),
+    };
+    let mut out = [0; STREAM_MESSAGE_MAX];
+    // A slave that could be made has numbers that can be told.
+    let length = encode_welcome(&welcome, &mut out).unwrap_or_default();
+    write_frame(send, out.get(..length).unwrap_or_default(), WRITE_WAIT).await
+}
+
+fn announce(connection: &Connection, hello: &Hello) {
+    let (address, program) = (connection.remote_address(), hello.program);
+    tracing::info!("{address} operates ({program}, {:?})", hello.coupling);
+}
+
+async fn farewell_of(mut receive: RecvStream) -> Result<Farewell<MasterTotals>, StreamError> {
+    let frame = read_frame(&mut receive, STREAM_MESSAGE_MAX, Duration::MAX).await?;
+    match decode_stream_message(&frame, Side::Master)? {
+        StreamMessage::MasterFarewell(farewell) => Ok(farewell),
+        _ => Err(StreamError::NoFarewell),
+    }
+}
+
+impl<'a> Session<'a> {
+    pub(super) fn new(
+        shared: &'a Shared,
+        config: SlaveConfig,
+        connection: Connection,
+        send: SendStream,
+        worker: Worker,
+        socket_before: SocketCounters,
+    ) -> Self {
+        Self {
+            link: SlaveLink::new(shared.clock.now()),
+            shared,
+            config,
+            connection,
+            send,
+            worker,
+            sent: UpdateCounts::default(),
+            lost: Lost::default(),
+            socket_before,
+            buffer: [0; DATAGRAM_MAX],
+        }
+    }
+
+    /// Goes on until somebody ends it; then says farewell and reports.
+    pub(super) async fn operate(
+        mut self,
+        receive: RecvStream,
+        stop: &mut watch::Receiver<bool>,
+        live: &LiveCell<SlaveLive>,
+    ) -> Result<SlaveReport, SlaveHostError> {
+        let farewell = farewell_of(receive);
+        tokio::pin!(farewell);
+        let end = self.until_end(farewell.as_mut(), stop, live).await;
+        tracing::info!("{}: {end}", self.connection.remote_address());
+        // What came before the end counts.
+        drain(&self.connection.clone(), |datagram| self.take(datagram)).await;
+        let finished = self.end_worker(&end).await;
+        let ending = match &end {
+            _ if finished.is_none() => Ending::Failed,
+            End::Asked => Ending::Interrupted,
+            End::Farewell(theirs) => theirs.ending,
+            _ => Ending::Failed,
+        };
+        let outcome = self.outcome(ending, finished);
+        let said = self.say_farewell(ending, &outcome.totals()).await;
+        let theirs = match end {
+            End::Farewell(theirs) => Some(*theirs),
+            // Nothing can come any more.
+            End::Stream(_) => None,
+            _ if said.is_err() => None,
+            _ => timeout(FAREWELL_WAIT, farewell)
+                .await
+                .ok()
+                .and_then(Result::ok),
+        };
+        // The master closes: a close of ours could overtake what we said.
+        let _ = timeout(FAREWELL_WAIT, self.connection.closed()).await;
+        self.connection
+            .close(CLOSE_FINISHED, b"the session is over");
+        match outcome.finished {
+            Some(_) => Ok(report::report(
+                self.shared,
+                &self.config,
+                &outcome,
+                theirs.as_ref(),
+            )),
+            None => Err(SlaveHostError::Panicked),
+        }
+    }
+
+    /// Ends the thread and takes what it hands back; none if it panicked.
+    async fn end_worker(&mut self, end: &End) -> Option<Finished> {
+        self.worker.stop();
+        if matches!(end, End::Panicked) {
+            return None;
+        }
+        let finished = timeout(WORKER_WAIT, &mut self.worker.finished).await;
+        finished.ok().and_then(Result::ok)
+    }
+
+    fn outcome(&self, ending: Ending, finished: Option<Finished>) -> Outcome {
+        let now = self.shared.clock.now();
+        let frames = self.connection.stats();
+        Outcome {
+            ending,
+            duration: now.saturating_since(self.link.end().began()),
+            finished,
+            sent: self.sent,
+            link: self.link.clone(),
+            lost: self.lost,
+            unsent: self.lost.given.saturating_sub(frames.frame_tx.datagram),
+            unread: frames.frame_rx.datagram.saturating_sub(self.lost.read),
+            before: self.socket_before,
+            after: self.shared.meter.snapshot(),
+            over_ipv4: self
+                .connection
+                .remote_address()
+                .ip()
+                .to_canonical()
+                .is_ipv4(),
+        }
+    }
+
+    async fn say_farewell(
+        &mut self,
+        ending: Ending,
+        totals: &SlaveTotals,
+    ) -> Result<(), WriteFrameError> {
+        let farewell = Farewell {
+            ending,
+            totals: *totals,
+        };
+        let mut out = [0; STREAM_MESSAGE_MAX];
+        // Totals come from reports, which hold no number that is not finite.
+        let length = encode_slave_farewell(&farewell, &mut out).unwrap_or_default();
+        let message = out.get(..length).unwrap_or_default();
+        write_frame(&mut self.send, message, FAREWELL_WAIT).await?;
+        // Finishing fails only on a stream that is finished.
+        let _ = self.send.finish();
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn play_out_waits_for_the_masters_packing_unless_its_delay_was_configured() {
+        let default = PlayoutConfig::default();
+        assert_eq!(playout_for(default, 10), default);
+        let one = playout_for(default, 1);
+        assert!((default.delay_ms - one.delay_ms - 9.0).abs() < 1e-9);
+        let faster = PlayoutConfig {
+            speed_max_m_per_s: 1.0,
+            ..default
+        };
+        assert_eq!(playout_for(faster, 1).speed_max_m_per_s, 1.0);
+        let configured = PlayoutConfig {
+            delay_ms: 33.0,
+            ..default
+        };
+        assert_eq!(playout_for(configured, 1), configured);
+    }
+}

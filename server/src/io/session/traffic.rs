@@ -1,0 +1,139 @@
+//! The traffic of a session: datagrams in, updates and heartbeats out, looks for the screen.
+//!
+//! It never waits for the network to take a datagram: what cannot be sent now is dropped and counted.
+
+use std::pin::Pin;
+use std::time::Duration;
+
+use bytes::Bytes;
+use mmt_shared::io::live::LiveCell;
+use mmt_shared::link_end::SealError;
+use mmt_shared::wire::{Farewell, MasterTotals};
+use quinn::SendDatagramError;
+use tokio::sync::watch;
+use tokio::time::{MissedTickBehavior, interval, sleep};
+
+use super::{End, SILENCE_MAX, Session, StreamError};
+use crate::io::SlaveLive;
+use crate::io::host::stopped;
+
+/// Between two looks for the screen: 40 in a second.
+const LOOK: Duration = Duration::from_millis(25);
+
+impl Session<'_> {
+    /// Carries the traffic until something ends it.
+    pub(super) async fn until_end(
+        &mut self,
+        farewell: Pin<&mut impl Future<Output = Result<Farewell<MasterTotals>, StreamError>>>,
+        stop: &mut watch::Receiver<bool>,
+        live: &LiveCell<SlaveLive>,
+    ) -> End {
+        let carried = self.carry(farewell, stop, live).await;
+        carried.map_or_else(|end| end, |never| match never {})
+    }
+
+    async fn carry(
+        &mut self,
+        mut farewell: Pin<&mut impl Future<Output = Result<Farewell<MasterTotals>, StreamError>>>,
+        stop: &mut watch::Receiver<bool>,
+        live: &LiveCell<SlaveLive>,
+    ) -> Result<std::convert::Infallible, End> {
+        let mut looks = interval(LOOK);
+        looks.set_missed_tick_behavior(MissedTickBehavior::Delay);
+        loop {
+            let now = self.shared.clock.now();
+            let due = self.link.end().heartbeat_due().saturating_since(now);
+            // In this order, so that a flood of datagrams holds up nothing else.
+            tokio::select! {
+                biased;
+                told = &mut farewell => return Err(End::Farewell(Box::new(told?))),
+                () = stopped(stop) => return Err(End::Asked),
+                _ = &mut self.worker.finished => return Err(End::Panicked),
+                woken = self.worker.wakeup.wait() => {
+                    // Only a runtime that shuts down fails here.
+                    woken.map_err(|_| End::Asked)?;
+                    self.send_update()?;
+                }
+                () = sleep(due) => self.send_heartbeat()?,
+                _ = looks.tick() => self.look(live)?,
+                datagram = self.connection.read_datagram() => self.take(&datagram?),
+            }
+        }
+    }
+
+    /// Takes in a datagram; its stamp is that of this moment.
+    pub(super) fn take(&mut self, datagram: &Bytes) {
+        self.lost.read += 1;
+        let now = self.shared.clock.now();
+        let Some(command) = self.link.handle(now, datagram) else {
+            return;
+        };
+        for sample in command.samples.as_slice() {
+            let taken = self.worker.samples.push((now, *sample));
+            self.lost.samples += u64::from(taken.is_err());
+        }
+    }
+
+    fn send_update(&mut self) -> Result<(), End> {
+        let Some(update) = self.worker.fresh_update() else {
+            return Ok(());
+        };
+        let now = self.shared.clock.now();
+        let sealed = self.link.send_update(now, &update, &mut self.buffer);
+        if self.send(sealed.map(Some))? {
+            self.sent.sent(update.cause);
+        }
+        Ok(())
+    }
+
+    fn send_heartbeat(&mut self) -> Result<(), End> {
+        let now = self.shared.clock.now();
+        let sealed = self.link.heartbeat(now, &mut self.buffer);
+        self.send(sealed).map(drop)
+    }
+
+    /// Gives what was sealed to the connection; whether it took it.
+    fn send(&mut self, sealed: Result<Option<usize>, SealError>) -> Result<bool, End> {
+        let length = match sealed {
+            Ok(Some(length)) => length,
+            Ok(None) => return Ok(false),
+            Err(SealError::Numbers(spent)) => return Err(spent.into()),
+            Err(SealError::Encode(_)) => {
+                self.lost.unsealed += 1;
+                return Ok(false);
+            }
+        };
+        let bytes = self.buffer.get(..length).unwrap_or_default();
+        let given = self.connection.send_datagram(Bytes::copy_from_slice(bytes));
+        let counter = match &given {
+            Ok(()) => &mut self.lost.given,
+            Err(SendDatagramError::TooLarge) => &mut self.lost.too_large,
+            Err(SendDatagramError::ConnectionLost(_)) => &mut self.lost.disconnected,
+            Err(SendDatagramError::UnsupportedByPeer | SendDatagramError::Disabled) => {
+                &mut self.lost.unsupported
+            }
+        };
+        *counter += 1;
+        Ok(given.is_ok())
+    }
+
+    /// Shows what there is to see, and looks whether the master is still there.
+    fn look(&mut self, live: &LiveCell<SlaveLive>) -> Result<(), End> {
+        let now = self.shared.clock.now();
+        let end = self.link.end();
+        let median = end.peer().round_trip().histogram().quantile(0.5);
+        let mut look = *self.worker.looks.read();
+        look.connected = true;
+        look.elapsed_s = now.saturating_since(end.began()).as_secs_f64();
+        look.rtt_ms = median.map(|rtt| rtt.as_secs_f64() * 1e3);
+        look.loss_up = end.peer().incoming().share();
+        for (slot, (_, count)) in look.updates.iter_mut().zip(self.sent.by_cause()) {
+            *slot = count;
+        }
+        live.set(look);
+        match end.silence(now) > SILENCE_MAX {
+            true => Err(End::Silence),
+            false => Ok(()),
+        }
+    }
+}
