@@ -7,6 +7,7 @@ mod traffic;
 
 use std::time::Duration;
 
+use bytes::Bytes;
 use mmt_netem::io::socket::SocketCounters;
 use mmt_shared::io::live::LiveCell;
 use mmt_shared::io::stream::{ReadFrameError, WriteFrameError, read_frame, write_frame};
@@ -37,8 +38,8 @@ const SILENCE_MAX: Duration = Duration::from_secs(10);
 const FAREWELL_WAIT: Duration = Duration::from_secs(1);
 /// How long the stream may take to take a message of ours.
 const WRITE_WAIT: Duration = Duration::from_secs(2);
-/// More than QUIC's queue holds.
-const PREMATURE_MAX: usize = 4096;
+/// More datagrams than QUIC's queue holds.
+const WAITING_MAX: usize = 4096;
 /// How long the thread may take to end: a tick, or what a stopped or crowded host makes of it.
 const WORKER_WAIT: Duration = Duration::from_secs(5);
 
@@ -133,7 +134,8 @@ pub(super) async fn serve(
     };
     slave.start_at(hello.hip);
     let socket_before = shared.meter.snapshot();
-    forget_premature(&connection).await;
+    // Datagrams from before the welcome belong to no session.
+    drain(&connection, |_| ()).await;
     if let Err(error) = welcome(&mut send, &config, &slave).await {
         tracing::warn!(
             "{} left before its welcome: {error}",
@@ -163,12 +165,12 @@ fn playout_for(configured: PlayoutConfig, samples_per_command: u8) -> PlayoutCon
     }
 }
 
-/// Datagrams from before the welcome belong to no session.
-async fn forget_premature(connection: &Connection) {
-    for _ in 0..PREMATURE_MAX {
-        let waiting = timeout(Duration::ZERO, connection.read_datagram()).await;
-        if !matches!(waiting, Ok(Ok(_))) {
-            break;
+/// Takes the datagrams that have arrived and were not read, without waiting for more.
+async fn drain(connection: &Connection, mut take: impl FnMut(&Bytes)) {
+    for _ in 0..WAITING_MAX {
+        match timeout(Duration::ZERO, connection.read_datagram()).await {
+            Ok(Ok(datagram)) => take(&datagram),
+            _ => break,
         }
     }
 }
@@ -237,6 +239,8 @@ impl<'a> Session<'a> {
         tokio::pin!(farewell);
         let end = self.until_end(farewell.as_mut(), stop, live).await;
         tracing::info!("{}: {end}", self.connection.remote_address());
+        // What came before the end counts.
+        drain(&self.connection.clone(), |datagram| self.take(datagram)).await;
         let finished = self.end_worker(&end).await;
         let ending = match &end {
             _ if finished.is_none() => Ending::Failed,

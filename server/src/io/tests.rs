@@ -1,1 +1,281 @@
-//! The host from outside.
+//! The host from outside, over loopback: sessions, refusals, endings.
+
+mod master;
+
+use std::sync::Arc;
+
+use mmt_netem::LinkConfig;
+use mmt_shared::io::identity::Identity;
+use mmt_shared::io::live::LiveCell;
+use mmt_shared::pairing::{Pairing, Token};
+use mmt_shared::wire::{Cause, Ending, Refusal};
+use tokio::sync::watch;
+use tokio::task::JoinHandle;
+
+use super::*;
+use master::{Master, patiently};
+
+type Served = Result<Option<SlaveReport>, SlaveHostError>;
+
+struct Running {
+    pairing: Pairing,
+    live: Arc<LiveCell<SlaveLive>>,
+    stop: watch::Sender<bool>,
+    served: JoinHandle<Served>,
+}
+
+fn options() -> SlaveOptions {
+    SlaveOptions {
+        listen: "127.0.0.1:0".parse().unwrap(),
+        identity: Identity::ephemeral().unwrap(),
+        config: SlaveConfig::default(),
+        netem: LinkConfig::default(),
+        netem_seed: 1,
+        once: false,
+    }
+}
+
+fn run(options: SlaveOptions) -> Running {
+    let host = SlaveHost::bind(options).unwrap();
+    let (stop, stopped) = watch::channel(false);
+    let live = Arc::<LiveCell<SlaveLive>>::default();
+    Running {
+        pairing: host.pairing(None),
+        served: tokio::spawn(host.run(stopped, Arc::clone(&live))),
+        live,
+        stop,
+    }
+}
+
+impl Running {
+    async fn end(self) -> Option<SlaveReport> {
+        self.stop.send_replace(true);
+        patiently(self.served).await.unwrap().unwrap()
+    }
+}
+
+#[tokio::test]
+async fn a_session_goes_from_the_welcome_to_a_report_that_agrees_with_the_master() {
+    let host = run(SlaveOptions {
+        once: true,
+        ..options()
+    });
+    let (mut master, welcome) = Master::operate(&host.pairing).await;
+    let coupling = mmt_shared::contact::Coupling::for_stiffness(1000.0);
+    let welcome = welcome.accept(&coupling).unwrap();
+    assert!(welcome.scheme.as_str().contains("hybrid"), "{welcome:?}");
+    master.push(100).await;
+    master.listen(1).await;
+    let look = host.live.get();
+    assert!(look.connected && look.elapsed_s > 0.5 && look.rtt_ms.is_some());
+    let heard = master.updates.len() as u64;
+    assert!(heard > 0, "no update in a second of contact");
+    let sequences: Vec<_> = master.updates.iter().map(|u| u.sequence()).collect();
+    assert!(sequences.is_sorted_by(|a, b| a < b), "{sequences:?}");
+    let farewell = patiently(master.farewell()).await;
+    assert_eq!(farewell.ending, Ending::Finished);
+    let totals = farewell.totals;
+    let report = patiently(host.served).await.unwrap().unwrap().unwrap();
+    assert_eq!(report.ending.as_deref(), Some("finished"));
+    assert_eq!(report.updates.applied, Some(7));
+    let by_cause = report.updates.by_cause.unwrap();
+    for (cause, sent) in Cause::ALL.into_iter().zip(totals.updates_by_cause) {
+        assert_eq!(by_cause.get(cause.name()), Some(&u64::from(sent)));
+    }
+    assert!(report.updates.sent >= Some(heard));
+    assert_eq!(report.messages.up.commands, Some(100));
+    assert_eq!(totals.samples_received, 1000);
+    assert_eq!(
+        report.wire.up.datagrams,
+        Some(totals.traffic.udp_datagrams_received)
+    );
+    assert!(report.wire.up.datagrams >= Some(50) && report.wire.down.bytes > Some(0));
+    assert!(report.link.loss_up.get() < Some(0.5) && report.link.rtt_ms.p50.get() > Some(0.0));
+    assert!(report.slave_loop.ticks > Some(100));
+    assert_eq!(report.model.mass_kg.truth.get(), totals.mass_kg.truth);
+}
+
+#[tokio::test]
+async fn a_wrong_token_and_numbers_out_of_range_are_refused_by_name_and_the_right_hello_is_not() {
+    let host = run(options());
+    let token = Token::new([1; 32]);
+    let mut stranger = Master::connect(&host.pairing).await;
+    let refused = patiently(stranger.hello(token, 1000.0)).await;
+    assert_eq!(refused.unwrap_err(), Refusal::WrongToken);
+    // the token is judged first
+    let mut stranger = Master::connect(&host.pairing).await;
+    let refused = patiently(stranger.hello(token, 1.0)).await;
+    assert_eq!(refused.unwrap_err(), Refusal::WrongToken);
+    let mut soft = Master::connect(&host.pairing).await;
+    let refused = patiently(soft.hello(host.pairing.token, 1.0)).await;
+    assert_eq!(refused.unwrap_err(), Refusal::BadHello);
+    let mut silent = Master::connect(&host.pairing).await;
+    silent.say(b"no message at all").await;
+    patiently(silent.connection.closed()).await;
+    let (master, _) = patiently(Master::operate(&host.pairing)).await;
+    patiently(master.farewell()).await;
+    let drops = host.end().await.unwrap().drops.unwrap();
+    assert_eq!(drops.get("masters_wrong_token"), Some(&2));
+    assert_eq!(drops.get("masters_bad_hello"), Some(&1));
+    assert_eq!(drops.get("masters_no_hello"), Some(&1));
+}
+
+#[tokio::test]
+async fn a_second_master_is_refused_while_one_operates_and_let_in_afterwards() {
+    let host = run(options());
+    let (first, _) = patiently(Master::operate(&host.pairing)).await;
+    let mut second = Master::connect(&host.pairing).await;
+    let refused = patiently(second.hello(host.pairing.token, 1000.0)).await;
+    assert_eq!(refused.unwrap_err(), Refusal::Busy);
+    patiently(first.farewell()).await;
+    let third = patiently(eventually_welcome(&host.pairing)).await;
+    patiently(third.farewell()).await;
+    let drops = host.end().await.unwrap().drops.unwrap();
+    assert!(drops.get("masters_busy") >= Some(&1));
+}
+
+/// The lease of the session before is free a moment after its farewell.
+async fn eventually_welcome(pairing: &Pairing) -> Master {
+    loop {
+        let mut master = Master::connect(pairing).await;
+        match master.hello(pairing.token, 1000.0).await {
+            Ok(_) => return master,
+            Err(refusal) => assert_eq!(refusal, Refusal::Busy),
+        }
+    }
+}
+
+#[tokio::test]
+async fn garbage_is_counted_and_harmless() {
+    let host = run(options());
+    let (mut master, _) = patiently(Master::operate(&host.pairing)).await;
+    for garbage in [
+        b"".as_slice(),
+        b"MMTP",
+        &[0xff; 300],
+        b"MMTP\x01\x01\x00\x00\x01",
+    ] {
+        master.send_raw(garbage);
+        patiently(master.listen(1)).await;
+    }
+    patiently(master.push(20)).await;
+    patiently(master.farewell()).await;
+    let report = host.end().await.unwrap();
+    let drops = report.drops.unwrap();
+    assert_eq!(drops.get("datagrams_malformed"), Some(&4));
+    assert_eq!(report.messages.up.commands, Some(20));
+    assert_eq!(report.ending.as_deref(), Some("finished"));
+}
+
+#[tokio::test]
+async fn a_message_that_is_no_farewell_ends_the_session_as_failed() {
+    let host = run(options());
+    let (mut master, _) = patiently(Master::operate(&host.pairing)).await;
+    master.say(b"MMTP\x02\x13\x00\x00").await;
+    let farewell = patiently(master.hear_farewell()).await;
+    assert_eq!(farewell.ending, Ending::Failed);
+    master.connection.close(0u32.into(), b"");
+    let report = host.end().await.unwrap();
+    assert_eq!(report.ending.as_deref(), Some("failed"));
+}
+
+#[tokio::test]
+async fn a_lost_connection_ends_the_session_and_the_next_master_is_served() {
+    let host = run(options());
+    let (mut master, _) = patiently(Master::operate(&host.pairing)).await;
+    patiently(master.push(5)).await;
+    master.connection.close(9u32.into(), b"gone");
+    drop(master);
+    let mut next = patiently(eventually_welcome(&host.pairing)).await;
+    patiently(next.push(5)).await;
+    assert!(host.live.get().connected);
+    patiently(next.farewell()).await;
+    let report = host.end().await.unwrap();
+    assert_eq!(report.ending.as_deref(), Some("finished"));
+    assert_eq!(report.messages.up.commands, Some(5), "of the last session");
+}
+
+#[tokio::test]
+async fn a_master_that_vanishes_without_a_word_loses_its_lease() {
+    let host = run(options());
+    let (mut master, _) = patiently(Master::operate(&host.pairing)).await;
+    patiently(master.push(5)).await;
+    // it lives, and says nothing any more
+    let next = patiently(eventually_welcome(&host.pairing)).await;
+    patiently(next.farewell()).await;
+    drop(master);
+    assert!(host.end().await.is_some());
+}
+
+#[tokio::test]
+async fn a_host_that_is_stopped_says_farewell_and_reports() {
+    let host = run(options());
+    let (mut master, _) = patiently(Master::operate(&host.pairing)).await;
+    patiently(master.push(10)).await;
+    host.stop.send_replace(true);
+    let farewell = patiently(master.hear_farewell()).await;
+    assert_eq!(farewell.ending, Ending::Interrupted);
+    master.say_farewell().await;
+    let report = patiently(host.served).await.unwrap().unwrap().unwrap();
+    assert_eq!(report.ending.as_deref(), Some("interrupted"));
+    assert_eq!(report.updates.applied, Some(7));
+}
+
+#[tokio::test]
+async fn a_host_without_a_session_has_no_report() {
+    let host = run(options());
+    assert_eq!(host.end().await, None);
+}
+
+#[tokio::test]
+async fn what_the_emulated_network_drops_is_named_and_not_counted_as_sent() {
+    let host = run(SlaveOptions {
+        netem: "delay 5ms loss 30%".parse().unwrap(),
+        ..options()
+    });
+    let (mut master, _) = patiently(Master::operate(&host.pairing)).await;
+    patiently(master.push(100)).await;
+    patiently(master.farewell()).await;
+    let report = host.end().await.unwrap();
+    let drops = report.drops.unwrap();
+    assert!(drops.get("netem_loss") > Some(&0), "{drops:?}");
+    assert!(report.link.rtt_ms.p50.get() >= Some(5.0));
+    assert_eq!(report.configuration.netem, "delay 5ms loss 30%");
+}
+
+#[tokio::test]
+async fn a_port_in_use_and_a_wrong_configuration_are_named() {
+    let first = SlaveHost::bind(options()).unwrap();
+    let listen = first.address();
+    let second = SlaveHost::bind(SlaveOptions {
+        listen,
+        ..options()
+    });
+    let text = second.err().unwrap().to_string();
+    assert!(
+        text.contains(&listen.to_string()) && text.contains("another port"),
+        "{text}"
+    );
+    let mut wrong = options();
+    wrong.config.playout.delay_ms = -1.0;
+    let text = SlaveHost::bind(wrong).err().unwrap().to_string();
+    assert!(text.contains("delay -1"), "{text}");
+}
+
+#[tokio::test]
+async fn the_pairing_names_an_address_that_a_master_can_reach() {
+    let host = SlaveHost::bind(SlaveOptions {
+        listen: "0.0.0.0:0".parse().unwrap(),
+        ..options()
+    });
+    let host = host.unwrap();
+    let pairing = host.pairing(None);
+    assert_eq!(pairing.address.port, host.address().port());
+    let shown = pairing.address.host.to_string();
+    assert!(
+        shown != "0.0.0.0" && shown.parse::<std::net::IpAddr>().is_ok(),
+        "{shown}"
+    );
+    let named = host.pairing(Some(mmt_shared::pairing::Host::Name("robot".into())));
+    assert!(named.to_string().starts_with("mmt://robot:"));
+}

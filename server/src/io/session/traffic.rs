@@ -62,7 +62,7 @@ impl Session<'_> {
     }
 
     /// Takes in a datagram; its stamp is that of this moment.
-    fn take(&mut self, datagram: &Bytes) {
+    pub(super) fn take(&mut self, datagram: &Bytes) {
         self.lost.read += 1;
         let now = self.shared.clock.now();
         let Some(command) = self.link.handle(now, datagram) else {

@@ -1,0 +1,207 @@
+//! A master of the tests: what the protocol's document says, and no more.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use bytes::Bytes;
+use mmt_shared::contact::Coupling;
+use mmt_shared::geometry::Vec2;
+use mmt_shared::io::clock::Clock;
+use mmt_shared::io::congestion::RateCap;
+use mmt_shared::io::connect::connect;
+use mmt_shared::io::quic::{Traffic, client_endpoint};
+use mmt_shared::io::socket;
+use mmt_shared::io::stream::{read_frame, write_frame};
+use mmt_shared::link_end::{LinkEnd, Outgoing};
+use mmt_shared::pairing::{Pairing, Token};
+use mmt_shared::time::{TICK, Time};
+use mmt_shared::wire::{
+    Command, DATAGRAM_MAX, Ending, Farewell, Hello, HipCounts, HipSample, Label, MasterTotals,
+    Matter, RawUpdate, RawWelcome, Refusal, Role, STREAM_MESSAGE_MAX, SampleBlock, Side,
+    SlaveTotals, StreamMessage, decode_stream_message, encode_hello, encode_master_farewell,
+};
+use quinn::{Connection, Endpoint, RecvStream, SendStream};
+use tokio::time::{interval, timeout};
+
+/// Longer than any healthy test needs on any host.
+pub(super) const PATIENCE: Duration = Duration::from_secs(60);
+const PACKED: u8 = 10;
+const TRAFFIC: Traffic = Traffic {
+    datagram_max: 400,
+    rate_cap: RateCap {
+        bytes_per_s: 300_000,
+    },
+};
+
+pub(super) struct Master {
+    pub(super) connection: Connection,
+    pub(super) link: LinkEnd,
+    pub(super) updates: Vec<RawUpdate>,
+    _endpoint: Endpoint,
+    send: SendStream,
+    receive: RecvStream,
+    clock: Clock,
+    stamp: Time,
+    hip: Vec2,
+}
+
+pub(super) async fn patiently<T>(future: impl Future<Output = T>) -> T {
+    timeout(PATIENCE, future).await.unwrap()
+}
+
+impl Master {
+    /// Connects and opens the stream; says nothing yet.
+    pub(super) async fn connect(pairing: &Pairing) -> Self {
+        let address = pairing.address.to_string().parse().unwrap();
+        let own = socket::bind("127.0.0.1:0".parse().unwrap()).unwrap();
+        let endpoint = client_endpoint(socket::for_quic(own).unwrap()).unwrap();
+        let connection = connect(&endpoint, address, pairing.pin, TRAFFIC, PATIENCE);
+        let connection = connection.await.unwrap();
+        let (send, receive) = connection.open_bi().await.unwrap();
+        let clock = Clock::start();
+        Self {
+            connection,
+            link: LinkEnd::new(Side::Master, clock.now()),
+            updates: Vec::new(),
+            _endpoint: endpoint,
+            send,
+            receive,
+            clock,
+            stamp: Time::from_millis(1),
+            hip: Vec2::new(-0.25, 0.02),
+        }
+    }
+
+    /// Connects and is welcomed.
+    pub(super) async fn operate(pairing: &Pairing) -> (Self, RawWelcome) {
+        let mut master = Self::connect(pairing).await;
+        let welcome = master.hello(pairing.token, 1000.0).await.unwrap();
+        (master, welcome)
+    }
+
+    pub(super) async fn hello(&mut self, token: Token, k_p: f64) -> Result<RawWelcome, Refusal> {
+        let hello = Hello {
+            token,
+            role: Role::Operator,
+            coupling: Coupling::for_stiffness(k_p),
+            samples_per_command: PACKED,
+            hip: self.hip,
+            program: Label::clipped("test"),
+        };
+        let mut out = [0; STREAM_MESSAGE_MAX];
+        let length = encode_hello(&hello, &mut out).unwrap();
+        self.say(&out[..length]).await;
+        match self.hear().await {
+            StreamMessage::Welcome(welcome) => Ok(welcome),
+            StreamMessage::Refused(refusal) => Err(refusal),
+            other => panic!("{other:?}"),
+        }
+    }
+
+    pub(super) async fn say(&mut self, message: &[u8]) {
+        write_frame(&mut self.send, message, PATIENCE)
+            .await
+            .unwrap();
+    }
+
+    async fn hear(&mut self) -> StreamMessage {
+        let frame = read_frame(&mut self.receive, STREAM_MESSAGE_MAX, PATIENCE).await;
+        decode_stream_message(&frame.unwrap(), Side::Slave).unwrap()
+    }
+
+    /// Pushes to the right at 0.2 m/s with a command every 10 ms.
+    pub(super) async fn push(&mut self, commands: u32) {
+        let mut turns = interval(TICK * u32::from(PACKED));
+        let mut left = commands;
+        while left > 0 {
+            tokio::select! {
+                _ = turns.tick() => {
+                    self.send_command();
+                    left -= 1;
+                }
+                datagram = self.connection.read_datagram() => self.take(&datagram.unwrap()),
+            }
+        }
+    }
+
+    /// Reads until the slave has sent `heartbeats` heartbeats.
+    pub(super) async fn listen(&mut self, heartbeats: u32) {
+        let heard = self.link.traffic().received.heartbeats;
+        while self.link.traffic().received.heartbeats < heard + heartbeats {
+            let datagram = self.connection.read_datagram().await.unwrap();
+            self.take(&datagram);
+        }
+    }
+
+    fn take(&mut self, datagram: &Bytes) {
+        if let Some(Matter::Update(update)) = self.link.open(self.clock.now(), datagram) {
+            self.updates.push(update);
+        }
+    }
+
+    fn send_command(&mut self) {
+        let mut samples = SampleBlock::new();
+        for _ in 0..PACKED {
+            self.stamp += TICK;
+            self.hip.x += 0.0002;
+            let (stamp, hip) = (self.stamp, HipCounts::nearest(self.hip));
+            samples
+                .push(HipSample {
+                    stamp,
+                    hip,
+                    ..HipSample::default()
+                })
+                .unwrap();
+        }
+        let newest_update = self.updates.last().map_or(0, RawUpdate::sequence);
+        let command = Command {
+            newest_update,
+            samples,
+        };
+        let mut out = [0; DATAGRAM_MAX];
+        let now = self.clock.now();
+        let length = self.link.seal(now, Outgoing::Command(&command), &mut out);
+        let bytes = Bytes::copy_from_slice(&out[..length.unwrap()]);
+        self.connection.send_datagram(bytes).unwrap();
+    }
+
+    pub(super) fn send_raw(&self, bytes: &'static [u8]) {
+        self.connection
+            .send_datagram(Bytes::from_static(bytes))
+            .unwrap();
+    }
+
+    /// Says farewell, and hears the slave's.
+    pub(super) async fn farewell(mut self) -> Farewell<SlaveTotals> {
+        self.say_farewell().await;
+        let theirs = self.hear_farewell().await;
+        self.connection.close(0u32.into(), b"");
+        self._endpoint.wait_idle().await;
+        theirs
+    }
+
+    pub(super) async fn say_farewell(&mut self) {
+        let farewell = Farewell {
+            ending: Ending::Finished,
+            totals: MasterTotals {
+                updates_applied: 7,
+                ..MasterTotals::default()
+            },
+        };
+        let mut out = [0; STREAM_MESSAGE_MAX];
+        let length = encode_master_farewell(&farewell, &mut out).unwrap();
+        self.say(&out[..length]).await;
+    }
+
+    pub(super) async fn hear_farewell(&mut self) -> Farewell<SlaveTotals> {
+        match self.hear().await {
+            StreamMessage::SlaveFarewell(farewell) => farewell,
+            other => panic!("{other:?}"),
+        }
+    }
+}
+
+/// An endpoint whose owner vanishes: nothing is said, nothing is closed.
+pub(super) fn vanish(master: Master) {
+    std::mem::forget(Arc::new(master));
+}
