@@ -7,7 +7,7 @@ use std::hint::black_box;
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use mmt_server::estimator::{Estimator, EstimatorConfig, Measured};
-use mmt_server::trigger::{Candidate, Trigger, TriggerConfig, TriggerInput};
+use mmt_server::trigger::{Trigger, TriggerConfig, TriggerInput};
 use mmt_shared::contact::Coupling;
 use mmt_shared::geometry::Vec2;
 use mmt_shared::params::ModelParams;
@@ -61,7 +61,8 @@ fn trigger(criterion: &mut Criterion) {
         sticking: false,
         speed: 0.16,
         acceleration: 0.2,
-        candidate: Candidate { params, angle: 0.1 },
+        params,
+        turn: 0.001,
     };
     for text in ["hybrid 10% 150ms", "useful 10% 150ms"] {
         let Ok(scheme) = text.parse() else { continue };

@@ -6,8 +6,10 @@
 //! the centre to each face. Pure; it must never use the true pose.
 
 use mmt_shared::contact::Coupling;
+use mmt_shared::dynamics::Motion;
 use mmt_shared::geometry::{BoxFootprint, Face, Pose, Twist, Vec2, rotate, wrap_angle};
-use mmt_shared::params::FACE_OFFSET_M;
+use mmt_shared::params::{FACE_OFFSET_M, ModelParams};
+use mmt_shared::settings::FrictionLaw;
 use mmt_shared::time::{TICK_S, Time};
 
 use crate::sensing::VisionSample;
@@ -24,8 +26,9 @@ const SLIDE_DRIFT_M: f64 = 5e-3;
 const REST_DRIFT_M: f64 = 1e-5;
 /// How far a box that was let go may coast, m, and turn, rad.
 const COAST: (f64, f64) = (3e-3, 0.02);
-/// A carved face lies this far behind the tool that did not touch it, m.
-const CARVE_MARGIN_M: f64 = 5e-4;
+/// A carved face lies this far behind the tool that did not touch it, m; twice as far each time that the
+/// tool still touches nothing, up to the most: the real face is found in a few steps, not in a hundred.
+const CARVE_MARGIN_M: (f64, f64) = (1e-3, 8e-3);
 /// Past that is kept for late vision, ticks: 256 ms.
 const PAST: usize = 256;
 
@@ -74,6 +77,8 @@ pub struct PoseObserver {
     learned: [u32; 4],
     touching: Option<Touching>,
     penetration: f64,
+    /// How far behind the tool the next carved face will lie, m.
+    carve_margin: f64,
     /// Covariance of (theta, omega): [theta², theta·omega, omega²].
     angle_cov: [f64; 3],
     /// Variance of the centre along the face (or, without touch, of both coordinates), m².
@@ -98,6 +103,7 @@ impl PoseObserver {
             learned: [0; 4],
             touching: None,
             penetration: 0.0,
+            carve_margin: CARVE_MARGIN_M.0,
             angle_cov: [angle_var, 0.0, 0.0],
             slide_var: shift_var,
             past: [Past::default(); PAST],
@@ -129,12 +135,20 @@ impl PoseObserver {
         self.touching
     }
 
-    /// One tick: measured tool (m) and force (N) and whether the slave is in contact.
-    pub fn step(&mut self, now: Time, tool: Vec2, force: Vec2, in_contact: bool) {
+    /// One tick: measured tool (m), force (N), whether the slave is in contact, and the parameters as
+    /// estimated so far, by which a box that was let go coasts.
+    pub fn step(
+        &mut self,
+        now: Time,
+        tool: Vec2,
+        force: Vec2,
+        in_contact: bool,
+        params: &ModelParams,
+    ) {
         if in_contact {
             self.touch(tool, force);
         } else {
-            self.let_go();
+            self.let_go(params);
         }
         let past = Past {
             time: now,
@@ -148,6 +162,7 @@ impl PoseObserver {
     }
 
     fn touch(&mut self, tool: Vec2, force: Vec2) {
+        self.carve_margin = CARVE_MARGIN_M.0;
         let size = force.norm();
         if self.touching.is_none() {
             self.penetration = size / self.config.coupling.stiffness_n_per_m;
@@ -231,13 +246,20 @@ impl PoseObserver {
         ];
     }
 
-    fn let_go(&mut self) {
+    fn let_go(&mut self, params: &ModelParams) {
         if self.touching.take().is_some() {
             self.slide_var += COAST.0 * COAST.0;
             self.angle_cov = [self.angle_cov[0] + COAST.1 * COAST.1, 0.0, 0.0];
-            self.twist = Twist::default();
         }
         self.slide_var += REST_DRIFT_M * REST_DRIFT_M * TICK_S;
+        let motion = Motion {
+            pose: self.pose,
+            twist: self.twist,
+        };
+        let law = FrictionLaw::LimitSurface;
+        let next = motion.step(law, params, Vec2::zeros(), Vec2::zeros());
+        self.pose = next.pose;
+        self.twist = next.twist;
     }
 
     /// Takes in what vision saw some time ago, if this mode uses it.
@@ -307,22 +329,32 @@ impl PoseObserver {
             .copied()
     }
 
-    /// Section III-A, case 1: the tool is inside the model and touches nothing. The face is where the
-    /// tool is not: it is carved back (recommended mode), or the whole box is moved away (the paper).
+    /// Section III-A, case 1: the tool is inside the model and touches nothing. A face that has never
+    /// been touched is not where it was thought to be and is carved back; a known face, or any in the
+    /// paper's mode, means that the box is further away.
     pub fn carve(&mut self, tool: Vec2, face: Face) {
         let depth = -self
             .footprint
             .distance(face, self.pose.point_to_object(tool));
-        let depth = depth + CARVE_MARGIN_M;
+        let depth = depth + self.carve_margin;
         if depth <= 0.0 {
             return;
         }
-        let carved = self.footprint.offset(face) - depth;
-        // a tool past the centre has not found a face: then the box is elsewhere
-        if self.config.learn && carved >= FACE_OFFSET_M.0 {
-            self.footprint.set_offset(face, carved);
-        } else {
-            self.pose.position -= rotate(self.pose.angle, face.outward()) * depth;
+        if !self.config.learn || self.is_known(face) {
+            let inward = -rotate(self.pose.angle, face.outward());
+            self.pose.position += inward * (depth - self.carve_margin + CARVE_MARGIN_M.0);
+            return;
         }
+        self.carve_margin = (self.carve_margin * 2.0).min(CARVE_MARGIN_M.1);
+        // a tool past the centre has not found a face; the offset stays in its accepted range
+        let carved = (self.footprint.offset(face) - depth).max(FACE_OFFSET_M.0);
+        self.footprint.set_offset(face, carved);
+    }
+
+    fn is_known(&self, face: Face) -> bool {
+        Face::ALL
+            .into_iter()
+            .zip(&self.learned)
+            .any(|(other, count)| other == face && *count > 0)
     }
 }

@@ -5,7 +5,7 @@
 //! master's own local model, driven by the same samples, with every update applied when it is sent.
 
 use mmt_shared::contact::Coupling;
-use mmt_shared::geometry::{BoxFootprint, Pose, Twist, Vec2};
+use mmt_shared::geometry::{BoxFootprint, Pose, Twist, Vec2, wrap_angle};
 use mmt_shared::local_model::LocalModel;
 use mmt_shared::metrics::ForceMetrics;
 use mmt_shared::params::{ModelParams, ModelState};
@@ -18,7 +18,7 @@ use crate::estimator::{Estimate, Estimator, EstimatorConfig, Measured};
 use crate::playout::PlayoutBuffer;
 use crate::pose_observer::{ObserverConfig, PoseObserver};
 use crate::sensing::Sensing;
-use crate::trigger::{Candidate, ContactDetector, Trigger, TriggerInput};
+use crate::trigger::{ContactDetector, Trigger, TriggerInput};
 
 mod config;
 
@@ -214,7 +214,7 @@ impl Slave {
         let sensed = self.sensing.sense(now, played.hip, contact.force, &truth);
         let in_contact = self.contact.step(sensed.force.norm());
         self.observer
-            .step(now, sensed.tool, sensed.force, in_contact);
+            .step(now, sensed.tool, sensed.force, in_contact, &self.params);
         if let Some(vision) = sensed.vision {
             self.observer.see(&vision);
         }
@@ -264,10 +264,8 @@ impl Slave {
             sticking: estimate.sticking,
             speed: estimate.speed,
             acceleration: estimate.acceleration,
-            candidate: Candidate {
-                params: self.params,
-                angle: self.observer.pose().angle,
-            },
+            params: self.params,
+            turn: wrap_angle(self.observer.pose().angle - self.shadow.state().pose.angle),
         }
     }
 

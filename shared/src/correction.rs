@@ -10,12 +10,29 @@ use crate::geometry::{Pose, Vec2, rotate};
 use crate::history::PoseChange;
 use crate::time::TICK_S;
 
-/// Fastest bled shift, m/s: well below the speed of a push, so that the hand does not notice it.
-pub const SHIFT_RATE_M_PER_S: f64 = 0.05;
-/// Fastest bled turn, rad/s.
-pub const TURN_RATE_RAD_PER_S: f64 = 1.0;
-/// Time constant of the bleed, s.
-pub const BLEED_TAU_S: f64 = 0.1;
+/// How fast a correction is bled in.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BleedRates {
+    /// Fastest shift, m/s.
+    pub shift_m_per_s: f64,
+    /// Fastest turn, rad/s.
+    pub turn_rad_per_s: f64,
+    /// Time constant, s.
+    pub tau_s: f64,
+}
+
+/// While the HIP touches the box: well below the speed of a push, so that the hand does not notice it.
+pub const IN_CONTACT: BleedRates = BleedRates {
+    shift_m_per_s: 0.05,
+    turn_rad_per_s: 1.0,
+    tau_s: 0.3,
+};
+/// While the HIP touches nothing: no hand feels it, it only must not look like a jump.
+pub const IN_FREE_SPACE: BleedRates = BleedRates {
+    shift_m_per_s: 0.5,
+    turn_rad_per_s: 10.0,
+    tau_s: 0.02,
+};
 /// Most energy that the tank holds, J: the coupling at 1000 N/m stores this at a depth of 14 mm, deeper
 /// than any push at 8 N. What is dissipated beyond it is gone.
 pub const TANK_MAX_J: f64 = 0.1;
@@ -92,8 +109,13 @@ impl Correction {
 
     /// Bleeds one tick's worth of what remains into `pose`. `touch` is what the HIP touches now.
     pub fn bleed(&mut self, pose: &mut Pose, touch: Option<&Touch>, coupling: &Coupling) {
-        let share = TICK_S / BLEED_TAU_S;
-        let most = TURN_RATE_RAD_PER_S * TICK_S;
+        let rates = if touch.is_some() {
+            IN_CONTACT
+        } else {
+            IN_FREE_SPACE
+        };
+        let share = TICK_S / rates.tau_s;
+        let most = rates.turn_rad_per_s * TICK_S;
         let turn = (self.remaining.turn * share).clamp(-most, most);
         let pivot = touch.map_or(pose.position, |touch| touch.proxy);
         let turned = turn_about(pose, pivot, turn);
@@ -101,7 +123,7 @@ impl Correction {
 
         let mut shift = self.remaining.shift * share;
         let size = shift.norm();
-        let most = SHIFT_RATE_M_PER_S * TICK_S;
+        let most = rates.shift_m_per_s * TICK_S;
         if size > most {
             shift *= most / size;
         }
@@ -112,6 +134,18 @@ impl Correction {
             shift = self.affordable(shift, inward, penetration, coupling);
         }
         self.apply(pose, PoseChange { shift, turn: 0.0 });
+    }
+
+    /// Takes back so much of the last bleed that a HIP which touched nothing before touches nothing now:
+    /// a correction may bring the box to the hand but not into it.
+    pub fn back_off(&mut self, pose: &mut Pose, touch: &Touch) {
+        self.apply(
+            pose,
+            PoseChange {
+                shift: touch.inward * touch.penetration,
+                turn: 0.0,
+            },
+        );
     }
 
     /// The part of a shift that is free or that the tank pays for.
@@ -181,9 +215,12 @@ mod tests {
     fn the_rates_are_bounded() {
         let (mut correction, mut pose) = (aimed(Vec2::new(1.0, 0.0), -3.0), Pose::default());
         let before = pose;
-        correction.bleed(&mut pose, None, &COUPLING);
-        assert!((pose.position - before.position).norm() <= SHIFT_RATE_M_PER_S * TICK_S + 1e-15);
-        assert!((pose.angle - before.angle).abs() <= TURN_RATE_RAD_PER_S * TICK_S + 1e-15);
+        let touched = touch(&pose);
+        correction.bleed(&mut pose, touched.as_ref(), &COUPLING);
+        // the shift, and what the turn about the proxy moves the centre by
+        let most = IN_CONTACT.shift_m_per_s * TICK_S + IN_CONTACT.turn_rad_per_s * TICK_S * 0.2;
+        assert!((pose.position - before.position).norm() <= most);
+        assert!((pose.angle - before.angle).abs() <= IN_CONTACT.turn_rad_per_s * TICK_S + 1e-15);
     }
 
     #[test]

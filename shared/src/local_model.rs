@@ -187,14 +187,7 @@ impl LocalModel {
             self.state.params = self.state.params.blend(&self.target, keep);
         }
         if self.settings.correction == PoseCorrection::MatchedStamps {
-            let touch = self
-                .god
-                .touch_at(&self.state.footprint, &self.state.pose, hip);
-            self.correction.bleed(
-                &mut self.state.pose,
-                touch.as_ref(),
-                &self.settings.coupling,
-            );
+            self.bleed(hip);
         }
         let motion = Motion {
             pose: self.state.pose,
@@ -210,6 +203,27 @@ impl LocalModel {
         self.rendered = self.render(hip, hip_velocity);
         self.advance();
         self.rendered
+    }
+
+    /// One tick of pose correction. Turning about the proxy in contact costs nothing; in free space the
+    /// box may come up to the HIP but not over it.
+    fn bleed(&mut self, hip: Vec2) {
+        let touch = self
+            .god
+            .touch_at(&self.state.footprint, &self.state.pose, hip);
+        self.correction.bleed(
+            &mut self.state.pose,
+            touch.as_ref(),
+            &self.settings.coupling,
+        );
+        if touch.is_none() {
+            let after = self
+                .god
+                .touch_at(&self.state.footprint, &self.state.pose, hip);
+            if let Some(after) = after {
+                self.correction.back_off(&mut self.state.pose, &after);
+            }
+        }
     }
 
     fn hip_velocity(&self, stamp: Time, hip: Vec2) -> Vec2 {

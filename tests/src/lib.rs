@@ -4,3 +4,4 @@
 //! it may be used by the other crates.
 
 pub mod architecture;
+pub mod process;

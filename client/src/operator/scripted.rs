@@ -19,6 +19,11 @@ pub use config::{ScriptedConfig, ScriptedError};
 
 /// A push or an approach that takes longer is given up, s: the box is blocked or not there.
 const GIVE_UP_S: f64 = 10.0;
+/// A hand that pushes into air notices it after this long and approaches again, ticks: between the reflex
+/// (50 ms) and the voluntary reaction to a touch (150 ms).
+const REACTION_TICKS: u32 = 80;
+/// Time from the touch to the full speed of the push, s: a hand loads what it touches before it shoves.
+const PUSH_ONSET_S: f64 = 0.4;
 /// A goal is reached when the wish is this near, m.
 const REACHED_M: f64 = 0.005;
 /// Rate at which a lateral error is steered out, 1/s, and the most speed for it, m/s.
@@ -84,6 +89,8 @@ pub struct Scripted {
     pushes_completed: u64,
     /// Way made along the face's normal in this push, m.
     pushed: f64,
+    /// Ticks without contact in a row.
+    ticks_in_air: u32,
     /// Where the operator wants the HIP, m, and its velocity, m/s.
     wanted: Vec2,
     wanted_velocity: Vec2,
@@ -111,6 +118,7 @@ impl Scripted {
             pushes_begun: 0,
             pushes_completed: 0,
             pushed: 0.0,
+            ticks_in_air: 0,
             wanted: start,
             wanted_velocity: Vec2::zeros(),
             config,
@@ -159,7 +167,12 @@ impl Scripted {
             .step(self.wanted, self.wanted_velocity, force_on_hand);
         self.wanted += self.wanted_velocity * TICK_S;
         self.give_way();
-        if self.phase == Phase::Push {
+        self.ticks_in_air = if self.seen.in_contact {
+            0
+        } else {
+            self.ticks_in_air.saturating_add(1)
+        };
+        if self.phase == Phase::Push && self.seen.in_contact {
             self.pushed += self.wanted_velocity.dot(&self.seen.inward(self.face)) * TICK_S;
         }
         self.ticks_in_phase = self.ticks_in_phase.saturating_add(1);
@@ -182,14 +195,12 @@ impl Scripted {
             Phase::Travel if self.distance_to(self.stand_off()) < REACHED_M => {
                 self.enter(Phase::Approach);
             }
-            Phase::Approach if self.seen.in_contact => {
-                self.pushed = 0.0;
-                self.enter(Phase::Push);
-            }
+            Phase::Approach if self.seen.in_contact => self.enter(Phase::Push),
             Phase::Push if self.pushed >= self.config.push_m => {
                 self.pushes_completed += 1;
                 self.enter(Phase::Hold);
             }
+            Phase::Push if self.ticks_in_air > REACTION_TICKS => self.enter(Phase::Approach),
             Phase::Approach | Phase::Push if late => self.enter(Phase::Retract),
             Phase::Hold if self.seconds_in_phase() >= self.config.hold_s => {
                 self.enter(Phase::Retract);
@@ -201,6 +212,7 @@ impl Scripted {
 
     fn next_push(&mut self) {
         self.pushes_begun += 1;
+        self.pushed = 0.0;
         self.stroke = Stroke::draw(&self.config, self.pushes_begun);
         self.face = self.next_face();
         self.enter(Phase::Travel);
@@ -229,10 +241,18 @@ impl Scripted {
         match self.phase {
             Phase::Travel => self.travel(),
             Phase::Approach => self.forward(config.approach_m_per_s),
-            Phase::Push => self.forward(self.stroke.speed(self.seconds_in_phase()) * self.ease()),
+            Phase::Push => self.forward(self.push_speed() * self.ease()),
             Phase::Hold => Vec2::zeros(),
             Phase::Retract => self.towards(self.retreat()),
         }
+    }
+
+    /// From the approach's speed at the touch up to the stroke's.
+    fn push_speed(&self) -> f64 {
+        let seconds = self.seconds_in_phase();
+        let share = (seconds / PUSH_ONSET_S).min(1.0);
+        let approach = self.config.approach_m_per_s;
+        approach + (self.stroke.speed(seconds) - approach) * share
     }
 
     /// Along the face's inward normal, steered onto the lateral place that was drawn.

@@ -1,17 +1,22 @@
-//! What a world promises.
+//! What a world promises: the job is done over the default network, and a run is a function of its
+//! configuration.
 
 use super::*;
+use mmt_server::playout::PlayoutConfig;
 use mmt_shared::settings::Mode;
-use mmt_shared::wire::Cause;
 
-fn wan() -> LinkConfig {
-    "delay 50ms 5ms loss 1%".parse().unwrap()
+/// The default network: 50 ms ± 5 ms each way, 1 % loss.
+const WAN: &str = "delay 50ms 5ms loss 1%";
+const SEEDS: std::ops::RangeInclusive<u64> = 1..=6;
+
+fn link(words: &str) -> LinkConfig {
+    words.parse().unwrap()
 }
 
-fn over(link: LinkConfig, seed: u64) -> WorldConfig {
+fn over(words: &str, seed: u64) -> WorldConfig {
     WorldConfig {
-        up: link.clone(),
-        down: link,
+        up: link(words),
+        down: link(words),
         ..WorldConfig::default()
     }
     .seeded(seed)
@@ -23,40 +28,208 @@ fn run(config: &WorldConfig, seconds: u64) -> World {
     world
 }
 
-#[test]
-fn probe() {
-    for seed in 1..=6 {
-        for link in [LinkConfig::default(), wan()] {
-            let world = run(&over(link, seed), 20);
-            let (f, o) = (world.force(), world.outcome());
-            let e = world.slave().estimate();
-            println!(
-                "seed {seed} rel {:.3} pmse {:.4} jnd7 {:.3} rate {:.2} pushes {:?} breaks {:.2} pose {:.1} mm peak {:.1} m {:.3} b {:.3} c {:.3} {:?}",
-                f.relative_error.unwrap(),
-                f.pmse.unwrap(),
-                f.jnd7_share.unwrap(),
-                o.updates.rate_hz().unwrap(),
-                world.operator().pushes_completed(),
-                o.breaks
-                    .per_push(world.operator().pushes_completed().unwrap())
-                    .unwrap(),
-                o.pose.position_rms_m().unwrap() * 1e3,
-                o.on_hand.largest_n().unwrap(),
-                e.m,
-                e.b,
-                e.c,
-                o.updates
-                    .by_cause()
-                    .map(|(c, n)| (c.name(), n))
-                    .collect::<Vec<_>>(),
-            );
-        }
+fn relative_error(world: &World) -> f64 {
+    world.force().relative_error.unwrap()
+}
+
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    let middle = values.len() / 2;
+    if values.len() % 2 == 1 {
+        values[middle]
+    } else {
+        values[middle - 1].midpoint(values[middle])
     }
+}
+
+/// Every number that a report is made of.
+fn numbers(world: &World) -> Vec<(&'static str, f64)> {
+    let (force, outcome) = (world.force(), world.outcome());
+    let estimate = world.slave().estimate();
+    let model = world.master().model().state();
+    let age_s = |age: Option<Duration>| age.unwrap().as_secs_f64();
+    let pushes = world.operator().pushes_completed().unwrap();
+    vec![
+        ("pmse", force.pmse.unwrap()),
+        ("pmse_x", force.pmse_x.unwrap()),
+        ("pmse_y", force.pmse_y.unwrap()),
+        ("pmse_magnitude", force.pmse_magnitude.unwrap()),
+        ("relative_error", force.relative_error.unwrap()),
+        ("error_rms_n", force.error_rms_n.unwrap()),
+        ("jnd7_share", force.jnd7_share.unwrap()),
+        ("jnd10_share", force.jnd10_share.unwrap()),
+        ("largest_n", outcome.on_hand.largest_n().unwrap()),
+        ("largest_step_n", outcome.on_hand.largest_step_n().unwrap()),
+        ("rate_hz", outcome.updates.rate_hz().unwrap()),
+        (
+            "contact_rate_hz",
+            outcome.updates.contact_rate_hz().unwrap(),
+        ),
+        ("age mean", age_s(outcome.age.mean())),
+        ("age max", age_s(outcome.age.largest())),
+        ("position_rms_m", outcome.pose.position_rms_m().unwrap()),
+        ("angle_rms_rad", outcome.pose.angle_rms_rad().unwrap()),
+        ("breaks", outcome.breaks.per_push(pushes).unwrap()),
+        ("m", estimate.m),
+        ("b", estimate.b),
+        ("c", estimate.c),
+        ("model x", model.pose.position.x),
+        ("model y", model.pose.position.y),
+        ("model angle", model.pose.angle),
+    ]
+}
+
+#[test]
+fn the_default_network_lets_the_job_be_done() {
+    let mut errors = Vec::new();
+    for seed in SEEDS {
+        let world = run(&over(WAN, seed), 20);
+        for (name, value) in numbers(&world) {
+            assert!(value.is_finite(), "seed {seed}: {name} is {value}");
+        }
+        let pushes = world.operator().pushes_completed().unwrap();
+        assert!(pushes >= 2, "seed {seed}: {pushes} pushes in 20 s");
+        let (start, truth) = (SlaveConfig::default().start.mass_kg, 0.7);
+        let m = world.slave().estimate().m;
+        assert!((start - truth).abs() > 0.4 * truth, "starts wrong");
+        assert!(
+            (m - truth).abs() <= 0.05 * truth,
+            "seed {seed}: m is estimated as {m} kg"
+        );
+        errors.push(relative_error(&world));
+    }
+    let typical = median(errors.clone());
+    assert!(
+        typical <= 0.2,
+        "relative force error {typical:.3}, by seed {errors:.3?}"
+    );
+}
+
+#[test]
+fn without_updates_the_force_error_is_clearly_larger() {
+    let mut silent = over(WAN, 2);
+    silent.slave.trigger.scheme = "timer 60s".parse().unwrap();
+    silent.slave.trigger.mismatch_debounce = Duration::from_secs(60);
+    let (silent, told) = (run(&silent, 20), run(&over(WAN, 2), 20));
+    let news = told.outcome().updates.total();
+    assert!(news > 20, "{news} updates");
+    let (silent, told) = (relative_error(&silent), relative_error(&told));
+    assert!(silent > 1.5 * told, "{silent} without, {told} with");
+}
+
+#[test]
+fn paper_mode_runs_and_renders_worse_forces_than_recommended_mode() {
+    for seed in [1, 2] {
+        let recommended = run(&over(WAN, seed), 20);
+        let mut config = over(WAN, seed);
+        config.slave = SlaveConfig {
+            seed,
+            ..SlaveConfig::of_mode(Mode::Paper)
+        };
+        let paper = run(&config, 20);
+        for (name, value) in numbers(&paper) {
+            assert!(value.is_finite(), "seed {seed}: {name} is {value}");
+        }
+        let (paper, recommended) = (relative_error(&paper), relative_error(&recommended));
+        assert!(
+            paper > recommended,
+            "seed {seed}: paper {paper}, recommended {recommended}"
+        );
+    }
+}
+
+/// Relative error of f_s against the force that the master rendered at the very stamp that the slave
+/// plays, whether or not a sample of that stamp arrived: the report leaves out what was not a sample.
+fn relative_error_at_the_stamps(config: &WorldConfig) -> f64 {
+    let mut world = World::try_new(config).unwrap();
+    let (mut felt, mut error, mut measured) = (Vec::new(), 0.0, 0.0);
+    world.run(Duration::from_secs(20), |tick| {
+        felt.push(tick.master.rendered.force);
+        let Some(slave) = &tick.slave else { return };
+        // the first tick is at one period
+        let place = slave.stamp.saturating_since(Time::ZERO + TICK).as_millis();
+        error += (slave.f_s - felt[place as usize]).norm_squared();
+        measured += slave.f_s.norm_squared();
+    });
+    (error / measured).sqrt()
+}
+
+#[test]
+fn a_play_out_delay_above_the_jitter_takes_the_force_error_of_jitter_away() {
+    let error = |words, playout| {
+        let mut config = over(words, 2);
+        config.slave.playout = playout;
+        config.samples_per_command = 1;
+        relative_error_at_the_stamps(&config)
+    };
+    let newest_held = PlayoutConfig {
+        delay_ms: 0.0,
+        extrapolation_ms: 0.0,
+        ..PlayoutConfig::default()
+    };
+    let buffered = PlayoutConfig::for_packing_and_jitter(1, Duration::from_millis(20));
+    // ±10 ms, in which packets overtake each other
+    let jitter = "delay 50ms 10ms order free";
+    let smooth = error("delay 50ms", newest_held);
+    let (held, played) = (error(jitter, newest_held), error(jitter, buffered));
+    assert!(held > 2.0 * smooth, "{held} with jitter, {smooth} without");
+    assert!(played < 0.5 * held, "{played} played out, {held} held");
 }
 
 #[test]
 fn one_configuration_is_one_run_to_the_bit_and_another_seed_is_another() {
-    let digest = |seed| run(&over(wan(), seed), 5).digest();
+    let digest = |seed| run(&over(WAN, seed), 5).digest();
     assert_eq!(digest(1), digest(1));
     assert_ne!(digest(1), digest(2));
+}
+
+#[test]
+fn every_datagram_that_an_end_sent_was_received_or_lost_or_is_in_flight() {
+    let world = run(&over("delay 50ms 5ms loss 5%", 3), 10);
+    let up = (&world.up, world.master_link.end(), world.slave_link.end());
+    let down = (&world.down, world.slave_link.end(), world.master_link.end());
+    for (path, from, to) in [up, down] {
+        let (sent, received) = (from.traffic(), to.traffic());
+        let counters = path.counters();
+        let lost = counters.dropped.total().packets;
+        assert!(lost > 0 && path.in_flight() > 0, "the law has work to do");
+        assert_eq!(sent.sent.total(), counters.offered.packets);
+        assert_eq!(received.received.total(), path.released().packets);
+        assert_eq!(
+            sent.sent.total(),
+            received.received.total() + lost + path.in_flight() as u64
+        );
+        let refused = received.malformed + received.duplicates + received.too_old;
+        assert_eq!(refused, 0);
+    }
+}
+
+#[test]
+fn loss_on_the_way_up_changes_no_draw_on_the_way_down() {
+    // lost down in the world, lost down by a link of the same seed alone, lost up
+    let lost_down = |up: &str| {
+        let mut config = over(WAN, 4);
+        config.up = link(up);
+        let world = run(&config, 10);
+        let counters = world.down.counters();
+        let most = counters.offered.packets;
+        let mut alone = mmt_netem::Link::try_new(link(WAN), 4, LinkId::DOWN).unwrap();
+        let fates = (0..most).map(|_| alone.offer(Time::ZERO, Default::default()));
+        let expected = fates.filter(|fate| fate.due().is_none()).count() as u64;
+        (
+            counters.dropped.loss.packets,
+            expected,
+            world.up.counters().dropped.loss.packets,
+        )
+    };
+    let (clean, faulty) = (
+        lost_down("delay 50ms 5ms"),
+        lost_down("delay 50ms 5ms loss 20%"),
+    );
+    assert_eq!((clean.2, faulty.2 > 100), (0, true), "loss up is on");
+    assert_eq!(
+        clean.0, clean.1,
+        "down loses the packets that its own seed says"
+    );
+    assert_eq!(faulty.0, faulty.1, "whatever happens on the way up");
 }

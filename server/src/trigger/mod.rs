@@ -13,7 +13,7 @@ pub use scheme::{Scheme, SchemeError};
 
 use std::time::Duration;
 
-use mmt_shared::geometry::{Vec2, wrap_angle};
+use mmt_shared::geometry::Vec2;
 use mmt_shared::params::ModelParams;
 use mmt_shared::settings::Mode;
 use mmt_shared::time::Time;
@@ -74,15 +74,6 @@ impl Default for TriggerConfig {
     }
 }
 
-/// What an update would say.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Candidate {
-    /// Parameters.
-    pub params: ModelParams,
-    /// theta, rad.
-    pub angle: f64,
-}
-
 /// What the trigger is told every sample period.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TriggerInput {
@@ -100,8 +91,10 @@ pub struct TriggerInput {
     pub speed: f64,
     /// Acceleration of the object along the push, m/s².
     pub acceleration: f64,
-    /// What an update would say now.
-    pub candidate: Candidate,
+    /// The parameters that an update would say now.
+    pub params: ModelParams,
+    /// By how much it would turn the shadow, rad.
+    pub turn: f64,
 }
 
 /// Only one side is in contact.
@@ -117,7 +110,7 @@ struct Mismatch {
 pub struct Trigger {
     config: TriggerConfig,
     /// When the last update went out and what it said.
-    last: Option<(Time, Candidate)>,
+    last: Option<(Time, ModelParams)>,
     began: Option<Time>,
     was_in_contact: bool,
     mismatch: Option<Mismatch>,
@@ -143,7 +136,7 @@ impl Trigger {
             .geometry(now, input)
             .or_else(|| self.scheme(now, input));
         if cause.is_some() {
-            self.last = Some((now, input.candidate));
+            self.last = Some((now, input.params));
         }
         cause
     }
@@ -239,11 +232,11 @@ impl Trigger {
         if now < time + USEFUL_GAP {
             return false;
         }
-        let (is, was) = (&input.candidate.params, &sent.params);
+        let (is, was) = (&input.params, &sent);
         let change = (is.m() - was.m()).abs() * input.acceleration.abs()
             + ((is.b() - was.b()) * input.speed.abs() + is.c() - was.c()).abs();
-        let turn = wrap_angle(input.candidate.angle - sent.angle).abs();
-        change > USEFUL_SHARE * input.f_s.norm().max(USEFUL_FLOOR_N) || turn > USEFUL_TURN_RAD
+        change > USEFUL_SHARE * input.f_s.norm().max(USEFUL_FLOOR_N)
+            || input.turn.abs() > USEFUL_TURN_RAD
     }
 }
 

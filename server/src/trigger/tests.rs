@@ -4,12 +4,9 @@ use super::*;
 use mmt_shared::contact::Coupling;
 use mmt_shared::rng::Substream;
 
-fn candidate(m: f64, c: f64, angle: f64) -> Candidate {
+fn params(m: f64, c: f64) -> ModelParams {
     let coupling = Coupling::for_stiffness(1000.0);
-    Candidate {
-        params: ModelParams::of_square(m, 3.0, c, 0.36, &coupling).unwrap(),
-        angle,
-    }
+    ModelParams::of_square(m, 3.0, c, 0.36, &coupling).unwrap()
 }
 
 fn input(f_s: f64, f_m: f64) -> TriggerInput {
@@ -21,7 +18,8 @@ fn input(f_s: f64, f_m: f64) -> TriggerInput {
         sticking: false,
         speed: 0.15,
         acceleration: 0.1,
-        candidate: candidate(0.7, 2.06, 0.0),
+        params: params(0.7, 2.06),
+        turn: 0.0,
     }
 }
 
@@ -189,18 +187,19 @@ fn useful_sends_only_what_would_be_felt_and_not_twice_within_ten_milliseconds() 
         "it would say the same again"
     );
     let changed = TriggerInput {
-        candidate: candidate(0.7, 2.2, 0.0),
+        params: params(0.7, 2.2),
         ..violating
     };
     assert_eq!(trigger.decide(at(21), &changed), Some(Cause::Deadband));
     let again = TriggerInput {
-        candidate: candidate(0.7, 2.4, 0.0),
+        params: params(0.7, 2.4),
         ..violating
     };
     assert_eq!(trigger.decide(at(30), &again), None);
     assert_eq!(trigger.decide(at(31), &again), Some(Cause::Deadband));
     let turned = TriggerInput {
-        candidate: candidate(0.7, 2.4, 0.011),
+        params: params(0.7, 2.4),
+        turn: 0.011,
         ..input(2.0, 2.0)
     };
     assert_eq!(trigger.decide(at(180), &turned), None);

@@ -1,0 +1,115 @@
+//! One haptic tick of the master: what the operator sees, the operator, the model, the limiter, the
+//! sample packed for the slave. Budget 10 µs, no allocation; applying an update is part of a tick.
+
+#![allow(missing_docs, reason = "the criterion macros make undocumented items")]
+#![allow(clippy::unwrap_used, reason = "a bench is a test: it may panic")]
+
+use std::hint::black_box;
+use std::time::Duration;
+
+use criterion::{Criterion, criterion_group, criterion_main};
+use mmt_client::device::DeviceProfile;
+use mmt_client::limiter::ForceLimiter;
+use mmt_client::link::MasterLink;
+use mmt_client::master::Master;
+use mmt_client::operator::Operator;
+use mmt_client::operator::scripted::{Scripted, ScriptedConfig};
+use mmt_shared::geometry::{BoxFootprint, Pose, Twist, Vec2};
+use mmt_shared::params::{ModelParams, ModelState};
+use mmt_shared::settings::Mode;
+use mmt_shared::time::{TICK, Time};
+use mmt_shared::wire::{Cause, DATAGRAM_MAX, Label, Update, Welcome};
+
+/// A master and an operator who pushes its model: no slave is needed for the hand to feel something.
+struct Haptic {
+    master: Master,
+    link: MasterLink,
+    operator: Operator,
+    hand_force: Vec2,
+    now: Time,
+    contact: u64,
+}
+
+impl Haptic {
+    fn new(mode: Mode) -> Self {
+        let device = DeviceProfile::default();
+        let coupling = device.coupling();
+        let params = ModelParams::of_square(0.7, 3.0, 2.06, 0.36, &coupling).unwrap();
+        let footprint = BoxFootprint::square(0.36);
+        let state = ModelState::try_new(params, footprint, Pose::default(), Twist::default());
+        let welcome = Welcome {
+            settings: mode.model_settings(coupling),
+            state: state.unwrap(),
+            scheme: Label::clipped("any"),
+            program: Label::clipped("bench"),
+        };
+        let limiter = ForceLimiter::try_new(device.limits()).unwrap();
+        let master = Master::new(&welcome, limiter);
+        let scripted = Scripted::try_new(ScriptedConfig::default(), master.view()).unwrap();
+        Self {
+            master,
+            link: MasterLink::new(Time::ZERO, coupling, 10),
+            operator: Operator::Scripted(Box::new(scripted)),
+            hand_force: Vec2::zeros(),
+            now: Time::ZERO,
+            contact: 0,
+        }
+    }
+
+    fn tick(&mut self, out: &mut [u8]) -> Option<usize> {
+        self.now += TICK;
+        let elapsed = self.now.saturating_since(Time::ZERO);
+        let view = self.master.view();
+        let reading = self.operator.step(elapsed, &view, self.hand_force);
+        let tick = self.master.tick(self.now, reading, Duration::ZERO);
+        self.hand_force = tick.hand_force;
+        self.contact += u64::from(tick.rendered.in_contact());
+        self.link.send(self.now, tick.sample, out).unwrap()
+    }
+}
+
+/// The modes and their names in the benches.
+const MODES: [(&str, Mode); 2] = [("recommended", Mode::Recommended), ("paper", Mode::Paper)];
+
+fn tick(criterion: &mut Criterion) {
+    let mut out = [0; DATAGRAM_MAX];
+    for (name, mode) in MODES {
+        let mut haptic = Haptic::new(mode);
+        criterion.bench_function(&format!("haptic/tick/{name}"), |bencher| {
+            bencher.iter(|| haptic.tick(black_box(&mut out)));
+        });
+    }
+}
+
+fn apply(criterion: &mut Criterion) {
+    let mut out = [0; DATAGRAM_MAX];
+    for (name, mode) in MODES {
+        let mut haptic = Haptic::new(mode);
+        // long enough for the history to be full, in which the answered sample is searched
+        for _ in 0..10_000 {
+            haptic.tick(&mut out);
+        }
+        assert!(haptic.contact > 0, "nothing was touched");
+        let update = Update {
+            sequence: 1,
+            cause: Cause::Deadband,
+            answers: haptic.now - Duration::from_millis(100),
+            newest_command: 1,
+            slave_in_contact: true,
+            state: *haptic.master.model().state(),
+        };
+        criterion.bench_function(&format!("haptic/apply/{name}"), |bencher| {
+            bencher.iter(|| haptic.master.apply(black_box(&update)));
+        });
+    }
+}
+
+criterion_group! {
+    name = benches;
+    config = Criterion::default()
+        .sample_size(50)
+        .warm_up_time(Duration::from_millis(500))
+        .measurement_time(Duration::from_secs(2));
+    targets = tick, apply
+}
+criterion_main!(benches);

@@ -1,0 +1,294 @@
+//! The command `mmt` as a process: built once, started, watched, and killed when the test is over.
+//!
+//! No call waits without a bound, and no process outlives its guard.
+#![allow(
+    clippy::disallowed_methods,
+    reason = "starts and watches processes, which is what it is for"
+)]
+
+use std::io::{BufRead, BufReader, Read, Write};
+use std::path::PathBuf;
+use std::process::{Child, Command, ExitStatus, Stdio};
+use std::sync::OnceLock;
+use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use rustix::process::{Pid, Signal, kill_process};
+use serde_json::Value;
+use thiserror::Error;
+
+/// How often a process is asked whether it has ended.
+const ASK: Duration = Duration::from_millis(10);
+
+/// Why a process did not do what was asked of it.
+#[derive(Debug, Error)]
+pub enum ProcessError {
+    /// The program could not be built.
+    #[error("`cargo build` of the command failed: {0}")]
+    Build(String),
+    /// It could not be started, asked or signalled.
+    #[error("{what}: {source}")]
+    System {
+        /// What was tried.
+        what: String,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// It did not say or end what it should in time.
+    #[error("{what} within {seconds} s; so far it said:\n{said}")]
+    Late {
+        /// What was waited for.
+        what: String,
+        /// For how long.
+        seconds: f64,
+        /// Its standard output and error.
+        said: String,
+    },
+    /// It ended with another document than one of JSON.
+    #[error("no JSON document ({source}) in:\n{said}")]
+    Document {
+        /// Why.
+        source: serde_json::Error,
+        /// Its standard output and error.
+        said: String,
+    },
+}
+
+/// The program `mmt`, built in the profile of this test on the first call.
+///
+/// # Errors
+/// The build fails.
+pub fn program() -> Result<PathBuf, ProcessError> {
+    static PROGRAM: OnceLock<Result<PathBuf, String>> = OnceLock::new();
+    let built = PROGRAM.get_or_init(build);
+    built.clone().map_err(ProcessError::Build)
+}
+
+/// A test runs in `target/PROFILE/deps`; the program belongs in `target/PROFILE`.
+fn build() -> Result<PathBuf, String> {
+    let test = std::env::current_exe().map_err(|error| error.to_string())?;
+    let out = test
+        .ancestors()
+        .nth(2)
+        .ok_or("a test without a directory")?;
+    let name = out.file_name().and_then(|name| name.to_str());
+    let profile = match name.ok_or("a profile without a name")? {
+        "debug" => "dev",
+        name => name,
+    };
+    let target = out.parent().ok_or("a profile without a directory")?;
+    let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
+    let output = Command::new(cargo)
+        .args(["build", "--locked", "-p", "mmt-cli", "--bin", "mmt"])
+        .args(["--profile", profile, "--target-dir"])
+        .arg(target)
+        .current_dir(crate::architecture::repository::root())
+        .output()
+        .map_err(|error| error.to_string())?;
+    let program = out.join(format!("mmt{}", std::env::consts::EXE_SUFFIX));
+    if output.status.success() && program.is_file() {
+        Ok(program)
+    } else {
+        Err(String::from_utf8_lossy(&output.stderr).into_owned())
+    }
+}
+
+/// A running process whose output is collected; killed when dropped.
+#[derive(Debug)]
+pub struct Running {
+    name: String,
+    child: Child,
+    lines: Receiver<Line>,
+    out: Vec<String>,
+    err: Vec<String>,
+}
+
+#[derive(Debug)]
+enum Line {
+    Out(String),
+    Err(String),
+}
+
+/// A process that has ended.
+#[derive(Debug)]
+pub struct Ended {
+    /// How.
+    pub status: ExitStatus,
+    /// The lines of its standard output.
+    pub out: Vec<String>,
+    /// Its standard error.
+    pub err: String,
+}
+
+impl Ended {
+    /// The one JSON document on standard output, after `skip` lines of other things.
+    ///
+    /// # Errors
+    /// There is none, or something besides it.
+    pub fn document(&self, skip: usize) -> Result<Value, ProcessError> {
+        let lines: Vec<_> = self.out.iter().skip(skip).map(String::as_str).collect();
+        serde_json::from_str(&lines.join("\n")).map_err(|source| ProcessError::Document {
+            source,
+            said: format!("{}\n{}", self.out.join("\n"), self.err),
+        })
+    }
+}
+
+impl Running {
+    /// Starts a command.
+    ///
+    /// # Errors
+    /// The system does not start it.
+    pub fn start(mut command: Command) -> Result<Self, ProcessError> {
+        let name = format!("{command:?}");
+        let mut child = command
+            .stdin(Stdio::null())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .map_err(|source| system(format!("starting {name}"), source))?;
+        let (say, lines) = channel();
+        let (out, err) = (child.stdout.take(), child.stderr.take());
+        let say_err = say.clone();
+        thread::spawn(move || read(out, |line| say.send(Line::Out(line)).is_ok()));
+        thread::spawn(move || read(err, |line| say_err.send(Line::Err(line)).is_ok()));
+        Ok(Self {
+            name,
+            child,
+            lines,
+            out: Vec::new(),
+            err: Vec::new(),
+        })
+    }
+
+    /// Starts `mmt` with arguments.
+    ///
+    /// # Errors
+    /// It cannot be built or started.
+    pub fn mmt(arguments: &[&str]) -> Result<Self, ProcessError> {
+        let mut command = Command::new(program()?);
+        command.args(arguments);
+        Self::start(command)
+    }
+
+    /// Waits for a line on standard output or error that `wanted` accepts, and returns it.
+    ///
+    /// # Errors
+    /// It does not come in time, or the process ends before.
+    pub fn wait_for_line(
+        &mut self,
+        within: Duration,
+        wanted: impl Fn(&str) -> bool,
+    ) -> Result<String, ProcessError> {
+        let said = self.out.iter().chain(&self.err);
+        if let Some(line) = said.into_iter().find(|line| wanted(line)) {
+            return Ok(line.clone());
+        }
+        let end = Instant::now() + within;
+        loop {
+            let left = end.saturating_duration_since(Instant::now());
+            let line = self
+                .take_line(left)
+                .map_err(|_| self.late("did not say", within))?;
+            if wanted(&line) {
+                return Ok(line);
+            }
+        }
+    }
+
+    fn take_line(&mut self, within: Duration) -> Result<String, RecvTimeoutError> {
+        match self.lines.recv_timeout(within)? {
+            Line::Out(line) => {
+                self.out.push(line.clone());
+                Ok(line)
+            }
+            Line::Err(line) => {
+                self.err.push(line.clone());
+                Ok(line)
+            }
+        }
+    }
+
+    /// Presses Ctrl-C.
+    ///
+    /// # Errors
+    /// The process cannot be signalled.
+    pub fn interrupt(&self) -> Result<(), ProcessError> {
+        let pid = i32::try_from(self.child.id()).ok().and_then(Pid::from_raw);
+        let sent = pid.map(|pid| kill_process(pid, Signal::INT));
+        sent.unwrap_or(Ok(()))
+            .map_err(|error| system(format!("interrupting {}", self.name), error.into()))
+    }
+
+    /// Waits for its end.
+    ///
+    /// # Errors
+    /// It does not end in time; it is killed then.
+    pub fn end(mut self, within: Duration) -> Result<Ended, ProcessError> {
+        let end = Instant::now() + within;
+        let status = loop {
+            let asked = self.child.try_wait();
+            match asked.map_err(|source| system(format!("waiting for {}", self.name), source))? {
+                Some(status) => break status,
+                None if Instant::now() >= end => {
+                    while self.take_line(Duration::ZERO).is_ok() {}
+                    return Err(self.late("did not end", within));
+                }
+                None => thread::sleep(ASK),
+            }
+        };
+        // both readers end with the process, unless a child of it lives on
+        while self.take_line(Duration::from_secs(1)).is_ok() {}
+        Ok(Ended {
+            status,
+            out: std::mem::take(&mut self.out),
+            err: self.err.join("\n"),
+        })
+    }
+
+    fn late(&self, what: &str, within: Duration) -> ProcessError {
+        ProcessError::Late {
+            what: format!("{} {what} what it should", self.name),
+            seconds: within.as_secs_f64(),
+            said: [&self.out[..], &self.err[..]].concat().join("\n"),
+        }
+    }
+}
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        // one that has ended cannot be killed, and that is well
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+fn system(what: String, source: std::io::Error) -> ProcessError {
+    ProcessError::System { what, source }
+}
+
+/// Hands over line by line until the end or until nobody listens.
+fn read(from: Option<impl Read>, say: impl Fn(String) -> bool) {
+    let lines = from.map(|from| BufReader::new(from).lines());
+    let mut lines = lines.into_iter().flatten().map_while(Result::ok);
+    let _ = lines.all(say);
+}
+
+/// The number at a path of keys such as `/link/rtt_ms/p50`; none if it is null or not there.
+#[must_use]
+pub fn number(document: &Value, path: &str) -> Option<f64> {
+    document.pointer(path).and_then(Value::as_f64)
+}
+
+/// Says so loudly when a test cannot run here, and fails it where everything must run: where the
+/// environment variable `CI` is set.
+///
+/// # Panics
+/// With `CI`.
+pub fn did_not_run(test: &str, why: &str) {
+    let ci = std::env::var_os("CI").is_some();
+    assert!(!ci, "{test} did not run, and CI must run it: {why}");
+    // not eprintln: the harness keeps that to itself when a test passes
+    let _ = writeln!(std::io::stderr(), "\n**** NOT RUN: {test}: {why} ****\n");
+}

@@ -1,0 +1,315 @@
+//! Slave and master as two processes on two hosts, the relay between them on a third.
+//!
+//! The hosts are network namespaces with addresses of their own, each on one cable to the relay's; there
+//! is no other way between them. Needs root and `ip`: without, it says so, and with `CI` set it fails.
+
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a test may panic")]
+#![allow(
+    clippy::disallowed_methods,
+    reason = "makes hosts and starts processes on them"
+)]
+
+use std::process::{Command, id};
+use std::time::Duration;
+
+use mmt_tests::process::{Ended, Running, did_not_run, number, program};
+use serde_json::Value;
+
+/// How long the master operates, s.
+const SECONDS: u64 = 8;
+/// What the relay does to each direction.
+const LINK: &str = "delay 20ms 2ms loss 1%";
+const LOSS: f64 = 0.01;
+const SLAVE: &str = "10.91.1.2";
+const RELAY_TO_SLAVE: &str = "10.91.1.1";
+const RELAY_TO_MASTER: &str = "10.91.2.1";
+const MASTER: &str = "10.91.2.2";
+/// Ethernet, IPv4 and UDP headers, bytes.
+const HEADERS: f64 = 14.0 + 20.0 + 8.0;
+
+/// Runs `ip`; what it says when it fails.
+fn ip(words: &str) -> Result<(), String> {
+    let output = Command::new("ip").args(words.split(' ')).output();
+    let output = output.map_err(|error| format!("`ip` does not start: {error}"))?;
+    if output.status.success() {
+        return Ok(());
+    }
+    let said = String::from_utf8_lossy(&output.stderr);
+    Err(format!("`ip {words}`: {}", said.trim()))
+}
+
+/// The three hosts; gone when dropped, with the cables between them.
+struct Hosts;
+
+impl Hosts {
+    /// No other test run has a namespace of this name.
+    fn name(host: &str) -> String {
+        format!("mmt-{}-{host}", id())
+    }
+
+    fn try_new() -> Result<Self, String> {
+        let hosts = Self;
+        for host in ["slave", "relay", "master"] {
+            ip(&format!("netns add {}", Self::name(host)))?;
+            ip(&format!("-n {} link set lo up", Self::name(host)))?;
+        }
+        cable("slave", SLAVE, RELAY_TO_SLAVE)?;
+        cable("master", MASTER, RELAY_TO_MASTER)?;
+        Ok(hosts)
+    }
+
+    /// A command that runs on a host.
+    fn on(&self, host: &str, program: &str) -> Command {
+        let mut command = Command::new("ip");
+        command.args(["netns", "exec", &Self::name(host), program]);
+        command
+    }
+
+    /// Starts `mmt` on a host.
+    fn mmt(&self, host: &str, arguments: &[&str]) -> Running {
+        let program = program().unwrap();
+        let mut command = self.on(host, program.to_str().unwrap());
+        command.args(arguments);
+        Running::start(command).unwrap()
+    }
+
+    /// What the cable's end at a host counted itself.
+    fn counted(&self, host: &str) -> Cable {
+        let read = |name: &str| {
+            let mut command = self.on(host, "cat");
+            command.arg(format!("/sys/class/net/cable/statistics/{name}"));
+            let output = command.output().unwrap();
+            let text = String::from_utf8(output.stdout).unwrap();
+            text.trim().parse().unwrap()
+        };
+        Cable {
+            sent: read("tx_packets"),
+            sent_bytes: read("tx_bytes"),
+            received: read("rx_packets"),
+            received_bytes: read("rx_bytes"),
+        }
+    }
+}
+
+impl Drop for Hosts {
+    fn drop(&mut self) {
+        for host in ["slave", "relay", "master"] {
+            // one that was never made cannot be removed
+            let _ = ip(&format!("netns del {}", Self::name(host)));
+        }
+    }
+}
+
+/// A cable from a host to the relay, with an address at each end.
+fn cable(host: &str, address: &str, relay_address: &str) -> Result<(), String> {
+    let (near, far, end) = (
+        Hosts::name(host),
+        Hosts::name("relay"),
+        format!("to-{host}"),
+    );
+    ip(&format!(
+        "-n {near} link add cable type veth peer name {end} netns {far}"
+    ))?;
+    for (space, device, address) in [(&near, "cable", address), (&far, &end[..], relay_address)] {
+        // without addresses of IPv6 nothing but ARP and ours is on the cable
+        ip(&format!("-n {space} link set {device} addrgenmode none"))?;
+        ip(&format!("-n {space} address add {address}/24 dev {device}"))?;
+        ip(&format!("-n {space} link set {device} up"))?;
+    }
+    Ok(())
+}
+
+/// Counters of one end of a cable.
+#[derive(Clone, Copy, Debug)]
+struct Cable {
+    sent: f64,
+    sent_bytes: f64,
+    received: f64,
+    received_bytes: f64,
+}
+
+fn get(report: &Value, path: &str) -> f64 {
+    let found = number(report, path);
+    found.unwrap_or_else(|| panic!("{path} is {:?}", report.pointer(path)))
+}
+
+/// One session of both hosts through the relay: their reports and what their cables counted.
+struct Session {
+    slave: Value,
+    master: Value,
+    slave_cable: Cable,
+    master_cable: Cable,
+}
+
+/// A process that ended well.
+fn well(ended: Result<Ended, mmt_tests::process::ProcessError>) -> Ended {
+    let ended = ended.unwrap_or_else(|error| panic!("{error}"));
+    assert_eq!(ended.status.code(), Some(0), "{}", ended.err);
+    ended
+}
+
+fn session(hosts: &Hosts) -> Session {
+    let soon = Duration::from_secs(10);
+    let listen = format!("{SLAVE}:4433");
+    let mut slave = hosts.mmt("slave", &["slave", "--listen", &listen, "--once", "--json"]);
+    let pairing = slave.wait_for_line(soon, |line| line.starts_with("mmt://"));
+    let pairing = pairing.unwrap_or_else(|error| panic!("{error}"));
+    let near = format!("{RELAY_TO_MASTER}:4434");
+    let relay = hosts.mmt(
+        "relay",
+        &[
+            "netem", "--listen", &near, "--to", &listen, "--up", LINK, "--down", LINK,
+        ],
+    );
+    assert!(pairing.contains(&listen), "{pairing} names {listen}");
+    let through_relay = pairing.replace(&listen, &near);
+    let duration = format!("{SECONDS}s");
+    let master = hosts.mmt(
+        "master",
+        &["master", &through_relay, "--duration", &duration, "--json"],
+    );
+    let master = well(master.end(Duration::from_secs(SECONDS) + soon));
+    let slave = well(slave.end(soon));
+    let session = Session {
+        slave: slave.document(1).unwrap(),
+        master: master.document(0).unwrap(),
+        slave_cable: hosts.counted("slave"),
+        master_cable: hosts.counted("master"),
+    };
+    relay.interrupt().unwrap();
+    well(relay.end(soon));
+    session
+}
+
+#[test]
+fn two_hosts_report_the_same_session_and_agree_with_their_cables() {
+    let test = "two_hosts";
+    if !rustix::process::geteuid().is_root() {
+        return did_not_run(test, "it needs root to make network namespaces");
+    }
+    let hosts = match Hosts::try_new() {
+        Ok(hosts) => hosts,
+        Err(why) => return did_not_run(test, &why),
+    };
+    let session = session(&hosts);
+    the_job_was_done(&session);
+    what_one_side_counted_the_other_reports(&session);
+    what_was_sent_was_received_or_lost(&session);
+    the_cables_counted_the_same(&session);
+}
+
+fn the_job_was_done(session: &Session) {
+    for report in [&session.slave, &session.master] {
+        let ending = report.pointer("/ending").and_then(Value::as_str);
+        assert_eq!(ending, Some("finished"));
+        let duration = get(report, "/duration_s");
+        assert!((duration - SECONDS as f64).abs() < 1.0, "{duration} s");
+        assert!(get(report, "/updates/sent") > 0.0);
+        // 20 ms ± 2 ms each way; the histogram's classes are a percent wide
+        let round_trip = get(report, "/link/rtt_ms/p50");
+        assert!((39.5..100.0).contains(&round_trip), "{round_trip} ms");
+    }
+    let (ticks, skipped) = (
+        get(&session.master, "/haptic_loop/ticks"),
+        get(&session.master, "/haptic_loop/skipped"),
+    );
+    let all = ticks + skipped;
+    assert!(
+        (all / (SECONDS as f64 * 1e3) - 1.0).abs() < 0.1,
+        "{all} ticks"
+    );
+}
+
+fn what_one_side_counted_the_other_reports(session: &Session) {
+    let both = |path: &str| (get(&session.slave, path), get(&session.master, path));
+    for path in [
+        "/updates/sent",
+        "/updates/by_cause/deadband",
+        "/updates/by_cause/timer",
+        "/force/samples",
+        "/force/contact_samples",
+        "/force/pmse",
+        "/force/pmse_magnitude",
+        "/force/relative_error",
+        "/force/error_rms_n",
+        "/force/jnd7_share",
+        "/model/mass_kg/estimate",
+        "/model/mass_kg/truth",
+    ] {
+        let (slave, master) = both(path);
+        assert_eq!(slave, master, "{path}");
+    }
+    let (sent, _) = both("/updates/sent");
+    let applied = get(&session.master, "/updates/applied");
+    assert!(0.0 < applied && applied <= sent, "{applied} of {sent}");
+}
+
+/// Whether `lost` of `sent` is what chance makes of the link's loss, but for once in 50 000 runs.
+fn is_by_chance(lost: f64, sent: f64) -> bool {
+    let (mean, deviation) = (LOSS * sent, (LOSS * (1.0 - LOSS) * sent).sqrt());
+    (lost - mean).abs() <= 4.3 * deviation + 1.0
+}
+
+fn what_was_sent_was_received_or_lost(session: &Session) {
+    let sides = [
+        ("up", &session.master, &session.slave),
+        ("down", &session.slave, &session.master),
+    ];
+    for (way, from, to) in sides {
+        let sent = get(from, &format!("/wire/{way}/datagrams"));
+        let received = get(to, &format!("/wire/{way}/datagrams"));
+        assert!(sent > 20.0 * SECONDS as f64, "{way}: {sent} datagrams");
+        assert!(sent >= received, "{way}: {sent} sent, {received} received");
+        assert!(
+            is_by_chance(sent - received, sent),
+            "{way}: {received} of {sent}"
+        );
+        // by the numbers of the application's own datagrams
+        for report in [from, to] {
+            let share = get(report, &format!("/link/loss_{way}"));
+            assert!(is_by_chance(share * sent, sent), "{way}: loss {share}");
+        }
+    }
+}
+
+fn the_cables_counted_the_same(session: &Session) {
+    let of = |report, way: &str| {
+        let datagrams = get(report, &format!("/wire/{way}/datagrams"));
+        let bytes = get(report, &format!("/wire/{way}/bytes"));
+        (datagrams, bytes + HEADERS * datagrams)
+    };
+    let (slave, master) = (session.slave_cable, session.master_cable);
+    let pairs = [
+        (
+            "slave, down",
+            of(&session.slave, "down"),
+            (slave.sent, slave.sent_bytes),
+        ),
+        (
+            "slave, up",
+            of(&session.slave, "up"),
+            (slave.received, slave.received_bytes),
+        ),
+        (
+            "master, up",
+            of(&session.master, "up"),
+            (master.sent, master.sent_bytes),
+        ),
+        (
+            "master, down",
+            of(&session.master, "down"),
+            (master.received, master.received_bytes),
+        ),
+    ];
+    for (end, (datagrams, bytes), (packets, octets)) in pairs {
+        // beside the session there is ARP, and the farewell's last words after the count
+        assert!(
+            datagrams <= packets && packets <= datagrams * 1.01 + 10.0,
+            "{end}: the socket counted {datagrams} datagrams, the cable {packets}"
+        );
+        assert!(
+            bytes <= octets && octets <= bytes * 1.01 + 4000.0,
+            "{end}: the socket counted {bytes} bytes with headers, the cable {octets}"
+        );
+    }
+}
