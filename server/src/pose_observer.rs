@@ -358,3 +358,6 @@ impl PoseObserver {
             .any(|(other, count)| other == face && *count > 0)
     }
 }
+
+#[cfg(test)]
+mod tests;

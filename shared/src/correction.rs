@@ -237,7 +237,7 @@ mod tests {
         let depth = |pose: &Pose| touch(pose).unwrap().penetration;
         let (mut correction, mut pose) = (aimed(towards, 0.0), Pose::default());
         let start = depth(&pose);
-        bleed(&mut correction, &mut pose, 2000);
+        bleed(&mut correction, &mut pose, 6000);
         assert!(
             (depth(&pose) - start).abs() < 1e-12,
             "no energy without payment"
@@ -249,7 +249,7 @@ mod tests {
 
         correction.tank.fill(1.0);
         let full = correction.tank.level_j();
-        bleed(&mut correction, &mut pose, 2000);
+        bleed(&mut correction, &mut pose, 6000);
         let gained = COUPLING.energy(depth(&pose)) - COUPLING.energy(start);
         assert!(depth(&pose) > start + 0.0019);
         assert!(

@@ -1,0 +1,141 @@
+//! What the pose observer promises.
+
+use super::*;
+use mmt_shared::time::TICK;
+
+const COUPLING: Coupling = Coupling {
+    stiffness_n_per_m: 1000.0,
+    damping_ns_per_m: 10.0,
+};
+/// The box as it really is: 0.36 m wide, pushed in x at its west face.
+const HALF: f64 = 0.18;
+
+fn observer(learn: bool) -> PoseObserver {
+    let config = ObserverConfig {
+        coupling: COUPLING,
+        force_noise_n: 0.01,
+        vision_noise_m: 1e-3,
+        vision_noise_rad: 5e-3,
+        learn,
+    };
+    PoseObserver::new(config, Pose::default(), BoxFootprint::square(0.40))
+}
+
+fn params() -> ModelParams {
+    ModelParams::of_square(0.7, 3.0, 2.06, 0.36, &COUPLING).unwrap()
+}
+
+/// Pushes the real box at 0.1 m/s for so many ticks; vision looks every 33 ms. Returns its true pose.
+fn push(observer: &mut PoseObserver, ticks: u32, angle: f64) -> Pose {
+    let force = rotate(angle, Vec2::new(2.36, 0.0));
+    let mut truth = Pose::new(0.0, 0.0, angle);
+    for n in 1..=ticks {
+        truth.position = rotate(angle, Vec2::new(1e-4 * f64::from(n), 0.0));
+        let surface = truth.point_to_world(Vec2::new(-HALF, 0.0));
+        let tool = surface + force / COUPLING.stiffness_n_per_m;
+        let now = Time::ZERO + TICK * n;
+        observer.step(now, tool, force, true, &params());
+        if n % 33 == 0 {
+            observer.see(&VisionSample {
+                taken: now,
+                pose: truth,
+            });
+        }
+    }
+    truth
+}
+
+#[test]
+fn touch_and_vision_teach_the_offset_of_a_face_and_the_others_guess_by_it() {
+    let mut observer = observer(true);
+    let truth = push(&mut observer, 1000, 0.0);
+    let footprint = observer.footprint();
+    assert!((footprint.west - HALF).abs() < 1e-4, "{footprint:?}");
+    assert_eq!(
+        footprint.north, footprint.west,
+        "the first face is the best guess for the others"
+    );
+    assert!((observer.pose().position - truth.position).norm() < 3e-4);
+    assert!((observer.twist().linear.x - 0.1).abs() < 0.01);
+}
+
+#[test]
+fn the_paper_keeps_its_side_and_finds_the_plane_of_the_face() {
+    let mut observer = observer(false);
+    let truth = push(&mut observer, 1000, 0.0);
+    assert_eq!(observer.footprint(), BoxFootprint::square(0.40));
+    // the plane of the face is right, so the centre is 2 cm too far
+    assert!((observer.pose().position.x - truth.position.x - 0.02).abs() < 2e-4);
+}
+
+#[test]
+fn the_direction_of_the_force_gives_theta() {
+    let mut observer = observer(true);
+    push(&mut observer, 300, 0.1);
+    assert!(
+        (observer.pose().angle - 0.1).abs() < 2e-3,
+        "{}",
+        observer.pose().angle
+    );
+}
+
+#[test]
+fn an_unknown_face_is_carved_in_growing_steps_and_a_known_one_stays() {
+    let mut unknown = observer(true);
+    let mut depths = Vec::new();
+    for _ in 0..3 {
+        let face = -unknown.footprint().west;
+        unknown.carve(Vec2::new(face + 1e-3, 0.0), Face::West);
+        depths.push(-face - unknown.footprint().west);
+    }
+    assert!((depths[0] - 2e-3).abs() < 1e-12 && depths[1] > depths[0] && depths[2] > depths[1]);
+    assert_eq!(unknown.pose(), Pose::default());
+
+    let mut known = observer(true);
+    let truth = push(&mut known, 1000, 0.0);
+    let footprint = known.footprint();
+    let inside = truth.position + Vec2::new(-HALF + 2e-3, 0.0);
+    known.carve(inside, Face::West);
+    assert_eq!(known.footprint(), footprint);
+    assert!(
+        known.pose().position.x > truth.position.x + 2e-3,
+        "the box is further away"
+    );
+}
+
+#[test]
+fn a_box_that_is_let_go_coasts_as_far_as_friction_allows() {
+    let mut observer = observer(true);
+    push(&mut observer, 1000, 0.0);
+    let let_go = observer.pose().position.x;
+    for n in 1001..=1200u32 {
+        observer.step(
+            Time::ZERO + TICK * n,
+            Vec2::zeros(),
+            Vec2::zeros(),
+            false,
+            &params(),
+        );
+    }
+    // v²/(2 c/m) for v = 0.1, less for the damping
+    let coasted = observer.pose().position.x - let_go;
+    let most = 0.1 * 0.1 / (2.0 * 2.06 / 0.7);
+    assert!(
+        coasted > 0.7 * most && coasted < 1.2 * most,
+        "{coasted} of {most}"
+    );
+    assert_eq!(observer.twist(), Twist::default());
+    assert!(observer.touching().is_none());
+}
+
+#[test]
+fn late_vision_is_held_against_the_pose_of_then() {
+    let mut observer = observer(true);
+    push(&mut observer, 1000, 0.0);
+    let before = observer.pose();
+    // an image of 50 ms ago, delivered now: the box has moved 5 mm since
+    let taken = Time::ZERO + TICK * 950;
+    let pose = Pose::new(0.095, 0.0, 0.0);
+    observer.see(&VisionSample { taken, pose });
+    assert!((observer.pose().position - before.position).norm() < 2e-4);
+}
