@@ -27,7 +27,11 @@ pub(crate) fn slave_config(
     };
     let text = read_text(path, "the configuration")?;
     parse(&text, mode).map_err(|error| {
-        let what = format!("the configuration {}: {}", path.display(), error.to_string().trim_end());
+        let what = format!(
+            "the configuration {}: {}",
+            path.display(),
+            error.to_string().trim_end()
+        );
         Failure::usage(what).remedy("correct that line; docs/commands.md lists every key")
     })
 }
@@ -49,7 +53,9 @@ fn parse(text: &str, mode: Option<Mode>) -> Result<SlaveConfig, toml::de::Error>
 fn lay_over(whole: &mut Table, given: Table) {
     for (key, value) in given {
         match (whole.get_mut(&key), value) {
-            (Some(Value::Table(inner)), Value::Table(given)) if !CHOICES.contains(&key.as_str()) => {
+            (Some(Value::Table(inner)), Value::Table(given))
+                if !CHOICES.contains(&key.as_str()) =>
+            {
                 lay_over(inner, given);
             }
             (_, value) => {
@@ -70,23 +76,33 @@ mod tests {
         assert_eq!(parse("", None), Ok(SlaveConfig::default()));
         let paper = SlaveConfig::of_mode(Mode::Paper);
         assert_eq!(parse("mode = \"paper\"", None), Ok(paper.clone()));
-        assert_eq!(parse("mode = \"recommended\"", Some(Mode::Paper)), Ok(paper));
+        assert_eq!(
+            parse("mode = \"recommended\"", Some(Mode::Paper)),
+            Ok(paper)
+        );
     }
 
     #[test]
     fn what_a_table_leaves_out_is_the_modes() {
-        let text = "mode = \"paper\"\n[trigger]\nforce_floor_n = 0.1\n[environment]\nmass_kg = 1.5\n";
+        let text =
+            "mode = \"paper\"\n[trigger]\nforce_floor_n = 0.1\n[environment]\nmass_kg = 1.5\n";
         let config = parse(text, None).unwrap();
         assert_eq!(config.environment.mass_kg, 1.5);
         let paper = TriggerConfig::of_mode(Mode::Paper);
-        let expected = TriggerConfig { force_floor_n: 0.1, ..paper };
+        let expected = TriggerConfig {
+            force_floor_n: 0.1,
+            ..paper
+        };
         assert_eq!(config.trigger, expected);
     }
 
     #[test]
     fn a_scheme_is_taken_whole() {
         let text = "[trigger.scheme]\nname = \"deadband\"\ndelta = 0.05\n";
-        assert_eq!(parse(text, None).unwrap().trigger.scheme, Scheme::Deadband { delta: 0.05 });
+        assert_eq!(
+            parse(text, None).unwrap().trigger.scheme,
+            Scheme::Deadband { delta: 0.05 }
+        );
     }
 
     #[test]
@@ -94,7 +110,10 @@ mod tests {
         let error = parse("seed = 1\n[environment]\nmas_kg = 1.0\n", None).unwrap_err();
         let text = error.to_string();
         assert!(text.contains("line 3") && text.contains("^^^^^^"), "{text}");
-        assert!(text.contains("mas_kg") && text.contains("mass_kg"), "{text}");
+        assert!(
+            text.contains("mas_kg") && text.contains("mass_kg"),
+            "{text}"
+        );
     }
 
     #[test]

@@ -31,10 +31,10 @@ pub(crate) fn print_json(document: &impl Serialize) -> Result<(), Failure> {
 
 fn print_to(out: &mut impl Write, data: impl Display) -> Result<(), Failure> {
     match writeln!(out, "{data}").and_then(|()| out.flush()) {
-        Err(error) if error.kind() != ErrorKind::BrokenPipe => Err(Failure::failed(format!(
-            "cannot write to stdout: {error}"
-        ))
-        .remedy("check where stdout goes: is the disk full?")),
+        Err(error) if error.kind() != ErrorKind::BrokenPipe => {
+            Err(Failure::failed(format!("cannot write to stdout: {error}"))
+                .remedy("check where stdout goes: is the disk full?"))
+        }
         _ => Ok(()),
     }
 }

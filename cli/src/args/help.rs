@@ -1,8 +1,7 @@
 //! The prose and the examples of `--help`.
 
 /// One line on the whole.
-pub(super) const ABOUT: &str =
-    "Model-mediated teleoperation: feel a box that stands far away without the network in your hand";
+pub(super) const ABOUT: &str = "Model-mediated teleoperation: feel a box that stands far away without the network in your hand";
 
 /// Below the list of commands.
 pub(super) const AFTER: &str = "\

@@ -53,31 +53,75 @@ fn a_duration_has_a_unit_and_a_range() {
 fn a_wrong_word_of_a_network_has_a_caret_below_it() {
     let text = complaint(&["demo", "--netem", "delay 50ms los 1%"]);
     let lines: Vec<&str> = text.lines().collect();
-    let at = lines.iter().position(|line| line.trim() == "delay 50ms los 1%");
+    let at = lines
+        .iter()
+        .position(|line| line.trim() == "delay 50ms los 1%");
     let caret = lines[at.unwrap() + 1];
     assert_eq!(caret, format!("    {}^^^", " ".repeat(11)), "{text}");
-    assert!(text.contains("--netem") && text.contains("write it as"), "{text}");
+    assert!(
+        text.contains("--netem") && text.contains("write it as"),
+        "{text}"
+    );
 }
 
 #[test]
 fn every_wrong_value_is_answered_with_its_option_and_what_would_be_right() {
     for (words, option, right) in [
-        (&["slave", "--listen", "4433"][..], "--listen", "0.0.0.0:4433"),
-        (&["slave", "--listen", "[::]:1", "--advertise", "a b"], "--advertise", "host name"),
-        (&["slave", "--listen", "[::]:1", "--scheme", "hybrid 10%"], "--scheme", "hybrid 10% 150ms"),
-        (&["slave", "--listen", "[::]:1", "--mode", "best"], "--mode", "recommended"),
+        (
+            &["slave", "--listen", "4433"][..],
+            "--listen",
+            "0.0.0.0:4433",
+        ),
+        (
+            &["slave", "--listen", "[::]:1", "--advertise", "a b"],
+            "--advertise",
+            "host name",
+        ),
+        (
+            &["slave", "--listen", "[::]:1", "--scheme", "hybrid 10%"],
+            "--scheme",
+            "hybrid 10% 150ms",
+        ),
+        (
+            &["slave", "--listen", "[::]:1", "--mode", "best"],
+            "--mode",
+            "recommended",
+        ),
         (&["slave"], "--listen", "required"),
-        (&["master", "x", "--operator", "trace:"], "--operator", "trace:FILE"),
-        (&["master", "x", "--device", "phantom"], "--device", "falcon"),
-        (&["master", "x", "--samples-per-command", "33"], "--samples-per-command", "1..=32"),
+        (
+            &["master", "x", "--operator", "trace:"],
+            "--operator",
+            "trace:FILE",
+        ),
+        (
+            &["master", "x", "--device", "phantom"],
+            "--device",
+            "falcon",
+        ),
+        (
+            &["master", "x", "--samples-per-command", "33"],
+            "--samples-per-command",
+            "1..=32",
+        ),
         (&["master", "x", "--duration", "20"], "--duration", "20s"),
-        (&["netem", "--listen", "[::]:1", "--to", "host"], "--to", "HOST:PORT"),
+        (
+            &["netem", "--listen", "[::]:1", "--to", "host"],
+            "--to",
+            "HOST:PORT",
+        ),
         (&["replay", "f", "--deadband", "10"], "--deadband", "10%"),
-        (&["replay", "f", "--t-update", "soon"], "--t-update", "150ms"),
+        (
+            &["replay", "f", "--t-update", "soon"],
+            "--t-update",
+            "150ms",
+        ),
         (&["replay"], "FILE", "required"),
     ] {
         let text = complaint(words);
-        assert!(text.contains(option) && text.contains(right), "{words:?}: {text}");
+        assert!(
+            text.contains(option) && text.contains(right),
+            "{words:?}: {text}"
+        );
     }
 }
 
@@ -93,7 +137,10 @@ fn the_pairing_string_is_not_in_what_is_shown_of_the_arguments() {
 #[test]
 fn a_period_may_be_none_and_a_deadband_is_a_share() {
     assert_eq!(values::period("none"), Ok(Period(None)));
-    assert_eq!(values::period("1s"), Ok(Period(Some(Duration::from_secs(1)))));
+    assert_eq!(
+        values::period("1s"),
+        Ok(Period(Some(Duration::from_secs(1))))
+    );
     assert_eq!(values::deadband("2.5%"), Ok(0.025));
     assert!(values::deadband("10% 5").is_err() && values::period("1ms 2").is_err());
 }

@@ -76,9 +76,7 @@ pub(super) fn duration(text: &str) -> Result<Duration, String> {
     let digits = text.trim_end_matches(|c: char| c.is_ascii_alphabetic());
     let unit = text.strip_prefix(digits).unwrap_or_default();
     let factor = UNITS.iter().find(|(name, _)| *name == unit);
-    let plain = digits
-        .chars()
-        .all(|c| c.is_ascii_digit() || c == '.');
+    let plain = digits.chars().all(|c| c.is_ascii_digit() || c == '.');
     let number = digits.parse::<f64>().ok().filter(|_| plain);
     let (number, (_, factor)) = number.zip(factor).ok_or_else(wrong)?;
     let time = Duration::try_from_secs_f64(number * factor * 1e-3).map_err(|_| wrong())?;
@@ -98,9 +96,10 @@ pub(super) fn netem(text: &str) -> Result<LinkConfig, String> {
 
 /// An update scheme in its words.
 pub(super) fn scheme(text: &str) -> Result<Scheme, String> {
-    text.parse().map_err(|error: mmt_server::trigger::SchemeError| {
-        format!("{error}; write it as \"hybrid 10% 150ms\"")
-    })
+    text.parse()
+        .map_err(|error: mmt_server::trigger::SchemeError| {
+            format!("{error}; write it as \"hybrid 10% 150ms\"")
+        })
 }
 
 /// Delta of (12) in per cent.
@@ -133,7 +132,8 @@ pub(super) fn listen(text: &str) -> Result<SocketAddr, String> {
 
 /// A host and a port to send to.
 pub(super) fn address(text: &str) -> Result<Address, String> {
-    text.parse().map_err(|error: AddressError| error.to_string())
+    text.parse()
+        .map_err(|error: AddressError| error.to_string())
 }
 
 /// A host without a port.

@@ -49,9 +49,11 @@ pub(crate) fn run(arguments: DemoArguments, messages: &Messages) -> Result<(), F
     let mut viewer = Viewer::new(caption, !arguments.json, messages, &stop);
     let mut master_ended = None;
     while master.is_running() || slave.is_running() {
+        // looked at first: a borrow that lives through the viewer's wait would stop the master's task
+        let master_now = *master_live.borrow();
         viewer.look(Snapshot {
             slave: Some(started.live.get()).filter(|slave| slave.connected),
-            master: Some(*master_live.borrow()),
+            master: Some(master_now),
         });
         if !master.is_running() {
             let since = *master_ended.get_or_insert_with(Instant::now);

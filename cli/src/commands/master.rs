@@ -44,7 +44,10 @@ pub(crate) fn run(arguments: MasterArguments, messages: &Messages) -> Result<(),
     let mut viewer = Viewer::new(caption, !arguments.json, messages, &stop);
     while host.is_running() {
         let master = Some(*live.borrow());
-        viewer.look(Snapshot { slave: None, master });
+        viewer.look(Snapshot {
+            slave: None,
+            master,
+        });
     }
     drop(viewer);
     let report = host.join()?;
@@ -62,7 +65,10 @@ type Started = (Host<MasterReport>, watch::Receiver<MasterLive>);
 ///
 /// # Errors
 /// No thread; what the host fails of is told when it is joined.
-pub(super) fn start(options: MasterOptions, stop: watch::Receiver<bool>) -> Result<Started, Failure> {
+pub(super) fn start(
+    options: MasterOptions,
+    stop: watch::Receiver<bool>,
+) -> Result<Started, Failure> {
     let (live, looks) = watch::channel(MasterLive::default());
     let work = async move { mmt_client::io::run(options, stop, live).await };
     let host = spawn("master", |runtime| {
@@ -109,7 +115,8 @@ fn pairing(words: &PairingWords) -> Result<Pairing, Failure> {
         text => text,
     };
     // The error holds nothing of the secret.
-    text.parse().map_err(|error| Failure::usage(format!("PAIRING: {error}")))
+    text.parse()
+        .map_err(|error| Failure::usage(format!("PAIRING: {error}")))
 }
 
 fn operator(arguments: &MasterArguments) -> Result<OperatorChoice, Failure> {
@@ -131,10 +138,14 @@ fn operator(arguments: &MasterArguments) -> Result<OperatorChoice, Failure> {
 
 fn trace(path: &Path, push: Option<usize>) -> Result<Trace, Failure> {
     let text = read_text(path, "the trace")?;
-    let is_csv = path.extension().is_some_and(|end| end.eq_ignore_ascii_case("csv"));
+    let is_csv = path
+        .extension()
+        .is_some_and(|end| end.eq_ignore_ascii_case("csv"));
     if is_csv && push.is_some() {
-        return Err(Failure::usage("--push: a .csv trace has no pushes to choose from")
-            .remedy("leave --push out"));
+        return Err(
+            Failure::usage("--push: a .csv trace has no pushes to choose from")
+                .remedy("leave --push out"),
+        );
     }
     let trace = match is_csv {
         true => Trace::from_csv(&text),
@@ -206,7 +217,15 @@ mod tests {
     #[test]
     fn the_options_say_what_the_arguments_said() {
         let pairing = pairing_string();
-        let words = [&pairing, "--device", "falcon", "--stiffness", "2000", "--seed", "7"];
+        let words = [
+            &pairing,
+            "--device",
+            "falcon",
+            "--stiffness",
+            "2000",
+            "--seed",
+            "7",
+        ];
         let options = options(&arguments(&words)).unwrap();
         assert_eq!(options.pairing.to_string(), pairing);
         assert_eq!(options.device.stiffness_n_per_m(), 2000.0);
@@ -233,20 +252,36 @@ mod tests {
     fn each_wrong_input_is_named_with_what_to_do() {
         let pairing = pairing_string();
         let cut = complaint(&[&pairing[..60]]);
-        assert!(cut.contains("PAIRING") && cut.contains("copy the whole line"), "{cut}");
+        assert!(
+            cut.contains("PAIRING") && cut.contains("copy the whole line"),
+            "{cut}"
+        );
         let soft = complaint(&[&pairing, "--stiffness", "1e9"]);
-        assert!(soft.contains("--stiffness") && soft.contains("3000"), "{soft}");
+        assert!(
+            soft.contains("--stiffness") && soft.contains("3000"),
+            "{soft}"
+        );
         let lone = complaint(&[&pairing, "--push", "1"]);
-        assert!(lone.contains("--push") && lone.contains("what to do"), "{lone}");
+        assert!(
+            lone.contains("--push") && lone.contains("what to do"),
+            "{lone}"
+        );
         let none = complaint(&[&pairing, "--operator", "trace:no-such.csv"]);
-        assert!(none.contains("no-such.csv") && none.contains("check the path"), "{none}");
+        assert!(
+            none.contains("no-such.csv") && none.contains("check the path"),
+            "{none}"
+        );
     }
 
     #[test]
     fn a_session_that_broke_is_a_failure_and_one_that_was_ended_is_not() {
         assert!(judge(Some(SessionEnd::LinkSilent)).is_err());
         assert!(judge(Some(SessionEnd::SlaveEnded(Ending::Failed))).is_err());
-        for fine in [None, Some(SessionEnd::Stopped), Some(SessionEnd::DurationOver)] {
+        for fine in [
+            None,
+            Some(SessionEnd::Stopped),
+            Some(SessionEnd::DurationOver),
+        ] {
             assert_eq!(judge(fine), Ok(()));
         }
     }
@@ -254,7 +289,10 @@ mod tests {
     #[test]
     fn a_refusal_and_silence_have_exit_codes_of_their_own() {
         let address = std::net::SocketAddr::from(([127, 0, 0, 1], 1));
-        assert_eq!(host_failure(&MasterHostError::Busy { address }).exit(), Exit::Refused);
+        assert_eq!(
+            host_failure(&MasterHostError::Busy { address }).exit(),
+            Exit::Refused
+        );
         let limit = std::time::Duration::from_secs(5);
         let silent = MasterHostError::from(ConnectError::NoAnswer { address, limit });
         assert_eq!(host_failure(&silent).exit(), Exit::NoAnswer);

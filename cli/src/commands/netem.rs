@@ -61,7 +61,11 @@ pub(crate) fn run(arguments: &NetemArguments) -> Result<(), Failure> {
     let began = Instant::now();
     wait(&relay, &stop, arguments.duration);
     let duration_s = began.elapsed().as_secs_f64();
-    let ending = if stop.asked() { "interrupted" } else { "finished" };
+    let ending = if stop.asked() {
+        "interrupted"
+    } else {
+        "finished"
+    };
     let report = NetemReport {
         version: env!("CARGO_PKG_VERSION"),
         command: "netem",
@@ -110,8 +114,9 @@ fn start_error(error: RelayError) -> Failure {
     match &error {
         RelayError::Listen { .. } => Failure::new(Exit::Address, &error)
             .remedy("give another --listen address, or port 0 for any free port"),
-        RelayError::Target { .. } | RelayError::Loop { .. } => Failure::usage(&error)
-            .remedy("give --to the address that the slave listens on"),
+        RelayError::Target { .. } | RelayError::Loop { .. } => {
+            Failure::usage(&error).remedy("give --to the address that the slave listens on")
+        }
         RelayError::Config(_) => Failure::usage(&error).remedy("change --up or --down"),
         RelayError::Histogram(_) | RelayError::Thread(_) | RelayError::Broken(_) => {
             Failure::failed(&error)
@@ -129,7 +134,10 @@ mod tests {
         let failure = resolve(&address).unwrap_err();
         assert_eq!(failure.exit(), Exit::Usage);
         let text = failure.to_string();
-        assert!(text.contains("no-such-host.invalid:1") && text.contains("what to do"), "{text}");
+        assert!(
+            text.contains("no-such-host.invalid:1") && text.contains("what to do"),
+            "{text}"
+        );
     }
 
     #[test]

@@ -56,9 +56,8 @@ fn recording(path: &Path) -> Result<Recording, Failure> {
     let text = read_text(path, "the recording")?;
     Recording::parse(&text).map_err(|error| {
         let what = format!("the recording {}: {error}", path.display());
-        Failure::usage(what).remedy(
-            "give a file of recorded pushes; shared/src/recording/mod.rs tells its grammar",
-        )
+        Failure::usage(what)
+            .remedy("give a file of recorded pushes; shared/src/recording/mod.rs tells its grammar")
     })
 }
 

@@ -56,7 +56,10 @@ fn watch_sessions(
     let mut viewer = Viewer::new(Caption::default(), false, messages, stop);
     while host.is_running() {
         let slave = Some(live.get()).filter(|slave| slave.connected);
-        viewer.look(Snapshot { slave, master: None });
+        viewer.look(Snapshot {
+            slave,
+            master: None,
+        });
     }
 }
 
@@ -156,7 +159,14 @@ mod tests {
     fn options_of(words: &[&str]) -> SlaveOptions {
         let home = tempfile::tempdir().unwrap();
         let identity = home.path().display().to_string();
-        let all = ["mmt", "slave", "--listen", "127.0.0.1:0", "--identity", &identity];
+        let all = [
+            "mmt",
+            "slave",
+            "--listen",
+            "127.0.0.1:0",
+            "--identity",
+            &identity,
+        ];
         match Arguments::parse_from(all.iter().chain(words)).command {
             Command::Slave(arguments) => options(&arguments).unwrap(),
             _ => panic!("not a slave"),
@@ -170,9 +180,19 @@ mod tests {
         std::fs::write(&path, "seed = 5\nmode = \"paper\"\n").unwrap();
         let file = path.display().to_string();
         let from_file = options_of(&["--config", &file]);
-        assert_eq!((from_file.config.seed, from_file.config.mode), (5, Mode::Paper));
+        assert_eq!(
+            (from_file.config.seed, from_file.config.mode),
+            (5, Mode::Paper)
+        );
         assert_eq!(from_file.netem_seed, 5);
-        let scheme = ["--scheme", "timer 50ms", "--seed", "6", "--mode", "recommended"];
+        let scheme = [
+            "--scheme",
+            "timer 50ms",
+            "--seed",
+            "6",
+            "--mode",
+            "recommended",
+        ];
         let both = options_of(&[&["--config", file.as_str()], &scheme[..]].concat());
         assert_eq!((both.config.seed, both.config.mode), (6, Mode::Recommended));
         assert_eq!(both.config.trigger.scheme.to_string(), "timer 50ms");

@@ -23,7 +23,11 @@ type Reading = fn(&Snapshot) -> Option<f64>;
 const CHARTS: [(&str, Reading, Color); 3] = [
     ("|f_s|  measured at the slave", Snapshot::f_s, Color::Green),
     ("|f_m|  rendered by the master", Snapshot::f_m, Color::Cyan),
-    ("|error|  f_s - f_m of one sample", Snapshot::error, Color::Red),
+    (
+        "|error|  f_s - f_m of one sample",
+        Snapshot::error,
+        Color::Red,
+    ),
 ];
 
 /// Draws everything.
@@ -33,7 +37,11 @@ pub(super) fn render(
     history: &History,
     messages: &[String],
 ) {
-    let below = if messages.is_empty() { 0 } else { MESSAGES_MAX as u16 };
+    let below = if messages.is_empty() {
+        0
+    } else {
+        MESSAGES_MAX as u16
+    };
     let rows = Layout::vertical([
         Constraint::Length(2),
         Constraint::Min(6),
@@ -44,13 +52,18 @@ pub(super) fn render(
     render_head(frame, head, caption, &history.newest());
     render_charts(frame, charts, history);
     render_panels(frame, panels, caption, history);
-    let lines: Vec<Line<'_>> = messages.iter().map(|text| Line::from(text.as_str())).collect();
+    let lines: Vec<Line<'_>> = messages
+        .iter()
+        .map(|text| Line::from(text.as_str()))
+        .collect();
     frame.render_widget(Paragraph::new(lines), bottom);
 }
 
 fn render_head(frame: &mut Frame<'_>, area: Rect, caption: &Caption, now: &Snapshot) {
     let bold = Style::new().add_modifier(Modifier::BOLD);
-    let of = caption.duration_s.map_or_else(String::new, |s| format!(" of {s:.0}"));
+    let of = caption
+        .duration_s
+        .map_or_else(String::new, |s| format!(" of {s:.0}"));
     let contact = |side: &str, touches: Option<bool>| match touches {
         Some(true) => format!("   {side} touches"),
         Some(false) => format!("   {side} free"),
@@ -59,7 +72,10 @@ fn render_head(frame: &mut Frame<'_>, area: Rect, caption: &Caption, now: &Snaps
     let first = Line::from(vec![
         Span::styled(format!("mmt {}", caption.command), bold),
         Span::raw(format!("   {:.1}{of} s", now.elapsed_s())),
-        Span::raw(contact("master", now.master.map(|master| master.in_contact))),
+        Span::raw(contact(
+            "master",
+            now.master.map(|master| master.in_contact),
+        )),
         Span::raw(contact("slave", now.slave.map(|slave| slave.in_contact))),
         Span::styled("   q ends it", Style::new().fg(Color::DarkGray)),
     ]);

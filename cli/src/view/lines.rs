@@ -20,13 +20,30 @@ pub(crate) fn line(history: &History) -> String {
     add("f_m", now.f_m(), 2, " N");
     add("error", now.error(), 2, " N");
     add("updates", sent(&now), 0, "");
-    add("rate", history.rates_hz().map(|rates| rates.iter().sum()), 1, " /s");
+    add(
+        "rate",
+        history.rates_hz().map(|rates| rates.iter().sum()),
+        1,
+        " /s",
+    );
     add("rtt", now.rtt_ms(), 0, " ms");
     let (up, down) = now.loss();
     add("loss up", up.map(|share| share * 100.0), 1, " %");
     add("loss down", down.map(|share| share * 100.0), 1, " %");
-    add("mass", now.slave.map(|slave| mass(slave.estimate)), 3, " kg");
-    add("pushes", now.master.and_then(|master| master.pushes).map(|n| n as f64), 0, "");
+    add(
+        "mass",
+        now.slave.map(|slave| mass(slave.estimate)),
+        3,
+        " kg",
+    );
+    add(
+        "pushes",
+        now.master
+            .and_then(|master| master.pushes)
+            .map(|n| n as f64),
+        0,
+        "",
+    );
     let silent = now.master.map(|master| master.link);
     if let Some(state) = silent.filter(|state| *state != LinkState::Fresh) {
         let _ = write!(text, "  link {}", state.name());

@@ -13,7 +13,10 @@ fn panel(title: &'static str, lines: Vec<String>) -> Paragraph<'static> {
 
 /// A number with a unit, or a dash.
 fn shown(value: Option<f64>, decimals: usize, unit: &str) -> String {
-    value.map_or_else(|| "-".to_owned(), |value| format!("{value:.decimals$}{unit}"))
+    value.map_or_else(
+        || "-".to_owned(),
+        |value| format!("{value:.decimals$}{unit}"),
+    )
 }
 
 /// Updates by cause: so far and per second.
@@ -38,7 +41,10 @@ pub(super) fn update_panel(history: &History) -> Paragraph<'static> {
 pub(super) fn model_panel(caption: &Caption, now: &Snapshot) -> Paragraph<'static> {
     let estimate = now.slave.map(|slave| slave.estimate);
     let in_use = now.master.map(|master| master.params);
-    let mut lines = vec![format!("{:10}{:>8}{:>8}{:>8}", "", "estimate", "truth", "master")];
+    let mut lines = vec![format!(
+        "{:10}{:>8}{:>8}{:>8}",
+        "", "estimate", "truth", "master"
+    )];
     for (index, label) in ["m kg", "b N s/m", "c N"].into_iter().enumerate() {
         let of = |values: Option<[f64; 3]>| {
             shown(values.and_then(|values| values.get(index).copied()), 3, "")
@@ -49,7 +55,10 @@ pub(super) fn model_panel(caption: &Caption, now: &Snapshot) -> Paragraph<'stati
     let hand = now.master.map(|master| master.hand_force.norm());
     let pushes = now.master.and_then(|master| master.pushes);
     lines.push(format!("force on the hand {:>8}", shown(hand, 2, " N")));
-    lines.push(format!("pushes            {:>8}", shown(pushes.map(|n| n as f64), 0, "")));
+    lines.push(format!(
+        "pushes            {:>8}",
+        shown(pushes.map(|n| n as f64), 0, "")
+    ));
     panel("model", lines)
 }
 

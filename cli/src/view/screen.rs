@@ -98,8 +98,7 @@ impl Drop for Screen {
 
 /// q, Esc or Ctrl-C: in raw mode the terminal makes no signal of the latter.
 fn ends(key: &KeyEvent) -> bool {
-    let control_c =
-        key.modifiers.contains(KeyModifiers::CONTROL) && key.code == KeyCode::Char('c');
+    let control_c = key.modifiers.contains(KeyModifiers::CONTROL) && key.code == KeyCode::Char('c');
     let quit = matches!(key.code, KeyCode::Char('q' | 'Q') | KeyCode::Esc);
     key.kind == KeyEventKind::Press && (quit || control_c)
 }

@@ -61,13 +61,44 @@ fn the_dashboard_shows_every_label_and_number_on_a_small_terminal() {
     (0..100_u32).for_each(|tick| history.push(snapshot(f64::from(tick) * 0.05)));
     let shown = screen(80, 24, &history, &["a message".to_owned()]);
     for part in [
-        "mmt demo", "of 20 s", "slave touches", "master free", "q ends it", "recommended",
-        "|f_s|", "5.00 N", "|f_m|", "2.50 N", "|error|", "0.50 N",
-        "deadband", "timer", "master only contact", "slave only contact", "contact lost",
-        "every sample", "11", "applied", "20", "per s",
-        "estimate", "truth", "0.701", "0.700", "0.699", "m kg", "b N s/m", "c N",
-        "pushes", "late", "101.5 ms", "loss up 1.1 %", "loss down 0.9 %",
-        "lateness p99 63 us", "skipped 4", "a message",
+        "mmt demo",
+        "of 20 s",
+        "slave touches",
+        "master free",
+        "q ends it",
+        "recommended",
+        "|f_s|",
+        "5.00 N",
+        "|f_m|",
+        "2.50 N",
+        "|error|",
+        "0.50 N",
+        "deadband",
+        "timer",
+        "master only contact",
+        "slave only contact",
+        "contact lost",
+        "every sample",
+        "11",
+        "applied",
+        "20",
+        "per s",
+        "estimate",
+        "truth",
+        "0.701",
+        "0.700",
+        "0.699",
+        "m kg",
+        "b N s/m",
+        "c N",
+        "pushes",
+        "late",
+        "101.5 ms",
+        "loss up 1.1 %",
+        "loss down 0.9 %",
+        "lateness p99 63 us",
+        "skipped 4",
+        "a message",
     ] {
         assert!(shown.contains(part), "{part}\n{shown}");
     }
@@ -87,7 +118,16 @@ fn the_plain_line_has_the_same_numbers_and_leaves_out_what_is_not_known() {
     let mut history = History::default();
     history.push(snapshot(1.0));
     let text = line(&history);
-    for part in ["1.0 s", "f_s 5.00 N", "error 0.50 N", "updates 21", "rtt 102 ms", "mass 0.701 kg", "pushes 3", "link late"] {
+    for part in [
+        "1.0 s",
+        "f_s 5.00 N",
+        "error 0.50 N",
+        "updates 21",
+        "rtt 102 ms",
+        "mass 0.701 kg",
+        "pushes 3",
+        "link late",
+    ] {
         assert!(text.contains(part), "{part}: {text}");
     }
     let text = line(&History::default());

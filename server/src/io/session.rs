@@ -3,23 +3,24 @@
 //! Begins with the slave that the hello asks for, ends with the report; what happens in between is
 //! `traffic`'s. It decides nothing about the model.
 
+mod end;
 mod traffic;
 
+use std::io;
 use std::time::Duration;
 
 use bytes::Bytes;
 use mmt_netem::io::socket::SocketCounters;
+use mmt_shared::io::clock::Clock;
 use mmt_shared::io::live::LiveCell;
-use mmt_shared::io::stream::{ReadFrameError, WriteFrameError, read_frame, write_frame};
+use mmt_shared::io::stream::{WriteFrameError, write_frame};
 use mmt_shared::io::versions::CLOSE_FINISHED;
 use mmt_shared::metrics::UpdateCounts;
-use mmt_shared::peer::NumbersSpent;
 use mmt_shared::wire::{
-    DATAGRAM_MAX, DecodeError, Ending, Farewell, Hello, Label, MasterTotals, Refusal,
-    STREAM_MESSAGE_MAX, Side, SlaveTotals, StreamMessage, Welcome, decode_stream_message,
-    encode_slave_farewell, encode_welcome,
+    DATAGRAM_MAX, Ending, Farewell, Hello, Label, Refusal, STREAM_MESSAGE_MAX, SlaveTotals,
+    Welcome, encode_slave_farewell, encode_welcome,
 };
-use quinn::{Connection, ConnectionError, RecvStream, SendStream};
+use quinn::{Connection, RecvStream, SendStream};
 use tokio::sync::watch;
 use tokio::time::timeout;
 
@@ -32,8 +33,8 @@ use crate::link::SlaveLink;
 use crate::playout::PlayoutConfig;
 use crate::slave::{Slave, SlaveConfig};
 
-/// A master that has not been heard for this long has lost its lease (reliability.md, section 1).
-const SILENCE_MAX: Duration = Duration::from_secs(10);
+use end::{End, farewell_of};
+
 /// How long each side waits for the other's farewell (protocol.md, section 2).
 const FAREWELL_WAIT: Duration = Duration::from_secs(1);
 /// How long the stream may take to take a message of ours.
@@ -62,36 +63,6 @@ pub(super) struct Lost {
     pub(super) given: u64,
 }
 
-/// Why a session ended.
-#[derive(Debug, thiserror::Error)]
-pub(super) enum End {
-    #[error("this side was asked to end")]
-    Asked,
-    #[error("the master said farewell ({:?})", .0.ending)]
-    Farewell(Farewell<MasterTotals>),
-    #[error("the master was not heard for {SILENCE_MAX:?}")]
-    Silence,
-    #[error("the connection was lost: {0}")]
-    Disconnected(#[from] ConnectionError),
-    #[error("the stream ended: {0}")]
-    Stream(#[from] StreamError),
-    #[error(transparent)]
-    Numbers(#[from] NumbersSpent),
-    #[error("the 1 kHz thread panicked")]
-    Panicked,
-}
-
-/// Why no farewell could be read.
-#[derive(Debug, thiserror::Error)]
-pub(super) enum StreamError {
-    #[error(transparent)]
-    Frame(#[from] ReadFrameError),
-    #[error(transparent)]
-    Message(#[from] DecodeError),
-    #[error("a message that is no farewell")]
-    NoFarewell,
-}
-
 /// A session that has begun.
 pub(super) struct Session<'a> {
     shared: &'a Shared,
@@ -112,6 +83,17 @@ pub(super) async fn serve(
     admitted: Admitted,
     stop: &mut watch::Receiver<bool>,
     live: &LiveCell<SlaveLive>,
+) -> Result<Option<SlaveReport>, SlaveHostError> {
+    serve_with(shared, admitted, stop, live, Worker::start).await
+}
+
+/// Serves with a thread of the caller's making.
+pub(super) async fn serve_with(
+    shared: &Shared,
+    admitted: Admitted,
+    stop: &mut watch::Receiver<bool>,
+    live: &LiveCell<SlaveLive>,
+    start: impl FnOnce(Clock, Slave) -> io::Result<Worker>,
 ) -> Result<Option<SlaveReport>, SlaveHostError> {
     let Admitted {
         connection,
@@ -144,7 +126,7 @@ pub(super) async fn serve(
         return Ok(None);
     }
     announce(&connection, &hello);
-    let worker = Worker::start(shared.clock, slave)?;
+    let worker = start(shared.clock, slave)?;
     let session = Session::new(shared, config, connection, send, worker, socket_before);
     session.operate(receive, stop, live).await.map(Some)
 }
@@ -197,14 +179,6 @@ fn announce(connection: &Connection, hello: &Hello) {
     tracing::info!("{address} operates ({program}, {:?})", hello.coupling);
 }
 
-async fn farewell_of(mut receive: RecvStream) -> Result<Farewell<MasterTotals>, StreamError> {
-    let frame = read_frame(&mut receive, STREAM_MESSAGE_MAX, Duration::MAX).await?;
-    match decode_stream_message(&frame, Side::Master)? {
-        StreamMessage::MasterFarewell(farewell) => Ok(farewell),
-        _ => Err(StreamError::NoFarewell),
-    }
-}
-
 impl<'a> Session<'a> {
     pub(super) fn new(
         shared: &'a Shared,
@@ -251,7 +225,7 @@ impl<'a> Session<'a> {
         let outcome = self.outcome(ending, finished);
         let said = self.say_farewell(ending, &outcome.totals()).await;
         let theirs = match end {
-            End::Farewell(theirs) => Some(theirs),
+            End::Farewell(theirs) => Some(*theirs),
             // Nothing can come any more.
             End::Stream(_) => None,
             _ if said.is_err() => None,

@@ -3,6 +3,7 @@
 mod master;
 
 use std::sync::Arc;
+use std::time::Duration;
 
 use mmt_netem::LinkConfig;
 use mmt_shared::io::identity::Identity;
@@ -11,7 +12,10 @@ use mmt_shared::pairing::{Pairing, Token};
 use mmt_shared::wire::{Cause, Ending, Refusal};
 use tokio::sync::watch;
 use tokio::task::JoinHandle;
+use tokio::time::sleep;
 
+use super::door::Door;
+use super::worker::Worker;
 use super::*;
 use master::{Master, patiently};
 
@@ -63,7 +67,8 @@ async fn a_session_goes_from_the_welcome_to_a_report_that_agrees_with_the_master
     let (mut master, welcome) = Master::operate(&host.pairing).await;
     let coupling = mmt_shared::contact::Coupling::for_stiffness(1000.0);
     let welcome = welcome.accept(&coupling).unwrap();
-    assert!(welcome.scheme.as_str().contains("hybrid"), "{welcome:?}");
+    let scheme = SlaveConfig::default().trigger.scheme.to_string();
+    assert_eq!(welcome.scheme.as_str(), scheme);
     master.push(100).await;
     master.listen(1).await;
     let look = host.live.get();
@@ -142,6 +147,7 @@ async fn eventually_welcome(pairing: &Pairing) -> Master {
             Ok(_) => return master,
             Err(refusal) => assert_eq!(refusal, Refusal::Busy),
         }
+        sleep(Duration::from_millis(50)).await;
     }
 }
 
@@ -219,6 +225,34 @@ async fn a_host_that_is_stopped_says_farewell_and_reports() {
     let report = patiently(host.served).await.unwrap().unwrap().unwrap();
     assert_eq!(report.ending.as_deref(), Some("interrupted"));
     assert_eq!(report.updates.applied, Some(7));
+}
+
+#[tokio::test]
+async fn a_panic_of_the_thread_ends_the_session_as_failed_and_is_an_error() {
+    let host = SlaveHost::bind(options()).unwrap();
+    let (stop, mut stopped) = watch::channel(false);
+    let shared = &host.shared;
+    let (door, mut masters) = Door::new(
+        host.pairing(None).token,
+        Arc::clone(&shared.refusals),
+        stop.subscribe(),
+    );
+    let keeper = tokio::spawn(door.keep(Arc::clone(&shared.listener)));
+    let pairing = host.pairing(None);
+    let master = tokio::spawn(async move {
+        let (mut master, _) = Master::operate(&pairing).await;
+        let farewell = master.hear_farewell().await;
+        master.connection.close(0u32.into(), b"");
+        farewell.ending
+    });
+    let admitted = patiently(masters.recv()).await.unwrap();
+    let start = |_, _| Worker::start_with(|_| panic!("on purpose"));
+    let live = LiveCell::default();
+    let served = session::serve_with(shared, admitted, &mut stopped, &live, start);
+    let served = patiently(served).await;
+    assert!(matches!(served, Err(SlaveHostError::Panicked)));
+    assert_eq!(patiently(master).await.unwrap(), Ending::Failed);
+    keeper.abort();
 }
 
 #[tokio::test]

@@ -10,7 +10,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 
 use mmt_shared::io::clock::Clock;
-use mmt_shared::io::realtime;
+use mmt_shared::io::realtime::{self, RealTime};
 use mmt_shared::io::schedule::Tick;
 use mmt_shared::io::ticker::{Ticker, TickerReport};
 use mmt_shared::io::wake::{self, Waker, Wakeup};
@@ -67,7 +67,7 @@ impl Worker {
     pub(super) fn start(clock: Clock, slave: Slave) -> io::Result<Self> {
         let ticker = Ticker::new(clock, TICK).map_err(io::Error::other)?;
         Self::start_with(move |inside| {
-            tracing::info!("slave loop: {}", realtime::request());
+            tell(&realtime::request());
             inside.run(ticker, slave)
         })
     }
@@ -121,6 +121,15 @@ impl Worker {
 impl Drop for Worker {
     fn drop(&mut self) {
         self.stop();
+    }
+}
+
+/// What was not granted is worth a line by default: deadlines will slip.
+fn tell(obtained: &RealTime) {
+    let granted = [&obtained.fifo, &obtained.memory, &obtained.slack];
+    match granted.into_iter().all(|of| of.granted()) {
+        true => tracing::info!("slave loop: {obtained}"),
+        false => tracing::warn!("slave loop: {obtained}"),
     }
 }
 

@@ -19,9 +19,14 @@ pub(super) fn join(
     master: &MasterReport,
     slave: Option<&SlaveReport>,
 ) -> Result<DemoReport, Failure> {
-    let defect = |error: serde_json::Error| Failure::failed(format!("the report is no JSON: {error}"));
+    let defect =
+        |error: serde_json::Error| Failure::failed(format!("the report is no JSON: {error}"));
     let mut joined = as_value(master).map_err(defect)?;
-    let mut other = slave.map(as_value).transpose().map_err(defect)?.unwrap_or_default();
+    let mut other = slave
+        .map(as_value)
+        .transpose()
+        .map_err(defect)?
+        .unwrap_or_default();
     let configuration = json!({
         "master": joined.get_mut("configuration").map(Value::take),
         "slave": other.get_mut("configuration").map(Value::take),
@@ -30,7 +35,10 @@ pub(super) fn join(
     let mut report = DemoReport::deserialize(joined).map_err(defect)?;
     report.command = "demo".to_owned();
     report.configuration = configuration;
-    report.drops = drops(master.drops.as_ref(), slave.and_then(|slave| slave.drops.as_ref()));
+    report.drops = drops(
+        master.drops.as_ref(),
+        slave.and_then(|slave| slave.drops.as_ref()),
+    );
     Ok(report)
 }
 
@@ -55,10 +63,16 @@ fn fill(joined: &mut Value, other: Value) {
 fn drops(master: Option<&Counts>, slave: Option<&Counts>) -> Option<Counts> {
     let named = |side: &'static str, counts: Option<&Counts>| {
         let counts = counts.cloned().unwrap_or_default();
-        counts.into_iter().map(move |(name, n)| (format!("{side}_{name}"), n))
+        counts
+            .into_iter()
+            .map(move |(name, n)| (format!("{side}_{name}"), n))
     };
     let known = master.is_some() || slave.is_some();
-    known.then(|| named("master", master).chain(named("slave", slave)).collect())
+    known.then(|| {
+        named("master", master)
+            .chain(named("slave", slave))
+            .collect()
+    })
 }
 
 #[cfg(test)]
@@ -68,7 +82,10 @@ mod tests {
     #[test]
     fn null_is_filled_and_what_is_known_stays() {
         let mut joined = json!({"a": 1.5, "b": {"c": null, "d": 2}, "e": null});
-        fill(&mut joined, json!({"a": 9, "b": {"c": 3, "d": 9}, "e": {"f": [1]}, "g": 4}));
+        fill(
+            &mut joined,
+            json!({"a": 9, "b": {"c": 3, "d": 9}, "e": {"f": [1]}, "g": 4}),
+        );
         let expected = json!({"a": 1.5, "b": {"c": 3, "d": 2}, "e": {"f": [1]}, "g": 4});
         assert_eq!(joined, expected);
     }
@@ -77,7 +94,10 @@ mod tests {
     fn equal_names_of_drops_on_both_sides_stay_apart() {
         let counts = |n| Counts::from([("malformed".to_owned(), n)]);
         let both = drops(Some(&counts(1)), Some(&counts(2))).unwrap();
-        let expected = [("master_malformed".to_owned(), 1), ("slave_malformed".to_owned(), 2)];
+        let expected = [
+            ("master_malformed".to_owned(), 1),
+            ("slave_malformed".to_owned(), 2),
+        ];
         assert_eq!(both, Counts::from(expected));
         assert_eq!(drops(None, None), None);
     }

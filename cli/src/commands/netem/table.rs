@@ -31,7 +31,11 @@ impl fmt::Display for NetemReport {
             "mmt {} {}, seed {}, {:.1} s, {}",
             self.command, self.version, self.seed, self.duration_s, self.ending
         )?;
-        writeln!(f, "\n{:20} {:>12} {:>12} {:>12} {:>12}", "", "up", "bytes", "down", "bytes")?;
+        writeln!(
+            f,
+            "\n{:20} {:>12} {:>12} {:>12} {:>12}",
+            "", "up", "bytes", "down", "bytes"
+        )?;
         for (number, (label, count)) in ROWS.into_iter().enumerate() {
             let (up, down) = (count(&counters.up), count(&counters.down));
             if number < ALWAYS || up.packets > 0 || down.packets > 0 {
@@ -68,7 +72,10 @@ impl NetemReport {
             late.p50_us, late.p99_us, late.max_us
         )?;
         match late.degraded() {
-            true => write!(f, "\nthis host was too slow for the emulation: do not trust its delays"),
+            true => write!(
+                f,
+                "\nthis host was too slow for the emulation: do not trust its delays"
+            ),
             false => Ok(()),
         }
     }

@@ -73,8 +73,10 @@ impl Document {
         run.seed = Some(config.seed);
         run.ending = Some("finished".to_owned());
         let sum = |of: fn(&ReplayReport) -> f64| replayed.iter().map(|one| of(&one.report)).sum();
-        let (duration_s, contact_s): (f64, f64) =
-            (sum(|report| report.duration_s), sum(|report| report.contact_s));
+        let (duration_s, contact_s): (f64, f64) = (
+            sum(|report| report.duration_s),
+            sum(|report| report.contact_s),
+        );
         run.duration_s = duration_s.into();
         let pushes: usize = replayed.iter().map(|one| one.report.pushes.len()).sum();
         run.pushes.completed = Some(pushes as u64);

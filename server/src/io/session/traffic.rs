@@ -13,7 +13,8 @@ use quinn::SendDatagramError;
 use tokio::sync::watch;
 use tokio::time::{MissedTickBehavior, interval, sleep};
 
-use super::{End, SILENCE_MAX, Session, StreamError};
+use super::Session;
+use super::end::{End, SILENCE_MAX, StreamError};
 use crate::io::SlaveLive;
 use crate::io::host::stopped;
 
@@ -46,7 +47,7 @@ impl Session<'_> {
             // In this order, so that a flood of datagrams holds up nothing else.
             tokio::select! {
                 biased;
-                told = &mut farewell => return Err(End::Farewell(told?)),
+                told = &mut farewell => return Err(End::Farewell(Box::new(told?))),
                 () = stopped(stop) => return Err(End::Asked),
                 _ = &mut self.worker.finished => return Err(End::Panicked),
                 woken = self.worker.wakeup.wait() => {

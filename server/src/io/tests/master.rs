@@ -1,6 +1,5 @@
 //! A master of the tests: what the protocol's document says, and no more.
 
-use std::sync::Arc;
 use std::time::Duration;
 
 use bytes::Bytes;
@@ -199,9 +198,4 @@ impl Master {
             other => panic!("{other:?}"),
         }
     }
-}
-
-/// An endpoint whose owner vanishes: nothing is said, nothing is closed.
-pub(super) fn vanish(master: Master) {
-    std::mem::forget(Arc::new(master));
 }

@@ -1,0 +1,207 @@
+//! The commands at work, as processes: what they print where, and how they end.
+#![allow(
+    clippy::disallowed_methods,
+    clippy::indexing_slicing,
+    clippy::unwrap_used,
+    reason = "a test starts the command, writes files for it, and fails by panicking"
+)]
+
+use std::fmt::Write;
+use std::io::{BufRead, BufReader, Read};
+use std::process::{Child, ChildStdout, Command, Stdio};
+
+use serde_json::Value;
+
+fn mmt(home: &tempfile::TempDir, arguments: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_mmt"));
+    command
+        .args(arguments)
+        .env("XDG_STATE_HOME", home.path())
+        .env_remove("MMT_LOG")
+        .current_dir(home.path())
+        .stdin(Stdio::null())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped());
+    command
+}
+
+/// A process whose first line on stdout has been read. Killed if the test fails.
+struct Running {
+    child: Child,
+    stdout: BufReader<ChildStdout>,
+    first_line: String,
+}
+
+impl Running {
+    fn start(mut command: Command) -> Self {
+        let mut child = command.stderr(Stdio::null()).spawn().unwrap();
+        let mut stdout = BufReader::new(child.stdout.take().unwrap());
+        let mut first_line = String::new();
+        stdout.read_line(&mut first_line).unwrap();
+        Self {
+            child,
+            stdout,
+            first_line: first_line.trim_end().to_owned(),
+        }
+    }
+
+    fn interrupt(&self) {
+        let number = self.child.id().to_string();
+        let killed = Command::new("kill").args(["-INT", &number]).status();
+        assert!(killed.unwrap().success());
+    }
+
+    /// What else it printed, and its exit code.
+    fn finish(mut self) -> (String, Option<i32>) {
+        let mut rest = String::new();
+        self.stdout.read_to_string(&mut rest).unwrap();
+        let status = self.child.wait().unwrap();
+        (rest, status.code())
+    }
+}
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+/// A recording of pushes along +x of a block that takes 2 N, each 1 cm long.
+fn recording(pushes: u32) -> String {
+    let mut text = format!("{pushes}\n");
+    for push in 0..pushes {
+        let (from, to) = (10.0 * f64::from(push), 10.0 * f64::from(push + 1));
+        for x in [from, to] {
+            writeln!(text, "{x} 0 0 1 0 0 0").unwrap();
+        }
+        writeln!(text, "100").unwrap();
+        for sample in 0..100_u32 {
+            let newtons = if sample < 20 { 0.0 } else { -2.0 };
+            writeln!(text, "{} {newtons} 0", f64::from(sample) * 0.01).unwrap();
+        }
+        writeln!(text, "34").unwrap();
+        for sample in 0..34_u32 {
+            let x = from + 10.0 * f64::from(sample) / 33.0;
+            writeln!(text, "{} {x} 50 0 1 0 0 0", f64::from(sample) * 0.03).unwrap();
+        }
+    }
+    text
+}
+
+fn replay(arguments: &[&str]) -> String {
+    let home = tempfile::tempdir().unwrap();
+    for name in ["a.txt", "b.txt"] {
+        std::fs::write(home.path().join(name), recording(8)).unwrap();
+    }
+    let output = mmt(&home, arguments).output().unwrap();
+    let errors = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{errors}");
+    assert!(errors.is_empty(), "a pipe shows no progress bar: {errors}");
+    String::from_utf8(output.stdout).unwrap()
+}
+
+#[test]
+fn a_replay_prints_the_tables_of_every_file() {
+    let text = replay(&["replay", "a.txt", "b.txt"]);
+    for part in ["a.txt", "b.txt", "(ii) surface, point", "All 8 pushes", "Held-out pushes"] {
+        assert!(text.contains(part), "{part}: {text}");
+    }
+}
+
+#[test]
+fn a_replay_as_json_is_one_document_with_the_keys_of_every_report() {
+    let text = replay(&["replay", "--json", "--seed", "3", "a.txt", "b.txt"]);
+    let document: Value = serde_json::from_str(&text).unwrap();
+    assert_eq!(document["command"], "replay");
+    assert_eq!(document["seed"], 3);
+    assert_eq!(document["ending"], "finished");
+    assert_eq!(document["pushes"]["completed"], 16);
+    assert!(document["model"]["mass_kg"]["estimate"].is_null());
+    assert!(document["wire"]["up"]["datagrams"].is_null());
+    assert_eq!(document["configuration"]["replay"]["deadband"], 0.10);
+    let files = document["replay"]["files"].as_array().unwrap();
+    assert_eq!(files.len(), 2);
+    let surface = |file: &Value| {
+        let laws = file["laws"].as_array().unwrap();
+        let law = laws.iter().find(|law| law["law"] == document["replay"]["law"]);
+        law.unwrap()["updates"]["sent"].as_u64().unwrap()
+    };
+    let sent: u64 = files.iter().map(surface).sum();
+    assert!(sent > 0);
+    assert_eq!(document["updates"]["sent"], sent);
+    let causes = document["updates"]["by_cause"].as_object().unwrap();
+    let by_cause: u64 = causes.values().filter_map(Value::as_u64).sum();
+    assert_eq!(by_cause, sent);
+}
+
+#[test]
+fn a_relay_prints_its_address_first_and_its_counters_when_interrupted() {
+    let home = tempfile::tempdir().unwrap();
+    let target = std::net::UdpSocket::bind("127.0.0.1:0").unwrap();
+    let to = target.local_addr().unwrap().to_string();
+    let arguments = ["netem", "--listen", "127.0.0.1:0", "--to", &to, "--up", "loss 100%", "--json"];
+    let relay = Running::start(mmt(&home, &arguments));
+    let address: std::net::SocketAddr = relay.first_line.parse().unwrap();
+    let source = std::net::UdpSocket::bind("127.0.0.1:0").unwrap();
+    source.send_to(b"lost", address).unwrap();
+    relay.interrupt();
+    let (rest, code) = relay.finish();
+    assert_eq!(code, Some(0));
+    let document: Value = serde_json::from_str(&rest).unwrap();
+    assert_eq!(document["ending"], "interrupted");
+    let up = &document["counters"]["up"];
+    assert_eq!(up["link"]["offered"], up["link"]["dropped"]["loss"]);
+    assert_eq!(up["forwarded"]["packets"], 0);
+}
+
+#[test]
+fn a_slave_that_nobody_comes_to_prints_its_pairing_string_and_an_empty_report() {
+    let home = tempfile::tempdir().unwrap();
+    let arguments = [
+        "slave", "--listen", "127.0.0.1:0", "--advertise", "robot.example.org", "--json",
+    ];
+    let slave = Running::start(mmt(&home, &arguments));
+    let line = &slave.first_line;
+    assert!(line.starts_with("mmt://robot.example.org:"), "{line}");
+    slave.interrupt();
+    let (rest, code) = slave.finish();
+    assert_eq!(code, Some(0));
+    let document: Value = serde_json::from_str(&rest).unwrap();
+    assert_eq!(document["command"], "slave");
+    assert_eq!(document["ending"], "interrupted");
+    assert!(document["updates"]["sent"].is_null());
+}
+
+#[test]
+fn a_master_that_nobody_answers_says_so_with_a_code_of_its_own() {
+    let home = tempfile::tempdir().unwrap();
+    // bound, so that no ICMP comes back, and never read from
+    let silent = std::net::UdpSocket::bind("127.0.0.1:0").unwrap();
+    let (pin, token) = ("0f".repeat(32), "a5".repeat(32));
+    let pairing = format!("mmt://{}?pin={pin}&token={token}", silent.local_addr().unwrap());
+    let output = mmt(&home, &["master", &pairing]).output().unwrap();
+    let text = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(4), "{text}");
+    assert!(text.contains("nothing answered") && !text.contains("panicked"), "{text}");
+}
+
+#[test]
+fn a_slave_and_a_master_as_processes_both_end_with_a_report() {
+    let home = tempfile::tempdir().unwrap();
+    let slave = Running::start(mmt(&home, &["slave", "--listen", "127.0.0.1:0", "--once", "--json"]));
+    let pairing = slave.first_line.clone();
+    let arguments = ["master", &pairing, "--duration", "2s", "--json"];
+    let output = mmt(&home, &arguments).output().unwrap();
+    let text = String::from_utf8_lossy(&output.stderr);
+    let master: Value = serde_json::from_slice(&output.stdout).expect(&text);
+    let (rest, _) = slave.finish();
+    let slave: Value = serde_json::from_str(&rest).unwrap();
+    assert_eq!(master["command"], "master");
+    assert_eq!(slave["command"], "slave");
+    assert!(master["haptic_loop"]["ticks"].as_u64().unwrap() > 0);
+    assert!(slave["slave_loop"]["ticks"].as_u64().unwrap() > 0);
+    // an overloaded host may lose the link; then the report says so and so does the exit code
+    let failed = master["ending"] == "failed";
+    assert_eq!(output.status.code(), Some(i32::from(failed)), "{text}");
+}

@@ -1,0 +1,156 @@
+//! Wrong input of every kind: exit code 2, a message that says what, where and what to do, no panic.
+#![allow(
+    clippy::disallowed_methods,
+    clippy::unwrap_used,
+    reason = "a test starts the command, writes files for it, and fails by panicking"
+)]
+
+use std::process::{Command, Output, Stdio};
+
+/// Runs `mmt` with these arguments, with a directory of its own for everything that it keeps.
+fn mmt(arguments: &[&str]) -> (Output, tempfile::TempDir) {
+    let home = tempfile::tempdir().unwrap();
+    let output = command(&home).args(arguments).output().unwrap();
+    (output, home)
+}
+
+fn command(home: &tempfile::TempDir) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_mmt"));
+    command
+        .env("XDG_STATE_HOME", home.path())
+        .env_remove("MMT_LOG")
+        .current_dir(home.path())
+        .stdin(Stdio::null());
+    command
+}
+
+/// Checks that the command refuses these arguments with a message that has these parts.
+fn refuses(arguments: &[&str], parts: &[&str]) {
+    let (output, _home) = mmt(arguments);
+    complains(&output, 2, parts);
+}
+
+fn complains(output: &Output, code: i32, parts: &[&str]) {
+    let text = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(code), "{text}");
+    assert!(output.stdout.is_empty(), "data on stdout");
+    assert!(!text.contains("panicked") && !text.contains("RUST_BACKTRACE"), "{text}");
+    for part in parts {
+        assert!(text.contains(part), "{part} is missing in: {text}");
+    }
+}
+
+fn pairing() -> String {
+    let (pin, token) = ("0f".repeat(32), "a5".repeat(32));
+    format!("mmt://127.0.0.1:9?pin={pin}&token={token}")
+}
+
+#[test]
+fn wrong_arguments_are_refused_with_the_option_and_what_would_be_right() {
+    refuses(&["fly"], &["fly", "--help"]);
+    refuses(&["demo", "--duration", "20"], &["--duration", "such as 20s"]);
+    refuses(&["demo", "--netem", "delay 50"], &["--netem", "^^", "50ms"]);
+    refuses(&["slave"], &["--listen"]);
+    refuses(&["slave", "--listen", "4433"], &["--listen", "0.0.0.0:4433"]);
+    refuses(&["replay"], &["FILE"]);
+}
+
+#[test]
+fn a_wrong_pairing_string_is_refused_without_showing_its_secret() {
+    let whole = pairing();
+    let cut = &whole[..whole.len() - 1];
+    for (text, parts) in [
+        ("localhost:4433", &["PAIRING", "mmt slave"][..]),
+        ("mmt://h:1", &["no pin", "quotes"]),
+        (cut, &["63 characters", "copy the whole line"]),
+    ] {
+        let (output, _home) = mmt(&["master", text]);
+        complains(&output, 2, parts);
+        assert!(!String::from_utf8_lossy(&output.stderr).contains("a5a5a5"));
+    }
+}
+
+#[test]
+fn a_wrong_configuration_is_refused_with_line_and_caret() {
+    let home = tempfile::tempdir().unwrap();
+    let file = home.path().join("slave.toml");
+    for (text, parts) in [
+        ("seed = 1\nmas_kg = 0.7\n", &["slave.toml", "line 2", "^^^^^^", "mas_kg", "what to do"][..]),
+        ("[environment]\nmass_kg = \"heavy\"\n", &["line 2", "^", "heavy"]),
+        ("[environment]\nmass_kg = -1.0\n", &["mass", "-1", "what to do"]),
+        ("= 1", &["line 1"]),
+    ] {
+        std::fs::write(&file, text).unwrap();
+        let arguments = ["slave", "--listen", "127.0.0.1:0", "--config", "slave.toml"];
+        complains(&command(&home).args(arguments).output().unwrap(), 2, parts);
+    }
+    refuses(
+        &["slave", "--listen", "127.0.0.1:0", "--config", "none.toml"],
+        &["none.toml", "check the path"],
+    );
+}
+
+#[test]
+fn a_wrong_trace_is_refused_with_file_and_line() {
+    let home = tempfile::tempdir().unwrap();
+    let pairing = pairing();
+    for (name, text, parts) in [
+        ("a.csv", "t_s,x_m,y_m\n0,0,zero\n", &["a.csv", "line 2", "y_m", "zero"][..]),
+        ("b.csv", "0,0,0\n", &["b.csv", "line 1", "t_s,x_m,y_m"]),
+        ("c.txt", "1 2 3", &["c.txt", "line 1", "what to do"]),
+        ("d.txt", "", &["d.txt", "line 1"]),
+    ] {
+        std::fs::write(home.path().join(name), text).unwrap();
+        let operator = format!("trace:{name}");
+        let arguments = ["master", &pairing, "--operator", &operator];
+        complains(&command(&home).args(arguments).output().unwrap(), 2, parts);
+    }
+}
+
+#[test]
+fn a_wrong_recording_is_refused_before_any_is_replayed() {
+    let home = tempfile::tempdir().unwrap();
+    std::fs::write(home.path().join("binary.txt"), [0xff, 0xfe]).unwrap();
+    let output = command(&home).args(["replay", "binary.txt"]).output().unwrap();
+    complains(&output, 2, &["binary.txt", "UTF-8"]);
+    refuses(&["replay", "none.txt"], &["none.txt", "check the path"]);
+    refuses(&["replay", "."], &["path of a file"]);
+}
+
+#[test]
+fn an_address_in_use_has_an_exit_code_of_its_own() {
+    let taken = std::net::UdpSocket::bind("127.0.0.1:0").unwrap();
+    let address = taken.local_addr().unwrap().to_string();
+    for arguments in [
+        &["slave", "--listen", &address][..],
+        &["netem", "--listen", &address, "--to", "127.0.0.1:9"],
+    ] {
+        let (output, _home) = mmt(arguments);
+        complains(&output, 5, &[&address, "--listen", "port 0"]);
+    }
+}
+
+#[test]
+fn a_wrong_log_filter_is_refused_by_the_name_of_its_variable() {
+    let home = tempfile::tempdir().unwrap();
+    let mut command = command(&home);
+    let output = command.env("MMT_LOG", "mmt=loud").args(["replay", "x"]).output();
+    complains(&output.unwrap(), 2, &["MMT_LOG", "debug"]);
+}
+
+#[test]
+fn nobody_reading_stdout_is_no_panic() {
+    let home = tempfile::tempdir().unwrap();
+    for arguments in [&["--help"][..], &["netem", "--listen", "127.0.0.1:0", "--to", "127.0.0.1:9", "--duration", "1ms"]] {
+        let mut child = command(&home)
+            .args(arguments)
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        drop(child.stdout.take());
+        let output = child.wait_with_output().unwrap();
+        let text = String::from_utf8_lossy(&output.stderr);
+        assert!(output.status.success() && !text.contains("panicked"), "{text}");
+    }
+}
