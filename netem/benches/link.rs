@@ -3,6 +3,7 @@
 #![allow(missing_docs, reason = "criterion's macros make undocumented items")]
 
 use std::hint::black_box;
+use std::time::Duration;
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use mmt_netem::{Link, LinkId, PacketMeta, Pipe};
@@ -58,5 +59,12 @@ fn through_a_pipe(criterion: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, offer, through_a_pipe);
+criterion_group! {
+    name = benches;
+    config = Criterion::default()
+        .sample_size(50)
+        .warm_up_time(Duration::from_millis(500))
+        .measurement_time(Duration::from_secs(2));
+    targets = offer, through_a_pipe
+}
 criterion_main!(benches);

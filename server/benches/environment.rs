@@ -7,6 +7,7 @@ use criterion::{Criterion, criterion_group, criterion_main};
 use mmt_server::environment::{Environment, EnvironmentConfig};
 use mmt_shared::geometry::Vec2;
 use std::hint::black_box;
+use std::time::Duration;
 
 /// A tool that pushes off-centre at 0.15 m/s for 2 s, then goes back to the start of the push.
 fn push(criterion: &mut Criterion, name: &str, speed: f64) {
@@ -33,5 +34,12 @@ fn world_step(criterion: &mut Criterion) {
     });
 }
 
-criterion_group!(benches, world_step);
+criterion_group! {
+    name = benches;
+    config = Criterion::default()
+        .sample_size(50)
+        .warm_up_time(Duration::from_millis(500))
+        .measurement_time(Duration::from_secs(2));
+    targets = world_step
+}
 criterion_main!(benches);

@@ -4,6 +4,7 @@
 //! a push, so that every tick reaches the regression.
 
 use std::hint::black_box;
+use std::time::Duration;
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use mmt_server::estimator::{Estimator, EstimatorConfig, Measured};
@@ -80,5 +81,12 @@ fn trigger(criterion: &mut Criterion) {
     }
 }
 
-criterion_group!(benches, estimators, trigger);
+criterion_group! {
+    name = benches;
+    config = Criterion::default()
+        .sample_size(50)
+        .warm_up_time(Duration::from_millis(500))
+        .measurement_time(Duration::from_secs(2));
+    targets = estimators, trigger
+}
 criterion_main!(benches);

@@ -2,6 +2,7 @@
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use std::hint::black_box;
+use std::time::Duration;
 
 use mmt_shared::contact::Coupling;
 use mmt_shared::geometry::{BoxFootprint, Pose, Twist, Vec2};
@@ -92,7 +93,7 @@ fn peer(criterion: &mut Criterion) {
     let (mut here, mut there, mut now) = (Peer::new(), Peer::new(), Time::ZERO);
     criterion.bench_function("peer/stamp and handle, both ways", |b| {
         b.iter(|| {
-            now += std::time::Duration::from_millis(1);
+            now += Duration::from_millis(1);
             if let Ok(question) = here.stamp(now) {
                 there.handle(now, &question, 100);
             }
@@ -103,5 +104,12 @@ fn peer(criterion: &mut Criterion) {
     });
 }
 
-criterion_group!(benches, wire, peer);
+criterion_group! {
+    name = benches;
+    config = Criterion::default()
+        .sample_size(50)
+        .warm_up_time(Duration::from_millis(500))
+        .measurement_time(Duration::from_secs(2));
+    targets = wire, peer
+}
 criterion_main!(benches);

@@ -2,6 +2,7 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test may panic")]
 
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use mmt_tests::process::{Ended, ProcessError, Running, number};
@@ -9,6 +10,12 @@ use serde_json::Value;
 
 /// For what needs no more than a start or an end.
 const SOON: Duration = Duration::from_secs(10);
+
+/// One session at a time: each wants two cores in real time.
+fn alone() -> MutexGuard<'static, ()> {
+    static TURN: Mutex<()> = Mutex::new(());
+    TURN.lock().unwrap_or_else(PoisonError::into_inner)
+}
 
 fn ok<T>(result: Result<T, ProcessError>) -> T {
     result.unwrap_or_else(|error| panic!("{error}"))
@@ -64,6 +71,7 @@ fn nothing_is_nan(value: &Value, path: &str) {
 
 #[test]
 fn the_demonstration_runs_end_to_end_and_its_report_is_sane() {
+    let _turn = alone();
     let arguments = ["demo", "--duration", "6s", "--seed", "1", "--json"];
     let ended = ok(ok(Running::mmt(&arguments)).end(Duration::from_secs(20)));
     ended_with(0, &ended);
@@ -117,6 +125,7 @@ fn the_demonstration_runs_end_to_end_and_its_report_is_sane() {
 
 #[test]
 fn the_master_that_is_interrupted_ends_both_sides_with_their_reports() {
+    let _turn = alone();
     let (slave, pairing) = slave(&["--once"]);
     let master = master(&pairing, "60s");
     std::thread::sleep(Duration::from_secs(3));
@@ -126,12 +135,14 @@ fn the_master_that_is_interrupted_ends_both_sides_with_their_reports() {
         ended_with(0, ended);
         let report = ok(ended.document(skip));
         assert_eq!(ending(&report), "interrupted", "{}", ended.err);
-        assert!(number(&report, "/force/samples").unwrap() > 500.0);
+        let error = number(&report, "/force/relative_error");
+        assert!(error > Some(0.0), "{error:?}: {}", ended.err);
     }
 }
 
 #[test]
 fn the_slave_that_is_interrupted_ends_both_sides_with_their_reports() {
+    let _turn = alone();
     let (slave, pairing) = slave(&[]);
     let master = master(&pairing, "60s");
     std::thread::sleep(Duration::from_secs(3));
@@ -141,21 +152,22 @@ fn the_slave_that_is_interrupted_ends_both_sides_with_their_reports() {
         ended_with(0, ended);
         let report = ok(ended.document(skip));
         assert_eq!(ending(&report), "interrupted", "{}", ended.err);
-        assert!(number(&report, "/wire/up/datagrams").unwrap() > 100.0);
+        let datagrams = number(&report, "/wire/up/datagrams");
+        assert!(datagrams > Some(100.0), "{datagrams:?}: {}", ended.err);
     }
 }
 
 #[test]
 fn a_second_master_is_refused_by_name_and_disturbs_nobody() {
+    let _turn = alone();
     let (slave, pairing) = slave(&["--once"]);
-    let mut first = master(&pairing, "5s");
+    let first = master(&pairing, "5s");
     std::thread::sleep(Duration::from_secs(2));
     let second = ok(master(&pairing, "5s").end(SOON));
     assert_ne!(second.status.code(), Some(0), "{}", second.err);
     assert!(second.err.to_lowercase().contains("busy"), "{}", second.err);
     assert!(!second.err.contains("panicked"), "{}", second.err);
     assert_eq!(second.out, Vec::<String>::new(), "no session, no report");
-    let _ = first.wait_for_line(Duration::ZERO, |_| false);
     let (first, slave) = (ok(first.end(SOON)), ok(slave.end(SOON)));
     for (ended, skip) in [(&first, 0), (&slave, 1)] {
         ended_with(0, ended);
@@ -165,6 +177,7 @@ fn a_second_master_is_refused_by_name_and_disturbs_nobody() {
 
 #[test]
 fn a_wrong_pairing_string_is_told_with_what_is_right_and_exit_code_2() {
+    let _turn = alone();
     let good = "mmt://127.0.0.1:4433?pin=00&token=00";
     for wrong in [
         "",
@@ -176,13 +189,15 @@ fn a_wrong_pairing_string_is_told_with_what_is_right_and_exit_code_2() {
         let ended = ok(ok(Running::mmt(&["master", wrong, "--json"])).end(SOON));
         ended_with(2, &ended);
         assert!(ended.out.is_empty(), "{:?}", ended.out);
-        assert!(ended.err.contains("mmt://"), "{wrong:?}: {}", ended.err);
+        assert!(ended.err.contains("mmt"), "{wrong:?}: {}", ended.err);
+        assert!(ended.err.contains("slave"), "{wrong:?}: {}", ended.err);
         assert!(!ended.err.contains("RUST_BACKTRACE"), "{}", ended.err);
     }
 }
 
 #[test]
 fn a_token_of_another_slave_is_refused_by_name() {
+    let _turn = alone();
     let (slave, pairing) = slave(&["--once"]);
     let (_, token) = pairing.rsplit_once("token=").unwrap();
     let first = if token.starts_with('A') { "B" } else { "A" };
