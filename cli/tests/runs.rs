@@ -104,7 +104,13 @@ fn replay(arguments: &[&str]) -> String {
 #[test]
 fn a_replay_prints_the_tables_of_every_file() {
     let text = replay(&["replay", "a.txt", "b.txt"]);
-    for part in ["a.txt", "b.txt", "(ii) surface, point", "All 8 pushes", "Held-out pushes"] {
+    for part in [
+        "a.txt",
+        "b.txt",
+        "(ii) surface, point",
+        "All 8 pushes",
+        "Held-out pushes",
+    ] {
         assert!(text.contains(part), "{part}: {text}");
     }
 }
@@ -124,7 +130,9 @@ fn a_replay_as_json_is_one_document_with_the_keys_of_every_report() {
     assert_eq!(files.len(), 2);
     let surface = |file: &Value| {
         let laws = file["laws"].as_array().unwrap();
-        let law = laws.iter().find(|law| law["law"] == document["replay"]["law"]);
+        let law = laws
+            .iter()
+            .find(|law| law["law"] == document["replay"]["law"]);
         law.unwrap()["updates"]["sent"].as_u64().unwrap()
     };
     let sent: u64 = files.iter().map(surface).sum();
@@ -140,7 +148,16 @@ fn a_relay_prints_its_address_first_and_its_counters_when_interrupted() {
     let home = tempfile::tempdir().unwrap();
     let target = std::net::UdpSocket::bind("127.0.0.1:0").unwrap();
     let to = target.local_addr().unwrap().to_string();
-    let arguments = ["netem", "--listen", "127.0.0.1:0", "--to", &to, "--up", "loss 100%", "--json"];
+    let arguments = [
+        "netem",
+        "--listen",
+        "127.0.0.1:0",
+        "--to",
+        &to,
+        "--up",
+        "loss 100%",
+        "--json",
+    ];
     let relay = Running::start(mmt(&home, &arguments));
     let address: std::net::SocketAddr = relay.first_line.parse().unwrap();
     let source = std::net::UdpSocket::bind("127.0.0.1:0").unwrap();
@@ -159,7 +176,12 @@ fn a_relay_prints_its_address_first_and_its_counters_when_interrupted() {
 fn a_slave_that_nobody_comes_to_prints_its_pairing_string_and_an_empty_report() {
     let home = tempfile::tempdir().unwrap();
     let arguments = [
-        "slave", "--listen", "127.0.0.1:0", "--advertise", "robot.example.org", "--json",
+        "slave",
+        "--listen",
+        "127.0.0.1:0",
+        "--advertise",
+        "robot.example.org",
+        "--json",
     ];
     let slave = Running::start(mmt(&home, &arguments));
     let line = &slave.first_line;
@@ -179,17 +201,26 @@ fn a_master_that_nobody_answers_says_so_with_a_code_of_its_own() {
     // bound, so that no ICMP comes back, and never read from
     let silent = std::net::UdpSocket::bind("127.0.0.1:0").unwrap();
     let (pin, token) = ("0f".repeat(32), "a5".repeat(32));
-    let pairing = format!("mmt://{}?pin={pin}&token={token}", silent.local_addr().unwrap());
+    let pairing = format!(
+        "mmt://{}?pin={pin}&token={token}",
+        silent.local_addr().unwrap()
+    );
     let output = mmt(&home, &["master", &pairing]).output().unwrap();
     let text = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(4), "{text}");
-    assert!(text.contains("nothing answered") && !text.contains("panicked"), "{text}");
+    assert!(
+        text.contains("nothing answered") && !text.contains("panicked"),
+        "{text}"
+    );
 }
 
 #[test]
 fn a_slave_and_a_master_as_processes_both_end_with_a_report() {
     let home = tempfile::tempdir().unwrap();
-    let slave = Running::start(mmt(&home, &["slave", "--listen", "127.0.0.1:0", "--once", "--json"]));
+    let slave = Running::start(mmt(
+        &home,
+        &["slave", "--listen", "127.0.0.1:0", "--once", "--json"],
+    ));
     let pairing = slave.first_line.clone();
     let arguments = ["master", &pairing, "--duration", "2s", "--json"];
     let output = mmt(&home, &arguments).output().unwrap();

@@ -34,7 +34,10 @@ fn complains(output: &Output, code: i32, parts: &[&str]) {
     let text = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(code), "{text}");
     assert!(output.stdout.is_empty(), "data on stdout");
-    assert!(!text.contains("panicked") && !text.contains("RUST_BACKTRACE"), "{text}");
+    assert!(
+        !text.contains("panicked") && !text.contains("RUST_BACKTRACE"),
+        "{text}"
+    );
     for part in parts {
         assert!(text.contains(part), "{part} is missing in: {text}");
     }
@@ -48,10 +51,16 @@ fn pairing() -> String {
 #[test]
 fn wrong_arguments_are_refused_with_the_option_and_what_would_be_right() {
     refuses(&["fly"], &["fly", "--help"]);
-    refuses(&["demo", "--duration", "20"], &["--duration", "such as 20s"]);
+    refuses(
+        &["demo", "--duration", "20"],
+        &["--duration", "such as 20s"],
+    );
     refuses(&["demo", "--netem", "delay 50"], &["--netem", "^^", "50ms"]);
     refuses(&["slave"], &["--listen"]);
-    refuses(&["slave", "--listen", "4433"], &["--listen", "0.0.0.0:4433"]);
+    refuses(
+        &["slave", "--listen", "4433"],
+        &["--listen", "0.0.0.0:4433"],
+    );
     refuses(&["replay"], &["FILE"]);
 }
 
@@ -75,9 +84,18 @@ fn a_wrong_configuration_is_refused_with_line_and_caret() {
     let home = tempfile::tempdir().unwrap();
     let file = home.path().join("slave.toml");
     for (text, parts) in [
-        ("seed = 1\nmas_kg = 0.7\n", &["slave.toml", "line 2", "^^^^^^", "mas_kg", "what to do"][..]),
-        ("[environment]\nmass_kg = \"heavy\"\n", &["line 2", "^", "heavy"]),
-        ("[environment]\nmass_kg = -1.0\n", &["mass", "-1", "what to do"]),
+        (
+            "seed = 1\nmas_kg = 0.7\n",
+            &["slave.toml", "line 2", "^^^^^^", "mas_kg", "what to do"][..],
+        ),
+        (
+            "[environment]\nmass_kg = \"heavy\"\n",
+            &["line 2", "^", "heavy"],
+        ),
+        (
+            "[environment]\nmass_kg = -1.0\n",
+            &["mass", "-1", "what to do"],
+        ),
         ("= 1", &["line 1"]),
     ] {
         std::fs::write(&file, text).unwrap();
@@ -95,7 +113,11 @@ fn a_wrong_trace_is_refused_with_file_and_line() {
     let home = tempfile::tempdir().unwrap();
     let pairing = pairing();
     for (name, text, parts) in [
-        ("a.csv", "t_s,x_m,y_m\n0,0,zero\n", &["a.csv", "line 2", "y_m", "zero"][..]),
+        (
+            "a.csv",
+            "t_s,x_m,y_m\n0,0,zero\n",
+            &["a.csv", "line 2", "y_m", "zero"][..],
+        ),
         ("b.csv", "0,0,0\n", &["b.csv", "line 1", "t_s,x_m,y_m"]),
         ("c.txt", "1 2 3", &["c.txt", "line 1", "what to do"]),
         ("d.txt", "", &["d.txt", "line 1"]),
@@ -111,7 +133,10 @@ fn a_wrong_trace_is_refused_with_file_and_line() {
 fn a_wrong_recording_is_refused_before_any_is_replayed() {
     let home = tempfile::tempdir().unwrap();
     std::fs::write(home.path().join("binary.txt"), [0xff, 0xfe]).unwrap();
-    let output = command(&home).args(["replay", "binary.txt"]).output().unwrap();
+    let output = command(&home)
+        .args(["replay", "binary.txt"])
+        .output()
+        .unwrap();
     complains(&output, 2, &["binary.txt", "UTF-8"]);
     refuses(&["replay", "none.txt"], &["none.txt", "check the path"]);
     refuses(&["replay", "."], &["path of a file"]);
@@ -134,14 +159,28 @@ fn an_address_in_use_has_an_exit_code_of_its_own() {
 fn a_wrong_log_filter_is_refused_by_the_name_of_its_variable() {
     let home = tempfile::tempdir().unwrap();
     let mut command = command(&home);
-    let output = command.env("MMT_LOG", "mmt=loud").args(["replay", "x"]).output();
+    let output = command
+        .env("MMT_LOG", "mmt=loud")
+        .args(["replay", "x"])
+        .output();
     complains(&output.unwrap(), 2, &["MMT_LOG", "debug"]);
 }
 
 #[test]
 fn nobody_reading_stdout_is_no_panic() {
     let home = tempfile::tempdir().unwrap();
-    for arguments in [&["--help"][..], &["netem", "--listen", "127.0.0.1:0", "--to", "127.0.0.1:9", "--duration", "1ms"]] {
+    for arguments in [
+        &["--help"][..],
+        &[
+            "netem",
+            "--listen",
+            "127.0.0.1:0",
+            "--to",
+            "127.0.0.1:9",
+            "--duration",
+            "1ms",
+        ],
+    ] {
         let mut child = command(&home)
             .args(arguments)
             .stdout(Stdio::piped())
@@ -151,6 +190,9 @@ fn nobody_reading_stdout_is_no_panic() {
         drop(child.stdout.take());
         let output = child.wait_with_output().unwrap();
         let text = String::from_utf8_lossy(&output.stderr);
-        assert!(output.status.success() && !text.contains("panicked"), "{text}");
+        assert!(
+            output.status.success() && !text.contains("panicked"),
+            "{text}"
+        );
     }
 }

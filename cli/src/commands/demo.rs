@@ -49,9 +49,12 @@ pub(crate) fn run(arguments: DemoArguments, messages: &Messages) -> Result<(), F
     let mut viewer = Viewer::new(caption, !arguments.json, messages, &stop);
     let mut master_ended = None;
     while master.is_running() || slave.is_running() {
+        let slave = Some(started.live.get()).filter(|slave| slave.connected);
+        // copied out first: a look borrowed while it is shown would stop the master's task
+        let look = *master_live.borrow();
         viewer.look(Snapshot {
-            slave: Some(started.live.get()).filter(|slave| slave.connected),
-            master: Some(*master_live.borrow()),
+            slave,
+            master: Some(look),
         });
         if !master.is_running() {
             let since = *master_ended.get_or_insert_with(Instant::now);
