@@ -49,12 +49,11 @@ pub(crate) fn run(arguments: DemoArguments, messages: &Messages) -> Result<(), F
     let mut viewer = Viewer::new(caption, !arguments.json, messages, &stop);
     let mut master_ended = None;
     while master.is_running() || slave.is_running() {
-        let slave = Some(started.live.get()).filter(|slave| slave.connected);
-        // copied out first: a look borrowed while it is shown would stop the master's task
-        let look = *master_live.borrow();
+        // looked at first: a borrow that lives through the viewer's wait would stop the master's task
+        let master_now = *master_live.borrow();
         viewer.look(Snapshot {
-            slave,
-            master: Some(look),
+            slave: Some(started.live.get()).filter(|slave| slave.connected),
+            master: Some(master_now),
         });
         if !master.is_running() {
             let since = *master_ended.get_or_insert_with(Instant::now);

@@ -22,8 +22,9 @@ const GIVE_UP_S: f64 = 10.0;
 /// A hand that pushes into air notices it after this long and approaches again, ticks: between the reflex
 /// (50 ms) and the voluntary reaction to a touch (150 ms).
 const REACTION_TICKS: u32 = 80;
-/// Time from the touch to the full speed of the push, s: a hand loads what it touches before it shoves.
-const PUSH_ONSET_S: f64 = 0.4;
+/// Time from the touch to the full speed of the push, s: a hand loads what it touches before it shoves, and
+/// a movement of two to three seconds takes about a third of it to reach its speed.
+const PUSH_ONSET_S: f64 = 0.8;
 /// A goal is reached when the wish is this near, m.
 const REACHED_M: f64 = 0.005;
 /// Rate at which a lateral error is steered out, 1/s, and the most speed for it, m/s.

@@ -164,7 +164,8 @@ impl SlaveHost {
     /// is over. The report is that of the last session, none if there was none.
     ///
     /// # Errors
-    /// The 1 kHz thread could not be started or panicked; the session's master has been told.
+    /// The 1 kHz thread panicked, of which the session's master has been told, or could not be started, which
+    /// closes the connection.
     pub async fn run(
         self,
         mut stop: watch::Receiver<bool>,

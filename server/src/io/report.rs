@@ -4,7 +4,8 @@
 //! socket, `wire.down` those that its socket really sent after the emulated network. What only the master knows
 //! comes from its farewell and is absent without it.
 
-use std::sync::atomic::{AtomicU64, Ordering};
+mod drops;
+
 use std::time::Duration;
 
 use mmt_netem::io::socket::SocketCounters;
@@ -103,7 +104,7 @@ pub(super) fn report(
     report.messages = messages(&traffic);
     report.wire = wire(outcome, &traffic);
     report.link = link(&outcome.link);
-    report.drops = Some(drops(shared, outcome, &traffic));
+    report.drops = Some(drops::drops(shared, outcome, &traffic));
     if let Some(theirs) = theirs {
         report.haptic_loop = loop_of_master(&theirs.totals.haptic_loop);
     }
@@ -245,74 +246,6 @@ fn loop_of_master(totals: &LoopTotals) -> LoopReport {
         cpu_us: quantiles(totals.cpu_us),
         lateness_us: quantiles(totals.lateness_us),
     }
-}
-
-/// Every drop of the session by name; who was turned away at the door is counted from the host's start on.
-fn drops(shared: &Shared, outcome: &Outcome, traffic: &Traffic) -> Counts {
-    let read = |counter: &AtomicU64| counter.load(Ordering::Relaxed);
-    let (lost, refusals) = (&outcome.lost, &shared.refusals);
-    let (netem, before) = (outcome.after.dropped, outcome.before.dropped);
-    let away = shared.listener.turned_away();
-    let mut drops = named([
-        ("datagrams_malformed", traffic.malformed.into()),
-        ("datagrams_duplicate", traffic.duplicates.into()),
-        ("datagrams_too_old", traffic.too_old.into()),
-        ("datagrams_unread", outcome.unread),
-        ("datagrams_displaced", outcome.unsent),
-        (
-            "echoes_implausible",
-            outcome.link.end().peer().bad_echoes().into(),
-        ),
-        ("samples_dropped", lost.samples),
-        ("updates_unsealed", lost.unsealed),
-        ("send_too_large", lost.too_large),
-        ("send_unsupported", lost.unsupported),
-        ("send_disconnected", lost.disconnected),
-        (
-            "netem_loss",
-            netem.loss.packets.saturating_sub(before.loss.packets),
-        ),
-        (
-            "netem_limit",
-            netem.limit.packets.saturating_sub(before.limit.packets),
-        ),
-        (
-            "socket_blocked",
-            netem.blocked.packets.saturating_sub(before.blocked.packets),
-        ),
-        (
-            "socket_failed",
-            netem.failed.packets.saturating_sub(before.failed.packets),
-        ),
-        ("masters_busy", read(&refusals.busy)),
-        ("masters_wrong_token", read(&refusals.wrong_token)),
-        ("masters_bad_hello", read(&refusals.bad_hello)),
-        ("masters_ending", read(&refusals.ending)),
-        ("masters_no_hello", read(&refusals.no_hello)),
-        ("masters_crowded", read(&refusals.crowded)),
-        ("handshakes_failed", read(&refusals.handshake)),
-        ("handshakes_refused", away.refused),
-        ("handshakes_unreadable", away.unreadable),
-    ]);
-    if let Some(finished) = &outcome.finished {
-        drops.extend(slave_drops(finished));
-    }
-    drops
-}
-
-fn slave_drops(finished: &Finished) -> Counts {
-    let slave = &finished.slave;
-    let playout = slave.playout().counts();
-    named([
-        ("updates_superseded", finished.superseded),
-        ("samples_late", playout.late),
-        ("samples_duplicate", playout.duplicate),
-        ("samples_overflow", playout.overflow),
-        ("samples_implausible", playout.implausible),
-        ("estimates_refused", slave.refused_estimates()),
-        ("wrenches_refused", slave.environment().refused()),
-        ("forces_not_finite", slave.force().rejected()),
-    ])
 }
 
 fn named<const N: usize>(counts: [(&str, u64); N]) -> Counts {

@@ -3,6 +3,7 @@
 //! Begins with the slave that the hello asks for, ends with the report; what happens in between is
 //! `traffic`'s. It decides nothing about the model.
 
+mod end;
 mod traffic;
 
 use std::io;
@@ -12,16 +13,14 @@ use bytes::Bytes;
 use mmt_netem::io::socket::SocketCounters;
 use mmt_shared::io::clock::Clock;
 use mmt_shared::io::live::LiveCell;
-use mmt_shared::io::stream::{ReadFrameError, WriteFrameError, read_frame, write_frame};
+use mmt_shared::io::stream::{WriteFrameError, write_frame};
 use mmt_shared::io::versions::CLOSE_FINISHED;
 use mmt_shared::metrics::UpdateCounts;
-use mmt_shared::peer::NumbersSpent;
 use mmt_shared::wire::{
-    DATAGRAM_MAX, DecodeError, Ending, Farewell, Hello, Label, MasterTotals, Refusal,
-    STREAM_MESSAGE_MAX, Side, SlaveTotals, StreamMessage, Welcome, decode_stream_message,
-    encode_slave_farewell, encode_welcome,
+    DATAGRAM_MAX, Ending, Farewell, Hello, Label, Refusal, STREAM_MESSAGE_MAX, SlaveTotals,
+    Welcome, encode_slave_farewell, encode_welcome,
 };
-use quinn::{Connection, ConnectionError, RecvStream, SendStream};
+use quinn::{Connection, RecvStream, SendStream};
 use tokio::sync::watch;
 use tokio::time::timeout;
 
@@ -34,8 +33,8 @@ use crate::link::SlaveLink;
 use crate::playout::PlayoutConfig;
 use crate::slave::{Slave, SlaveConfig};
 
-/// A master that has not been heard for this long has lost its lease (reliability.md, section 1).
-const SILENCE_MAX: Duration = Duration::from_secs(10);
+use end::{End, farewell_of};
+
 /// How long each side waits for the other's farewell (protocol.md, section 2).
 const FAREWELL_WAIT: Duration = Duration::from_secs(1);
 /// How long the stream may take to take a message of ours.
@@ -62,36 +61,6 @@ pub(super) struct Lost {
     pub(super) read: u64,
     /// Not lost, but given to the connection: tells what it dropped unsent.
     pub(super) given: u64,
-}
-
-/// Why a session ended.
-#[derive(Debug, thiserror::Error)]
-pub(super) enum End {
-    #[error("this side was asked to end")]
-    Asked,
-    #[error("the master said farewell ({:?})", .0.ending)]
-    Farewell(Box<Farewell<MasterTotals>>),
-    #[error("the master was not heard for {SILENCE_MAX:?}")]
-    Silence,
-    #[error("the connection was lost: {0}")]
-    Disconnected(#[from] ConnectionError),
-    #[error("the stream ended: {0}")]
-    Stream(#[from] StreamError),
-    #[error(transparent)]
-    Numbers(#[from] NumbersSpent),
-    #[error("the 1 kHz thread panicked")]
-    Panicked,
-}
-
-/// Why no farewell could be read.
-#[derive(Debug, thiserror::Error)]
-pub(super) enum StreamError {
-    #[error(transparent)]
-    Frame(#[from] ReadFrameError),
-    #[error(transparent)]
-    Message(#[from] DecodeError),
-    #[error("a message that is no farewell")]
-    NoFarewell,
 }
 
 /// A session that has begun.
@@ -208,14 +177,6 @@ async fn welcome(
 fn announce(connection: &Connection, hello: &Hello) {
     let (address, program) = (connection.remote_address(), hello.program);
     tracing::info!("{address} operates ({program}, {:?})", hello.coupling);
-}
-
-async fn farewell_of(mut receive: RecvStream) -> Result<Farewell<MasterTotals>, StreamError> {
-    let frame = read_frame(&mut receive, STREAM_MESSAGE_MAX, Duration::MAX).await?;
-    match decode_stream_message(&frame, Side::Master)? {
-        StreamMessage::MasterFarewell(farewell) => Ok(farewell),
-        _ => Err(StreamError::NoFarewell),
-    }
 }
 
 impl<'a> Session<'a> {

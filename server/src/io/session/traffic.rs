@@ -13,7 +13,8 @@ use quinn::SendDatagramError;
 use tokio::sync::watch;
 use tokio::time::{MissedTickBehavior, interval, sleep};
 
-use super::{End, SILENCE_MAX, Session, StreamError};
+use super::Session;
+use super::end::{End, SILENCE_MAX, StreamError};
 use crate::io::SlaveLive;
 use crate::io::host::stopped;
 

@@ -1,0 +1,78 @@
+//! Everything that a slave host drops or refuses, by the name that the report gives it.
+
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use mmt_shared::report::Counts;
+use mmt_shared::wire::Traffic;
+
+use super::{Outcome, named};
+use crate::io::host::Shared;
+use crate::io::worker::Finished;
+
+/// Every drop of the session by name; who was turned away at the door is counted from the host's start on.
+pub(super) fn drops(shared: &Shared, outcome: &Outcome, traffic: &Traffic) -> Counts {
+    let read = |counter: &AtomicU64| counter.load(Ordering::Relaxed);
+    let (lost, refusals) = (&outcome.lost, &shared.refusals);
+    let (netem, before) = (outcome.after.dropped, outcome.before.dropped);
+    let away = shared.listener.turned_away();
+    let mut drops = named([
+        ("datagrams_malformed", traffic.malformed.into()),
+        ("datagrams_duplicate", traffic.duplicates.into()),
+        ("datagrams_too_old", traffic.too_old.into()),
+        ("datagrams_unread", outcome.unread),
+        ("datagrams_displaced", outcome.unsent),
+        (
+            "echoes_implausible",
+            outcome.link.end().peer().bad_echoes().into(),
+        ),
+        ("samples_dropped", lost.samples),
+        ("updates_unsealed", lost.unsealed),
+        ("send_too_large", lost.too_large),
+        ("send_unsupported", lost.unsupported),
+        ("send_disconnected", lost.disconnected),
+        (
+            "netem_loss",
+            netem.loss.packets.saturating_sub(before.loss.packets),
+        ),
+        (
+            "netem_limit",
+            netem.limit.packets.saturating_sub(before.limit.packets),
+        ),
+        (
+            "socket_blocked",
+            netem.blocked.packets.saturating_sub(before.blocked.packets),
+        ),
+        (
+            "socket_failed",
+            netem.failed.packets.saturating_sub(before.failed.packets),
+        ),
+        ("masters_busy", read(&refusals.busy)),
+        ("masters_wrong_token", read(&refusals.wrong_token)),
+        ("masters_bad_hello", read(&refusals.bad_hello)),
+        ("masters_ending", read(&refusals.ending)),
+        ("masters_no_hello", read(&refusals.no_hello)),
+        ("masters_crowded", read(&refusals.crowded)),
+        ("handshakes_failed", read(&refusals.handshake)),
+        ("handshakes_refused", away.refused),
+        ("handshakes_unreadable", away.unreadable),
+    ]);
+    if let Some(finished) = &outcome.finished {
+        drops.extend(slave_drops(finished));
+    }
+    drops
+}
+
+fn slave_drops(finished: &Finished) -> Counts {
+    let slave = &finished.slave;
+    let playout = slave.playout().counts();
+    named([
+        ("updates_superseded", finished.superseded),
+        ("samples_late", playout.late),
+        ("samples_duplicate", playout.duplicate),
+        ("samples_overflow", playout.overflow),
+        ("samples_implausible", playout.implausible),
+        ("estimates_refused", slave.refused_estimates()),
+        ("wrenches_refused", slave.environment().refused()),
+        ("forces_not_finite", slave.force().rejected()),
+    ])
+}
