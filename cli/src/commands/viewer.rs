@@ -54,7 +54,9 @@ impl Viewer {
 
     fn line(&mut self) {
         let now = Instant::now();
-        if now >= self.next_line {
+        // nothing is shown of a side that nobody is connected to
+        let quiet = self.history.newest() == Snapshot::default();
+        if now >= self.next_line && !quiet {
             // after a pause of this process there is no burst of lines
             self.next_line = now + LINE;
             note(line(&self.history));

@@ -13,6 +13,9 @@ use super::{Caption, History, Snapshot};
 pub(super) const MESSAGES_MAX: usize = 3;
 /// Height of a panel of numbers, lines.
 const PANEL_HEIGHT: u16 = 9;
+/// Widths of the panels; the last one takes what is left.
+const UPDATES_WIDTH: u16 = 25;
+const MODEL_WIDTH: u16 = 32;
 /// The least full scale of a force chart, N: noise shall not fill it.
 const SCALE_MIN_N: f64 = 1.0;
 
@@ -111,9 +114,9 @@ fn centinewtons(force_n: Option<f64>) -> Option<u64> {
 
 fn render_panels(frame: &mut Frame<'_>, area: Rect, caption: &Caption, history: &History) {
     let [updates, model, right] = Layout::horizontal([
-        Constraint::Fill(5),
-        Constraint::Fill(6),
-        Constraint::Fill(5),
+        Constraint::Length(UPDATES_WIDTH),
+        Constraint::Length(MODEL_WIDTH),
+        Constraint::Min(0),
     ])
     .areas(area);
     let [link, loops] = Layout::vertical([Constraint::Length(5), Constraint::Fill(1)]).areas(right);

@@ -6,9 +6,9 @@ use ratatui::widgets::{Block, Paragraph};
 
 use super::{Caption, History, Snapshot};
 
-fn panel(title: &'static str, lines: Vec<String>) -> Paragraph<'static> {
+fn panel(title: impl Into<String>, lines: Vec<String>) -> Paragraph<'static> {
     let lines: Vec<Line<'_>> = lines.into_iter().map(Line::from).collect();
-    Paragraph::new(lines).block(Block::bordered().title(title))
+    Paragraph::new(lines).block(Block::bordered().title(title.into()))
 }
 
 /// A number with a unit, or a dash.
@@ -28,13 +28,15 @@ pub(super) fn update_panel(history: &History) -> Paragraph<'static> {
         let rate = rates.and_then(|rates| rates.get(index).copied());
         let count = counts.and_then(|counts| counts.get(index).copied());
         let count = count.map_or_else(|| "-".to_owned(), |count| count.to_string());
-        let name = cause.name().replace('_', " ");
-        format!("{name:19}{count:>5}{:>6}", shown(rate, 1, ""))
+        let name = cause.name();
+        let name = name.strip_suffix("_contact").unwrap_or(name);
+        let name = name.replace('_', " ");
+        format!("{name:12}{count:>5}{:>6}", shown(rate, 1, ""))
     };
     let mut lines: Vec<String> = Cause::ALL.into_iter().enumerate().map(row).collect();
     let applied = now.master.map(|master| master.updates_applied as f64);
-    lines.push(format!("{:19}{:>5}", "applied", shown(applied, 0, "")));
-    panel("updates  sent  per s", lines)
+    lines.push(format!("{:12}{:>5}", "applied", shown(applied, 0, "")));
+    panel("updates ─── sent per s", lines)
 }
 
 /// m, b, c: estimated, true, in use; pushes.
@@ -42,7 +44,7 @@ pub(super) fn model_panel(caption: &Caption, now: &Snapshot) -> Paragraph<'stati
     let estimate = now.slave.map(|slave| slave.estimate);
     let in_use = now.master.map(|master| master.params);
     let mut lines = vec![format!(
-        "{:10}{:>8}{:>8}{:>8}",
+        "{:8}{:>8}{:>7}{:>7}",
         "", "estimate", "truth", "master"
     )];
     for (index, label) in ["m kg", "b N s/m", "c N"].into_iter().enumerate() {
@@ -50,7 +52,7 @@ pub(super) fn model_panel(caption: &Caption, now: &Snapshot) -> Paragraph<'stati
             shown(values.and_then(|values| values.get(index).copied()), 3, "")
         };
         let (estimate, truth, in_use) = (of(estimate), of(caption.truth), of(in_use));
-        lines.push(format!("{label:10}{estimate:>8}{truth:>8}{in_use:>8}"));
+        lines.push(format!("{label:8}{estimate:>8}{truth:>7}{in_use:>7}"));
     }
     let hand = now.master.map(|master| master.hand_force.norm());
     let pushes = now.master.and_then(|master| master.pushes);
@@ -68,9 +70,9 @@ pub(super) fn link_panel(now: &Snapshot) -> Paragraph<'static> {
     let percent = |share: Option<f64>| shown(share.map(|share| share * 100.0), 1, " %");
     let state = now.master.map_or("-", |master| master.link.name());
     panel(
-        "link",
+        format!("link: {state}"),
         vec![
-            format!("{state}, round trip {}", shown(now.rtt_ms(), 1, " ms")),
+            format!("round trip {}", shown(now.rtt_ms(), 1, " ms")),
             format!("loss up {}", percent(up)),
             format!("loss down {}", percent(down)),
         ],

@@ -47,7 +47,8 @@ impl Section<'_, '_> {
         if let Some(title) = self.title.take() {
             writeln!(self.out, "\n{title}")?;
         }
-        let mut line = format!("  {label:LABEL$}");
+        // a label that is full still ends with a space
+        let mut line = format!("  {label:width$} ", width = LABEL - 1);
         for cell in cells {
             let text = cell.as_deref().unwrap_or("-");
             // a cell that is full still ends with a space
@@ -76,7 +77,7 @@ impl<C> fmt::Display for RunReport<C> {
         self.network(f)?;
         loop_rows(f, "Haptic loop", &self.haptic_loop)?;
         loop_rows(f, "Slave loop", &self.slave_loop)?;
-        section(f, "Dropped or refused").counts("", self.drops.as_ref())
+        self.drops(f)
     }
 }
 
@@ -88,6 +89,16 @@ fn section<'a, 'f>(out: &'a mut fmt::Formatter<'f>, title: &'static str) -> Sect
 }
 
 impl<C> RunReport<C> {
+    /// Only what happened: there are dozens of names, and in a sound run all counts are 0.
+    fn drops(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let mut rows = section(f, "Dropped or refused");
+        let happened = self.drops.iter().flatten().filter(|(_, n)| **n > 0);
+        for (name, n) in happened {
+            rows.row(&name.replace('_', " "), &[count(Some(*n), "")])?;
+        }
+        Ok(())
+    }
+
     fn head(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "mmt {} {}", self.command, self.version)?;
         let parts = [
