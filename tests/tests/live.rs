@@ -1,6 +1,7 @@
 //! The live system on one host: the demonstration, and how sessions end and are refused.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test may panic")]
+#![allow(clippy::disallowed_methods, reason = "lets sessions go on for a while")]
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
