@@ -4,11 +4,12 @@
 //! extrapolates: before its first sample and after its last it holds them. Between samples it is linear.
 //!
 //! A recorded path was made around another object, elsewhere. [`Trace::starting_at`] carries it to where
-//! ours is, unscaled: choose the start so that the path's first motion leads into the face to be pushed.
+//! ours is, unscaled. A path from CSV is left as it lies; recorded pushes are turned to push towards +x, one
+//! going on where the other ended.
 
 use std::time::Duration;
 
-use mmt_shared::geometry::Vec2;
+use mmt_shared::geometry::{Vec2, rotate};
 use mmt_shared::recording::{ParseError, Push, Recording};
 
 /// The first line of a tool path in CSV, exactly.
@@ -19,9 +20,15 @@ pub const SAMPLES_MAX: usize = 10_000_000;
 pub const TIME_MAX_S: f64 = 2.7e6;
 /// The farthest coordinate accepted in CSV, m.
 pub const COORDINATE_MAX_M: f64 = 100.0;
-/// Speed of the straight moves between recorded pushes, m/s. The recording has no path there; this is the
-/// slow end of how people move a tool to a new place.
-pub const MOVE_SPEED_M_PER_S: f64 = 0.1;
+/// Way in +x before the first recorded push, m: from the stand-off nearly to the box, so that a push of
+/// two centimetres, as they are recorded, gets there.
+pub const APPROACH_M: f64 = 0.06;
+/// Its speed, m/s: the scripted operator's.
+const APPROACH_M_PER_S: f64 = 0.06;
+/// From the last sample of a push to the first of the next, s: the recordings' own sample period.
+const BETWEEN_S: f64 = 0.03;
+/// A finger that ends nearer than this to where it began has no direction, m.
+const DIRECTION_MIN_M: f64 = 1e-6;
 
 /// Why a text is not a tool path.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -138,11 +145,11 @@ impl Trace {
         Self::from_recording(&Recording::parse(text)?, push)
     }
 
-    /// The finger's path in recorded pushes: of the push of that number (from 0), or of all, joined.
+    /// The finger's path in recorded pushes: of the push of that number (from 0), or of all.
     ///
-    /// Each push keeps its own timing (about 33 samples a second at 2.7 mm/s). A joined push is preceded
-    /// by a straight move at [`MOVE_SPEED_M_PER_S`] from where the last one ended; the finger's real way
-    /// was not recorded, and the straight one may touch the object.
+    /// Each push keeps its own timing and shape (about 33 samples a second at 2.7 mm/s) and is turned so
+    /// that it leads towards +x on the whole; it begins where the last one ended, for the finger's way
+    /// between them was not recorded. A straight approach of [`APPROACH_M`] comes first.
     ///
     /// # Errors
     /// There is no push of that number.
@@ -157,7 +164,8 @@ impl Trace {
                     last: recording.pushes.len().saturating_sub(1),
                 })?,
         };
-        let mut samples = Vec::new();
+        let approached = (APPROACH_M / APPROACH_M_PER_S, Vec2::new(APPROACH_M, 0.0));
+        let mut samples = vec![(0.0, Vec2::zeros()), approached];
         pushes.iter().for_each(|push| append(&mut samples, push));
         Ok(Self { samples })
     }
@@ -234,21 +242,27 @@ fn csv_sample(line: usize, text: &str) -> Result<(f64, Vec2), TraceError> {
     Ok((t_s, Vec2::new(x, y)))
 }
 
-/// Appends a push's finger path, after a move to its start.
+/// Appends a push's finger path, turned towards +x, from where the path has come to.
 fn append(samples: &mut Vec<(f64, Vec2)>, push: &Push) {
-    let Some(first) = push.finger.first() else {
+    let (Some(first), Some(end)) = (push.finger.first(), push.finger.last()) else {
         return;
     };
-    let start_s = samples.last().map_or(0.0, |(last_s, last)| {
-        let way = (first.pose.position - last).norm();
-        // At least one sample period, so that time increases when the finger starts where it was.
-        last_s + (way / MOVE_SPEED_M_PER_S).max(0.03)
-    });
-    samples.extend(
-        push.finger
-            .iter()
-            .map(|sample| (start_s + (sample.t_s - first.t_s), sample.pose.position)),
-    );
+    let Some((last_s, last)) = samples.last().copied() else {
+        return;
+    };
+    let way = end.pose.position - first.pose.position;
+    let direction = if way.norm() > DIRECTION_MIN_M {
+        libm::atan2(way.y, way.x)
+    } else {
+        0.0
+    };
+    samples.extend(push.finger.iter().map(|sample| {
+        let moved = sample.pose.position - first.pose.position;
+        (
+            last_s + BETWEEN_S + (sample.t_s - first.t_s),
+            last + rotate(-direction, moved),
+        )
+    }));
 }
 
 #[cfg(test)]
@@ -296,13 +310,15 @@ mod tests {
     }
 
     #[test]
-    fn pushes_are_joined_by_moves_that_take_their_time() {
+    fn recorded_pushes_all_lead_towards_the_box_one_after_the_other() {
         let trace = Trace::from_cmu(PUSHES, None).unwrap();
-        // 0.06 s of pushing, 50 mm at 0.1 m/s, 0.03 s of pushing
-        assert!((trace.duration().as_secs_f64() - 0.59).abs() < 1e-6);
-        assert!(close(trace.at(Duration::ZERO), Vec2::new(-0.010, 0.0)));
-        let halfway = trace.at(Duration::from_millis(310));
-        assert!((halfway - Vec2::new(-0.008, 0.025)).norm() < 1e-6);
+        // 1 s of approach, then 2 mm along x in 0.06 s, then 1 mm that was recorded along y in 0.03 s
+        let at = |millis| trace.at(Duration::from_millis(millis));
+        assert!(close(at(0), Vec2::zeros()));
+        assert!(close(at(1000), Vec2::new(0.060, 0.0)));
+        assert!(close(at(1060), Vec2::new(0.061, 0.0)));
+        assert!((trace.duration().as_secs_f64() - 1.15).abs() < 1e-6);
+        assert!(close(trace.at(Duration::MAX), Vec2::new(0.063, 0.0)));
         let rising = trace.samples().windows(2).all(|pair| pair[0].0 < pair[1].0);
         assert!(rising);
     }
@@ -310,8 +326,8 @@ mod tests {
     #[test]
     fn one_push_can_be_taken_by_number_and_a_number_that_is_not_there_is_refused() {
         let trace = Trace::from_cmu(PUSHES, Some(1)).unwrap();
-        assert!(close(trace.at(Duration::ZERO), Vec2::new(-0.008, 0.050)));
-        assert!((trace.duration().as_secs_f64() - 0.03).abs() < 1e-6);
+        assert!(close(trace.at(Duration::MAX), Vec2::new(0.061, 0.0)));
+        assert!((trace.duration().as_secs_f64() - 1.06).abs() < 1e-6);
         let error = Trace::from_cmu(PUSHES, Some(2)).unwrap_err();
         assert_eq!(
             error.to_string(),
