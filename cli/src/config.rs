@@ -11,9 +11,6 @@ use toml::{Table, Value};
 use crate::failure::Failure;
 use crate::input::read_text;
 
-/// Keys whose tables name a choice: they are taken whole, not key by key.
-const CHOICES: [&str; 1] = ["scheme"];
-
 /// The slave of a file, if there is one, in a mode, if one is given.
 ///
 /// # Errors
@@ -53,11 +50,7 @@ fn parse(text: &str, mode: Option<Mode>) -> Result<SlaveConfig, toml::de::Error>
 fn lay_over(whole: &mut Table, given: Table) {
     for (key, value) in given {
         match (whole.get_mut(&key), value) {
-            (Some(Value::Table(inner)), Value::Table(given))
-                if !CHOICES.contains(&key.as_str()) =>
-            {
-                lay_over(inner, given);
-            }
+            (Some(Value::Table(inner)), Value::Table(given)) => lay_over(inner, given),
             (_, value) => {
                 whole.insert(key, value);
             }
@@ -97,8 +90,8 @@ mod tests {
     }
 
     #[test]
-    fn a_scheme_is_taken_whole() {
-        let text = "[trigger.scheme]\nname = \"deadband\"\ndelta = 0.05\n";
+    fn a_scheme_is_written_in_words() {
+        let text = "[trigger]\nscheme = \"deadband 5%\"\n";
         assert_eq!(
             parse(text, None).unwrap().trigger.scheme,
             Scheme::Deadband { delta: 0.05 }

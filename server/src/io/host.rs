@@ -195,6 +195,7 @@ impl SlaveHost {
         live: &LiveCell<SlaveLive>,
     ) -> Result<Option<SlaveReport>, SlaveHostError> {
         let mut last = None;
+        let mut socket_before = self.shared.meter.snapshot();
         loop {
             let admitted = tokio::select! {
                 biased;
@@ -204,7 +205,8 @@ impl SlaveHost {
             let Some(admitted) = admitted else {
                 return Ok(last);
             };
-            let report = session::serve(&self.shared, admitted, stop, live).await?;
+            let report = session::serve(&self.shared, admitted, socket_before, stop, live).await?;
+            socket_before = self.shared.meter.snapshot();
             live.set(SlaveLive::default());
             let served = report.is_some();
             last = report.or(last);

@@ -77,20 +77,23 @@ pub(super) struct Session<'a> {
     buffer: [u8; DATAGRAM_MAX],
 }
 
-/// Serves an admitted master. No report if no session came about.
+/// Serves an admitted master. No report if no session came about. `socket_before` is what the socket had
+/// counted when nobody had knocked for this session yet: the handshake is part of what a session costs.
 pub(super) async fn serve(
     shared: &Shared,
     admitted: Admitted,
+    socket_before: SocketCounters,
     stop: &mut watch::Receiver<bool>,
     live: &LiveCell<SlaveLive>,
 ) -> Result<Option<SlaveReport>, SlaveHostError> {
-    serve_with(shared, admitted, stop, live, Worker::start).await
+    serve_with(shared, admitted, socket_before, stop, live, Worker::start).await
 }
 
 /// Serves with a thread of the caller's making.
 pub(super) async fn serve_with(
     shared: &Shared,
     admitted: Admitted,
+    socket_before: SocketCounters,
     stop: &mut watch::Receiver<bool>,
     live: &LiveCell<SlaveLive>,
     start: impl FnOnce(Clock, Slave) -> io::Result<Worker>,
@@ -115,7 +118,6 @@ pub(super) async fn serve_with(
         }
     };
     slave.start_at(hello.hip);
-    let socket_before = shared.meter.snapshot();
     // Datagrams from before the welcome belong to no session.
     drain(&connection, |_| ()).await;
     if let Err(error) = welcome(&mut send, &config, &slave).await {

@@ -248,7 +248,14 @@ async fn a_panic_of_the_thread_ends_the_session_as_failed_and_is_an_error() {
     let admitted = patiently(masters.recv()).await.unwrap();
     let start = |_, _| Worker::start_with(|_| panic!("on purpose"));
     let live = LiveCell::default();
-    let served = session::serve_with(shared, admitted, &mut stopped, &live, start);
+    let served = session::serve_with(
+        shared,
+        admitted,
+        shared.meter.snapshot(),
+        &mut stopped,
+        &live,
+        start,
+    );
     let served = patiently(served).await;
     assert!(matches!(served, Err(SlaveHostError::Panicked)));
     assert_eq!(patiently(master).await.unwrap(), Ending::Failed);

@@ -6,13 +6,9 @@ use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 
-/// When updates are sent.
+/// When updates are sent. In files it is written in the same words as on the command line.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(
-    rename_all = "kebab-case",
-    rename_all_fields = "snake_case",
-    tag = "name"
-)]
+#[serde(try_from = "String", into = "String")]
 pub enum Scheme {
     /// (12) alone.
     Deadband {
@@ -106,6 +102,20 @@ impl Scheme {
             Self::Dis { .. } => "dis",
             Self::Useful { .. } => "useful",
         }
+    }
+}
+
+impl TryFrom<String> for Scheme {
+    type Error = SchemeError;
+
+    fn try_from(text: String) -> Result<Self, SchemeError> {
+        text.parse()
+    }
+}
+
+impl From<Scheme> for String {
+    fn from(scheme: Scheme) -> Self {
+        scheme.to_string()
     }
 }
 
