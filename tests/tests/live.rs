@@ -102,7 +102,7 @@ fn the_demonstration_runs_end_to_end_and_its_report_is_sane() {
         ("/link/rtt_ms/p50", 95.0, 160.0),
         ("/link/loss_up", 0.0, 0.05),
         ("/link/loss_down", 0.0, 0.08),
-        ("/haptic_loop/ticks", 3000.0, 7000.0),
+        ("/haptic_loop/ticks", 3000.0, 6500.0),
         ("/haptic_loop/skipped", 0.0, 3000.0),
         ("/haptic_loop/cpu_us/p50", 0.0, 1000.0),
     ] {
