@@ -196,11 +196,6 @@ impl World {
         &self.slave
     }
 
-    /// The slave, to change its environment in mid-run.
-    pub fn slave_mut(&mut self) -> &mut Slave {
-        &mut self.slave
-    }
-
     /// The master.
     #[must_use]
     pub fn master(&self) -> &Master {

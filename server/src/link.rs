@@ -2,7 +2,7 @@
 
 use mmt_shared::link_end::{LinkEnd, Outgoing, SealError};
 use mmt_shared::time::Time;
-use mmt_shared::wire::{Command, Matter, Scene, Side, Update};
+use mmt_shared::wire::{Command, Matter, Side, Update};
 
 /// The slave's end of the link.
 #[derive(Clone, Debug)]
@@ -66,19 +66,6 @@ impl SlaveLink {
             ..*update
         };
         self.end.seal(now, Outgoing::Update(&update), out)
-    }
-
-    /// Writes what the slave sees to `out`; returns its length.
-    ///
-    /// # Errors
-    /// When it cannot be sealed.
-    pub fn send_scene(
-        &mut self,
-        now: Time,
-        scene: &Scene,
-        out: &mut [u8],
-    ) -> Result<usize, SealError> {
-        self.end.seal(now, Outgoing::Scene(scene), out)
     }
 
     /// A heartbeat, if nothing has been sent for long enough.

@@ -11,7 +11,7 @@ use mmt_shared::metrics::ForceMetrics;
 use mmt_shared::params::{ModelParams, ModelState};
 use mmt_shared::settings::{Mode, ModelSettings};
 use mmt_shared::time::Time;
-use mmt_shared::wire::{Cause, HipSample, Scene, Update};
+use mmt_shared::wire::{Cause, HipSample, Update};
 
 use crate::environment::{Environment, EnvironmentConfig};
 use crate::estimator::{Estimate, Estimator, EstimatorConfig, Measured};
@@ -61,7 +61,6 @@ pub struct Slave {
     refused_estimates: u64,
     sequence: u32,
     force: ForceMetrics,
-    last: Option<SlaveTick>,
 }
 
 impl Slave {
@@ -121,7 +120,6 @@ impl Slave {
             refused_estimates: 0,
             sequence: 0,
             force: ForceMetrics::default(),
-            last: None,
         })
     }
 
@@ -141,11 +139,6 @@ impl Slave {
     #[must_use]
     pub fn environment(&self) -> &Environment {
         &self.environment
-    }
-
-    /// Changes the real object in mid-run.
-    pub fn environment_mut(&mut self) -> &mut Environment {
-        &mut self.environment
     }
 
     /// What the estimator found so far.
@@ -194,17 +187,6 @@ impl Slave {
         self.playout.start_at(hip);
     }
 
-    /// What a viewer sees; none before the first tick.
-    #[must_use]
-    pub fn scene(&self) -> Option<Scene> {
-        self.last.map(|tick| Scene {
-            answers: tick.stamp,
-            object: self.observer.pose(),
-            tool: tick.tool,
-            force: tick.f_s,
-        })
-    }
-
     /// One sample period. None before the first HIP sample is due.
     pub fn tick(&mut self, now: Time) -> Option<SlaveTick> {
         let played = self.playout.advance(now)?;
@@ -235,7 +217,6 @@ impl Slave {
         };
         let cause = self.trigger.decide(now, &self.trigger_input(&tick));
         tick.update = cause.map(|cause| self.send(cause, &tick));
-        self.last = Some(tick);
         Some(tick)
     }
 

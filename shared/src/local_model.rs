@@ -450,6 +450,26 @@ mod tests {
     }
 
     #[test]
+    fn in_free_space_the_box_comes_up_to_the_hip_and_not_over_it() {
+        let mut model = model(Mode::Recommended, PoseCorrection::MatchedStamps);
+        let hip = Vec2::new(-0.205, 0.0);
+        let rest = |model: &mut LocalModel, ticks: std::ops::RangeInclusive<u64>| {
+            ticks
+                .map(|n| model.step(Time::from_millis(n), hip).force.norm())
+                .fold(0.0, f64::max)
+        };
+        rest(&mut model, 1..=10);
+        let mut nearer = *model.state();
+        nearer.pose.position.x -= 0.020;
+        model.apply(&update(Cause::SlaveOnlyContact, 10, nearer));
+        // the tank is empty: nothing has been dissipated yet
+        let largest = rest(&mut model, 11..=500);
+        let moved = model.state().pose.position.x;
+        assert!((moved + 0.005).abs() < 1e-6, "up to the HIP: {moved}");
+        assert!(largest < 1e-6, "not over it: {largest} N");
+    }
+
+    #[test]
     fn two_models_with_the_same_samples_and_updates_are_equal_to_the_bit() {
         let run = || {
             let mut model = model(Mode::Recommended, PoseCorrection::MatchedStamps);

@@ -274,3 +274,32 @@ fn a_number_outside_its_range_is_named_with_the_range() {
     );
     assert!(with(f64::NAN).is_err());
 }
+
+#[test]
+fn a_hand_that_pushes_into_air_approaches_again_and_loads_before_it_shoves() {
+    let view = |in_contact| View {
+        pose: Pose::default(),
+        footprint: BoxFootprint::square(0.4),
+        in_contact,
+    };
+    let mut scripted = Scripted::try_new(ScriptedConfig::default(), view(false)).unwrap();
+    let ticks = |scripted: &mut Scripted, n: u32, in_contact| {
+        for _ in 0..n {
+            scripted.step(&view(in_contact), Vec2::zeros());
+        }
+    };
+    while scripted.phase() != Phase::Approach {
+        ticks(&mut scripted, 1, false);
+    }
+    ticks(&mut scripted, 1, true);
+    assert_eq!(scripted.phase(), Phase::Push);
+    let approach = ScriptedConfig::default().approach_m_per_s;
+    assert!(
+        (scripted.push_speed() - approach).abs() < 1e-3,
+        "as fast as the approach at first"
+    );
+    ticks(&mut scripted, REACTION_TICKS, false);
+    assert_eq!(scripted.phase(), Phase::Push, "not noticed yet");
+    ticks(&mut scripted, 2, false);
+    assert_eq!(scripted.phase(), Phase::Approach);
+}
