@@ -14,6 +14,7 @@ use mmt_client::operator::scripted::{Scripted, ScriptedConfig, ScriptedError, Vi
 use mmt_netem::config::{ConfigError, LinkConfig};
 use mmt_netem::link::{Direction, LinkId};
 use mmt_netem::pipe::SimPath;
+use mmt_server::environment::Environment;
 use mmt_server::link::SlaveLink;
 use mmt_server::slave::{Slave, SlaveConfig, SlaveError, SlaveTick};
 use mmt_shared::contact::Coupling;
@@ -194,6 +195,11 @@ impl World {
     #[must_use]
     pub fn slave(&self) -> &Slave {
         &self.slave
+    }
+
+    /// The real object, to be changed in mid-run.
+    pub fn environment_mut(&mut self) -> &mut Environment {
+        self.slave.environment_mut()
     }
 
     /// The master.

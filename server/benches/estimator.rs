@@ -63,6 +63,7 @@ fn trigger(criterion: &mut Criterion) {
         speed: 0.16,
         acceleration: 0.2,
         params,
+        shift: Vec2::zeros(),
         turn: 0.001,
     };
     for text in ["hybrid 10% 150ms", "useful 10% 150ms"] {

@@ -56,6 +56,7 @@ pub struct Slave {
     estimator: Estimator,
     shadow: LocalModel,
     trigger: Trigger,
+    timer_carries_pose: bool,
     /// The last parameters that were accepted.
     params: ModelParams,
     refused_estimates: u64,
@@ -105,7 +106,11 @@ impl Slave {
             vision_noise_rad: sensing.vision.angle_noise_rad,
             learn,
         };
-        let estimator = EstimatorConfig::of_mode(config.mode, coupling).starting_at([m, b, c]);
+        let estimator = config
+            .estimator
+            .unwrap_or_else(|| EstimatorConfig::of_mode(config.mode, coupling))
+            .starting_at([m, b, c]);
+        estimator.check()?;
         Ok(Self {
             settings,
             playout: PlayoutBuffer::try_new(config.playout)?,
@@ -116,6 +121,7 @@ impl Slave {
             estimator: Estimator::new(&estimator),
             shadow: LocalModel::new(settings, start),
             trigger: Trigger::new(config.trigger),
+            timer_carries_pose: config.trigger.timer_carries_pose,
             params,
             refused_estimates: 0,
             sequence: 0,
@@ -139,6 +145,11 @@ impl Slave {
     #[must_use]
     pub fn environment(&self) -> &Environment {
         &self.environment
+    }
+
+    /// The real object, to be changed in mid-run: scenarios do, sessions never.
+    pub fn environment_mut(&mut self) -> &mut Environment {
+        &mut self.environment
     }
 
     /// What the estimator found so far.
@@ -246,6 +257,7 @@ impl Slave {
             speed: estimate.speed,
             acceleration: estimate.acceleration,
             params: self.params,
+            shift: self.observer.pose().position - self.shadow.state().pose.position,
             turn: wrap_angle(self.observer.pose().angle - self.shadow.state().pose.angle),
         }
     }
@@ -256,11 +268,19 @@ impl Slave {
             self.observer.carve(tick.tool, touch.face);
         }
         self.sequence = self.sequence.saturating_add(1);
-        let state = ModelState {
+        let seen = ModelState {
             params: self.params,
             footprint: self.observer.footprint(),
             pose: self.observer.pose(),
             twist: self.observer.twist(),
+        };
+        let state = if cause == Cause::Timer && !self.timer_carries_pose {
+            ModelState {
+                params: self.params,
+                ..*self.shadow.state()
+            }
+        } else {
+            seen
         };
         let update = Update {
             sequence: self.sequence,

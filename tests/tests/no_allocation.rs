@@ -288,6 +288,7 @@ impl Parts {
             speed: estimate.speed,
             acceleration: estimate.acceleration,
             params: self.shadow.state().params,
+            shift: Vec2::zeros(),
             turn: 0.0,
         };
         self.decided += u64::from(self.trigger.decide(now, &input).is_some());

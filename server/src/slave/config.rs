@@ -5,6 +5,7 @@ use mmt_shared::settings::Mode;
 use serde::{Deserialize, Serialize};
 
 use crate::environment::{EnvironmentConfig, EnvironmentError};
+use crate::estimator::{EstimatorConfig, SettingOutOfRange};
 use crate::playout::{PlayoutConfig, PlayoutError};
 use crate::sensing::{SensingConfig, SensingError};
 use crate::trigger::TriggerConfig;
@@ -49,6 +50,8 @@ pub struct SlaveConfig {
     pub sensing: SensingConfig,
     /// Buffer for the master's samples.
     pub playout: PlayoutConfig,
+    /// The estimator of m, b and c; the mode's own if absent. It starts from `start` in any case.
+    pub estimator: Option<EstimatorConfig>,
     /// When updates are sent.
     pub trigger: TriggerConfig,
     /// What the local model starts from.
@@ -65,6 +68,7 @@ impl SlaveConfig {
             environment: EnvironmentConfig::default(),
             sensing: SensingConfig::default(),
             playout: PlayoutConfig::default(),
+            estimator: None,
             trigger: TriggerConfig::of_mode(mode),
             start: StartModel::default(),
         }
@@ -89,6 +93,9 @@ pub enum SlaveError {
     /// The play-out buffer's numbers are wrong.
     #[error(transparent)]
     Playout(#[from] PlayoutError),
+    /// The estimator's settings are wrong.
+    #[error("estimator: {0}")]
+    Estimator(#[from] SettingOutOfRange),
     /// The start model's numbers are not accepted.
     #[error("start model: {0}")]
     Start(#[from] ParamsError),

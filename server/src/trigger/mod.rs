@@ -6,9 +6,11 @@
 //! once. Every update, whatever its cause, resets the timer.
 
 mod contact;
+mod metric;
 mod scheme;
 
 pub use contact::{ContactConfig, ContactDetector};
+pub use metric::MismatchMetric;
 pub use scheme::{Scheme, SchemeError};
 
 use std::time::Duration;
@@ -35,6 +37,13 @@ const USEFUL_TURN_RAD: f64 = 0.010;
 pub struct TriggerConfig {
     /// When updates are sent.
     pub scheme: Scheme,
+    /// What Delta bounds.
+    pub metric: MismatchMetric,
+    /// Whether the timer of `hybrid` runs in free space as well; that of `useful` never does.
+    pub timer_in_free_space: bool,
+    /// Whether an update that only the timer asked for says where the object is. If not, it says the
+    /// pose and the velocity that the shadow has, and renews the parameters alone.
+    pub timer_carries_pose: bool,
     /// Least force that (12) divides by, N.
     pub force_floor_n: f64,
     /// Whether a box that sticks can be mismatched: its force is whatever friction holds.
@@ -48,8 +57,8 @@ pub struct TriggerConfig {
 }
 
 impl TriggerConfig {
-    /// The settings of a mode. Paper: hybrid at its best point (10 %, 150 ms), floor F_min = 0.04 N.
-    /// Recommended: `useful` with the same numbers, floor 0.3 N.
+    /// The settings of a mode. Paper: hybrid at its best point (10 %, 150 ms), floor F_min = 0.04 N, and
+    /// timer packets of parameters alone. Recommended: `useful` with the same numbers, floor 0.3 N.
     #[must_use]
     pub fn of_mode(mode: Mode) -> Self {
         let (delta, t_update) = (0.10, Duration::from_millis(150));
@@ -59,6 +68,9 @@ impl TriggerConfig {
         };
         Self {
             scheme,
+            metric: MismatchMetric::Force,
+            timer_in_free_space: true,
+            timer_carries_pose: mode == Mode::Recommended,
             force_floor_n,
             judge_sticking,
             mismatch_debounce: Duration::from_millis(10),
@@ -93,8 +105,16 @@ pub struct TriggerInput {
     pub acceleration: f64,
     /// The parameters that an update would say now.
     pub params: ModelParams,
+    /// By how much it would shift the shadow, m.
+    pub shift: Vec2,
     /// By how much it would turn the shadow, rad.
     pub turn: f64,
+}
+
+impl TriggerInput {
+    fn both_in_contact(&self) -> bool {
+        self.slave_in_contact && self.shadow_in_contact
+    }
 }
 
 /// Only one side is in contact.
@@ -179,9 +199,11 @@ impl Trigger {
     fn scheme(&self, now: Time, input: &TriggerInput) -> Option<Cause> {
         match self.config.scheme {
             Scheme::Deadband { delta } => self.violated(input, delta),
-            Scheme::Hybrid { delta, t_update } => self
-                .violated(input, delta)
-                .or_else(|| self.timed(now, t_update)),
+            Scheme::Hybrid { delta, t_update } => {
+                let running = self.config.timer_in_free_space || input.both_in_contact();
+                self.violated(input, delta)
+                    .or_else(|| self.timed(now, t_update).filter(|_| running))
+            }
             Scheme::Timer { t_update } => self.timed(now, t_update),
             Scheme::EverySample => Some(Cause::EverySample),
             Scheme::Dis {
@@ -194,8 +216,10 @@ impl Trigger {
                     .or_else(|| self.timed(now, heartbeat))
             }
             Scheme::Useful { delta, t_update } => {
-                let in_contact = input.slave_in_contact && input.shadow_in_contact;
-                let timed = || self.timed(now, t_update).filter(|_| in_contact);
+                let timed = || {
+                    self.timed(now, t_update)
+                        .filter(|_| input.both_in_contact())
+                };
                 self.violated(input, delta)
                     .or_else(timed)
                     .filter(|_| self.useful(now, input))
@@ -210,10 +234,18 @@ impl Trigger {
     }
 
     fn violated(&self, input: &TriggerInput, delta: f64) -> Option<Cause> {
-        let scale = input.f_s.norm().max(self.config.force_floor_n);
-        // (12), multiplied out
-        let beyond = (input.f_s - input.f_m).norm() > delta * scale;
-        (self.judged(input) && beyond).then_some(Cause::Deadband)
+        let beyond = match self.config.metric {
+            MismatchMetric::Force => {
+                let scale = input.f_s.norm().max(self.config.force_floor_n);
+                // (12), multiplied out
+                self.judged(input) && (input.f_s - input.f_m).norm() > delta * scale
+            }
+            MismatchMetric::Parameters => self
+                .last
+                .is_none_or(|(_, sent)| metric::parameters(&input.params, &sent) > delta),
+            MismatchMetric::Pose => metric::pose(input.shift, input.turn) > delta,
+        };
+        beyond.then_some(Cause::Deadband)
     }
 
     /// The paper's second step. Its `Timer > T_update` with its bounds of 20 and 7 packets/s means an

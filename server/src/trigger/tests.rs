@@ -19,6 +19,7 @@ fn input(f_s: f64, f_m: f64) -> TriggerInput {
         speed: 0.15,
         acceleration: 0.1,
         params: params(0.7, 2.06),
+        shift: Vec2::zeros(),
         turn: 0.0,
     }
 }
@@ -219,6 +220,64 @@ fn dis_fires_beyond_an_absolute_error_or_at_its_heartbeat() {
         trigger.decide(Time::ZERO, &input(2.0, 2.26)),
         Some(Cause::Deadband)
     );
+    assert_eq!(
+        trigger.decide(Time::from_millis(1000), &input(2.0, 2.0)),
+        Some(Cause::Timer)
+    );
+}
+
+#[test]
+fn each_metric_sees_its_own_mismatch_and_no_other() {
+    let quiet = input(2.0, 2.0);
+    let cases = [
+        (MismatchMetric::Force, input(2.0, 2.5)),
+        (
+            MismatchMetric::Parameters,
+            TriggerInput {
+                params: params(0.7, 2.6),
+                ..quiet
+            },
+        ),
+        (
+            MismatchMetric::Pose,
+            TriggerInput {
+                turn: 0.03,
+                ..quiet
+            },
+        ),
+    ];
+    for (metric, _) in &cases {
+        for (other, mismatched) in &cases {
+            let mut trigger = Trigger::new(TriggerConfig {
+                scheme: "deadband 10%".parse().unwrap(),
+                metric: *metric,
+                ..TriggerConfig::of_mode(Mode::Paper)
+            });
+            // what the master starts from has not been sent, so parameters fire once
+            let _ = trigger.decide(Time::ZERO, &quiet);
+            assert_eq!(trigger.decide(Time::from_millis(1), &quiet), None);
+            let fired = trigger.decide(Time::from_millis(2), mismatched);
+            let expected = (metric == other).then_some(Cause::Deadband);
+            assert_eq!(fired, expected, "{metric:?} on a mismatch of {other:?}");
+        }
+    }
+}
+
+#[test]
+fn a_timer_that_rests_in_free_space_counts_on_and_fires_at_the_touch() {
+    let mut trigger = Trigger::new(TriggerConfig {
+        scheme: "hybrid 10% 150ms".parse().unwrap(),
+        timer_in_free_space: false,
+        ..TriggerConfig::of_mode(Mode::Paper)
+    });
+    let free = TriggerInput {
+        slave_in_contact: false,
+        shadow_in_contact: false,
+        ..input(0.0, 0.0)
+    };
+    for n in 0..1000 {
+        assert_eq!(trigger.decide(Time::from_millis(n), &free), None);
+    }
     assert_eq!(
         trigger.decide(Time::from_millis(1000), &input(2.0, 2.0)),
         Some(Cause::Timer)
