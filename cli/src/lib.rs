@@ -51,6 +51,7 @@ fn execute(command: Command) -> Result<(), Failure> {
         Command::Master(arguments) => commands::master::run(arguments, &messages),
         Command::Netem(arguments) => commands::netem::run(&arguments),
         Command::Replay(arguments) => commands::replay::run(&arguments),
+        Command::Reproduce(arguments) => commands::reproduce::run(&arguments),
     }
 }
 

@@ -9,6 +9,7 @@ Examples:
   mmt demo                                     20 s on this machine, real sockets, emulated network
   mmt slave --listen 0.0.0.0:4433              on the host with the object: prints a pairing string
   mmt master 'mmt://HOST:4433?pin=…&token=…'   on the host with the hand
+  mmt reproduce fig5                           the paper's fig. 5, in virtual time
 
 Data goes to stdout, messages to stderr. MMT_LOG=debug shows more messages.
 Exit codes: 0 ok, 1 failed, 2 wrong input, 3 refused, 4 no answer, 5 address not to be had,
@@ -64,3 +65,12 @@ Examples:
   mmt replay black-patch.txt
   mmt replay --deadband 5% --t-update none *.txt
   mmt replay --json wood-patch.txt > report.json";
+
+/// Examples of `mmt reproduce`.
+pub(super) const REPRODUCE: &str = "\
+Examples:
+  mmt reproduce fig5
+  mmt reproduce fig5 --seeds 1 --duration 10s --samples --out trial
+
+Every run is a function of its configuration and seed: the files are the same, byte for byte, on every
+machine and with any number of threads. manifest.json says what was run and holds the files' SHA-256.";

@@ -1,6 +1,7 @@
 //! The arguments of every command, as clap takes them, with help and examples.
 
 mod help;
+mod reproduce;
 mod values;
 
 use std::net::SocketAddr;
@@ -14,6 +15,7 @@ use mmt_server::trigger::Scheme;
 use mmt_shared::pairing::{Address, Host};
 use mmt_shared::settings::Mode;
 
+pub(crate) use reproduce::{Experiment, ReproduceArguments};
 pub(crate) use values::{OperatorWords, PairingWords, Period};
 
 /// The command line.
@@ -43,6 +45,9 @@ pub(crate) enum Command {
     /// Replay recorded pushes of a real object through estimator and trigger
     #[command(after_help = help::REPLAY)]
     Replay(ReplayArguments),
+    /// Reproduce the paper's figures, and go beyond them, in virtual time
+    #[command(after_help = help::REPRODUCE, subcommand_required = true, arg_required_else_help = true)]
+    Reproduce(ReproduceArguments),
 }
 
 /// Arguments of `mmt demo`.

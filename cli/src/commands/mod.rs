@@ -5,5 +5,6 @@ mod host;
 pub(crate) mod master;
 pub(crate) mod netem;
 pub(crate) mod replay;
+pub(crate) mod reproduce;
 pub(crate) mod slave;
 mod viewer;

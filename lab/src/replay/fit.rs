@@ -8,6 +8,7 @@
 use mmt_shared::geometry::Vec2;
 
 use super::surface::{Law, Motion, Surface};
+use crate::statistics::median;
 
 /// k: force errors well below it count by their square, well above by their size, N.
 const ROBUST_N: f64 = 0.3;
@@ -45,15 +46,6 @@ pub(super) fn fit(law: Law, start: &Surface, from: &Surface, pushes: &[Observati
             Search { law, start, pushes }.run(from)
         }
     }
-}
-
-/// The median of finite numbers; none of none.
-pub(super) fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
-    let mut sorted: Vec<f64> = values.collect();
-    sorted.sort_by(f64::total_cmp);
-    let high = *sorted.get(sorted.len() / 2)?;
-    let low = *sorted.get((sorted.len() - 1) / 2)?;
-    Some(0.5 * (low + high))
 }
 
 struct Search<'a> {
@@ -236,12 +228,5 @@ mod tests {
                 "{law:?}"
             );
         }
-    }
-
-    #[test]
-    fn the_median_is_the_middle_one_or_the_mean_of_the_middle_two() {
-        assert_eq!(median([3.0, 1.0, 2.0].into_iter()), Some(2.0));
-        assert_eq!(median([4.0, 1.0, 2.0, 3.0].into_iter()), Some(2.5));
-        assert_eq!(median(std::iter::empty()), None);
     }
 }

@@ -4,9 +4,10 @@ use mmt_shared::rng::Substream;
 use serde::Serialize;
 
 use super::ReplayConfig;
-use super::fit::{Observation, fit, median};
+use super::fit::{Observation, fit};
 use super::report::relative_error;
 use super::surface::Law;
+use crate::statistics::median;
 
 /// How well a law predicts pushes that it was not fitted on.
 #[derive(Clone, Debug, PartialEq, Serialize)]

@@ -7,10 +7,10 @@ use mmt_shared::geometry::Vec2;
 use serde::Serialize;
 
 use super::ReplayConfig;
-use super::fit::median;
 use super::heldout::HeldOut;
 use super::surface::{Law, Surface};
 use super::trigger::Packets;
+use crate::statistics::median;
 
 /// | |predicted| − |measured| | / |measured|.
 pub(super) fn relative_error(predicted: Vec2, measured: Vec2) -> f64 {

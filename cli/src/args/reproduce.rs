@@ -1,0 +1,43 @@
+//! The arguments of `mmt reproduce`.
+
+use std::num::NonZero;
+use std::path::PathBuf;
+use std::time::Duration;
+
+use clap::{Args, Subcommand};
+
+use super::values;
+
+/// Arguments of `mmt reproduce`.
+#[derive(Debug, Args)]
+pub(crate) struct ReproduceArguments {
+    /// What to reproduce.
+    #[command(subcommand)]
+    pub(crate) experiment: Experiment,
+    /// Folder for CSV, SVG and manifest.json; made if it is not there
+    #[arg(long, global = true, value_name = "DIR", default_value = "figures")]
+    pub(crate) out: PathBuf,
+    /// Seeds 1 to N [default: each experiment's own]
+    #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=10_000))]
+    pub(crate) seeds: Option<u64>,
+    /// Length of a run, in virtual time
+    #[arg(long, global = true, value_name = "TIME", default_value = "30s", value_parser = values::duration)]
+    pub(crate) duration: Duration,
+    /// Threads [default: as many as the machine has cores]
+    #[arg(long, global = true, value_name = "N")]
+    pub(crate) jobs: Option<NonZero<usize>>,
+    /// Print one JSON document instead of tables
+    #[arg(long, global = true)]
+    pub(crate) json: bool,
+}
+
+/// What can be reproduced.
+#[derive(Clone, Debug, PartialEq, Subcommand)]
+pub(crate) enum Experiment {
+    /// Fig. 5: packet rate and PMSE of the update schemes, both modes
+    Fig5 {
+        /// Write every run's forces and updates at 1 kHz as well, under samples/ (about 2 MB a run)
+        #[arg(long)]
+        samples: bool,
+    },
+}

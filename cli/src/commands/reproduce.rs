@@ -1,0 +1,64 @@
+//! `mmt reproduce`: the experiments of `mmt_lab::reproduce` on threads, with their files in a folder.
+
+mod desk;
+mod manifest;
+
+use mmt_lab::reproduce::{Extent, Findings, fig5};
+
+use crate::args::{Experiment, ReproduceArguments};
+use crate::failure::Failure;
+use crate::output::{note, print, print_json};
+
+use desk::Desk;
+use manifest::Manifest;
+
+/// Seeds of fig. 5: the paper's ten repetitions.
+const SEEDS: u64 = 10;
+
+/// Runs `mmt reproduce`.
+///
+/// # Errors
+/// The folder cannot be written to; stdout cannot be written to.
+pub(crate) fn run(arguments: &ReproduceArguments) -> Result<(), Failure> {
+    let desk = Desk::open(&arguments.out, arguments.jobs)?;
+    let mut found = Vec::new();
+    for experiment in experiments(&arguments.experiment) {
+        let findings = reproduce(&desk, &experiment, arguments)?;
+        if !arguments.json {
+            for table in &findings.tables {
+                print(table)?;
+            }
+        }
+        found.push(findings);
+    }
+    let manifest = Manifest::new(&found, desk.files());
+    desk.keep_manifest(&manifest)?;
+    if arguments.json {
+        print_json(&manifest)?;
+    }
+    note(format_args!("files are in {}", desk.folder().display()));
+    Ok(())
+}
+
+/// What one word of the command line asks for.
+fn experiments(experiment: &Experiment) -> Vec<Experiment> {
+    vec![experiment.clone()]
+}
+
+fn reproduce(
+    desk: &Desk,
+    experiment: &Experiment,
+    arguments: &ReproduceArguments,
+) -> Result<Findings, Failure> {
+    let extent = |seeds: u64| Extent {
+        seeds: arguments.seeds.unwrap_or(seeds),
+        duration: arguments.duration,
+    };
+    let findings = match experiment {
+        Experiment::Fig5 { samples } => fig5::reproduce(desk, extent(SEEDS), *samples),
+    };
+    findings.map_err(|error| {
+        Failure::failed(format!("the experiment failed: {error}"))
+            .remedy("check the folder given with --out: does it exist, is the disk full?")
+    })
+}

@@ -1,0 +1,264 @@
+//! Figures: panels of curves with error bars, drawn as SVG.
+//!
+//! An experiment says what is to be seen; this file and its drawing say how. The same data must give the same
+//! bytes on every machine.
+
+mod draw;
+mod symbol;
+mod ticks;
+
+use std::ops::Range;
+
+/// One figure: panels side by side, in rows.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Figure {
+    /// Panels, row by row.
+    pub panels: Vec<Panel>,
+    /// Panels in a row.
+    pub columns: usize,
+    /// Width and height of a panel, in pixels.
+    pub panel_size: (u32, u32),
+}
+
+/// How numbers are laid out along an axis.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Scale {
+    /// Evenly.
+    Linear,
+    /// By their logarithm; what is not positive is not drawn.
+    Log,
+}
+
+/// An axis.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Axis {
+    /// Quantity and unit.
+    pub label: String,
+    /// Layout.
+    pub scale: Scale,
+    /// What is shown; of the data if absent.
+    pub range: Option<Range<f64>>,
+}
+
+impl Axis {
+    /// A linear axis from zero, or from the least value below it, to the largest value.
+    #[must_use]
+    pub fn linear(label: &str) -> Self {
+        Self {
+            label: label.to_owned(),
+            scale: Scale::Linear,
+            range: None,
+        }
+    }
+
+    /// A logarithmic axis.
+    #[must_use]
+    pub fn log(label: &str) -> Self {
+        Self {
+            scale: Scale::Log,
+            ..Self::linear(label)
+        }
+    }
+
+    /// The same with a fixed range.
+    #[must_use]
+    pub fn over(self, range: Range<f64>) -> Self {
+        Self {
+            range: Some(range),
+            ..self
+        }
+    }
+}
+
+/// Where the legend stands.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Legend {
+    /// Nowhere.
+    None,
+    /// In a corner of the panel.
+    UpperRight,
+    /// In a corner of the panel.
+    UpperLeft,
+    /// In a corner of the panel.
+    LowerLeft,
+    /// In a corner of the panel.
+    LowerRight,
+}
+
+/// One panel.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Panel {
+    /// What it shows.
+    pub title: String,
+    /// Horizontal axis.
+    pub x: Axis,
+    /// Vertical axis.
+    pub y: Axis,
+    /// The curves, later ones on top.
+    pub series: Vec<Series>,
+    /// Where the legend stands.
+    pub legend: Legend,
+}
+
+/// How a curve's line is drawn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stroke {
+    /// Continuous.
+    Solid,
+    /// In dashes.
+    Dashed,
+    /// Not at all: marks alone.
+    None,
+    /// A thin vertical line from the foot of the panel at each point: events.
+    Events,
+}
+
+/// How a curve's points are drawn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Mark {
+    /// Not at all.
+    None,
+    /// A filled circle.
+    Circle,
+    /// A filled square.
+    Square,
+    /// A filled triangle.
+    Triangle,
+    /// A cross.
+    Cross,
+}
+
+/// Colours that most colour-blind readers can tell apart (Okabe and Ito 2008).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Colour {
+    /// #0072B2
+    Blue,
+    /// #D55E00
+    Vermilion,
+    /// #009E73
+    Green,
+    /// #CC79A7
+    Purple,
+    /// #E69F00
+    Orange,
+    /// #56B4E9
+    Sky,
+    /// #000000
+    Black,
+    /// #999999
+    Grey,
+}
+
+impl Colour {
+    /// In the order in which curves take them.
+    pub const ALL: [Self; 8] = [
+        Self::Blue,
+        Self::Vermilion,
+        Self::Green,
+        Self::Purple,
+        Self::Orange,
+        Self::Sky,
+        Self::Black,
+        Self::Grey,
+    ];
+
+    /// The colour of the n-th curve.
+    #[must_use]
+    pub fn nth(n: usize) -> Self {
+        Self::ALL
+            .get(n % Self::ALL.len())
+            .copied()
+            .unwrap_or(Self::Black)
+    }
+
+    fn rgb(self) -> (u8, u8, u8) {
+        match self {
+            Self::Blue => (0x00, 0x72, 0xB2),
+            Self::Vermilion => (0xD5, 0x5E, 0x00),
+            Self::Green => (0x00, 0x9E, 0x73),
+            Self::Purple => (0xCC, 0x79, 0xA7),
+            Self::Orange => (0xE6, 0x9F, 0x00),
+            Self::Sky => (0x56, 0xB4, 0xE9),
+            Self::Black => (0, 0, 0),
+            Self::Grey => (0x99, 0x99, 0x99),
+        }
+    }
+}
+
+/// A point of a curve with its intervals.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Dot {
+    /// Horizontal.
+    pub x: f64,
+    /// Vertical.
+    pub y: f64,
+    /// Interval of x.
+    pub x_interval: Option<(f64, f64)>,
+    /// Interval of y.
+    pub y_interval: Option<(f64, f64)>,
+    /// What stands beside it.
+    pub note: Option<String>,
+}
+
+impl Dot {
+    /// A point without intervals.
+    #[must_use]
+    pub fn at(x: f64, y: f64) -> Self {
+        Self {
+            x,
+            y,
+            ..Self::default()
+        }
+    }
+}
+
+/// A curve.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Series {
+    /// Its name in the legend; empty for none.
+    pub label: String,
+    /// Its colour.
+    pub colour: Colour,
+    /// Its line.
+    pub stroke: Stroke,
+    /// Width of the line, pixels.
+    pub width: u32,
+    /// Its points' marks.
+    pub mark: Mark,
+    /// Its points, in the order in which they are joined.
+    pub dots: Vec<Dot>,
+}
+
+impl Series {
+    /// A plain line.
+    #[must_use]
+    pub fn line(label: &str, colour: Colour, dots: Vec<Dot>) -> Self {
+        Self {
+            label: label.to_owned(),
+            colour,
+            stroke: Stroke::Solid,
+            width: 2,
+            mark: Mark::None,
+            dots,
+        }
+    }
+
+    /// The same with marks.
+    #[must_use]
+    pub fn marked(self, mark: Mark) -> Self {
+        Self { mark, ..self }
+    }
+
+    /// The same with another line.
+    #[must_use]
+    pub fn stroked(self, stroke: Stroke, width: u32) -> Self {
+        Self {
+            stroke,
+            width,
+            ..self
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

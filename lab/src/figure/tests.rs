@@ -1,0 +1,56 @@
+//! What a figure promises.
+
+use super::*;
+
+fn figure(dots: Vec<Dot>) -> Figure {
+    Figure {
+        panels: vec![Panel {
+            title: "Title".to_owned(),
+            x: Axis::log("x, 1/s"),
+            y: Axis::linear("y"),
+            series: vec![
+                Series::line("a curve", Colour::Blue, dots.clone()).marked(Mark::Circle),
+                Series::line("dashed", Colour::Green, dots.clone()).stroked(Stroke::Dashed, 1),
+                Series::line("", Colour::Sky, dots).stroked(Stroke::Events, 1),
+            ],
+            legend: Legend::UpperRight,
+        }],
+        columns: 2,
+        panel_size: (400, 300),
+    }
+}
+
+#[test]
+fn the_same_data_give_the_same_bytes_and_every_text_is_there() {
+    let mut dots = vec![Dot::at(1.0, 2.0), Dot::at(10.0, 1.0), Dot::at(100.0, 0.5)];
+    dots[1].y_interval = Some((0.8, 1.2));
+    dots[1].note = Some("10 %".to_owned());
+    let svg = figure(dots.clone()).draw("a").unwrap();
+    assert_eq!(svg, figure(dots).draw("a").unwrap());
+    for text in ["Title", "x, 1/s", "a curve", "dashed", "10 %", "100"] {
+        assert!(svg.contains(text), "{text}");
+    }
+    assert!(svg.trim_end().ends_with("</svg>"));
+}
+
+#[test]
+fn what_cannot_be_drawn_is_left_out_and_breaks_nothing() {
+    for dots in [
+        vec![],
+        vec![Dot::at(0.0, 1.0)],
+        vec![
+            Dot::at(-1.0, f64::NAN),
+            Dot::at(5.0, 1.0),
+            Dot::at(6.0, f64::INFINITY),
+        ],
+        vec![Dot::at(5.0, 5.0)],
+    ] {
+        assert!(figure(dots).draw("a").unwrap().contains("</svg>"));
+    }
+    let empty = Figure {
+        panels: Vec::new(),
+        columns: 1,
+        panel_size: (100, 100),
+    };
+    assert!(empty.draw("a").unwrap().contains("</svg>"));
+}

@@ -1,0 +1,111 @@
+//! The paper's experiments and those that go beyond it: which trials, and what is made of them.
+//!
+//! Pure: trials are handed to a [`Laboratory`], which runs them and keeps the files. An experiment must never
+//! depend on the order in which its trials ran, nor on the machine they ran on.
+
+pub mod fig5;
+mod scenario;
+
+pub use scenario::{Curve, DEADBANDS, FIG5_CURVES, mode_name, paper_world};
+
+use std::time::Duration;
+
+use serde::Serialize;
+use sha2::{Digest, Sha256};
+
+use crate::table::Table;
+use crate::trial::{Measured, Trial, TrialError};
+use crate::world::WorldConfig;
+
+/// Called with each result as soon as it is there, from any thread; may take the trace out of it.
+pub type Each<'a> = &'a (dyn Fn(usize, &mut Measured) -> Result<(), ReproduceError> + Sync);
+
+/// Runs trials and keeps files.
+pub trait Laboratory: Sync {
+    /// Runs all trials, in any order, and returns the results in the order of the trials.
+    ///
+    /// # Errors
+    /// The first error of a trial or of `each`.
+    fn run(
+        &self,
+        what: &str,
+        trials: &[Trial],
+        each: Each,
+    ) -> Result<Vec<Measured>, ReproduceError>;
+
+    /// Keeps a file under a name, which may have folders in it.
+    ///
+    /// # Errors
+    /// When the file cannot be written.
+    fn keep(&self, name: &str, bytes: &[u8]) -> Result<(), ReproduceError>;
+}
+
+/// Why an experiment could not be done.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ReproduceError {
+    /// A trial could not be run.
+    #[error(transparent)]
+    Trial(#[from] TrialError),
+    /// A file could not be written.
+    #[error("cannot write {name}: {why}")]
+    Keep {
+        /// The file.
+        name: String,
+        /// What the system said.
+        why: String,
+    },
+    /// A figure could not be drawn.
+    #[error("cannot draw {name}: {why}")]
+    Draw {
+        /// The figure.
+        name: String,
+        /// What went wrong.
+        why: String,
+    },
+}
+
+/// How much of an experiment is done.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Extent {
+    /// Seeds 1 to this.
+    pub seeds: u64,
+    /// Length of a run.
+    #[serde(rename = "duration_s", serialize_with = "seconds")]
+    pub duration: Duration,
+}
+
+fn seconds<S: serde::Serializer>(duration: &Duration, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.serialize_f64(duration.as_secs_f64())
+}
+
+/// What an experiment found.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Findings {
+    /// The experiment's name.
+    pub experiment: &'static str,
+    /// How much of it was done.
+    pub extent: Extent,
+    /// SHA-256 over the digests of all its trials, in their order: equal on every machine.
+    pub digest: String,
+    /// The configuration that its trials vary, by mode.
+    pub configuration: Vec<WorldConfig>,
+    /// What is printed.
+    pub tables: Vec<Table>,
+}
+
+/// SHA-256 over the digests of trials, in hexadecimal digits.
+fn digest<'a>(measured: impl IntoIterator<Item = &'a Measured>) -> String {
+    let mut hash = Sha256::new();
+    measured
+        .into_iter()
+        .for_each(|m| hash.update(m.digest.as_bytes()));
+    hash.finalize()
+        .iter()
+        .map(|byte| format!("{byte:02x}"))
+        .collect()
+}
+
+/// For experiments that need nothing done with a single result.
+fn nothing(_: usize, _: &mut Measured) -> Result<(), ReproduceError> {
+    Ok(())
+}

@@ -1,0 +1,248 @@
+//! A table of results: one shape for CSV files, for the terminal and for JSON.
+//!
+//! A number that does not exist is empty in CSV, a dash on the terminal and null in JSON, never a zero. CSV and
+//! JSON hold every digit; the terminal rounds as the column says.
+
+use std::fmt;
+
+use serde::ser::{Serialize, SerializeMap, SerializeSeq, Serializer};
+
+/// What one field holds.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Cell {
+    /// A word.
+    Text(String),
+    /// A whole number.
+    Count(u64),
+    /// A measured number.
+    Number(f64),
+    /// Nothing could be measured.
+    Absent,
+}
+
+impl From<&str> for Cell {
+    fn from(text: &str) -> Self {
+        Self::Text(text.to_owned())
+    }
+}
+
+impl From<String> for Cell {
+    fn from(text: String) -> Self {
+        Self::Text(text)
+    }
+}
+
+impl From<u64> for Cell {
+    fn from(count: u64) -> Self {
+        Self::Count(count)
+    }
+}
+
+impl From<f64> for Cell {
+    fn from(number: f64) -> Self {
+        if number.is_finite() {
+            Self::Number(number)
+        } else {
+            Self::Absent
+        }
+    }
+}
+
+impl<T: Into<Cell>> From<Option<T>> for Cell {
+    fn from(value: Option<T>) -> Self {
+        value.map_or(Self::Absent, Into::into)
+    }
+}
+
+impl Serialize for Cell {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        match self {
+            Self::Text(text) => serializer.serialize_str(text),
+            Self::Count(count) => serializer.serialize_u64(*count),
+            Self::Number(number) => serializer.serialize_f64(*number),
+            Self::Absent => serializer.serialize_none(),
+        }
+    }
+}
+
+/// A column: its key in files and how many decimals people want to see.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Column {
+    /// The key.
+    pub key: &'static str,
+    /// Decimals on the terminal.
+    pub decimals: usize,
+}
+
+/// Rows under columns.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Table {
+    /// What the table shows, for people.
+    pub title: String,
+    /// Its columns.
+    pub columns: Vec<Column>,
+    rows: Vec<Vec<Cell>>,
+}
+
+impl Table {
+    /// An empty table with columns of keys and decimals.
+    #[must_use]
+    pub fn new(title: impl Into<String>, columns: &[(&'static str, usize)]) -> Self {
+        let column = |(key, decimals): &(&'static str, usize)| Column {
+            key,
+            decimals: *decimals,
+        };
+        Self {
+            title: title.into(),
+            columns: columns.iter().map(column).collect(),
+            rows: Vec::new(),
+        }
+    }
+
+    /// Adds a row; missing cells are absent, superfluous ones are dropped.
+    pub fn push(&mut self, cells: impl IntoIterator<Item = Cell>) {
+        let mut row: Vec<Cell> = cells.into_iter().collect();
+        debug_assert_eq!(row.len(), self.columns.len(), "{}", self.title);
+        row.resize(self.columns.len(), Cell::Absent);
+        self.rows.push(row);
+    }
+
+    /// The rows, each as long as the columns.
+    pub fn rows(&self) -> impl Iterator<Item = &[Cell]> {
+        self.rows.iter().map(Vec::as_slice)
+    }
+
+    /// The table as CSV (RFC 4180, lines end with LF): a header of keys, then the rows.
+    #[must_use]
+    pub fn to_csv(&self) -> Vec<u8> {
+        let mut csv = csv::Writer::from_writer(Vec::new());
+        // writing to memory cannot fail, and every row has as many fields as there are columns
+        let _ = csv.write_record(self.columns.iter().map(|column| column.key));
+        for row in &self.rows {
+            let _ = csv.write_record(row.iter().map(csv_field));
+        }
+        csv.into_inner().unwrap_or_default()
+    }
+
+    fn texts(&self) -> Vec<Vec<String>> {
+        let keys = self.columns.iter().map(|column| column.key.to_owned());
+        let shown = |row: &Vec<Cell>| {
+            let cells = row.iter().zip(&self.columns);
+            cells
+                .map(|(cell, column)| shown(cell, column.decimals))
+                .collect()
+        };
+        std::iter::once(keys.collect())
+            .chain(self.rows.iter().map(shown))
+            .collect()
+    }
+}
+
+/// A field with every digit.
+fn csv_field(cell: &Cell) -> String {
+    match cell {
+        Cell::Text(text) => text.clone(),
+        Cell::Count(count) => count.to_string(),
+        Cell::Number(number) => number.to_string(),
+        Cell::Absent => String::new(),
+    }
+}
+
+fn shown(cell: &Cell, decimals: usize) -> String {
+    match cell {
+        Cell::Text(text) => text.clone(),
+        Cell::Count(count) => count.to_string(),
+        Cell::Number(number) => format!("{number:.decimals$}"),
+        Cell::Absent => "-".to_owned(),
+    }
+}
+
+impl fmt::Display for Table {
+    /// The title and the rows, words to the left and numbers to the right.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(f, "{}", self.title)?;
+        let texts = self.texts();
+        let width = |k: usize| {
+            let fields = texts.iter().filter_map(|row| row.get(k));
+            fields.map(|text| text.chars().count()).max().unwrap_or(0)
+        };
+        let widths: Vec<usize> = (0..self.columns.len()).map(width).collect();
+        for (n, texts) in texts.iter().enumerate() {
+            let cells = n.checked_sub(1).and_then(|n| self.rows.get(n));
+            let mut line = String::new();
+            for (k, (text, width)) in texts.iter().zip(&widths).enumerate() {
+                let sample = cells.or(self.rows.first()).and_then(|row| row.get(k));
+                let word = matches!(sample, Some(Cell::Text(_)));
+                let gap = if k == 0 { "  " } else { "   " };
+                line += gap;
+                let pad = " ".repeat(width.saturating_sub(text.chars().count()));
+                line += &if word {
+                    format!("{text}{pad}")
+                } else {
+                    format!("{pad}{text}")
+                };
+            }
+            writeln!(f, "{}", line.trim_end())?;
+        }
+        Ok(())
+    }
+}
+
+/// A row as a map from keys to cells.
+struct Record<'a>(&'a [Column], &'a [Cell]);
+
+impl Serialize for Record<'_> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut map = serializer.serialize_map(Some(self.1.len()))?;
+        for (column, cell) in self.0.iter().zip(self.1) {
+            map.serialize_entry(column.key, cell)?;
+        }
+        map.end()
+    }
+}
+
+impl Serialize for Table {
+    /// A list of records.
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut list = serializer.serialize_seq(Some(self.rows.len()))?;
+        for row in &self.rows {
+            list.serialize_element(&Record(&self.columns, row))?;
+        }
+        list.end()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn table() -> Table {
+        let mut table = Table::new("Three", &[("name", 0), ("rate_hz", 1), ("n", 0)]);
+        table.push(["plain".into(), 0.1.into(), 10_u64.into()]);
+        table.push(["a, \"b\"".into(), Cell::from(None::<f64>), 2_u64.into()]);
+        table.push(["c".into(), f64::NAN.into(), 3_u64.into()]);
+        table
+    }
+
+    #[test]
+    fn csv_keeps_every_digit_quotes_what_it_must_and_leaves_absent_fields_empty() {
+        let csv = "name,rate_hz,n\nplain,0.1,10\n\"a, \"\"b\"\"\",,2\nc,,3\n";
+        assert_eq!(table().to_csv(), csv.as_bytes());
+    }
+
+    #[test]
+    fn the_terminal_sees_columns() {
+        let text = "Three\n  name     rate_hz    n\n  plain        0.1   10\n  a, \"b\"         -    2\n  c              -    3\n";
+        assert_eq!(table().to_string(), text);
+    }
+
+    #[test]
+    fn json_is_a_list_of_records() {
+        let json = serde_json::to_string(&table()).unwrap();
+        assert!(
+            json.starts_with(r#"[{"name":"plain","rate_hz":0.1,"n":10},"#),
+            "{json}"
+        );
+        assert!(json.contains(r#""rate_hz":null"#));
+    }
+}

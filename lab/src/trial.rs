@@ -1,0 +1,244 @@
+//! One run of an experiment: a world, how long it runs, what changes on the way, and what is measured.
+//!
+//! Pure and deterministic: a trial's result is a function of the trial. It must never look at another
+//! trial, so that trials may run in any order on any number of threads.
+
+mod recovery;
+
+pub use recovery::Recovery;
+
+use std::time::Duration;
+
+use mmt_server::environment::EnvironmentError;
+use mmt_server::slave::SlaveTick;
+use mmt_shared::geometry::Vec2;
+use mmt_shared::metrics::{ForceSummary, UpdateCounts};
+use mmt_shared::time::TICK_S;
+use mmt_shared::wire::Cause;
+use serde::{Deserialize, Serialize};
+
+use crate::world::{World, WorldConfig, WorldError, WorldTick};
+use recovery::Watch;
+
+/// The first second of contact is the opening: the model starts wrong there.
+const OPENING_S: f64 = 1.0;
+
+/// A run to be done.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Trial {
+    /// The world.
+    pub config: WorldConfig,
+    /// How long it runs.
+    pub duration: Duration,
+    /// What changes on the way; none is usual.
+    pub change: Option<Change>,
+    /// Whether every tick's forces are kept.
+    pub traced: bool,
+}
+
+/// A change of the object in mid-push.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Change {
+    /// Pushes completed before the one in which it comes.
+    pub after_pushes: u64,
+    /// Contact in that push before it comes, s.
+    pub contact_s: f64,
+    /// What changes.
+    pub to: Alteration,
+}
+
+/// What can change under the tool.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Alteration {
+    /// The friction coefficient mu.
+    FrictionCoefficient(f64),
+    /// The mass m, kg, and with it c, I and e.
+    MassKg(f64),
+}
+
+/// One tick of a traced trial.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TraceRow {
+    /// Stamp of the HIP sample, s since the start.
+    pub t_s: f64,
+    /// f_s, N.
+    pub f_s: Vec2,
+    /// f_m rendered for the same sample, N; none if the sample was lost.
+    pub f_m: Option<Vec2>,
+    /// Why an update was sent in this tick.
+    pub update: Option<Cause>,
+}
+
+/// What a trial came to.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Measured {
+    /// Time from the slave's first tick, s.
+    pub duration_s: f64,
+    /// Time in contact, s.
+    pub contact_s: f64,
+    /// Force metrics of the whole run.
+    pub force: ForceSummary,
+    /// Updates by cause.
+    pub updates: UpdateCounts,
+    /// Updates per second of contact in the first second of contact; none if contact was shorter.
+    pub opening_rate_hz: Option<f64>,
+    /// Updates per second of contact after it, counting those sent in contact; none without.
+    pub later_rate_hz: Option<f64>,
+    /// Pushes that the operator completed.
+    pub pushes: u64,
+    /// Root mean square error of the master's model's position, m.
+    pub position_rms_m: Option<f64>,
+    /// The same of its angle, rad.
+    pub angle_rms_rad: Option<f64>,
+    /// Breaks of contact per push.
+    pub breaks_per_push: Option<f64>,
+    /// Largest force on the hand, N.
+    pub force_peak_n: Option<f64>,
+    /// m, b, c as estimated at the end, less the truth, over the truth.
+    pub parameter_errors: [f64; 3],
+    /// How the change was followed; none if the trial has no change or it never came.
+    pub recovery: Option<Recovery>,
+    /// The forces, tick by tick; empty unless the trial is traced.
+    pub trace: Vec<TraceRow>,
+    /// SHA-256 of the world's event log.
+    pub digest: String,
+}
+
+/// Why a trial could not be run.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum TrialError {
+    /// The world could not be made.
+    #[error(transparent)]
+    World(#[from] WorldError),
+    /// The change is to something that no object can be.
+    #[error("change: {0}")]
+    Change(#[from] EnvironmentError),
+}
+
+impl Trial {
+    /// A trial without change and without trace.
+    #[must_use]
+    pub fn new(config: WorldConfig, duration: Duration) -> Self {
+        Self {
+            config,
+            duration,
+            change: None,
+            traced: false,
+        }
+    }
+
+    /// Runs it.
+    ///
+    /// # Errors
+    /// When a number of the configuration or of the change is not accepted.
+    pub fn run(&self) -> Result<Measured, TrialError> {
+        let mut world = World::try_new(&self.config)?;
+        let mut run = Run::default();
+        for _ in 0..self.duration.as_millis() {
+            let tick = world.step();
+            run.take(&tick, self.traced);
+            self.change_if_due(&mut world, &mut run)?;
+        }
+        Ok(run.measured(&world))
+    }
+
+    fn change_if_due(&self, world: &mut World, run: &mut Run) -> Result<(), TrialError> {
+        let Some(change) = self.change.filter(|_| run.watch.is_none()) else {
+            return Ok(());
+        };
+        let pushes = world.operator().pushes_completed().unwrap_or_default();
+        if pushes != change.after_pushes {
+            run.push_contact_s = 0.0;
+        }
+        if run.push_contact_s < change.contact_s {
+            return Ok(());
+        }
+        let environment = world.environment_mut();
+        match change.to {
+            Alteration::FrictionCoefficient(mu) => environment.set_friction(mu)?,
+            Alteration::MassKg(m) => environment.set_mass(m)?,
+        }
+        run.watch = Some(Watch::default());
+        Ok(())
+    }
+}
+
+/// What is counted while a trial runs.
+#[derive(Debug, Default)]
+struct Run {
+    contact_s: f64,
+    /// Contact in the current push, s.
+    push_contact_s: f64,
+    opening_updates: u64,
+    later_updates: u64,
+    watch: Option<Watch>,
+    trace: Vec<TraceRow>,
+}
+
+impl Run {
+    fn take(&mut self, tick: &WorldTick, traced: bool) {
+        let Some(slave) = &tick.slave else {
+            return;
+        };
+        if slave.in_contact {
+            let sent = u64::from(slave.update.is_some());
+            if self.contact_s < OPENING_S {
+                self.opening_updates += sent;
+            } else {
+                self.later_updates += sent;
+            }
+            self.contact_s += TICK_S;
+            self.push_contact_s += TICK_S;
+        }
+        if let Some(watch) = &mut self.watch {
+            watch.take(slave);
+        }
+        if traced {
+            self.trace.push(row(slave));
+        }
+    }
+
+    fn measured(self, world: &World) -> Measured {
+        let outcome = world.outcome();
+        let pushes = world.operator().pushes_completed().unwrap_or_default();
+        let later_s = self.contact_s - OPENING_S;
+        let estimate = world.slave().estimate();
+        let truth = world.slave().environment().truth();
+        let error = |found: f64, is: f64| (found - is) / is;
+        Measured {
+            duration_s: outcome.updates.duration_s(),
+            contact_s: outcome.updates.contact_s(),
+            force: world.force(),
+            updates: outcome.updates,
+            opening_rate_hz: (later_s >= 0.0).then(|| self.opening_updates as f64 / OPENING_S),
+            later_rate_hz: (later_s > 0.0).then(|| self.later_updates as f64 / later_s),
+            pushes,
+            position_rms_m: outcome.pose.position_rms_m(),
+            angle_rms_rad: outcome.pose.angle_rms_rad(),
+            breaks_per_push: outcome.breaks.per_push(pushes),
+            force_peak_n: outcome.on_hand.largest_n(),
+            parameter_errors: [
+                error(estimate.m, truth.m()),
+                error(estimate.b, truth.b()),
+                error(estimate.c, truth.c()),
+            ],
+            recovery: self.watch.map(Watch::recovery),
+            trace: self.trace,
+            digest: world.digest(),
+        }
+    }
+}
+
+fn row(slave: &SlaveTick) -> TraceRow {
+    TraceRow {
+        t_s: slave.stamp.as_secs_f64(),
+        f_s: slave.f_s,
+        f_m: slave.f_m,
+        update: slave.update.map(|update| update.cause),
+    }
+}
+
+#[cfg(test)]
+mod tests;
