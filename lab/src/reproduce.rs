@@ -3,8 +3,10 @@
 //! Pure: trials are handed to a [`Laboratory`], which runs them and keeps the files. An experiment must never
 //! depend on the order in which its trials ran, nor on the machine they ran on.
 
+pub mod claims;
 pub mod fig5;
 mod scenario;
+pub mod traces;
 
 pub use scenario::{Curve, DEADBANDS, FIG5_CURVES, mode_name, paper_world};
 
@@ -38,6 +40,10 @@ pub trait Laboratory: Sync {
     /// # Errors
     /// When the file cannot be written.
     fn keep(&self, name: &str, bytes: &[u8]) -> Result<(), ReproduceError>;
+
+    /// CPU time of one tick of the paper's estimator in contact, ms; none where there is no clock. The one number
+    /// that depends on the machine.
+    fn estimator_tick_ms(&self) -> Option<f64>;
 }
 
 /// Why an experiment could not be done.

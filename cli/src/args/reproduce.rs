@@ -40,4 +40,10 @@ pub(crate) enum Experiment {
         #[arg(long)]
         samples: bool,
     },
+    /// Fig. 6: forces and packets over time, deadband 15 %
+    Fig6,
+    /// Fig. 7: the same for hybrid 15 %, 150 ms
+    Fig7,
+    /// Every claim of section IV-B with value, interval and verdict
+    Claims,
 }

@@ -3,7 +3,8 @@
 mod desk;
 mod manifest;
 
-use mmt_lab::reproduce::{Extent, Findings, fig5};
+use mmt_lab::reproduce::traces::Trace;
+use mmt_lab::reproduce::{Extent, Findings, claims, fig5, traces};
 
 use crate::args::{Experiment, ReproduceArguments};
 use crate::failure::Failure;
@@ -14,6 +15,8 @@ use manifest::Manifest;
 
 /// Seeds of fig. 5: the paper's ten repetitions.
 const SEEDS: u64 = 10;
+/// Seeds of the claims: with fewer, differences between the schemes are noise.
+const CLAIM_SEEDS: u64 = 40;
 
 /// Runs `mmt reproduce`.
 ///
@@ -56,6 +59,9 @@ fn reproduce(
     };
     let findings = match experiment {
         Experiment::Fig5 { samples } => fig5::reproduce(desk, extent(SEEDS), *samples),
+        Experiment::Fig6 => traces::reproduce(desk, extent(1), Trace::Fig6),
+        Experiment::Fig7 => traces::reproduce(desk, extent(1), Trace::Fig7),
+        Experiment::Claims => claims::reproduce(desk, extent(CLAIM_SEEDS)),
     };
     findings.map_err(|error| {
         Failure::failed(format!("the experiment failed: {error}"))

@@ -1,7 +1,9 @@
-//! The shell of the lab: threads for the trials, a folder for the files.
+//! The shell of the lab: threads for the trials, a folder for the files, a clock for what things cost.
 
+mod cost;
 mod folder;
 mod pool;
 
+pub use cost::estimator_tick_ms;
 pub use folder::Folder;
 pub use pool::Pool;

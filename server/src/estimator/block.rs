@@ -1,11 +1,13 @@
 //! Block least squares: (3) over a sliding window, for (2) in the plane.
 //!
-//! Each tick gives two rows, x and y. The paper is one-dimensional; in the plane c·sign(v) becomes
-//! c·v/|v|, the force that opposes sliding with the same size in every direction. (The sign of each axis
-//! by itself would make friction √2 c at 45°.) The result is the plain minimum, bounded by nothing.
+//! The paper writes (1)–(3) for one direction and measures in the plane, and does not say how. Two readings:
+//! along the force, one row a tick, which is what (1) says where the tool does not slide on the object; or
+//! stacked, two rows a tick, x and y, in which c·sign(v) becomes c·v/|v|. (The sign of each axis by itself
+//! would make friction √2 c at 45°.) The result is the plain minimum, bounded by nothing.
 
 use mmt_shared::geometry::Vec2;
 use nalgebra::{Matrix3, Matrix3x2, Vector3};
+use serde::{Deserialize, Serialize};
 
 use super::quadratic::{condition, inverse_of_gram};
 
@@ -14,7 +16,28 @@ use super::quadratic::{condition, inverse_of_gram};
 /// At 10⁴ a force error of 1 mN is worth 10 N of some combination of m a, b v and c.
 const CONDITION_MAX: f64 = 1e4;
 
-/// One tick of (1) in the plane: one column of regressors and one force for each axis.
+/// How a tick in the plane becomes rows of (3).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Rows {
+    /// One row: force and motion along the measured force.
+    #[default]
+    AlongForce,
+    /// Two rows: x and y. Counts sliding of the tool along the face as motion of the object.
+    Stacked,
+}
+
+impl Rows {
+    fn in_a_tick(self) -> f64 {
+        match self {
+            Self::AlongForce => 1.0,
+            Self::Stacked => 2.0,
+        }
+    }
+}
+
+/// One tick of (1) in the plane: one column of regressors and one force for each axis, or for the direction
+/// of the force and for nothing.
 #[derive(Clone, Copy, Debug)]
 struct PlanarRow {
     regressor: Matrix3x2<f64>,
@@ -55,6 +78,7 @@ pub struct Solution {
 /// The window: a ring of rows and their sums.
 #[derive(Clone, Debug)]
 pub struct Block {
+    rows: Rows,
     ring: Box<[PlanarRow]>,
     next: usize,
     filled: bool,
@@ -67,12 +91,13 @@ pub struct Block {
 impl Block {
     /// A window of `ticks` rows (at least 2). Allocates here and never again.
     #[must_use]
-    pub fn new(ticks: usize) -> Self {
+    pub fn new(ticks: usize, rows: Rows) -> Self {
         let empty = PlanarRow {
             regressor: Matrix3x2::zeros(),
             force: Vec2::zeros(),
         };
         Self {
+            rows,
             ring: vec![empty; ticks.max(2)].into_boxed_slice(),
             next: 0,
             filled: false,
@@ -89,15 +114,10 @@ impl Block {
 
     /// Takes one tick: acceleration (m/s²), velocity (m/s), force on the object (N).
     pub fn push(&mut self, a: Vec2, v: Vec2, force: Vec2) {
-        let speed = v.norm();
-        let sliding = if speed > 0.0 {
-            v / speed
-        } else {
-            Vec2::zeros()
+        let row = match self.rows {
+            Rows::AlongForce => along_force(a, v, force),
+            Rows::Stacked => stacked(a, v, force),
         };
-        // (2)
-        let regressor = Matrix3x2::from_rows(&[a.transpose(), v.transpose(), sliding.transpose()]);
-        let row = PlanarRow { regressor, force };
         let Some(slot) = self.ring.get_mut(self.next) else {
             return;
         };
@@ -123,7 +143,7 @@ impl Block {
         let solution = inverse.filter(|_| solvable).map(|inverse| {
             // (3)
             let estimate = inverse * self.sums.moment;
-            let rows = 2.0 * self.ring.len() as f64;
+            let rows = self.rows.in_a_tick() * self.ring.len() as f64;
             let error = (self.sums.squares - estimate.dot(&self.sums.moment)).max(0.0);
             Solution {
                 estimate,
@@ -137,6 +157,36 @@ impl Block {
                 .all(|x| x.is_finite())
         };
         (condition, solution.filter(finite))
+    }
+}
+
+/// (2) along the force.
+fn along_force(a: Vec2, v: Vec2, force: Vec2) -> PlanarRow {
+    let size = force.norm();
+    let normal = if size > 0.0 {
+        force / size
+    } else {
+        Vec2::zeros()
+    };
+    let (a, v) = (a.dot(&normal), v.dot(&normal));
+    let sign = if v == 0.0 { 0.0 } else { v.signum() };
+    PlanarRow {
+        regressor: Matrix3x2::new(a, 0.0, v, 0.0, sign, 0.0),
+        force: Vec2::new(size, 0.0),
+    }
+}
+
+/// (2) for x and for y.
+fn stacked(a: Vec2, v: Vec2, force: Vec2) -> PlanarRow {
+    let speed = v.norm();
+    let sliding = if speed > 0.0 {
+        v / speed
+    } else {
+        Vec2::zeros()
+    };
+    PlanarRow {
+        regressor: Matrix3x2::from_rows(&[a.transpose(), v.transpose(), sliding.transpose()]),
+        force,
     }
 }
 
@@ -158,20 +208,22 @@ mod tests {
 
     #[test]
     fn exact_data_of_1_give_the_parameters_by_3() {
-        let mut block = Block::new(200);
-        for k in 0..2000 {
-            let (a, v, f) = exact(k);
-            block.push(a, v, f);
-            if k > 200 {
-                let (_, solution) = block.solve();
-                assert!((solution.unwrap().estimate - TRUTH).norm() < 1e-8);
+        for rows in [Rows::AlongForce, Rows::Stacked] {
+            let mut block = Block::new(200, rows);
+            for k in 0..2000 {
+                let (a, v, f) = exact(k);
+                block.push(a, v, f);
+                if k > 200 {
+                    let (_, solution) = block.solve();
+                    assert!((solution.unwrap().estimate - TRUTH).norm() < 1e-8);
+                }
             }
         }
     }
 
     #[test]
     fn an_outlier_is_forgotten_without_a_trace_after_two_windows() {
-        let mut block = Block::new(200);
+        let mut block = Block::new(200, Rows::AlongForce);
         for k in 0..1000 {
             let (a, v, f) = exact(k);
             block.push(a, v, if k == 300 { f * 1e9 } else { f });
@@ -182,7 +234,7 @@ mod tests {
 
     #[test]
     fn a_window_that_is_not_full_or_is_singular_says_nothing() {
-        let mut block = Block::new(200);
+        let mut block = Block::new(200, Rows::AlongForce);
         let (a, v, f) = exact(0);
         for k in 0..1000 {
             assert!(block.solve().1.is_none(), "constant motion, tick {k}");
@@ -195,5 +247,20 @@ mod tests {
             block.push(a, v, f);
         }
         assert!(block.solve().1.is_some());
+    }
+
+    #[test]
+    fn a_tool_that_slides_along_the_face_deceives_the_stacked_rows_only() {
+        let error = |rows| {
+            let mut block = Block::new(200, rows);
+            for k in 0..400 {
+                let (a, v, f) = exact(k);
+                let along_face = rotate(0.5, Vec2::new(0.0, 0.05));
+                block.push(a, v + along_face, f);
+            }
+            (block.solve().1.unwrap().estimate - TRUTH).norm()
+        };
+        assert!(error(Rows::AlongForce) < 1e-8);
+        assert!(error(Rows::Stacked) > 0.1);
     }
 }

@@ -27,6 +27,7 @@ pub mod surface;
 #[cfg(test)]
 mod tests;
 
+pub use block::Rows;
 pub use direction::{DirectionConfig, ForceDirection};
 pub use limits::SettingOutOfRange;
 pub use paper::{PaperConfig, PaperEstimator};

@@ -8,7 +8,7 @@ use mmt_shared::time::TICK_S;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-use super::block::Block;
+use super::block::{Block, Rows};
 use super::kalman::{KalmanConfig, MotionFilter};
 use super::{Estimate, Measured, STICK_SPEED};
 
@@ -19,6 +19,8 @@ pub struct PaperConfig {
     pub kalman: KalmanConfig,
     /// Length of the window of (3), s; 2 ms to 60 s. The paper gives none; 200 ms is a study's choice.
     pub window_s: f64,
+    /// How a tick becomes rows of (3).
+    pub rows: Rows,
     /// Values of m (kg), b (N s/m), c (N) before the first full window.
     pub prior: [f64; 3],
 }
@@ -28,6 +30,7 @@ impl Default for PaperConfig {
         Self {
             kalman: KalmanConfig::default(),
             window_s: 0.200,
+            rows: Rows::default(),
             prior: [0.4, 0.0, 1.0],
         }
     }
@@ -48,7 +51,7 @@ impl PaperEstimator {
         let ticks = (config.window_s / TICK_S).round().clamp(2.0, 60_000.0) as usize;
         Self {
             motion: MotionFilter::new(&config.kalman),
-            block: Block::new(ticks),
+            block: Block::new(ticks, config.rows),
             estimate: Estimate::at(Vector3::from(config.prior)),
         }
     }

@@ -6,9 +6,10 @@ use std::path::Path;
 use std::sync::Mutex;
 
 use indicatif::{ProgressBar, ProgressStyle};
-use mmt_lab::io::{Folder, Pool};
+use mmt_lab::io::{Folder, Pool, estimator_tick_ms};
 use mmt_lab::reproduce::{Each, Laboratory, ReproduceError};
 use mmt_lab::trial::{Measured, Trial};
+use mmt_shared::settings::Mode;
 
 use super::manifest::Manifest;
 use crate::failure::Failure;
@@ -112,5 +113,9 @@ impl Laboratory for Desk {
                 name: name.to_owned(),
                 why: error.to_string(),
             })
+    }
+
+    fn estimator_tick_ms(&self) -> Option<f64> {
+        Some(estimator_tick_ms(Mode::Paper))
     }
 }

@@ -1,0 +1,231 @@
+//! Figs. 6 and 7: the forces and the packets of one run, over time.
+
+use mmt_shared::settings::Mode;
+
+use super::{Curve, Extent, Findings, Laboratory, ReproduceError, digest, nothing, paper_world};
+use crate::figure::{Axis, Colour, Dot, Figure, Legend, Mark, Panel, Series, Stroke};
+use crate::table::{Cell, Table};
+use crate::trial::{Measured, TraceRow, Trial};
+
+/// The deadband of both figures.
+const DEADBAND: f64 = 0.15;
+/// The opening that is shown enlarged, s.
+const OPENING_S: f64 = 6.0;
+/// A curve is drawn by the least and the largest value of so many parts of the time shown.
+const PARTS: usize = 900;
+
+/// Which figure.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Trace {
+    /// Deadband 15 %.
+    Fig6,
+    /// Hybrid 15 %, 150 ms.
+    Fig7,
+}
+
+impl Trace {
+    fn name(self) -> &'static str {
+        match self {
+            Self::Fig6 => "fig6",
+            Self::Fig7 => "fig7",
+        }
+    }
+
+    fn curve(self) -> Curve {
+        match self {
+            Self::Fig6 => Curve::Deadband,
+            Self::Fig7 => Curve::Hybrid(150),
+        }
+    }
+
+    fn title(self) -> String {
+        format!(
+            "{} {} %, paper mode",
+            self.curve().label(),
+            DEADBAND * 100.0
+        )
+    }
+}
+
+/// Runs the figure with the last of the seeds and keeps its CSV and SVG.
+///
+/// # Errors
+/// As [`Laboratory::run`] and [`Laboratory::keep`].
+pub fn reproduce(
+    laboratory: &dyn Laboratory,
+    extent: Extent,
+    trace: Trace,
+) -> Result<Findings, ReproduceError> {
+    let world = paper_world(Mode::Paper, trace.curve().at(DEADBAND)).seeded(extent.seeds);
+    let trial = Trial {
+        traced: true,
+        ..Trial::new(world.clone(), extent.duration)
+    };
+    let name = trace.name();
+    let measured = laboratory.run(name, &[trial], &nothing)?;
+    let mut tables = Vec::new();
+    if let Some(run) = measured.first() {
+        laboratory.keep(&format!("{name}.csv"), &forces(&run.trace).to_csv())?;
+        let (svg, figure) = (format!("{name}.svg"), figure(trace, &run.trace));
+        laboratory.keep(&svg, figure.draw(&svg)?.as_bytes())?;
+        tables.push(summary(trace, run));
+    }
+    Ok(Findings {
+        experiment: name,
+        extent,
+        digest: digest(&measured),
+        configuration: vec![world],
+        tables,
+    })
+}
+
+fn forces(trace: &[TraceRow]) -> Table {
+    let mut table = Table::new(
+        "Forces",
+        &[
+            ("t_s", 3),
+            ("fs_n", 3),
+            ("fm_n", 3),
+            ("error_n", 3),
+            ("update", 0),
+        ],
+    );
+    for row in trace {
+        table.push([
+            row.t_s.into(),
+            row.f_s.norm().into(),
+            row.f_m.map(|f_m| f_m.norm()).into(),
+            row.f_m.map(|f_m| (row.f_s - f_m).norm()).into(),
+            row.update.map(|cause| cause.name()).into(),
+        ]);
+    }
+    table
+}
+
+fn summary(trace: Trace, run: &Measured) -> Table {
+    let mut table = Table::new(
+        format!("{}: {}", trace.name(), trace.title()),
+        &[
+            ("packets_per_s", 1),
+            ("contact_packets_per_s", 1),
+            ("first_contact_second_per_s", 1),
+            ("later_contact_per_s", 1),
+            ("pmse", 4),
+            ("relative_error", 3),
+        ],
+    );
+    table.push([
+        Cell::from(run.updates.rate_hz()),
+        run.updates.contact_rate_hz().into(),
+        run.opening_rate_hz.into(),
+        run.later_rate_hz.into(),
+        run.force.pmse.into(),
+        run.force.relative_error.into(),
+    ]);
+    table
+}
+
+/// The whole run above, its opening below.
+fn figure(trace: Trace, rows: &[TraceRow]) -> Figure {
+    let end = rows.last().map_or(1.0, |row| row.t_s);
+    let contact = rows.iter().find(|row| row.f_s.norm() > 0.1);
+    let begin = contact.map_or(0.0, |row| (row.t_s - 0.5).max(0.0));
+    Figure {
+        panels: vec![
+            panel(&trace.title(), rows, 0.0, end, Legend::UpperRight),
+            panel(
+                "the first push",
+                rows,
+                begin,
+                begin + OPENING_S,
+                Legend::None,
+            ),
+        ],
+        columns: 1,
+        panel_size: (1060, 330),
+    }
+}
+
+fn panel(title: &str, rows: &[TraceRow], from: f64, to: f64, legend: Legend) -> Panel {
+    let shown: Vec<&TraceRow> = rows
+        .iter()
+        .filter(|row| (from..=to).contains(&row.t_s))
+        .collect();
+    let largest = shown
+        .iter()
+        .map(|row| row.f_s.norm().max(row.f_m.map_or(0.0, |f| f.norm())));
+    let top = largest.fold(1.0, f64::max) * 1.08;
+    let curve = |label: &str, colour: Colour, width: u32, of: &dyn Fn(&TraceRow) -> Option<f64>| {
+        let line = Series::line(label, colour, envelope(&shown, of));
+        line.stroked(Stroke::Solid, width)
+    };
+    let sent = shown.iter().filter(|row| row.update.is_some());
+    let events = sent.map(|row| Dot::at(row.t_s, 0.07 * top)).collect();
+    Panel {
+        title: title.to_owned(),
+        x: Axis::linear("time, s").over(from..to),
+        y: Axis::linear("force, N").over(0.0..top),
+        series: vec![
+            Series::line("packet", Colour::Sky, events)
+                .stroked(Stroke::Events, 1)
+                .marked(Mark::None),
+            curve("|f_s|", Colour::Vermilion, 2, &|row| Some(row.f_s.norm())),
+            curve("|f_m|", Colour::Green, 1, &|row| row.f_m.map(|f| f.norm())),
+            curve("|f_s − f_m|", Colour::Blue, 1, &|row| {
+                row.f_m.map(|f| (row.f_s - f).norm())
+            }),
+        ],
+        legend,
+    }
+}
+
+/// The least and the largest value of each part of the rows, in the order in which they came.
+fn envelope(rows: &[&TraceRow], of: &dyn Fn(&TraceRow) -> Option<f64>) -> Vec<Dot> {
+    let mut dots = Vec::new();
+    for part in rows.chunks(rows.len().div_ceil(PARTS).max(1)) {
+        let values = part
+            .iter()
+            .filter_map(|row| Some(Dot::at(row.t_s, of(row)?)));
+        let mut ends: Vec<Dot> = Vec::new();
+        for dot in values {
+            match ends.as_mut_slice() {
+                [low, high] => {
+                    if dot.y < low.y {
+                        *low = dot;
+                    } else if dot.y > high.y {
+                        *high = dot;
+                    }
+                }
+                _ => ends = vec![dot.clone(), dot],
+            }
+        }
+        ends.sort_by(|a, b| a.x.total_cmp(&b.x));
+        ends.dedup();
+        dots.append(&mut ends);
+    }
+    dots
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use mmt_shared::geometry::Vec2;
+
+    #[test]
+    fn the_envelope_keeps_every_peak() {
+        let peak = |k: usize| if k == 12_345 { 9.0 } else { 1.0 };
+        let rows: Vec<TraceRow> = (0..30_000)
+            .map(|k| TraceRow {
+                t_s: k as f64 * 1e-3,
+                f_s: Vec2::new(peak(k), 0.0),
+                f_m: None,
+                update: None,
+            })
+            .collect();
+        let shown: Vec<&TraceRow> = rows.iter().collect();
+        let dots = envelope(&shown, &|row| Some(row.f_s.x));
+        assert!(dots.len() <= 2 * PARTS && dots.is_sorted_by(|a, b| a.x <= b.x));
+        assert!(dots.iter().any(|dot| dot.y == 9.0));
+        assert!(envelope(&shown, &|_| None).is_empty());
+    }
+}
