@@ -3,9 +3,11 @@
 //! Pure: trials are handed to a [`Laboratory`], which runs them and keeps the files. An experiment must never
 //! depend on the order in which its trials ran, nor on the machine they ran on.
 
+pub mod ablation;
 pub mod claims;
 pub mod fig5;
 mod scenario;
+pub mod schemes;
 pub mod traces;
 
 pub use scenario::{Curve, DEADBANDS, FIG5_CURVES, mode_name, paper_world};

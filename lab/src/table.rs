@@ -107,6 +107,27 @@ impl Table {
         self.rows.push(row);
     }
 
+    /// The same with some of its columns, in their order; keys that it does not have are passed over.
+    #[must_use]
+    pub fn selected(&self, keys: &[&str]) -> Self {
+        let places = keys
+            .iter()
+            .filter_map(|key| self.columns.iter().position(|column| column.key == *key));
+        let places: Vec<usize> = places.collect();
+        let rows = self.rows.iter().map(|row| {
+            let cells = places.iter().filter_map(|place| row.get(*place).cloned());
+            cells.collect()
+        });
+        Self {
+            title: self.title.clone(),
+            columns: places
+                .iter()
+                .filter_map(|place| self.columns.get(*place).cloned())
+                .collect(),
+            rows: rows.collect(),
+        }
+    }
+
     /// The rows, each as long as the columns.
     pub fn rows(&self) -> impl Iterator<Item = &[Cell]> {
         self.rows.iter().map(Vec::as_slice)
@@ -234,6 +255,15 @@ mod tests {
     fn the_terminal_sees_columns() {
         let text = "Three\n  name     rate_hz    n\n  plain        0.1   10\n  a, \"b\"         -    2\n  c              -    3\n";
         assert_eq!(table().to_string(), text);
+    }
+
+    #[test]
+    fn some_columns_can_be_selected() {
+        let some = table().selected(&["n", "nothing", "name"]);
+        assert_eq!(
+            some.to_string(),
+            "Three\n   n   name\n  10   plain\n   2   a, \"b\"\n   3   c\n"
+        );
     }
 
     #[test]

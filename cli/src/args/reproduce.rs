@@ -46,4 +46,8 @@ pub(crate) enum Experiment {
     Fig7,
     /// Every claim of section IV-B with value, interval and verdict
     Claims,
+    /// How the paper's results depend on what the paper leaves open
+    Ablation,
+    /// Every update scheme and mismatch metric, with recovery after a change of friction
+    Schemes,
 }

@@ -4,7 +4,7 @@ mod desk;
 mod manifest;
 
 use mmt_lab::reproduce::traces::Trace;
-use mmt_lab::reproduce::{Extent, Findings, claims, fig5, traces};
+use mmt_lab::reproduce::{Extent, Findings, ablation, claims, fig5, schemes, traces};
 
 use crate::args::{Experiment, ReproduceArguments};
 use crate::failure::Failure;
@@ -61,6 +61,8 @@ fn reproduce(
         Experiment::Fig5 { samples } => fig5::reproduce(desk, extent(SEEDS), *samples),
         Experiment::Fig6 => traces::reproduce(desk, extent(1), Trace::Fig6),
         Experiment::Fig7 => traces::reproduce(desk, extent(1), Trace::Fig7),
+        Experiment::Ablation => ablation::reproduce(desk, extent(SEEDS)),
+        Experiment::Schemes => schemes::reproduce(desk, extent(SEEDS)),
         Experiment::Claims => claims::reproduce(desk, extent(CLAIM_SEEDS)),
     };
     findings.map_err(|error| {

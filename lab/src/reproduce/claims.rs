@@ -108,14 +108,15 @@ pub fn reproduce(laboratory: &dyn Laboratory, extent: Extent) -> Result<Findings
     claims.push(estimation_time(laboratory));
     let table = table(&claims, extent.seeds);
     laboratory.keep("claims.csv", &table.to_csv())?;
-    let document = serde_json::to_string_pretty(&Document { claims: &table }).unwrap_or_default();
+    let document = Document { claims: &table };
+    let document = serde_json::to_string_pretty(&document).unwrap_or_default();
     laboratory.keep("claims.json", format!("{document}\n").as_bytes())?;
     Ok(Findings {
         experiment: "claims",
         extent,
         digest: digest(&measured),
         configuration: vec![paper_world(Mode::Paper, Curve::Hybrid(150).at(0.10))],
-        tables: vec![table],
+        tables: vec![table.selected(&["claim", "expected", "value", "low", "high", "verdict"])],
     })
 }
 
@@ -133,9 +134,9 @@ fn table(claims: &[Claim], seeds: u64) -> Table {
             ("statement", 0),
             ("quantity", 0),
             ("expected", 0),
-            ("value", 3),
-            ("low", 3),
-            ("high", 3),
+            ("value", 4),
+            ("low", 4),
+            ("high", 4),
             ("verdict", 0),
         ],
     );

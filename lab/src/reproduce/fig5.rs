@@ -15,6 +15,9 @@ use crate::statistics::Interval;
 use crate::table::{Cell, Table};
 use crate::trial::{Measured, TraceRow, Trial};
 
+/// Deadbands that are written beside their points.
+const NOTED: [f64; 4] = [0.025, 0.05, 0.10, 0.30];
+
 /// What a run varies.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Point {
@@ -287,7 +290,7 @@ fn figure(knots: &[Knot]) -> Figure {
                 series: series(Mode::Paper, false)
                     .chain(series(Mode::Recommended, false))
                     .collect(),
-                legend: Legend::LowerRight,
+                legend: Legend::UpperLeft,
             },
         ],
         columns: 2,
@@ -307,7 +310,7 @@ fn drawn(knots: &[Knot], mode: Mode, curve: Curve, notes: bool) -> Series {
         .filter(|knot| (knot.mode, knot.curve) == (mode, curve));
     let dots = of_curve.filter_map(|knot| {
         let (rate, pmse) = (knot.rate_hz?, knot.pmse?);
-        let noted = notes && curve == Curve::Deadband;
+        let noted = notes && curve == Curve::Deadband && NOTED.contains(&knot.deadband);
         Some(Dot {
             x: rate.mean,
             y: pmse.mean,
