@@ -274,14 +274,15 @@ impl Slave {
             pose: self.observer.pose(),
             twist: self.observer.twist(),
         };
-        let state = if cause == Cause::Timer && !self.timer_carries_pose {
-            ModelState {
-                params: self.params,
-                ..*self.shadow.state()
-            }
-        } else {
-            seen
-        };
+        // what the model had at the stamp: nothing is left to be corrected there
+        let own = self.shadow.history().at(tick.stamp);
+        let own = own.filter(|_| cause == Cause::Timer && !self.timer_carries_pose);
+        let state = own.map_or(seen, |own| ModelState {
+            footprint: self.shadow.state().footprint,
+            pose: own.motion.pose,
+            twist: own.motion.twist,
+            ..seen
+        });
         let update = Update {
             sequence: self.sequence,
             cause,

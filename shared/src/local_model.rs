@@ -113,17 +113,16 @@ impl LocalModel {
     }
 
     /// The paper's way. Cases 1 and 2 of III-A and a lost contact set position and orientation, a force
-    /// mismatch sets the orientation, a timer packet neither (parameters only).
+    /// mismatch or the timer the orientation alone (a timer packet may say the model's own).
     fn snap(&mut self, update: &Update) {
         self.aim(update);
         match update.cause {
-            Cause::Timer => {}
             Cause::MasterOnlyContact | Cause::SlaveOnlyContact | Cause::ContactLost => {
                 self.state.footprint = update.state.footprint;
                 self.correction.snap(&mut self.state.pose);
                 self.state.twist = update.state.twist;
             }
-            Cause::Deadband | Cause::EverySample => {
+            Cause::Deadband | Cause::EverySample | Cause::Timer => {
                 let pivot = self
                     .rendered
                     .touch
