@@ -62,6 +62,7 @@ fn trigger(criterion: &mut Criterion) {
         sticking: false,
         speed: 0.16,
         acceleration: 0.2,
+        force_deviation: 0.0,
         params,
         shift: Vec2::zeros(),
         turn: 0.001,

@@ -256,6 +256,7 @@ impl Slave {
             sticking: estimate.sticking,
             speed: estimate.speed,
             acceleration: estimate.acceleration,
+            force_deviation: estimate.force_deviation(),
             params: self.params,
             shift: self.observer.pose().position - self.shadow.state().pose.position,
             turn: wrap_angle(self.observer.pose().angle - self.shadow.state().pose.angle),

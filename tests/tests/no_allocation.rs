@@ -287,6 +287,7 @@ impl Parts {
             sticking: estimate.sticking,
             speed: estimate.speed,
             acceleration: estimate.acceleration,
+            force_deviation: 0.0,
             params: self.shadow.state().params,
             shift: Vec2::zeros(),
             turn: 0.0,

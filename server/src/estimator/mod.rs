@@ -123,6 +123,13 @@ impl Estimate {
         self.sticking = false;
     }
 
+    /// Standard deviation of m a + b v + c in the present motion, N.
+    #[must_use]
+    pub fn force_deviation(&self) -> f64 {
+        let motion = Vector3::new(self.acceleration, self.speed, 1.0);
+        motion.dot(&(self.covariance * motion)).max(0.0).sqrt()
+    }
+
     /// Standard deviations of m (kg), b (N s/m), c (N).
     #[must_use]
     pub fn deviation(&self) -> [f64; 3] {

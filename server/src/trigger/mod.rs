@@ -18,7 +18,7 @@ use std::time::Duration;
 use mmt_shared::geometry::Vec2;
 use mmt_shared::params::ModelParams;
 use mmt_shared::settings::Mode;
-use mmt_shared::time::Time;
+use mmt_shared::time::{TICK_S, Time};
 use mmt_shared::wire::Cause;
 use serde::{Deserialize, Serialize};
 
@@ -103,6 +103,8 @@ pub struct TriggerInput {
     pub speed: f64,
     /// Acceleration of the object along the push, m/s².
     pub acceleration: f64,
+    /// Standard deviation of the force that the estimate predicts in the present motion, N.
+    pub force_deviation: f64,
     /// The parameters that an update would say now.
     pub params: ModelParams,
     /// By how much it would shift the shadow, m.
@@ -134,6 +136,8 @@ pub struct Trigger {
     began: Option<Time>,
     was_in_contact: bool,
     mismatch: Option<Mismatch>,
+    /// What the last update left unsaid, summed over contact: relative force error times s.
+    unsaid: f64,
 }
 
 impl Trigger {
@@ -146,17 +150,22 @@ impl Trigger {
             began: None,
             was_in_contact: false,
             mismatch: None,
+            unsaid: 0.0,
         }
     }
 
     /// Whether an update is to be sent now, and why. An answer counts as sent.
     pub fn decide(&mut self, now: Time, input: &TriggerInput) -> Option<Cause> {
         self.began.get_or_insert(now);
+        if input.both_in_contact() {
+            self.unsaid += self.news(input).max(0.0) * TICK_S;
+        }
         let cause = self
             .geometry(now, input)
             .or_else(|| self.scheme(now, input));
         if cause.is_some() {
             self.last = Some((now, input.params));
+            self.unsaid = 0.0;
         }
         cause
     }
@@ -215,6 +224,13 @@ impl Trigger {
                     .then_some(Cause::Deadband)
                     .or_else(|| self.timed(now, heartbeat))
             }
+            Scheme::Adaptive { delta, horizon } => {
+                let due = self.unsaid > delta * horizon.as_secs_f64();
+                let timed = due.then_some(Cause::Timer);
+                self.violated(input, delta)
+                    .or(timed)
+                    .filter(|_| self.useful(now, input))
+            }
             Scheme::Useful { delta, t_update } => {
                 let timed = || {
                     self.timed(now, t_update)
@@ -255,6 +271,16 @@ impl Trigger {
         (now >= since + t_update).then_some(Cause::Timer)
     }
 
+    /// What an update would correct now, as a relative force error: the change of the force beyond the
+    /// estimate's own deviation, and the turn of its direction.
+    fn news(&self, input: &TriggerInput) -> f64 {
+        let Some((_, sent)) = &self.last else {
+            return 0.0;
+        };
+        let change = (force_change(input, sent) - input.force_deviation).max(0.0);
+        change / input.f_s.norm().max(USEFUL_FLOOR_N) + input.turn.abs()
+    }
+
     /// Whether the hand would feel what an update says: by the force that the changed parameters would
     /// give in the present motion, or by the direction of the face.
     fn useful(&self, now: Time, input: &TriggerInput) -> bool {
@@ -264,12 +290,17 @@ impl Trigger {
         if now < time + USEFUL_GAP {
             return false;
         }
-        let (is, was) = (&input.params, &sent);
-        let change = (is.m() - was.m()).abs() * input.acceleration.abs()
-            + ((is.b() - was.b()) * input.speed.abs() + is.c() - was.c()).abs();
+        let change = force_change(input, &sent);
         change > USEFUL_SHARE * input.f_s.norm().max(USEFUL_FLOOR_N)
             || input.turn.abs() > USEFUL_TURN_RAD
     }
+}
+
+/// By how much the force of the present motion differs between the parameters now and those sent, N: at most.
+fn force_change(input: &TriggerInput, sent: &ModelParams) -> f64 {
+    let (is, was) = (&input.params, sent);
+    (is.m() - was.m()).abs() * input.acceleration.abs()
+        + ((is.b() - was.b()) * input.speed.abs() + is.c() - was.c()).abs()
 }
 
 #[cfg(test)]

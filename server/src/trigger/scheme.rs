@@ -43,6 +43,14 @@ pub enum Scheme {
         /// T_update.
         t_update: Duration,
     },
+    /// (12), or when what the last update leaves unsaid has added up, in contact, to Delta for as long as
+    /// `horizon`: T_update is short while the model changes and endless while it does not.
+    Adaptive {
+        /// Delta, relative force error.
+        delta: f64,
+        /// How long an error of Delta may go unsaid.
+        horizon: Duration,
+    },
 }
 
 /// Accepted Delta: beyond 100 % nothing is left of the force.
@@ -58,7 +66,7 @@ pub enum SchemeError {
     /// The first word is not a scheme.
     #[error(
         "unknown update scheme '{word}'; use one of 'deadband 10%', 'hybrid 10% 150ms', \
-         'timer 150ms', 'every-sample', 'dis 0.3N 1s', 'useful 10% 150ms'"
+         'timer 150ms', 'every-sample', 'dis 0.3N 1s', 'useful 10% 150ms', 'adaptive 10% 50ms'"
     )]
     Unknown {
         /// The word.
@@ -101,6 +109,7 @@ impl Scheme {
             Self::EverySample => "every-sample",
             Self::Dis { .. } => "dis",
             Self::Useful { .. } => "useful",
+            Self::Adaptive { .. } => "adaptive",
         }
     }
 }
@@ -137,6 +146,9 @@ impl fmt::Display for Scheme {
             }
             Self::Useful { delta, t_update } => {
                 write!(f, "useful {}% {}ms", percent(*delta), ms(t_update))
+            }
+            Self::Adaptive { delta, horizon } => {
+                write!(f, "adaptive {}% {}ms", percent(*delta), ms(horizon))
             }
         }
     }
@@ -177,12 +189,17 @@ impl FromStr for Scheme {
                 delta: share(delta)?,
                 t_update: period(t)?,
             }),
+            ["adaptive", delta, t] => Ok(Self::Adaptive {
+                delta: share(delta)?,
+                horizon: period(t)?,
+            }),
             ["deadband", ..] => Err(wrong("deadband", "deadband 10%")),
             ["hybrid", ..] => Err(wrong("hybrid", "hybrid 10% 150ms")),
             ["timer", ..] => Err(wrong("timer", "timer 150ms")),
             ["every-sample", ..] => Err(wrong("every-sample", "every-sample")),
             ["dis", ..] => Err(wrong("dis", "dis 0.3N 1s")),
             ["useful", ..] => Err(wrong("useful", "useful 10% 150ms")),
+            ["adaptive", ..] => Err(wrong("adaptive", "adaptive 10% 50ms")),
             _ => Err(SchemeError::Unknown {
                 word: words.first().copied().unwrap_or_default().to_owned(),
             }),
@@ -252,6 +269,7 @@ mod tests {
             "every-sample",
             "dis 0.3N 1000ms",
             "useful 10% 150ms",
+            "adaptive 10% 50ms",
         ] {
             let scheme: Scheme = text.parse().unwrap();
             assert_eq!(scheme.to_string(), text);

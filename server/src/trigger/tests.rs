@@ -18,6 +18,7 @@ fn input(f_s: f64, f_m: f64) -> TriggerInput {
         sticking: false,
         speed: 0.15,
         acceleration: 0.1,
+        force_deviation: 0.0,
         params: params(0.7, 2.06),
         shift: Vec2::zeros(),
         turn: 0.0,
@@ -282,4 +283,44 @@ fn a_timer_that_rests_in_free_space_counts_on_and_fires_at_the_touch() {
         trigger.decide(Time::from_millis(1000), &input(2.0, 2.0)),
         Some(Cause::Timer)
     );
+}
+
+#[test]
+fn adaptive_sends_sooner_the_more_there_is_to_say_and_never_when_there_is_nothing() {
+    // relative force changes of 2, 4 and 8 %: below Delta, so that only what adds up can fire
+    let first_after = |change_n: f64| {
+        let mut trigger = trigger("adaptive 10% 50ms", Mode::Recommended);
+        let start = input(2.0, 2.0);
+        let away = TriggerInput {
+            f_m: Vec2::new(3.0, 0.0),
+            ..start
+        };
+        assert_eq!(trigger.decide(Time::ZERO, &away), Some(Cause::Deadband));
+        let changed = TriggerInput {
+            params: params(0.7, 2.06 + change_n),
+            ..start
+        };
+        (1..5000).find(|n| trigger.decide(Time::from_millis(*n), &changed).is_some())
+    };
+    // 10 % for 50 ms: 5e-3 s
+    for (change_n, ticks) in [(0.04, 250), (0.08, 125), (0.16, 63)] {
+        let sent = first_after(change_n).unwrap();
+        assert!(sent == ticks || sent == ticks + 1, "{change_n} N after {sent} ms");
+    }
+    assert_eq!(first_after(0.0), None);
+}
+
+#[test]
+fn adaptive_does_not_send_what_the_estimate_does_not_know() {
+    let mut trigger = trigger("adaptive 10% 50ms", Mode::Recommended);
+    let start = input(2.0, 3.0);
+    assert_eq!(trigger.decide(Time::ZERO, &start), Some(Cause::Deadband));
+    let unsure = TriggerInput {
+        params: params(0.7, 2.16),
+        force_deviation: 0.12,
+        ..input(2.0, 2.0)
+    };
+    for n in 1..5000 {
+        assert_eq!(trigger.decide(Time::from_millis(n), &unsure), None);
+    }
 }
