@@ -6,11 +6,13 @@
 pub mod ablation;
 pub mod claims;
 pub mod fig5;
-mod scenario;
+pub mod scenarios;
 pub mod schemes;
+mod setting;
 pub mod traces;
+pub mod tupdate;
 
-pub use scenario::{Curve, DEADBANDS, FIG5_CURVES, mode_name, paper_world};
+pub use setting::{Curve, DEADBANDS, FIG5_CURVES, mode_name, paper_world};
 
 use std::time::Duration;
 

@@ -52,6 +52,8 @@ pub struct Change {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Alteration {
+    /// Nothing: only watched from here on, since the model starts wrong.
+    Nothing,
     /// The friction coefficient mu.
     FrictionCoefficient(f64),
     /// The mass m, kg, and with it c, I and e.
@@ -152,11 +154,12 @@ impl Trial {
         if pushes != change.after_pushes {
             run.push_contact_s = 0.0;
         }
-        if run.push_contact_s < change.contact_s {
+        if run.push_contact_s <= 0.0 || run.push_contact_s < change.contact_s {
             return Ok(());
         }
         let environment = world.environment_mut();
         match change.to {
+            Alteration::Nothing => {}
             Alteration::FrictionCoefficient(mu) => environment.set_friction(mu)?,
             Alteration::MassKg(m) => environment.set_mass(m)?,
         }

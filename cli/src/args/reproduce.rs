@@ -50,4 +50,8 @@ pub(crate) enum Experiment {
     Ablation,
     /// Every update scheme and mismatch metric, with recovery after a change of friction
     Schemes,
+    /// The best T_update: fixed periods and an adaptive rule, over trajectories and grounds
+    Tupdate,
+    /// Other bodies, other grounds, changes in mid-run: recovery, packets and force error in both modes
+    Scenarios,
 }

@@ -4,7 +4,9 @@ mod desk;
 mod manifest;
 
 use mmt_lab::reproduce::traces::Trace;
-use mmt_lab::reproduce::{Extent, Findings, ablation, claims, fig5, schemes, traces};
+use mmt_lab::reproduce::{
+    Extent, Findings, ablation, claims, fig5, scenarios, schemes, traces, tupdate,
+};
 
 use crate::args::{Experiment, ReproduceArguments};
 use crate::failure::Failure;
@@ -15,6 +17,8 @@ use manifest::Manifest;
 
 /// Seeds of fig. 5: the paper's ten repetitions.
 const SEEDS: u64 = 10;
+/// Seeds of the sweep over T_update: 252 places.
+const TUPDATE_SEEDS: u64 = 5;
 /// Seeds of the claims: with fewer, differences between the schemes are noise.
 const CLAIM_SEEDS: u64 = 40;
 
@@ -63,6 +67,8 @@ fn reproduce(
         Experiment::Fig7 => traces::reproduce(desk, extent(1), Trace::Fig7),
         Experiment::Ablation => ablation::reproduce(desk, extent(SEEDS)),
         Experiment::Schemes => schemes::reproduce(desk, extent(SEEDS)),
+        Experiment::Scenarios => scenarios::reproduce(desk, extent(SEEDS)),
+        Experiment::Tupdate => tupdate::reproduce(desk, extent(TUPDATE_SEEDS)),
         Experiment::Claims => claims::reproduce(desk, extent(CLAIM_SEEDS)),
     };
     findings.map_err(|error| {

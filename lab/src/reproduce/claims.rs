@@ -5,6 +5,8 @@
 
 mod equal_rate;
 
+pub(super) use equal_rate::log_ratio;
+
 use mmt_shared::settings::Mode;
 use serde::Serialize;
 

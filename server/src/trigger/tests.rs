@@ -305,7 +305,10 @@ fn adaptive_sends_sooner_the_more_there_is_to_say_and_never_when_there_is_nothin
     // 10 % for 50 ms: 5e-3 s
     for (change_n, ticks) in [(0.04, 250), (0.08, 125), (0.16, 63)] {
         let sent = first_after(change_n).unwrap();
-        assert!(sent == ticks || sent == ticks + 1, "{change_n} N after {sent} ms");
+        assert!(
+            sent == ticks || sent == ticks + 1,
+            "{change_n} N after {sent} ms"
+        );
     }
     assert_eq!(first_after(0.0), None);
 }
