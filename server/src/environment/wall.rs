@@ -45,13 +45,13 @@ pub(super) struct Limits {
 
 impl Wall {
     /// Unit vector into the wall.
-    fn into_wall(&self) -> Vec2 {
+    fn normal(&self) -> Vec2 {
         rotate(self.angle_rad, Vec2::x())
     }
 
     /// Least distance of an outline to the wall, m; negative if it is inside.
     pub(super) fn clearance(&self, outline: &Outline, pose: &Pose) -> f64 {
-        let into = rotate(-pose.angle, self.into_wall());
+        let into = rotate(-pose.angle, self.normal());
         let reach = match outline {
             Outline::Circle(radius) => *radius,
             Outline::Corners(corners) => {
@@ -59,7 +59,7 @@ impl Wall {
                 depths.fold(f64::MIN, f64::max)
             }
         };
-        self.distance_m - self.into_wall().dot(&pose.position) - reach
+        self.distance_m - self.normal().dot(&pose.position) - reach
     }
 
     /// The limits on a body at `pose` (its centroid), its centre of mass as far from there, if it would
@@ -71,8 +71,8 @@ impl Wall {
         centre_of_mass: Vec2,
         free: &Vector3<f64>,
     ) -> Limits {
-        let into = rotate(-pose.angle, self.into_wall());
-        let left = self.distance_m - self.into_wall().dot(&pose.position);
+        let into = rotate(-pose.angle, self.normal());
+        let left = self.distance_m - self.normal().dot(&pose.position);
         let mut limits = Limits::default();
         let mut offer = |point: Vec2| {
             let gap = left - into.dot(&point);

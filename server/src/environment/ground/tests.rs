@@ -71,42 +71,82 @@ fn pure_spin_feels_9_exactly() {
 
 #[test]
 fn the_ellipse_of_the_quick_stick_test_lies_inside_the_limit_surface() {
-    let (patch, load) = (square(), load());
-    let least = directions(&load, 180)
-        .map(|d| support(&patch, &d))
-        .fold(f64::MAX, f64::min);
-    assert!(least > HELD && least < HELD + 0.02, "{least}");
+    let disc = Patch::disc(SIDE / 2.0, SIDE / 3.0, Vec2::zeros());
+    let disc_load = Load {
+        e: load().c * SIDE / 3.0,
+        ..load()
+    };
+    for (patch, load) in [(square(), load()), (disc, disc_load)] {
+        assert!(patch.round && patch.even);
+        let least = directions(&load, 180)
+            .map(|d| support(&patch, &d))
+            .fold(f64::MAX, f64::min);
+        assert!(least > HELD && least < HELD + 0.05, "{least}");
+    }
+}
+
+/// Every kind of patch: even and uneven, centred and not.
+fn patches() -> [Patch; 4] {
+    let triangle = [(-0.12, -0.1), (0.24, -0.1), (-0.12, 0.2)].map(|(x, y)| Vec2::new(x, y));
+    let triangle = Patch::polygon(&triangle, 0.11, Vec2::new(0.02, 0.01));
+    let brick = Patch::rectangle(0.5, 0.2, 0.145, Vec2::zeros());
+    let mut uneven = square();
+    uneven.weigh(|at| if at.x > 0.0 { 1.6 } else { 0.5 + at.y });
+    [square(), brick, triangle, uneven]
 }
 
 #[test]
 fn the_stick_test_agrees_with_the_limit_surface() {
-    let (patch, load) = (square(), load());
-    let ways: Vec<_> = directions(&load, 90)
-        .map(|d| (d, support(&patch, &d) * load.c))
-        .collect();
-    let mut stream = Substream::new(7, "test/stick", 0);
-    let (mut held, mut slid) = (0, 0);
-    for _ in 0..400 {
-        let mut wrench = random(&mut stream, 1.0);
-        wrench.z *= load.e / load.c / 10.0;
-        // scaled onto the limit surface, then a little inside and outside
-        let at_limit = ways
-            .iter()
-            .map(|(d, h)| wrench.dot(d) / h)
-            .fold(0.0, f64::max);
-        for (share, sticks) in [(0.5, true), (0.998, true), (1.003, false), (2.0, false)] {
-            let u = patch.step(
-                &load,
-                &Limits::default(),
-                Vector3::zeros(),
-                free(&load, wrench * (share / at_limit)),
-            );
-            assert_eq!(u == Vector3::zeros(), sticks, "{share} of {wrench}: {u}");
-            held += u32::from(sticks);
-            slid += u32::from(!sticks);
+    for patch in patches() {
+        let load = Load {
+            e: load().c * patch.hold.arm,
+            ..load()
+        };
+        let ways: Vec<_> = directions(&load, 90)
+            .map(|d| (d, support(&patch, &d) * load.c))
+            .collect();
+        let mut stream = Substream::new(7, "test/stick", 0);
+        for _ in 0..200 {
+            let mut wrench = random(&mut stream, 1.0);
+            wrench.z *= load.e / load.c / 10.0;
+            // scaled onto the limit surface, then a little inside and outside
+            let at_limit = ways
+                .iter()
+                .map(|(d, h)| wrench.dot(d) / h)
+                .fold(0.0, f64::max);
+            for (share, sticks) in [(0.5, true), (0.997, true), (1.003, false), (2.0, false)] {
+                let free = free(&load, wrench * (share / at_limit));
+                let u = patch.step(&load, &Limits::default(), Vector3::zeros(), free);
+                assert_eq!(u == Vector3::zeros(), sticks, "{share} of {wrench}: {u}");
+            }
         }
     }
-    assert_eq!((held, slid), (800, 800));
+}
+
+#[test]
+fn an_uneven_patch_answers_a_push_at_its_centre_of_friction() {
+    let [.., triangle, uneven] = patches();
+    assert!(
+        (triangle.hold.force - 1.0).abs() < 1e-12,
+        "the cells make up the area"
+    );
+    assert!((triangle.hold.centre + Vec2::new(0.02, 0.01)).norm() < 1e-12);
+    assert!((triangle.hold.arm / 0.11 - 1.0).abs() < 1e-12);
+    assert!((uneven.hold.force - 1.05).abs() < 1e-12);
+    assert!(uneven.hold.centre.x > 0.04 && uneven.hold.drift.norm() > 1e-3);
+    let load = load();
+    for (patch, c) in [(triangle, load.c), (uneven, 1.05 * load.c)] {
+        let centre = patch.hold.centre;
+        for degrees in [0.0_f64, 70.0, 200.0] {
+            let (y, x) = libm::sincos(degrees.to_radians());
+            let push = Vector3::new(x, y, cross(centre, Vec2::new(x, y))) * c;
+            let held = |share: f64| {
+                let free = free(&load, push * share);
+                patch.step(&load, &Limits::default(), Vector3::zeros(), free) == Vector3::zeros()
+            };
+            assert!(held(0.9999) && !held(1.0001), "{degrees}");
+        }
+    }
 }
 
 #[test]
@@ -140,13 +180,18 @@ fn sliding_velocities_solve_the_step_to_the_stated_tolerance() {
 
 #[test]
 fn friction_never_adds_energy_and_never_reverses() {
-    let (patch, load) = (square(), load());
+    let load = load();
     let mut stream = Substream::new(9, "test/energy", 0);
+    let patches = patches();
     for k in 0..2_000 {
+        let patch = &patches[k / 4 % 4];
         let star = random(&mut stream, [1e-3, 0.01, 0.1, 1.0][k % 4]);
         let u = patch.step(&load, &Limits::default(), Vector3::zeros(), star);
         let energy = |u: &Vector3<f64>| u.component_mul(&load.masses()).dot(u);
         assert!(energy(&u) <= energy(&star));
+        if patch.hold.centre != Vec2::zeros() {
+            continue;
+        }
         let push = Vector3::new(star.x, star.y, 0.0);
         assert!(
             patch
