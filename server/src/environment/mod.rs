@@ -125,7 +125,7 @@ impl Environment {
         let gain = force * (TICK_S / load.m);
         let free = before + Vector3::new(gain.x, gain.y, torque * TICK_S / load.inertia);
         let limits = self.config.wall.map_or_else(Limits::default, |wall| {
-            wall.limits(&self.outline, &pose, centre_of_mass, &free)
+            wall.limits(&self.outline, &pose, centre_of_mass, &before)
         });
         let u = self.patch.step(load, &limits, before, free);
         self.body.advance(Twist {

@@ -197,23 +197,3 @@ fn a_wrong_configuration_is_named() {
     assert!(wrong(|c| c.coupling.stiffness_n_per_m = 1e9).contains("stiffness"));
     assert!(wrong(|c| c.rotational_damping_nms = Some(-1.0)).contains("rotational"));
 }
-
-#[test]
-fn golden_tmp() {
-    let mut hash = 0xcbf2_9ce4_8422_2325_u64;
-    let mut environment = default();
-    environment.set_twist(Twist::new(0.1, -0.05, 1.0));
-    for tick in 0..20_000_u32 {
-        let t = f64::from(tick) * 1e-3;
-        let x = -0.3 + 0.15 * t + 0.1 * libm::sin(3.0 * t);
-        let y = 0.05 * libm::sin(1.3 * t);
-        let c = environment.step(Vec2::new(x, y), Vec2::new(0.15, 0.0));
-        for bit in bits(&environment)
-            .into_iter()
-            .chain([c.force.x.to_bits(), c.force.y.to_bits()])
-        {
-            hash = (hash ^ bit).wrapping_mul(0x0100_0000_01b3);
-        }
-    }
-    println!("GOLDEN {hash:016x} {:?}", environment.pose());
-}

@@ -33,7 +33,7 @@ struct Limit {
     away: Vector3<f64>,
     /// Its least accepted value, m/s, never positive.
     least: f64,
-    /// Where the point would be at the end of the step without any resistance, m: what is sorted by.
+    /// How far from the wall the point would be at the end of the step at the velocity of before, m.
     gap: f64,
 }
 
@@ -62,31 +62,42 @@ impl Wall {
         self.distance_m - self.normal().dot(&pose.position) - reach
     }
 
-    /// The limits on a body at `pose` (its centroid), its centre of mass as far from there, if it would
-    /// have the velocity `free` (of its centre of mass, body frame) without them.
+    /// The limits on a body at `pose` (its centroid), its centre of mass as far from there, that has the
+    /// velocity `before` (of its centre of mass, body frame).
+    ///
+    /// A point's lever is taken as it will be half a period later: taken as it is now, a turning body
+    /// would creep into the wall or off it by the curvature of its points' paths.
     pub(super) fn limits(
         &self,
         outline: &Outline,
         pose: &Pose,
         centre_of_mass: Vec2,
-        free: &Vector3<f64>,
+        before: &Vector3<f64>,
     ) -> Limits {
         let into = rotate(-pose.angle, self.normal());
         let left = self.distance_m - self.normal().dot(&pose.position);
+        let (sin, cos) = libm::sincos(0.5 * before.z * TICK_S);
+        let later = |r: Vec2| Vec2::new(cos * r.x - sin * r.y, sin * r.x + cos * r.y);
         let mut limits = Limits::default();
-        let mut offer = |point: Vec2| {
+        let mut offer = |point: Vec2, lever: Vec2| {
             let gap = left - into.dot(&point);
-            let lever = point - centre_of_mass;
             let away = -Vector3::new(into.x, into.y, cross(lever, into));
             limits.offer(Limit {
                 away,
                 least: -gap.max(0.0) / TICK_S,
-                gap: gap + away.dot(free) * TICK_S,
+                gap: gap + away.dot(before) * TICK_S,
             });
         };
         match outline {
-            Outline::Circle(radius) => offer(into * *radius),
-            Outline::Corners(corners) => corners.as_slice().iter().copied().for_each(offer),
+            Outline::Circle(radius) => {
+                let point = into * *radius;
+                offer(point, point - later(centre_of_mass));
+            }
+            Outline::Corners(corners) => {
+                for corner in corners.as_slice() {
+                    offer(*corner, later(corner - centre_of_mass));
+                }
+            }
         }
         limits
     }

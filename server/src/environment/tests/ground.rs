@@ -305,3 +305,54 @@ fn tools_that_are_not_finite_touch_nothing_of_any_shape() {
         assert_eq!(environment.pose(), Pose::default());
     }
 }
+
+#[test]
+fn no_body_goes_through_a_wall_or_gains_energy_from_it_however_it_comes() {
+    let mut stream = mmt_shared::rng::Substream::new(11, "test/wall", 0);
+    let (mut touched, mut deepest) = (0, 0.0_f64);
+    for round in 0..120 {
+        let shape = shapes()[round % 5];
+        let wall = Wall {
+            distance_m: 0.45,
+            angle_rad: stream.uniform_in(-3.0, 3.0),
+        };
+        let mut environment = made(EnvironmentConfig {
+            wall: Some(wall),
+            friction_coefficient: [0.0, 0.1, 0.6][round % 3],
+            static_ratio: [1.0, 1.6][round % 2],
+            centre_of_mass_m: Vec2::new(stream.uniform_in(-0.05, 0.05), 0.03),
+            ripple: (round % 4 == 0).then(Ripple::default),
+            pose: Pose::new(0.0, 0.0, stream.uniform_in(-3.0, 3.0)),
+            ..undamped(shape)
+        });
+        let into = rotate(wall.angle_rad, Vec2::x());
+        let along = Vec2::new(-into.y, into.x);
+        environment.set_twist(Twist {
+            linear: into * stream.uniform_in(0.2, 3.0) + along * stream.uniform_in(-1.0, 1.0),
+            angular: stream.uniform_in(-8.0, 8.0),
+        });
+        let mut energy = environment.kinetic_energy();
+        let mut nearest = f64::MAX;
+        for tick in 0..600 {
+            let pushed = tick >= 300;
+            if pushed {
+                let push = into * 8.0 + along * stream.uniform_in(-3.0, 3.0);
+                environment.step_with_wrench(push, stream.uniform_in(-0.5, 0.5));
+            } else {
+                environment.step_with_wrench(Vec2::zeros(), 0.0);
+            }
+            let next = environment.kinetic_energy();
+            assert!(
+                pushed || next <= energy * (1.0 + 1e-12),
+                "{round}: {energy} {next}"
+            );
+            energy = next;
+            nearest = nearest.min(wall.clearance(&environment.outline, &environment.pose()));
+        }
+        deepest = deepest.max(-nearest);
+        assert!(nearest > -1e-5, "{round}, {shape:?}: {nearest} m");
+        touched += u32::from(nearest < 1e-6);
+    }
+    println!("{touched} of 120 touched, deepest {deepest:.1e} m");
+    assert!(touched > 80, "{touched}");
+}
