@@ -139,7 +139,7 @@ impl Environment {
     pub fn pose(&self) -> Pose {
         let Pose { position, angle } = self.body.pose();
         Pose {
-            position: position - rotate(angle, self.load.centre_of_mass),
+            position: position - self.centre_of_mass(),
             angle,
         }
     }
@@ -148,7 +148,7 @@ impl Environment {
     #[must_use]
     pub fn twist(&self) -> Twist {
         let twist = self.body.twist();
-        let offset = rotate(self.body.pose().angle, self.load.centre_of_mass);
+        let offset = self.centre_of_mass();
         Twist {
             linear: twist.linear - spin(twist.angular, offset),
             angular: twist.angular,
@@ -206,7 +206,7 @@ impl Environment {
 
     /// Gives the object a velocity, at once: initial conditions of tests and studies.
     pub fn set_twist(&mut self, twist: Twist) {
-        let offset = rotate(self.body.pose().angle, self.load.centre_of_mass);
+        let offset = self.centre_of_mass();
         self.body.set_twist(Twist {
             linear: twist.linear + spin(twist.angular, offset),
             angular: twist.angular,
@@ -219,6 +219,15 @@ impl Environment {
         let twist = self.body.twist();
         0.5 * self.load.m * twist.linear.norm_squared()
             + 0.5 * self.load.inertia * twist.angular * twist.angular
+    }
+
+    /// The centre of mass from the centroid, world frame, m.
+    fn centre_of_mass(&self) -> Vec2 {
+        let offset = self.load.centre_of_mass;
+        if offset == Vec2::zeros() {
+            return offset;
+        }
+        rotate(self.body.pose().angle, offset)
     }
 
     fn reconfigure(&mut self, config: EnvironmentConfig) -> Result<(), EnvironmentError> {
