@@ -90,6 +90,24 @@ mod tests {
     }
 
     #[test]
+    fn a_body_its_ground_and_its_wall_are_written_as_the_documents_show() {
+        let text = include_str!("../../docs/physics.md");
+        let examples: Vec<_> = text
+            .split("```toml\n")
+            .skip(1)
+            .filter_map(|rest| rest.split("```").next())
+            .collect();
+        assert!(examples.len() >= 2);
+        for example in examples {
+            let config = parse(example, None).unwrap();
+            assert_ne!(config.environment, SlaveConfig::default().environment);
+            mmt_server::environment::Environment::try_new(config.environment).unwrap();
+        }
+        let error = parse("[environment.shape.disc]\nradius_m = 0.1\n", None).unwrap_err();
+        assert!(error.to_string().contains("radius_m"), "{error}");
+    }
+
+    #[test]
     fn a_scheme_is_written_in_words() {
         let text = "[trigger]\nscheme = \"deadband 5%\"\n";
         assert_eq!(

@@ -7,6 +7,7 @@ pub mod figure;
     reason = "the shell of the lab: threads and files are its business"
 )]
 pub mod io;
+pub mod physics;
 pub mod replay;
 pub mod reproduce;
 pub mod statistics;

@@ -1,14 +1,14 @@
 //! The body in rapier: the only file that names rapier or its vectors.
 //!
-//! rapier is asked to integrate and nothing else: no gravity, no user force, no friction of its own, no
-//! sleep, one solver iteration, so that p_n = p_{n−1} + T v_n to the bit and theta_n = theta_{n−1} +
+//! rapier is asked to integrate and nothing else: no gravity, no user force, no collider, no sleep, one
+//! solver iteration, so that p_n = p_{n−1} + T v_n to the bit and theta_n = theta_{n−1} +
 //! atan(T omega_n), which is T omega_n to (T omega)³/3. It must never be given a number that is not finite.
 
 use mmt_shared::geometry::{Pose, Twist, Vec2};
 use mmt_shared::params::{SPEED_M_PER_S, TURN_RATE_RAD_PER_S};
 use mmt_shared::time::TICK_S;
 use rapier2d_f64::prelude::{
-    ColliderBuilder, MassProperties, PhysicsWorld, RigidBodyBuilder, RigidBodyHandle, Vector,
+    MassProperties, PhysicsWorld, RigidBodyBuilder, RigidBodyHandle, Vector,
 };
 
 /// One free body on the plane.
@@ -20,8 +20,9 @@ pub(super) struct Body {
 }
 
 impl Body {
-    /// A square of side l (m), mass m (kg) and inertia I (kg m²) at rest at `pose`.
-    pub(super) fn square(side: f64, m: f64, inertia: f64, pose: Pose) -> Self {
+    /// A body of mass m (kg) and inertia I (kg m²) about its centre of mass, at rest with its centre of
+    /// mass at `pose`.
+    pub(super) fn new(m: f64, inertia: f64, pose: Pose) -> Self {
         let mut world = PhysicsWorld::new();
         world.gravity = Vector::ZERO;
         world.integration_parameters.dt = TICK_S;
@@ -33,10 +34,7 @@ impl Body {
             .rotation(pose.angle)
             .additional_mass_properties(MassProperties::new(Vector::ZERO, m, inertia))
             .can_sleep(false);
-        let collider = ColliderBuilder::cuboid(side / 2.0, side / 2.0)
-            .density(0.0)
-            .friction(0.0);
-        let (handle, _) = world.insert(body, collider);
+        let handle = world.insert_body(body);
         Self {
             world,
             handle,
@@ -45,12 +43,12 @@ impl Body {
         }
     }
 
-    /// `world_from_object`, not wrapped.
+    /// Pose of the centre of mass in the world, its angle not wrapped.
     pub(super) fn pose(&self) -> Pose {
         self.pose
     }
 
-    /// Velocity of the centre in the world, and turning rate.
+    /// Velocity of the centre of mass in the world, and turning rate.
     pub(super) fn twist(&self) -> Twist {
         self.twist
     }

@@ -2,6 +2,9 @@
 
 use super::*;
 
+mod bodies;
+mod ground;
+
 fn default() -> Environment {
     Environment::try_new(EnvironmentConfig::default()).unwrap()
 }
