@@ -24,8 +24,11 @@ const PERIODS_MS: [u64; 10] = [10, 20, 50, 100, 150, 200, 300, 500, 1000, 2000];
 const HORIZONS_MS: [u64; 8] = [1, 2, 5, 10, 20, 50, 100, 200];
 const DELTA: f64 = 0.10;
 
+/// A name and what it makes of the world.
+type Named = (&'static str, fn(&mut WorldConfig));
+
 /// A way to push.
-const TRAJECTORIES: [(&str, fn(&mut WorldConfig)); 3] = [
+const TRAJECTORIES: [Named; 3] = [
     ("slow", |world| {
         world.operator.push_speed_m_per_s = (0.06, 0.10)
     }),
@@ -38,7 +41,7 @@ const TRAJECTORIES: [(&str, fn(&mut WorldConfig)); 3] = [
 ];
 
 /// A friction map.
-const GROUNDS: [(&str, fn(&mut WorldConfig)); 3] = [
+const GROUNDS: [Named; 3] = [
     ("plain", |_| {}),
     ("ripple", |world| {
         world.slave.environment.ripple = Some(Ripple::default())
