@@ -371,4 +371,6 @@ impl World {
 }
 
 #[cfg(test)]
+mod estimation;
+#[cfg(test)]
 mod tests;

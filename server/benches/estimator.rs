@@ -31,6 +31,7 @@ fn push() -> Vec<Measured> {
             tool: Vec2::new(position + force / 1000.0, 0.0),
             force: Vec2::new(force, 0.0),
             normal: Some(Vec2::new(1.0, 0.0)),
+            seen: None,
         });
     }
     measured

@@ -322,6 +322,7 @@ fn the_slaves_own_parts_never_allocate() {
                 tool: met.tool,
                 force: met.f_s,
                 normal: sides.slave.observer().touching().map(|t| t.inward),
+                seen: None,
             };
             let (sent, calls) = counted(|| parts.step(now, &met, &measured));
             assert_eq!(calls, 0, "allocator called in tick {tick}");

@@ -11,10 +11,11 @@ use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
 use super::direction::{DirectionConfig, ForceDirection};
-use super::filter::{Row, StateVariableFilter, stage_weight};
+use super::filter::{StateVariableFilter, stage_weight};
 use super::gate::{Gate, GateConfig, Passage};
 use super::recursive::{Recursive, RecursiveConfig, Verdict};
-use super::surface::Surface;
+use super::surface::{Surface, SurfaceMotion};
+use super::turning::{self, Seen};
 use super::{Estimate, Measured, STICK_SPEED};
 
 /// Settings of [`RecommendedEstimator`].
@@ -135,12 +136,12 @@ impl RecommendedEstimator {
         let v = motion.row.regressor.y;
         self.estimate.speed += (v - self.estimate.speed) * self.speed_weight;
         self.estimate.sticking = self.estimate.speed.abs() < STICK_SPEED;
-        self.slide(motion.row);
+        self.slide(&motion, normal, measured.seen.as_ref());
     }
 
-    fn slide(&mut self, mut row: Row) {
+    fn slide(&mut self, motion: &SurfaceMotion, normal: Vec2, seen: Option<&Seen>) {
         let speed = self.estimate.speed;
-        let passage = self.gate.step(row.force, speed);
+        let passage = self.gate.step(motion.row.force, speed);
         if passage == Passage::Closed {
             self.estimate.acceleration = 0.0;
             return self.recursive.hold();
@@ -149,7 +150,10 @@ impl RecommendedEstimator {
             self.filter.restart();
         }
         // the smoothed speed has been far from zero since the filter started, so its sign is v's
-        row.regressor.z = 1.0_f64.copysign(speed);
+        let row = match seen {
+            Some(seen) => turning::shared(motion, normal, speed, seen),
+            None => motion.row.with_sign(speed),
+        };
         let filtered = self.filter.step(row);
         self.estimate.acceleration = filtered.regressor.x;
         if passage == Passage::Open {

@@ -447,6 +447,7 @@ proptest! {
                     tool: Vec2::new(x, y),
                     force: Vec2::new(fx, fy),
                     normal: touching.then_some(Vec2::new(1.0, 0.0)),
+                    seen: None,
                 };
                 let e = estimator.step(&measured);
                 let numbers = [e.m, e.b, e.c, e.speed, e.acceleration, e.heading.unwrap_or(0.0)];
