@@ -20,6 +20,8 @@ const FORCE_MIN_N: f64 = 0.15;
 /// Turning acceleration that the angle filter allows for while the box is pushed, rad/s²: all of it, and
 /// what remains of it where the moment of the push is reckoned with.
 const TURN_ACCELERATION: (f64, f64) = (20.0, 2.5);
+/// Sliding from which the parameters have been learned well enough to reckon with, ticks.
+const TICKS_TO_LEARN: u32 = 500;
 /// Speed of the centre from which the box slides for certain, m/s: the gate of the estimator.
 const SLIDES_M_PER_S: f64 = 0.020;
 /// Direction error of the force besides its noise (the face is not perfectly smooth), rad.
@@ -83,6 +85,8 @@ pub struct PoseObserver {
     penetration: f64,
     /// e/(c l) of the limit surface that resists turning as the box does.
     friction_arm: f64,
+    /// Ticks of sliding so far.
+    slid: u32,
     /// How far behind the tool the next carved face will lie, m.
     carve_margin: f64,
     /// Covariance of (theta, omega): [theta², theta·omega, omega²].
@@ -111,6 +115,7 @@ impl PoseObserver {
             penetration: 0.0,
             // (9)
             friction_arm: friction_torque_of_square(1.0, 1.0),
+            slid: 0,
             carve_margin: CARVE_MARGIN_M.0,
             angle_cov: [angle_var, 0.0, 0.0],
             slide_var: shift_var,
@@ -210,13 +215,15 @@ impl PoseObserver {
     /// cause before the direction of the force shows it. Returns the turning acceleration that remains
     /// unknown, rad/s².
     fn turn(&mut self, force: Vec2, params: &ModelParams) -> f64 {
-        let speed = self
-            .touching
-            .map_or(0.0, |touching| self.twist.linear.dot(&touching.inward));
-        let Some(touching) = self.touching.filter(|_| speed > SLIDES_M_PER_S) else {
+        let Some(touching) = self.touching.filter(|_| self.config.learn) else {
             return TURN_ACCELERATION.0;
         };
-        if !self.config.learn {
+        let speed = self.twist.linear.dot(&touching.inward);
+        if speed < SLIDES_M_PER_S {
+            return TURN_ACCELERATION.0;
+        }
+        self.slid = self.slid.saturating_add(1);
+        if self.slid < TICKS_TO_LEARN {
             return TURN_ACCELERATION.0;
         }
         let (side, omega) = (self.footprint.mean_side(), self.twist.angular);
