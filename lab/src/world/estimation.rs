@@ -191,3 +191,20 @@ fn a_step_of_mu_is_followed() {
         );
     }
 }
+
+#[test]
+fn probe_slow() {
+    for seed in 1..=5 {
+        let mut config = experiment(seed);
+        config.operator.push_speed_m_per_s = (0.010, 0.010);
+        config.operator.approach_m_per_s = 0.010;
+        let mut world = match World::try_new(&config) { Ok(w) => w, Err(e) => { println!("{e}"); return; } };
+        for second in 0..30 {
+            world.run(Duration::from_secs(1), |_| {});
+            if second % 5 == 4 {
+                let e = world.slave().estimate();
+                println!("{seed} {second}: {:.4?} speed {:.4} sticking {} samples {} {:?}", errors(&world), e.speed, e.sticking, e.samples, world.outcome().updates.total());
+            }
+        }
+    }
+}

@@ -12,6 +12,7 @@ use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 
 pub mod block;
+pub mod creep;
 pub mod direction;
 pub mod filter;
 pub mod gate;

@@ -311,6 +311,30 @@ fn friction_that_changes_at_constant_speed_is_still_found_as_force() {
 }
 
 #[test]
+fn probe_slow() {
+    for seed in 0..5 {
+        for fresh in [true, false] {
+            let (mut estimator, mut plant) = learned(seed);
+            if fresh {
+                estimator = recommended(|_| {});
+            }
+            for k in 0..6000 {
+                let estimate = estimator.step(&plant.push(&Motion::steady(0.003)));
+                if k % 1000 == 999 {
+                    println!(
+                        "{seed} {fresh} {k}: {:?} {} {} {}",
+                        errors(values(&estimate), TRUTH),
+                        estimate.excited,
+                        estimate.sticking,
+                        estimate.samples
+                    );
+                }
+            }
+        }
+    }
+}
+
+#[test]
 fn without_contact_and_while_sticking_nothing_moves_to_the_bit() {
     let (mut estimator, mut plant) = learned(4);
     let before = values(estimator.estimate());

@@ -16,6 +16,9 @@ use super::filter::Row;
 use super::surface::SurfaceMotion;
 use crate::square::friction;
 
+/// e/(c l) of the ellipse through the wrenches with which a slow tool pushes a square.
+const CREEP_RADIUS: f64 = 0.30;
+
 /// The object as the slave sees it: of its own observer, never the truth.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Seen {
@@ -58,6 +61,22 @@ pub fn shared(motion: &SurfaceMotion, normal: Vec2, speed: f64, seen: &Seen) -> 
     let (force, torque) = friction(speed - omega * d, omega, seen.side);
     Row {
         regressor: Vector3::new(motion_row.x + carried, motion_row.y, force + arm * torque) * share,
+        force: motion.row.force,
+    }
+}
+
+/// The same where the object moves too slowly for omega to be known: turning is what the lever makes it.
+///
+/// Without inertia the moment and the force on a square lie on its limit surface, so that f = c s with
+/// `s = 1/sqrt(1 + (d/(0.30 l))²)`: 0.3 % off the square's for levers up to 0.14 l.
+#[must_use]
+pub fn creeping(motion: &SurfaceMotion, normal: Vec2, seen: &Seen) -> Row {
+    let d = cross(motion.point - seen.centre, normal) / seen.side;
+    let share = 1.0 / (1.0 + 6.0 * d * d);
+    let raw = motion.row.regressor;
+    let s = 1.0 / (1.0 + d * d / (CREEP_RADIUS * CREEP_RADIUS)).sqrt();
+    Row {
+        regressor: Vector3::new(raw.x * share, raw.y * share, s),
         force: motion.row.force,
     }
 }
