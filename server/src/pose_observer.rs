@@ -5,25 +5,23 @@
 //! coordinate. Vision (slow, late, noisy) corrects what touch cannot see and teaches the distance from
 //! the centre to each face. Pure; it must never use the true pose.
 
+mod turning;
+
 use mmt_shared::contact::Coupling;
 use mmt_shared::dynamics::Motion;
 use mmt_shared::geometry::{BoxFootprint, Face, Pose, Twist, Vec2, cross, rotate, wrap_angle};
-use mmt_shared::params::{FACE_OFFSET_M, ModelParams, friction_torque_of_square};
+use mmt_shared::params::{FACE_OFFSET_M, ModelParams};
 use mmt_shared::settings::FrictionLaw;
 use mmt_shared::time::{TICK_S, Time};
 
 use crate::sensing::VisionSample;
-use crate::square;
+use turning::{Push, Turning};
 
 /// Force below which its direction says nothing, N: fifteen times the default sensor noise.
 const FORCE_MIN_N: f64 = 0.15;
 /// Turning acceleration that the angle filter allows for while the box is pushed, rad/s²: all of it, and
 /// what remains of it where the moment of the push is reckoned with.
 const TURN_ACCELERATION: (f64, f64) = (20.0, 2.5);
-/// Sliding from which the parameters have been learned well enough to reckon with, ticks.
-const TICKS_TO_LEARN: u32 = 500;
-/// Speed of the centre from which the box slides for certain, m/s: the gate of the estimator.
-const SLIDES_M_PER_S: f64 = 0.020;
 /// Direction error of the force besides its noise (the face is not perfectly smooth), rad.
 const DIRECTION_FLOOR_RAD: f64 = 2e-3;
 /// Drift of the coordinate along the face while pushed, m per square root of a second.
@@ -83,10 +81,7 @@ pub struct PoseObserver {
     learned: [u32; 4],
     touching: Option<Touching>,
     penetration: f64,
-    /// e/(c l) of the limit surface that resists turning as the box does.
-    friction_arm: f64,
-    /// Ticks of sliding so far.
-    slid: u32,
+    turning: Turning,
     /// How far behind the tool the next carved face will lie, m.
     carve_margin: f64,
     /// Covariance of (theta, omega): [theta², theta·omega, omega²].
@@ -113,9 +108,7 @@ impl PoseObserver {
             learned: [0; 4],
             touching: None,
             penetration: 0.0,
-            // (9)
-            friction_arm: friction_torque_of_square(1.0, 1.0),
-            slid: 0,
+            turning: Turning::new(),
             carve_margin: CARVE_MARGIN_M.0,
             angle_cov: [angle_var, 0.0, 0.0],
             slide_var: shift_var,
@@ -146,7 +139,7 @@ impl PoseObserver {
     /// in the paper's mode.
     #[must_use]
     pub fn friction_radius(&self) -> f64 {
-        self.friction_arm * self.footprint.mean_side()
+        self.turning.arm() * self.footprint.mean_side()
     }
 
     /// What is touched.
@@ -211,29 +204,24 @@ impl PoseObserver {
         });
     }
 
-    /// Turns the box by the moment of the push against the ground, if it slides: turning is known by its
-    /// cause before the direction of the force shows it. Returns the turning acceleration that remains
-    /// unknown, rad/s².
+    /// Turns the box by the moment of the push, where that can be reckoned, and returns the turning
+    /// acceleration that remains unknown, rad/s².
     fn turn(&mut self, force: Vec2, params: &ModelParams) -> f64 {
+        let (all, rest) = TURN_ACCELERATION;
         let Some(touching) = self.touching.filter(|_| self.config.learn) else {
-            return TURN_ACCELERATION.0;
+            return all;
         };
-        let speed = self.twist.linear.dot(&touching.inward);
-        if speed < SLIDES_M_PER_S {
-            return TURN_ACCELERATION.0;
-        }
-        self.slid = self.slid.saturating_add(1);
-        if self.slid < TICKS_TO_LEARN {
-            return TURN_ACCELERATION.0;
-        }
-        let (side, omega) = (self.footprint.mean_side(), self.twist.angular);
-        let moment = cross(touching.surface - self.pose.position, force);
-        self.twist.angular = square::turned(params, side, speed, omega, moment);
-        if params.c() > 0.0 {
-            let arm = square::friction_torque(params, side, speed, omega) / (params.c() * side);
-            self.friction_arm += (arm - self.friction_arm) * (TICK_S / 0.100);
-        }
-        TURN_ACCELERATION.1
+        let push = Push {
+            side: self.footprint.mean_side(),
+            speed: self.twist.linear.dot(&touching.inward),
+            omega: self.twist.angular,
+            moment: cross(touching.surface - self.pose.position, force),
+        };
+        let Some(omega) = self.turning.step(params, &push) else {
+            return all;
+        };
+        self.twist.angular = omega;
+        rest
     }
 
     fn face_of(&self, force: Vec2) -> Face {

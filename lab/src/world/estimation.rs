@@ -107,104 +107,146 @@ fn pushes_through_the_centre_leave_less_than_half_a_percent() {
 }
 
 #[test]
-fn the_first_push_shows_m_b_and_c() {
+fn the_first_push_shows_m_b_and_c_within_250_ms() {
     let mut last = [vec![], vec![], vec![], vec![]];
     for seed in SEEDS {
         let mut world = World::try_new(&experiment(seed)).unwrap();
-        let (mut sliding, mut off) = (0.0, [0.0; 4]);
-        while sliding < 2000.0 {
+        let (mut slid, mut off) = (0.0, [0.0; 4]);
+        while slid < 2000.0 {
             world.step();
-            if slides(&world) {
-                sliding += 1.0;
-                let [m, b, c] = felt_errors(&world);
-                let now = [m, b, c, force_error(&world)];
-                off.iter_mut()
-                    .zip(now)
-                    .filter(|(_, e)| *e > 0.1)
-                    .for_each(|(off, _)| *off = sliding);
+            if !slides(&world) {
+                continue;
+            }
+            slid += 1.0;
+            let [m, b, c] = felt_errors(&world);
+            for (off, error) in off.iter_mut().zip([m, b, c, force_error(&world)]) {
+                if error > 0.1 {
+                    *off = slid;
+                }
             }
         }
-        println!("{seed}: {off:?}");
-        last.iter_mut()
-            .zip(off)
-            .for_each(|(last, off)| last.push(off));
+        last.iter_mut().zip(off).for_each(|(all, ms)| all.push(ms));
     }
-    let all = last.map(median);
-    println!("first push: m, b (as force), c, force within 10 % after {all:?} ms of sliding");
+    let [m, b, c, force] = last.map(median);
+    println!(
+        "first push: within 10 % after m {m} b (as force) {b} c {c} force {force} ms of sliding"
+    );
+    assert!([m, b, c, force].iter().all(|ms| *ms <= 250.0));
 }
 
-/// After mu has gone from 0.30 to 0.45 in the middle of a push: sliding contact (ms) until c and the
-/// predicted force stay within 10 % for the next second of it, and the packets of that time.
-fn after_a_step_of_mu(scheme: &str, seed: u64) -> [f64; 4] {
+/// What a step of mu from 0.30 to 0.45 in the middle of a push costs.
+#[derive(Clone, Copy)]
+struct Recovery {
+    /// Contact until c and the force that (1) predicts stay within 10 % for the rest of a second, ms.
+    estimate_ms: f64,
+    /// The same for the force of the master's model against the measured one.
+    model_ms: f64,
+    /// Updates until both do.
+    packets: f64,
+}
+
+fn recovery(scheme: &str, seed: u64) -> Recovery {
     let mut config = experiment(seed);
     config.slave.trigger.scheme = scheme.parse().unwrap();
     let mut world = World::try_new(&config).unwrap();
     world.run(Duration::from_secs(10), |_| {});
-    let mut slid = 0;
-    while slid < 700 {
+    let mut sliding = 0;
+    while sliding < 700 {
         world.step();
-        slid = if slides(&world) { slid + 1 } else { 0 };
+        sliding = if slides(&world) { sliding + 1 } else { 0 };
     }
     world.environment_mut().set_friction(0.45).unwrap();
     let sent = world.outcome().updates.total();
-    let (mut sliding, mut off, mut packets, mut in_contact) = (0.0, [0.0; 3], 0, 0.0);
-    while sliding < 1000.0 {
+    let (mut contact_ms, mut slid) = (0.0, 0);
+    let mut found = Recovery {
+        estimate_ms: 0.0,
+        model_ms: 0.0,
+        packets: 0.0,
+    };
+    while slid < 1000 {
         let tick = world.step();
         let Some(slave) = tick.slave.filter(|slave| slave.in_contact) else {
             continue;
         };
-        in_contact += 1.0;
+        contact_ms += 1.0;
         if !slides(&world) {
             continue;
         }
-        sliding += 1.0;
-        let model = (slave.f_s - slave.f_shadow).norm() / slave.f_s.norm().max(0.3);
-        let now = [errors(&world)[2], force_error(&world), model];
-        for (i, e) in now.into_iter().enumerate() {
-            if e > 0.1 {
-                off[i] = in_contact;
-                if i < 2 {
-                    packets = world.outcome().updates.total() - sent;
-                }
-            }
+        slid += 1;
+        let [_, _, c] = errors(&world);
+        if c.max(force_error(&world)) > 0.1 {
+            found.estimate_ms = contact_ms;
+        }
+        if (slave.f_s - slave.f_shadow).norm() > 0.1 * slave.f_s.norm().max(0.3) {
+            found.model_ms = contact_ms;
+        }
+        if contact_ms == found.estimate_ms.max(found.model_ms) {
+            found.packets = (world.outcome().updates.total() - sent) as f64;
         }
     }
-    println!(
-        "{scheme} {seed}: {off:?} {packets} all {}",
-        world.outcome().updates.total() - sent
-    );
-    let [c, force, model] = off;
-    [c, force, model, packets as f64]
+    found
+}
+
+fn typical_recovery(scheme: &str) -> Recovery {
+    let all: Vec<Recovery> = SEEDS.map(|seed| recovery(scheme, seed)).collect();
+    let of = |number: fn(&Recovery) -> f64| median(all.iter().map(number).collect());
+    Recovery {
+        estimate_ms: of(|r| r.estimate_ms),
+        model_ms: of(|r| r.model_ms),
+        packets: of(|r| r.packets),
+    }
 }
 
 #[test]
-fn a_step_of_mu_is_followed() {
-    for scheme in ["useful 10% 150ms", "hybrid 10% 150ms"] {
-        let mut all = [vec![], vec![], vec![], vec![]];
-        for seed in SEEDS {
-            let found = after_a_step_of_mu(scheme, seed);
-            all.iter_mut().zip(found).for_each(|(all, v)| all.push(v));
-        }
+fn a_step_of_mu_is_followed_in_half_a_second_as_fast_as_by_hybrid() {
+    let (useful, hybrid) = (
+        typical_recovery("useful 10% 150ms"),
+        typical_recovery("hybrid 10% 150ms"),
+    );
+    for (name, found) in [("useful", useful), ("hybrid", hybrid)] {
         println!(
-            "{scheme}: c, force, model force, packets {:?}",
-            all.map(median)
+            "mu 0.30 to 0.45, {name}: estimate within 10 % after {} ms of contact, model after {} ms, {} packets",
+            found.estimate_ms, found.model_ms, found.packets
         );
     }
+    assert!(useful.estimate_ms > 20.0, "the step is felt");
+    assert!(useful.estimate_ms <= 500.0 && useful.model_ms <= 500.0);
+    assert!(useful.packets <= 30.0);
+    // as fast, to within the shortest time between two updates
+    assert!(useful.model_ms <= hybrid.model_ms + 10.0);
+    assert!(useful.estimate_ms <= hybrid.estimate_ms + 10.0);
 }
 
 #[test]
-fn probe_slow() {
-    for seed in 1..=5 {
+fn pushes_at_10_mm_per_s_show_c() {
+    let mut all = vec![];
+    for seed in SEEDS {
         let mut config = experiment(seed);
         config.operator.push_speed_m_per_s = (0.010, 0.010);
         config.operator.approach_m_per_s = 0.010;
-        let mut world = match World::try_new(&config) { Ok(w) => w, Err(e) => { println!("{e}"); return; } };
-        for second in 0..30 {
-            world.run(Duration::from_secs(1), |_| {});
-            if second % 5 == 4 {
-                let e = world.slave().estimate();
-                println!("{seed} {second}: {:.4?} speed {:.4} sticking {} samples {} {:?}", errors(&world), e.speed, e.sticking, e.samples, world.outcome().updates.total());
-            }
-        }
+        let mut world = World::try_new(&config).unwrap();
+        world.run(Duration::from_secs(15), |_| {});
+        let [_, _, c] = errors(&world);
+        all.push(c);
     }
+    let c = median(all);
+    println!("pushes at 10 mm/s: c {c:.4}");
+    assert!(c <= 0.02);
+}
+
+#[test]
+fn a_box_that_turns_more_easily_than_a_square_is_told_to_the_model() {
+    let mut pmse = vec![];
+    for seed in SEEDS {
+        let mut config = experiment(seed);
+        config.slave.environment.rotational_damping_nms = Some(0.0);
+        let mut world = World::try_new(&config).unwrap();
+        world.run(Duration::from_secs(30), |_| {});
+        let e = world.slave().observer().friction_radius();
+        let by_9 = truth(&world).e() / truth(&world).c();
+        assert!(e < 0.9 * by_9, "seed {seed}: {e} m, by (9) {by_9} m");
+        pmse.push(world.force().pmse.unwrap());
+    }
+    println!("no rotational damping: PMSE {:.4}", mean(&pmse));
+    assert!(mean(&pmse) <= 0.025);
 }
