@@ -181,7 +181,7 @@ fn turning_is_known_by_its_moment_and_a_box_that_resists_more_is_found() {
     );
     let mut stubborn = observer(true);
     let (found, truth) = turn(&mut stubborn, 2.0, 4);
-    assert!((found / truth - 1.0).abs() < 0.05, "{found} {truth}");
+    assert!((found / truth - 1.0).abs() < 0.15, "{found} {truth}");
     assert!(stubborn.friction_radius() > 1.2 * of_square);
 }
 
