@@ -371,6 +371,4 @@ impl World {
 }
 
 #[cfg(test)]
-mod estimation;
-#[cfg(test)]
 mod tests;

@@ -3,7 +3,7 @@
 //! Perfect links, no play-out delay, poses set on arrival: what errs is the estimation, not the network.
 //! Every law prints what it found; all times are virtual and count sliding contact only.
 
-use super::*;
+use super::super::*;
 use mmt_server::playout::PlayoutConfig;
 use mmt_shared::params::ModelParams;
 use mmt_shared::settings::{Mode, PoseCorrection};
