@@ -7,7 +7,7 @@ use std::hint::black_box;
 use std::time::Duration;
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use mmt_server::estimator::{Estimator, EstimatorConfig, Measured};
+use mmt_server::estimator::{Estimator, EstimatorConfig, Measured, Seen};
 use mmt_server::trigger::{Trigger, TriggerConfig, TriggerInput};
 use mmt_shared::contact::Coupling;
 use mmt_shared::geometry::Vec2;
@@ -26,11 +26,18 @@ fn push() -> Vec<Measured> {
         let v = 0.16 * (1.0 + 0.3 * slow + 0.12 * fast);
         let a = 0.16 * (1.2 * libm::cos(4.0 * t) + 1.56 * libm::cos(13.0 * t));
         position += v * TICK_S;
+        // seen and turning, so that every tick pays for it
+        let seen = Seen {
+            centre: Vec2::new(position + 0.18, 0.0),
+            turning: 0.01,
+            side: 0.36,
+        };
         let force = 0.7 * a + 3.0 * v + 2.06;
         measured.push(Measured {
             tool: Vec2::new(position + force / 1000.0, 0.0),
             force: Vec2::new(force, 0.0),
             normal: Some(Vec2::new(1.0, 0.0)),
+            seen: Some(seen),
         });
     }
     measured

@@ -10,6 +10,7 @@ pub mod playout;
 pub mod pose_observer;
 pub mod sensing;
 pub mod slave;
+pub mod square;
 pub mod trigger;
 
 #[cfg(feature = "io")]

@@ -5,19 +5,23 @@
 //! coordinate. Vision (slow, late, noisy) corrects what touch cannot see and teaches the distance from
 //! the centre to each face. Pure; it must never use the true pose.
 
+mod turning;
+
 use mmt_shared::contact::Coupling;
 use mmt_shared::dynamics::Motion;
-use mmt_shared::geometry::{BoxFootprint, Face, Pose, Twist, Vec2, rotate, wrap_angle};
+use mmt_shared::geometry::{BoxFootprint, Face, Pose, Twist, Vec2, cross, rotate, wrap_angle};
 use mmt_shared::params::{FACE_OFFSET_M, ModelParams};
 use mmt_shared::settings::FrictionLaw;
 use mmt_shared::time::{TICK_S, Time};
 
 use crate::sensing::VisionSample;
+use turning::{Push, Turning};
 
 /// Force below which its direction says nothing, N: fifteen times the default sensor noise.
 const FORCE_MIN_N: f64 = 0.15;
-/// Turning acceleration that the angle filter allows for while the box is pushed, rad/s².
-const TURN_ACCELERATION: f64 = 20.0;
+/// Turning acceleration that the angle filter allows for while the box is pushed, rad/s²: all of it, and
+/// what remains of it where the moment of the push is reckoned with.
+const TURN_ACCELERATION: (f64, f64) = (20.0, 2.5);
 /// Direction error of the force besides its noise (the face is not perfectly smooth), rad.
 const DIRECTION_FLOOR_RAD: f64 = 2e-3;
 /// Drift of the coordinate along the face while pushed, m per square root of a second.
@@ -77,6 +81,7 @@ pub struct PoseObserver {
     learned: [u32; 4],
     touching: Option<Touching>,
     penetration: f64,
+    turning: Turning,
     /// How far behind the tool the next carved face will lie, m.
     carve_margin: f64,
     /// Covariance of (theta, omega): [theta², theta·omega, omega²].
@@ -103,6 +108,7 @@ impl PoseObserver {
             learned: [0; 4],
             touching: None,
             penetration: 0.0,
+            turning: Turning::new(),
             carve_margin: CARVE_MARGIN_M.0,
             angle_cov: [angle_var, 0.0, 0.0],
             slide_var: shift_var,
@@ -129,6 +135,13 @@ impl PoseObserver {
         self.footprint
     }
 
+    /// e/c (m) with which the local model turns as the box does; by (9) until the box has slid, and always
+    /// in the paper's mode.
+    #[must_use]
+    pub fn friction_radius(&self) -> f64 {
+        self.turning.arm() * self.footprint.mean_side()
+    }
+
     /// What is touched.
     #[must_use]
     pub fn touching(&self) -> Option<Touching> {
@@ -146,7 +159,7 @@ impl PoseObserver {
         params: &ModelParams,
     ) {
         if in_contact {
-            self.touch(tool, force);
+            self.touch(tool, force, params);
         } else {
             self.let_go(params);
         }
@@ -161,7 +174,7 @@ impl PoseObserver {
         self.next = (self.next + 1) % PAST;
     }
 
-    fn touch(&mut self, tool: Vec2, force: Vec2) {
+    fn touch(&mut self, tool: Vec2, force: Vec2, params: &ModelParams) {
         self.carve_margin = CARVE_MARGIN_M.0;
         let size = force.norm();
         if self.touching.is_none() {
@@ -170,7 +183,8 @@ impl PoseObserver {
         let face = self
             .touching
             .map_or_else(|| self.face_of(force), |touching| touching.face);
-        self.follow_angle(face, force, size);
+        let unknown = self.turn(force, params);
+        self.follow_angle(face, force, size, unknown);
         let inward = -rotate(self.pose.angle, face.outward());
         self.follow_penetration(force.dot(&inward));
         let surface = tool - inward * self.penetration;
@@ -188,6 +202,26 @@ impl PoseObserver {
             inward,
             surface,
         });
+    }
+
+    /// Turns the box by the moment of the push, where that can be reckoned, and returns the turning
+    /// acceleration that remains unknown, rad/s².
+    fn turn(&mut self, force: Vec2, params: &ModelParams) -> f64 {
+        let (all, rest) = TURN_ACCELERATION;
+        let Some(touching) = self.touching.filter(|_| self.config.learn) else {
+            return all;
+        };
+        let push = Push {
+            side: self.footprint.mean_side(),
+            speed: self.twist.linear.dot(&touching.inward),
+            omega: self.twist.angular,
+            moment: cross(touching.surface - self.pose.position, force),
+        };
+        let Some(omega) = self.turning.step(params, &push) else {
+            return all;
+        };
+        self.twist.angular = omega;
+        rest
     }
 
     fn face_of(&self, force: Vec2) -> Face {
@@ -212,10 +246,10 @@ impl PoseObserver {
     }
 
     /// Constant-velocity Kalman filter of theta on the direction of the force.
-    fn follow_angle(&mut self, face: Face, force: Vec2, size: f64) {
+    fn follow_angle(&mut self, face: Face, force: Vec2, size: f64, acceleration: f64) {
         self.pose.angle += self.twist.angular * TICK_S;
         let [p, pc, q] = self.angle_cov;
-        let noise = TURN_ACCELERATION * TURN_ACCELERATION * TICK_S;
+        let noise = acceleration * acceleration * TICK_S;
         self.angle_cov = [
             p + 2.0 * pc * TICK_S + q * TICK_S * TICK_S,
             pc + q * TICK_S,

@@ -8,13 +8,13 @@ use mmt_shared::contact::Coupling;
 use mmt_shared::geometry::{BoxFootprint, Pose, Twist, Vec2, wrap_angle};
 use mmt_shared::local_model::LocalModel;
 use mmt_shared::metrics::ForceMetrics;
-use mmt_shared::params::{ModelParams, ModelState};
+use mmt_shared::params::{ModelParams, ModelState, inertia_of_square};
 use mmt_shared::settings::{Mode, ModelSettings};
 use mmt_shared::time::Time;
 use mmt_shared::wire::{Cause, HipSample, Update};
 
 use crate::environment::{Environment, EnvironmentConfig};
-use crate::estimator::{Estimate, Estimator, EstimatorConfig, Measured};
+use crate::estimator::{Estimate, Estimator, EstimatorConfig, Measured, Seen};
 use crate::playout::PlayoutBuffer;
 use crate::pose_observer::{ObserverConfig, PoseObserver};
 use crate::sensing::Sensing;
@@ -233,14 +233,22 @@ impl Slave {
 
     fn estimate_from(&mut self, tool: Vec2, force: Vec2) {
         let normal = self.observer.touching().map(|touching| touching.inward);
+        // As wide as the faces say; the paper's never change.
+        let side = self.observer.footprint().mean_side();
+        let seen = Some(Seen {
+            centre: self.observer.pose().position,
+            turning: self.observer.twist().angular,
+            side,
+        });
         let Estimate { m, b, c, .. } = self.estimator.step(&Measured {
             tool,
             force,
             normal,
+            seen,
         });
-        // As wide as the faces say; the paper's never change.
-        let side = self.observer.footprint().mean_side();
-        match ModelParams::of_square(m, b, c, side, &self.settings.coupling) {
+        let inertia = inertia_of_square(m, side);
+        let e = c * self.observer.friction_radius();
+        match ModelParams::try_new(m, b, c, inertia, e, &self.settings.coupling) {
             Ok(params) => self.params = params,
             Err(_) => self.refused_estimates += 1,
         }

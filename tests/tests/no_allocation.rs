@@ -19,7 +19,7 @@ use mmt_client::link::{FromSlave, MasterLink};
 use mmt_client::master::Master;
 use mmt_client::operator::Operator;
 use mmt_client::operator::scripted::{Scripted, ScriptedConfig};
-use mmt_server::estimator::{Estimator, EstimatorConfig, Measured};
+use mmt_server::estimator::{Estimator, EstimatorConfig, Measured, Seen};
 use mmt_server::link::SlaveLink;
 use mmt_server::playout::{PlayoutBuffer, PlayoutConfig};
 use mmt_server::slave::{Slave, SlaveConfig, SlaveTick};
@@ -318,10 +318,17 @@ fn the_slaves_own_parts_never_allocate() {
         );
         samples += u64::from(sample.is_some());
         if let Some(met) = slaved.tick {
+            let observer = sides.slave.observer();
+            let seen = Seen {
+                centre: observer.pose().position,
+                turning: observer.twist().angular,
+                side: observer.footprint().mean_side(),
+            };
             let measured = Measured {
                 tool: met.tool,
                 force: met.f_s,
                 normal: sides.slave.observer().touching().map(|t| t.inward),
+                seen: Some(seen),
             };
             let (sent, calls) = counted(|| parts.step(now, &met, &measured));
             assert_eq!(calls, 0, "allocator called in tick {tick}");

@@ -1,6 +1,6 @@
 //! What a piece of the system costs in CPU time, which other processes on the machine do not change much.
 
-use mmt_server::estimator::{Estimator, EstimatorConfig, Measured};
+use mmt_server::estimator::{Estimator, EstimatorConfig, Measured, Seen};
 use mmt_shared::contact::Coupling;
 use mmt_shared::geometry::Vec2;
 use mmt_shared::io::clock::thread_cpu_time;
@@ -19,10 +19,17 @@ pub fn estimator_tick_ms(mode: Mode) -> f64 {
     for k in 0..TICKS {
         let t = f64::from(k) * TICK_S;
         let v = 0.16 + 0.05 * libm::sin(4.0 * t);
+        // seen and turning, so that every tick pays for it
+        let seen = Seen {
+            centre: Vec2::new(0.16 * t + 0.18, 0.0),
+            turning: 0.01,
+            side: 0.36,
+        };
         estimator.step(&Measured {
             tool: Vec2::new(0.16 * t + 0.0125 * (1.0 - libm::cos(4.0 * t)), 0.0),
             force: Vec2::new(0.7 * 0.2 * libm::cos(4.0 * t) + 3.0 * v + 2.06, 0.0),
             normal: Some(Vec2::new(1.0, 0.0)),
+            seen: Some(seen),
         });
     }
     let spent = thread_cpu_time().saturating_sub(began);

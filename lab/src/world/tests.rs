@@ -5,6 +5,8 @@ use super::*;
 use mmt_server::playout::PlayoutConfig;
 use mmt_shared::settings::Mode;
 
+mod estimation;
+
 /// The default network: 50 ms ± 5 ms each way, 1 % loss.
 const WAN: &str = "delay 50ms 5ms loss 1%";
 const SEEDS: std::ops::RangeInclusive<u64> = 1..=6;

@@ -23,6 +23,15 @@ pub struct Row {
     pub force: f64,
 }
 
+impl Row {
+    /// This row with the sign of `speed` for s: friction opposes the push alone.
+    #[must_use]
+    pub fn with_sign(mut self, speed: f64) -> Self {
+        self.regressor.z = 1.0_f64.copysign(speed);
+        self
+    }
+}
+
 /// Three equal first-order stages in a row, each with unit gain at rest.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StateVariableFilter {

@@ -60,9 +60,12 @@ impl Gate {
 
     /// Takes force (N) and smoothed speed (m/s) along the normal.
     ///
-    /// A speed that changes sign begins anew: it has been through zero, where the object may stick.
-    pub fn step(&mut self, force: f64, speed: f64) -> Passage {
-        let enough = force > self.config.force_min_n && speed.abs() > self.config.speed_min_m_per_s;
+    /// A slow object slides if it is known to creep. A speed that changes sign begins anew: it has been
+    /// through zero, where the object may stick.
+    pub fn step(&mut self, force: f64, speed: f64, creeps: bool) -> Passage {
+        let slides = self.slides(speed) || creeps;
+        let speed = if creeps { speed.abs() } else { speed };
+        let enough = force > self.config.force_min_n && slides;
         let turned = self.age > 0 && self.backwards != (speed < 0.0);
         self.backwards = speed < 0.0;
         if !enough {
@@ -81,6 +84,12 @@ impl Gate {
         }
     }
 
+    /// Whether a smoothed speed (m/s) is fast enough to be known as sliding by itself.
+    #[must_use]
+    pub fn slides(&self, speed: f64) -> bool {
+        speed.abs() > self.config.speed_min_m_per_s
+    }
+
     /// Closes: contact was lost.
     pub fn close(&mut self) {
         self.age = 0;
@@ -94,26 +103,26 @@ mod tests {
     fn pushed(ticks: u32) -> Gate {
         let mut gate = Gate::new(GateConfig::default());
         for _ in 0..ticks {
-            gate.step(2.0, 0.1);
+            gate.step(2.0, 0.1, false);
         }
         gate
     }
 
     #[test]
     fn it_opens_after_42_ticks_of_sliding_and_not_before() {
-        assert_eq!(pushed(0).step(2.0, 0.1), Passage::Begins);
-        assert_eq!(pushed(1).step(2.0, 0.1), Passage::Young);
-        assert_eq!(pushed(41).step(2.0, 0.1), Passage::Young);
-        assert_eq!(pushed(42).step(2.0, 0.1), Passage::Open);
+        assert_eq!(pushed(0).step(2.0, 0.1, false), Passage::Begins);
+        assert_eq!(pushed(1).step(2.0, 0.1, false), Passage::Young);
+        assert_eq!(pushed(41).step(2.0, 0.1, false), Passage::Young);
+        assert_eq!(pushed(42).step(2.0, 0.1, false), Passage::Open);
     }
 
     #[test]
     fn sticking_a_light_touch_and_a_reversal_each_begin_anew() {
         for (force, speed) in [(2.0, 0.020), (0.15, 0.1), (f64::NAN, 0.1), (2.0, f64::NAN)] {
             let mut gate = pushed(100);
-            assert_eq!(gate.step(force, speed), Passage::Closed);
-            assert_eq!(gate.step(2.0, 0.1), Passage::Begins);
+            assert_eq!(gate.step(force, speed, false), Passage::Closed);
+            assert_eq!(gate.step(2.0, 0.1, false), Passage::Begins);
         }
-        assert_eq!(pushed(100).step(2.0, -0.1), Passage::Begins);
+        assert_eq!(pushed(100).step(2.0, -0.1, false), Passage::Begins);
     }
 }

@@ -12,6 +12,7 @@ use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 
 pub mod block;
+pub mod creep;
 pub mod direction;
 pub mod filter;
 pub mod gate;
@@ -26,12 +27,14 @@ pub mod recursive;
 pub mod surface;
 #[cfg(test)]
 mod tests;
+pub mod turning;
 
 pub use block::Rows;
 pub use direction::{DirectionConfig, ForceDirection};
 pub use limits::SettingOutOfRange;
 pub use paper::{PaperConfig, PaperEstimator};
 pub use recommended::{RecommendedConfig, RecommendedEstimator};
+pub use turning::Seen;
 
 /// Below this speed along the normal the object is taken to stick, m/s: four standard deviations of the
 /// smoothed speed at the default position noise.
@@ -51,6 +54,8 @@ pub struct Measured {
     /// Inward unit normal of the touched face as the slave believes it; none when not in contact. It
     /// serves until the direction of the force is known.
     pub normal: Option<Vec2>,
+    /// Where the slave sees the object; none: it is taken to be pushed through its centre.
+    pub seen: Option<Seen>,
 }
 
 impl Measured {
@@ -60,6 +65,7 @@ impl Measured {
         within(&self.tool, POSITION_LIMIT)
             && within(&self.force, FORCE_LIMIT)
             && self.normal.is_none_or(|normal| within(&normal, 1.0))
+            && self.seen.is_none_or(|seen| seen.is_usable())
     }
 }
 

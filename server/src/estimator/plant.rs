@@ -144,6 +144,7 @@ impl Plant {
             tool: tool + Vec2::new(px, py) * self.noise.0,
             force: ahead * force + Vec2::new(fx, fy) * self.noise.1,
             normal: touching.then_some(ahead),
+            seen: None,
         }
     }
 }

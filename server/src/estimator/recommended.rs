@@ -10,11 +10,13 @@ use mmt_shared::time::TICK_S;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
+use super::creep::Creep;
 use super::direction::{DirectionConfig, ForceDirection};
 use super::filter::{Row, StateVariableFilter, stage_weight};
 use super::gate::{Gate, GateConfig, Passage};
 use super::recursive::{Recursive, RecursiveConfig, Verdict};
-use super::surface::Surface;
+use super::surface::{Surface, SurfaceMotion};
+use super::turning::{self, Seen};
 use super::{Estimate, Measured, STICK_SPEED};
 
 /// Settings of [`RecommendedEstimator`].
@@ -70,6 +72,7 @@ pub struct RecommendedEstimator {
     surface: Surface,
     speed_weight: f64,
     gate: Gate,
+    creep: Creep,
     filter: StateVariableFilter,
     recursive: Recursive,
     estimate: Estimate,
@@ -95,6 +98,7 @@ impl RecommendedEstimator {
             surface: Surface::new(config.coupling),
             speed_weight: stage_weight(config.cutoff_rad_per_s),
             gate: Gate::new(gate),
+            creep: Creep::new(std::f64::consts::SQRT_2 * config.position_noise_m / TICK_S),
             filter: StateVariableFilter::new(config.cutoff_rad_per_s),
             recursive,
             estimate,
@@ -134,13 +138,27 @@ impl RecommendedEstimator {
         };
         let v = motion.row.regressor.y;
         self.estimate.speed += (v - self.estimate.speed) * self.speed_weight;
-        self.estimate.sticking = self.estimate.speed.abs() < STICK_SPEED;
-        self.slide(motion.row);
+        let creeps = self.creep.step(v);
+        self.estimate.sticking = !creeps && self.estimate.speed.abs() < STICK_SPEED;
+        let passage = self
+            .gate
+            .step(motion.row.force, self.estimate.speed, creeps);
+        self.slide(passage, &self.row(&motion, normal, measured.seen.as_ref()));
     }
 
-    fn slide(&mut self, mut row: Row) {
+    /// The row of (1) that a motion gives while the object slides.
+    fn row(&self, motion: &SurfaceMotion, normal: Vec2, seen: Option<&Seen>) -> Row {
         let speed = self.estimate.speed;
-        let passage = self.gate.step(row.force, speed);
+        match seen {
+            Some(seen) if self.gate.slides(speed) => turning::shared(motion, normal, speed, seen),
+            Some(seen) => turning::creeping(motion, normal, seen),
+            // the smoothed speed is far from zero, so its sign is v's; creeping is forwards
+            None if self.gate.slides(speed) => motion.row.with_sign(speed),
+            None => motion.row.with_sign(1.0),
+        }
+    }
+
+    fn slide(&mut self, passage: Passage, row: &Row) {
         if passage == Passage::Closed {
             self.estimate.acceleration = 0.0;
             return self.recursive.hold();
@@ -148,9 +166,7 @@ impl RecommendedEstimator {
         if passage == Passage::Begins {
             self.filter.restart();
         }
-        // the smoothed speed has been far from zero since the filter started, so its sign is v's
-        row.regressor.z = 1.0_f64.copysign(speed);
-        let filtered = self.filter.step(row);
+        let filtered = self.filter.step(*row);
         self.estimate.acceleration = filtered.regressor.x;
         if passage == Passage::Open {
             if self.recursive.update(&filtered) == Verdict::Changed {
@@ -164,6 +180,7 @@ impl RecommendedEstimator {
     fn release(&mut self) {
         self.surface.reset();
         self.gate.close();
+        self.creep.reset();
         self.recursive.hold();
         self.estimate.release();
     }

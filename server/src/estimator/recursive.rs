@@ -17,6 +17,8 @@ use super::quadratic::{condition, inverse_of_gram, minimum_above};
 const LEAST: Vector3<f64> = Vector3::new(MASS_KG.0, 0.0, 0.0);
 /// Least variance of a filtered row's error, N²: 1 mN r.m.s., the default force noise after the filter.
 const ROW_VARIANCE_MIN: f64 = 1e-6;
+/// Least speed (m/s) at which a row can tell b from c: half of the gate's.
+const TELLING_SPEED: f64 = 0.010;
 /// Pull of m towards the prior in powers of the noise: five times the scatter of the noise's power over
 /// a memory, so that the matrix stays positive when the noise is taken away.
 const PRIOR_PULL: f64 = 2.0;
@@ -287,6 +289,7 @@ impl Recursive {
             let seen = 1.0 / inverse.m11;
             let b_force = (variance * inverse.m22).sqrt() * row.regressor.y.abs();
             self.condition.is_finite()
+                && row.regressor.y.abs() > TELLING_SPEED
                 && seen > self.config.excitation * self.acceleration_noise * self.weight
                 && b_force < self.config.damping_force_n
         });

@@ -17,6 +17,8 @@ use super::filter::Row;
 pub struct SurfaceMotion {
     /// The surface point, world frame, m.
     pub point: Vec2,
+    /// Its velocity, world frame, m/s.
+    pub velocity: Vec2,
     /// a·n, v·n and the sign s still 0; and the force f·n of the step that led to this motion.
     pub row: Row,
 }
@@ -70,6 +72,7 @@ impl Surface {
         let (v, a) = velocity.zip(acceleration)?;
         Some(SurfaceMotion {
             point,
+            velocity: v,
             row: Row {
                 regressor: Vector3::new(a.dot(&normal), v.dot(&normal), 0.0),
                 force: acted.dot(&normal),

@@ -311,6 +311,40 @@ fn friction_that_changes_at_constant_speed_is_still_found_as_force() {
 }
 
 #[test]
+fn a_push_at_3_mm_per_s_shows_c_alone_and_says_so() {
+    for seed in 0..5 {
+        let (mut fresh, mut plant) = (recommended(|_| {}), Plant::new(seed, Noise::DEFAULT));
+        let mut motion = Motion::of_operator(seed, 0);
+        (motion.speed, motion.slow.0, motion.fast.0) = (0.003, 0.0, 0.0);
+        let mut sliding = 0;
+        for _ in 0..6000 {
+            let estimate = fresh.step(&plant.push(&motion));
+            sliding += i32::from(plant.velocity > 0.002);
+            assert!(!estimate.excited);
+            // the averages take 0.3 s to agree, and the gate opens 42 ms later
+            if sliding > 600 {
+                assert!((estimate.c / TRUTH[2] - 1.0).abs() < 0.01, "{}", estimate.c);
+                assert!(!estimate.sticking);
+            }
+        }
+        assert!(sliding > 1000, "{sliding}");
+        // and what an earlier push has shown of m and b is held
+        let (mut learned, mut plant) = learned(seed);
+        let before = values(learned.estimate());
+        for _ in 0..6000 {
+            let estimate = learned.step(&plant.push(&motion));
+            let moved = errors(values(&estimate), before);
+            assert!(
+                moved[0] < 0.05 && moved[1] < 0.15 && moved[2] < 0.03,
+                "{moved:?}"
+            );
+        }
+        let c = learned.estimate().c;
+        assert!((c / TRUTH[2] - 1.0).abs() < 0.01, "{c}");
+    }
+}
+
+#[test]
 fn without_contact_and_while_sticking_nothing_moves_to_the_bit() {
     let (mut estimator, mut plant) = learned(4);
     let before = values(estimator.estimate());
@@ -447,6 +481,7 @@ proptest! {
                     tool: Vec2::new(x, y),
                     force: Vec2::new(fx, fy),
                     normal: touching.then_some(Vec2::new(1.0, 0.0)),
+                    seen: None,
                 };
                 let e = estimator.step(&measured);
                 let numbers = [e.m, e.b, e.c, e.speed, e.acceleration, e.heading.unwrap_or(0.0)];

@@ -1,6 +1,7 @@
 //! What the pose observer promises.
 
 use super::*;
+use mmt_shared::params::friction_torque_of_square;
 use mmt_shared::time::TICK;
 
 const COUPLING: Coupling = Coupling {
@@ -138,4 +139,56 @@ fn late_vision_is_held_against_the_pose_of_then() {
     let pose = Pose::new(0.095, 0.0, 0.0);
     observer.see(&VisionSample { taken, pose });
     assert!((observer.pose().position - before.position).norm() < 2e-4);
+}
+
+/// Pushes a box of twice the square's resistance to turning, or of as much, beside its centre at constant
+/// speed; returns omega as found and as true.
+fn turn(observer: &mut PoseObserver, resistance: f64, seconds: u32) -> (f64, f64) {
+    let (params, speed, lever) = (params(), 0.15, 0.03);
+    let (mut truth, mut omega) = (Pose::default(), 0.0);
+    for n in 1..=seconds * 1000 {
+        let inward = rotate(truth.angle, Vec2::new(1.0, 0.0));
+        let along = Vec2::new(-inward.y, inward.x);
+        let surface = truth.position - inward * HALF - along * lever;
+        let force = inward * (params.c() + params.b() * speed);
+        let drag = resistance * crate::square::drag(&params, 2.0 * HALF, speed, omega);
+        let moment = cross(surface - truth.position, force);
+        omega = crate::square::turned(params.inertia(), drag, omega, moment);
+        let now = Time::ZERO + TICK * n;
+        let tool = surface + force / COUPLING.stiffness_n_per_m;
+        observer.step(now, tool, force, true, &params);
+        if n % 33 == 0 {
+            observer.see(&VisionSample {
+                taken: now,
+                pose: truth,
+            });
+        }
+        truth.position += inward * (speed * 1e-3);
+        truth.angle += omega * 1e-3;
+    }
+    (observer.twist().angular, omega)
+}
+
+#[test]
+fn turning_is_known_by_its_moment_and_a_box_that_resists_more_is_found() {
+    let mut square = observer(true);
+    let (found, truth) = turn(&mut square, 1.0, 4);
+    assert!((found / truth - 1.0).abs() < 0.05, "{found} {truth}");
+    let of_square = square.friction_radius();
+    assert!(
+        of_square < 0.95 * 0.3826 * 2.0 * HALF,
+        "less than (9): it slides as well: {of_square}"
+    );
+    let mut stubborn = observer(true);
+    let (found, truth) = turn(&mut stubborn, 2.0, 4);
+    assert!((found / truth - 1.0).abs() < 0.15, "{found} {truth}");
+    assert!(stubborn.friction_radius() > 1.2 * of_square);
+}
+
+#[test]
+fn the_paper_takes_e_by_9_whatever_it_feels() {
+    let mut observer = observer(false);
+    turn(&mut observer, 2.0, 2);
+    let by_9 = friction_torque_of_square(1.0, observer.footprint().mean_side());
+    assert!((observer.friction_radius() - by_9).abs() < 1e-15);
 }
