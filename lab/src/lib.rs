@@ -2,10 +2,6 @@
 
 pub mod figure;
 #[cfg(feature = "io")]
-#[allow(
-    clippy::disallowed_methods,
-    reason = "the shell of the lab: threads and files are its business"
-)]
 pub mod io;
 pub mod physics;
 pub mod replay;

@@ -1,5 +1,10 @@
 //! The shell of the lab: threads for the trials, a folder for the files, a clock for what things cost.
 
+#![allow(
+    clippy::disallowed_methods,
+    reason = "the shell of the lab: threads, files and clocks are its business"
+)]
+
 mod cost;
 mod folder;
 mod pool;

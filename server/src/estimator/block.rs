@@ -171,6 +171,7 @@ fn along_force(a: Vec2, v: Vec2, force: Vec2) -> PlanarRow {
     let (a, v) = (a.dot(&normal), v.dot(&normal));
     let sign = if v == 0.0 { 0.0 } else { v.signum() };
     PlanarRow {
+        // (2)
         regressor: Matrix3x2::new(a, 0.0, v, 0.0, sign, 0.0),
         force: Vec2::new(size, 0.0),
     }
@@ -185,6 +186,7 @@ fn stacked(a: Vec2, v: Vec2, force: Vec2) -> PlanarRow {
         Vec2::zeros()
     };
     PlanarRow {
+        // (2)
         regressor: Matrix3x2::from_rows(&[a.transpose(), v.transpose(), sliding.transpose()]),
         force,
     }
