@@ -5,9 +5,8 @@
 //! form where there is one, else a much finer patch integrated by code of its own (`reference.rs`). It
 //! must never take a number from the environment as a reference.
 //!
-//! The motions are those of the model study for its body (0.7 kg, 0.36 m, mu 0.3): speeds and times are
-//! the same for every body, forces and torques go with c = mu m g and c l, so that every body moves. Only
-//! where a small or rough body would become faster than the environment accepts is a push shorter.
+//! The motions are the same for every body: a body whose friction holds a push or a wrench stays, and that is
+//! its reference. Only where a body would become faster than the environment accepts is a push shorter.
 
 mod motion;
 mod reference;

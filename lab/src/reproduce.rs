@@ -6,6 +6,7 @@
 pub mod ablation;
 pub mod claims;
 pub mod fig5;
+pub mod physics;
 pub mod scenarios;
 pub mod schemes;
 mod setting;
@@ -19,6 +20,7 @@ use std::time::Duration;
 use serde::Serialize;
 use sha2::{Digest, Sha256};
 
+use crate::physics::PhysicsError;
 use crate::table::Table;
 use crate::trial::{Measured, Trial, TrialError};
 use crate::world::WorldConfig;
@@ -56,6 +58,9 @@ pub enum ReproduceError {
     /// A trial could not be run.
     #[error(transparent)]
     Trial(#[from] TrialError),
+    /// A body has no reference motions.
+    #[error(transparent)]
+    Physics(#[from] PhysicsError),
     /// A file could not be written.
     #[error("cannot write {name}: {why}")]
     Keep {

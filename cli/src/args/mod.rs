@@ -15,7 +15,7 @@ use mmt_server::trigger::Scheme;
 use mmt_shared::pairing::{Address, Host};
 use mmt_shared::settings::Mode;
 
-pub(crate) use reproduce::{Experiment, ReproduceArguments};
+pub(crate) use reproduce::{BodyArguments, Experiment, ReproduceArguments};
 pub(crate) use values::{OperatorWords, PairingWords, Period};
 
 /// The command line.

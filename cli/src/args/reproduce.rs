@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use clap::{Args, Subcommand};
+use mmt_lab::physics::Body;
 
 use super::values;
 
@@ -54,4 +55,47 @@ pub(crate) enum Experiment {
     Tupdate,
     /// Other bodies, other grounds, changes in mid-run: recovery, packets and force error in both modes
     Scenarios,
+    /// What the environment does against closed forms and a fine reference, for any body
+    Physics(BodyArguments),
+    /// All of these, in one folder
+    All,
+}
+
+/// The body of `mmt reproduce physics`.
+#[derive(Args, Clone, Copy, Debug, PartialEq)]
+pub(crate) struct BodyArguments {
+    /// Mass m, kg
+    #[arg(long, value_name = "KG", default_value_t = Body::default().mass_kg)]
+    pub(crate) mass: f64,
+    /// Side l of the square footprint, m
+    #[arg(long, value_name = "M", default_value_t = Body::default().side_m)]
+    pub(crate) side: f64,
+    /// Friction coefficient between body and ground
+    #[arg(long, value_name = "MU", default_value_t = Body::default().friction_coefficient)]
+    pub(crate) mu: f64,
+    /// Viscous damping b, N s/m
+    #[arg(long, value_name = "NS_PER_M", default_value_t = Body::default().damping_ns_per_m)]
+    pub(crate) damping: f64,
+}
+
+impl From<BodyArguments> for Body {
+    fn from(arguments: BodyArguments) -> Self {
+        Self {
+            mass_kg: arguments.mass,
+            side_m: arguments.side,
+            friction_coefficient: arguments.mu,
+            damping_ns_per_m: arguments.damping,
+        }
+    }
+}
+
+impl From<Body> for BodyArguments {
+    fn from(body: Body) -> Self {
+        Self {
+            mass: body.mass_kg,
+            side: body.side_m,
+            mu: body.friction_coefficient,
+            damping: body.damping_ns_per_m,
+        }
+    }
 }

@@ -3,12 +3,14 @@
 mod desk;
 mod manifest;
 
+use mmt_lab::physics::Body;
 use mmt_lab::reproduce::traces::Trace;
 use mmt_lab::reproduce::{
-    Extent, Findings, ablation, claims, fig5, scenarios, schemes, traces, tupdate,
+    Extent, Findings, ReproduceError, ablation, claims, fig5, physics, scenarios, schemes, traces,
+    tupdate,
 };
 
-use crate::args::{Experiment, ReproduceArguments};
+use crate::args::{BodyArguments, Experiment, ReproduceArguments};
 use crate::failure::Failure;
 use crate::output::{note, print, print_json};
 
@@ -49,7 +51,21 @@ pub(crate) fn run(arguments: &ReproduceArguments) -> Result<(), Failure> {
 
 /// What one word of the command line asks for.
 fn experiments(experiment: &Experiment) -> Vec<Experiment> {
-    vec![experiment.clone()]
+    let body = BodyArguments::from(Body::default());
+    match experiment {
+        Experiment::All => vec![
+            Experiment::Physics(body),
+            Experiment::Fig5 { samples: false },
+            Experiment::Fig6,
+            Experiment::Fig7,
+            Experiment::Claims,
+            Experiment::Ablation,
+            Experiment::Schemes,
+            Experiment::Scenarios,
+            Experiment::Tupdate,
+        ],
+        one => vec![one.clone()],
+    }
 }
 
 fn reproduce(
@@ -62,6 +78,9 @@ fn reproduce(
         duration: arguments.duration,
     };
     let findings = match experiment {
+        // taken apart in `experiments`
+        Experiment::All => return Err(Failure::failed("all is not one experiment")),
+        Experiment::Physics(body) => physics::reproduce(desk, extent(1), &Body::from(*body)),
         Experiment::Fig5 { samples } => fig5::reproduce(desk, extent(SEEDS), *samples),
         Experiment::Fig6 => traces::reproduce(desk, extent(1), Trace::Fig6),
         Experiment::Fig7 => traces::reproduce(desk, extent(1), Trace::Fig7),
@@ -71,8 +90,13 @@ fn reproduce(
         Experiment::Tupdate => tupdate::reproduce(desk, extent(TUPDATE_SEEDS)),
         Experiment::Claims => claims::reproduce(desk, extent(CLAIM_SEEDS)),
     };
-    findings.map_err(|error| {
-        Failure::failed(format!("the experiment failed: {error}"))
-            .remedy("check the folder given with --out: does it exist, is the disk full?")
+    findings.map_err(|error| match error {
+        ReproduceError::Physics(_) => {
+            Failure::usage(error).remedy("change --mass, --side, --mu or --damping")
+        }
+        ReproduceError::Keep { .. } => {
+            Failure::failed(error).remedy("check the folder given with --out: is the disk full?")
+        }
+        _ => Failure::failed(format!("the experiment failed: {error}")),
     })
 }

@@ -10,15 +10,13 @@ use mmt_shared::time::TICK_S;
 use super::reference::{FinePatch, Line, STEPS, State};
 use super::{Dynamics, PhysicsError, Source, TracePoint};
 
-/// c of the model study's body, N: what its forces are taken relative to.
-const STUDY_C: f64 = 0.3 * 0.7 * 9.81;
-/// c l of the model study's body, N m: what its torque is taken relative to.
-const STUDY_CL: f64 = STUDY_C * 0.36;
+/// Force of the push, force (N) and torque (N m) of the wrench.
+const PUSH_N: f64 = 4.0;
+const WRENCH_N_NM: (f64, f64) = (3.0, -0.18);
+/// How long push and wrench last, s.
+const DURATIONS: (f64, f64) = (0.5, 0.4);
 /// How fast pushes may make a body: nine tenths of what the environment accepts.
 const SPEED_SHARE: f64 = 0.9;
-/// Mean acceleration of the study's body in its push, m/s², in its wrench, m/s², and mean angular
-/// acceleration in its wrench, rad/s². The former two go with mu, the latter with mu by l.
-const STUDY_ACCELERATIONS: (f64, f64, f64) = (2.77, 1.59, 5.87);
 /// Most points of a trace.
 const TRACE_POINTS: usize = 400;
 /// A coast that lasts longer than this did not end, s.
@@ -83,16 +81,14 @@ impl Motion {
         ];
         const HOLD_HALF: &[Kind] = &[kind("hold-0.5c", false, false)];
         const HOLD_NEAR: &[Kind] = &[kind("hold-0.9c", false, false)];
-        let force = |newton: f64| newton * (body.c / STUDY_C);
-        let torque = -0.18 * (body.c * body.side / STUDY_CL);
         let (push, wrench) = durations(body);
         let motions = [
-            (What::Push(force(4.0), 0.0, push), PUSH),
-            (What::Push(force(4.0), 45.0, push), PUSH_45),
+            (What::Push(PUSH_N, 0.0, push), PUSH),
+            (What::Push(PUSH_N, 45.0, push), PUSH_45),
             (What::Coast(0.5, 0.0), STOP),
             (What::Coast(0.0, 5.0), SPIN),
             (What::Coast(0.3, 3.0), COAST),
-            (What::Wrench(force(3.0), torque, wrench), WRENCH),
+            (What::Wrench(WRENCH_N_NM.0, WRENCH_N_NM.1, wrench), WRENCH),
             (What::Hold(0.5 * body.c, 10.0), HOLD_HALF),
             (What::Hold(0.9 * body.c, 10.0), HOLD_NEAR),
         ];
@@ -205,15 +201,20 @@ impl Motion {
             };
             (0..=TRACE_POINTS).map(at).collect()
         };
+        let at_rest = |s| vec![(0.0, Place::default()), (s, Place::default())];
         let patch = |force, torque, start: State, seconds| {
             let fine = FinePatch::new(body, force, torque);
+            if start == [0.0; 6] && fine.holds() {
+                return at_rest(seconds);
+            }
             let states = fine.run(start, seconds, STEPS);
             let seen = |(t, [shift, _, angle, ..]): (f64, State)| (t, Place { shift, angle });
             states.into_iter().map(seen).collect()
         };
         match self.what {
+            What::Push(force, _, s) if force <= body.c => at_rest(s),
             What::Push(force, _, s) => on_a_line(slide(force - body.c, 0.0), s, false),
-            What::Hold(_, s) => vec![(0.0, Place::default()), (s, Place::default())],
+            What::Hold(_, s) => at_rest(s),
             What::Coast(v, 0.0) => {
                 let line = slide(-body.c, v);
                 on_a_line(line, line.rest_s(), false)
@@ -237,15 +238,21 @@ impl Motion {
     }
 }
 
-/// How long push and wrench last, s: as in the study, or until the body is as fast as it may be.
+/// How long push and wrench last, s, or until the body is as fast as it may be.
 fn durations(body: &Dynamics) -> (f64, f64) {
-    let mu = body.config.friction_coefficient / 0.3;
-    let (push, wrench, turn) = STUDY_ACCELERATIONS;
-    let speed = SPEED_SHARE * SPEED_M_PER_S / mu;
-    let rate = SPEED_SHARE * TURN_RATE_RAD_PER_S / (mu * 0.36 / body.side);
+    let until = |rate: f64, most: f64| {
+        if rate > 0.0 {
+            SPEED_SHARE * most / rate
+        } else {
+            f64::INFINITY
+        }
+    };
     let whole = |seconds: f64| libm::floor(seconds / TICK_S) * TICK_S;
-    let wrench = (speed / wrench).min(rate / turn);
-    (whole(speed / push).min(0.5), whole(wrench).min(0.4))
+    let push = until((PUSH_N - body.c) / body.m, SPEED_M_PER_S);
+    // as if nothing braked it
+    let wrench = until(WRENCH_N_NM.0 / body.m, SPEED_M_PER_S);
+    let wrench = wrench.min(until(-WRENCH_N_NM.1 / body.inertia, TURN_RATE_RAD_PER_S));
+    (whole(push.min(DURATIONS.0)), whole(wrench.min(DURATIONS.1)))
 }
 
 /// A motion, measured and as it should be.

@@ -11,6 +11,9 @@ const POINTS_PER_SIDE: usize = 48;
 /// Steps of the fine patch from start to end; half as many change no row by more than 1e-4 of itself.
 pub(super) const STEPS: usize = 4000;
 
+/// Motions between a pure shift and a pure turn that are tried when a body may be held.
+const TURNS: u32 = 900;
+
 /// One degree of freedom under constant drive, damping and Coulomb friction: m v' = f − c sign(v) − b v.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Line {
@@ -77,6 +80,24 @@ impl<'a> FinePatch<'a> {
             points: all.collect(),
             drive: (force, torque),
         }
+    }
+
+    /// Whether friction holds the resting body: no small motion takes less work than the drive does along it.
+    /// The best motion is a shift along the force with a turn, since patch and force are symmetric about x.
+    pub(super) fn holds(&self) -> bool {
+        let (force, torque) = self.drive;
+        let reach = self.body.side / 2.0;
+        let share = self.body.c / self.points.len() as f64;
+        (0..=TURNS).all(|k| {
+            let (sin, cos) =
+                libm::sincos(std::f64::consts::FRAC_PI_2 * f64::from(k) / f64::from(TURNS));
+            let (v, omega) = (cos * force.signum(), sin * torque.signum() / reach);
+            let slip = |(x, y): &(f64, f64)| {
+                let (sx, sy) = (v - omega * y, omega * x);
+                (sx * sx + sy * sy).sqrt()
+            };
+            force * v + torque * omega <= share * self.points.iter().map(slip).sum::<f64>()
+        })
     }
 
     /// States from the start on, `seconds` long in so many steps or until rest, each with its time.
