@@ -65,16 +65,16 @@ pub(crate) enum Experiment {
 #[derive(Args, Clone, Copy, Debug, PartialEq)]
 pub(crate) struct BodyArguments {
     /// Mass m, kg
-    #[arg(long, value_name = "KG", default_value_t = Body::default().mass_kg)]
+    #[arg(long, allow_negative_numbers = true, value_name = "KG", default_value_t = Body::default().mass_kg)]
     pub(crate) mass: f64,
     /// Side l of the square footprint, m
-    #[arg(long, value_name = "M", default_value_t = Body::default().side_m)]
+    #[arg(long, allow_negative_numbers = true, value_name = "M", default_value_t = Body::default().side_m)]
     pub(crate) side: f64,
     /// Friction coefficient between body and ground
-    #[arg(long, value_name = "MU", default_value_t = Body::default().friction_coefficient)]
+    #[arg(long, allow_negative_numbers = true, value_name = "MU", default_value_t = Body::default().friction_coefficient)]
     pub(crate) mu: f64,
     /// Viscous damping b, N s/m
-    #[arg(long, value_name = "NS_PER_M", default_value_t = Body::default().damping_ns_per_m)]
+    #[arg(long, allow_negative_numbers = true, value_name = "NS_PER_M", default_value_t = Body::default().damping_ns_per_m)]
     pub(crate) damping: f64,
 }
 
