@@ -104,12 +104,43 @@ fn apply(criterion: &mut Criterion) {
     }
 }
 
+/// An update that answers a sample of a second ago, and the ticks until its replay has caught up: what a
+/// round trip of a second costs, sliced over 53 ticks.
+fn replay(criterion: &mut Criterion) {
+    let mut out = [0; DATAGRAM_MAX];
+    let mut haptic = Haptic::new(Mode::Recommended);
+    for _ in 0..10_000 {
+        haptic.tick(&mut out);
+    }
+    assert!(haptic.contact > 0, "nothing was touched");
+    let mut ticks = 0_u64;
+    criterion.bench_function("haptic/replay/one second with its ticks", |bencher| {
+        bencher.iter(|| {
+            let update = Update {
+                sequence: 1,
+                cause: Cause::Deadband,
+                answers: haptic.now - Duration::from_secs(1),
+                newest_command: 1,
+                slave_in_contact: true,
+                state: *haptic.master.model().state(),
+            };
+            haptic.master.apply(black_box(&update));
+            haptic.tick(&mut out);
+            while !haptic.master.model().is_replayed() {
+                haptic.tick(&mut out);
+                ticks += 1;
+            }
+        });
+    });
+    assert!(ticks > 0, "nothing was replayed");
+}
+
 criterion_group! {
     name = benches;
     config = Criterion::default()
         .sample_size(50)
         .warm_up_time(Duration::from_millis(500))
         .measurement_time(Duration::from_secs(2));
-    targets = tick, apply
+    targets = tick, apply, replay
 }
 criterion_main!(benches);

@@ -3,6 +3,8 @@
 //! HIP in, force out, a sample for the slave. It must never wait, allocate, log or read a clock, and
 //! force leaves it through the limiter only.
 
+mod port;
+
 use std::time::Duration;
 
 use mmt_shared::geometry::Vec2;
@@ -13,6 +15,7 @@ use mmt_shared::wire::{ForceCounts, HipCounts, HipSample, Update, Welcome};
 use crate::failsafe::LinkState;
 use crate::limiter::ForceLimiter;
 use crate::operator::scripted::View;
+pub use port::PortObserver;
 
 /// What one haptic tick gave.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -33,6 +36,7 @@ pub struct Master {
     model: LocalModel,
     limiter: ForceLimiter,
     link: LinkState,
+    port: PortObserver,
     hip: HipCounts,
     bad_readings: u64,
     applied: u32,
@@ -48,6 +52,7 @@ impl Master {
             model: LocalModel::new(welcome.settings, welcome.state),
             limiter,
             link: LinkState::Fresh,
+            port: PortObserver::default(),
             hip: HipCounts::default(),
             bad_readings: 0,
             applied: 0,
@@ -83,6 +88,18 @@ impl Master {
     #[must_use]
     pub fn frozen(&self) -> u32 {
         self.frozen
+    }
+
+    /// Energy that updates have added to the model so far beyond what its tank paid, J.
+    #[must_use]
+    pub fn energy_injected_j(&self) -> f64 {
+        self.model.energy_injected_j()
+    }
+
+    /// The passivity observer at the hand.
+    #[must_use]
+    pub fn port(&self) -> &PortObserver {
+        &self.port
     }
 
     /// What the operator sees: the local model, which is where it is felt.
@@ -132,6 +149,7 @@ impl Master {
             force,
         };
         let hand_force = self.limiter.limit(-rendered.force);
+        self.port.push(self.hip.metres(), hand_force);
         MasterTick {
             sample,
             rendered,

@@ -3,6 +3,7 @@
 //! Everything that decides anything is the live system's own core: the same slave, master, link ends and
 //! emulated link. A run is a pure function of its configuration; the digest of its event log says so.
 
+use std::collections::VecDeque;
 use std::time::Duration;
 
 use mmt_client::device::{DeviceError, DeviceProfile};
@@ -10,7 +11,7 @@ use mmt_client::limiter::{ForceLimiter, LimitsError};
 use mmt_client::link::{FromSlave, MasterLink};
 use mmt_client::master::{Master, MasterTick};
 use mmt_client::operator::Operator;
-use mmt_client::operator::scripted::{Scripted, ScriptedConfig, ScriptedError, View};
+use mmt_client::operator::scripted::{Picture, Scripted, ScriptedConfig, ScriptedError, View};
 use mmt_netem::config::{ConfigError, LinkConfig};
 use mmt_netem::link::{Direction, LinkId};
 use mmt_netem::pipe::SimPath;
@@ -28,7 +29,7 @@ use mmt_shared::wire::{DATAGRAM_MAX, Label, Update, Welcome};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
-/// By how much the slave's clock is ahead of the master's: nothing may depend on it.
+/// By how much the slave's clock is ahead of the master's at the start: nothing may depend on it.
 const SLAVE_EPOCH: Duration = Duration::from_secs(3600);
 
 /// Everything that a run depends on.
@@ -120,10 +121,30 @@ pub struct World {
     master_link: MasterLink,
     operator: Operator,
     hand_force: Vec2,
+    /// The remote scene on its way to the operator's eyes, if that is what it looks at.
+    picture: Option<VecDeque<(Time, View)>>,
     up: SimPath<Packet>,
     down: SimPath<Packet>,
+    /// The delay of `down`, without jitter.
+    down_delay: Duration,
+    slave_clock: SlaveClock,
     outcome: Outcome,
     log: Sha256,
+}
+
+/// The slave's clock as a function of the master's, which is the world's.
+#[derive(Clone, Copy, Debug)]
+struct SlaveClock {
+    ahead: Duration,
+    /// How much it gains, ns per ms, which is ppm.
+    drift_ppm: u64,
+}
+
+impl SlaveClock {
+    fn at(&self, now: Time) -> Time {
+        let ms = now.as_nanos() / 1_000_000;
+        now + self.ahead + Duration::from_nanos(ms.saturating_mul(self.drift_ppm))
+    }
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -147,7 +168,13 @@ pub struct Outcome {
     pub breaks: ContactBreaks,
     /// Force on the hand.
     pub on_hand: ForcePeak,
+    /// Energy that updates added to the master's model beyond what its tank paid, J.
+    pub energy_injected_j: f64,
+    /// The least that the passivity observer at the hand ever showed, J.
+    pub observer_min_j: f64,
     newest_answer: Option<Time>,
+    /// Number of the newest update that the master has.
+    newest_update: u32,
 }
 
 impl World {
@@ -173,6 +200,7 @@ impl World {
         let scripted = Scripted::try_new(config.operator, view)?;
         let operator = Operator::Scripted(Box::new(scripted));
         slave.start_at(operator.start());
+        let (down_delay, _) = config.down.delay.parts();
         let path = |link: LinkConfig, direction| {
             SimPath::try_new(link, config.seed, LinkId::first(direction))
         };
@@ -181,11 +209,23 @@ impl World {
             slave,
             slave_link: SlaveLink::new(Time::ZERO + SLAVE_EPOCH),
             master,
-            master_link: MasterLink::new(Time::ZERO, settings.coupling, config.samples_per_command),
+            // a session begins with the slave's welcome, which takes its time as well
+            master_link: MasterLink::new(
+                Time::ZERO + down_delay,
+                settings.coupling,
+                config.samples_per_command,
+            ),
             operator,
             hand_force: Vec2::zeros(),
+            picture: (config.operator.view == Picture::Delayed)
+                .then(|| VecDeque::from([(Time::ZERO, view)])),
             up: path(config.up.clone(), Direction::Up)?,
             down: path(config.down.clone(), Direction::Down)?,
+            down_delay,
+            slave_clock: SlaveClock {
+                ahead: SLAVE_EPOCH,
+                drift_ppm: 0,
+            },
             outcome: Outcome::default(),
             log: Sha256::new(),
         })
@@ -284,6 +324,7 @@ impl World {
         if let Some(update) = newest {
             self.master.apply(&update);
             self.outcome.newest_answer = Some(update.answers);
+            self.outcome.newest_update = update.sequence;
         }
         if let Some(answers) = self.outcome.newest_answer {
             self.outcome.age.push(self.now, answers);
@@ -292,13 +333,14 @@ impl World {
 
     fn master_tick(&mut self) -> MasterTick {
         let elapsed = self.now.saturating_since(Time::ZERO + TICK);
-        let reading = self
-            .operator
-            .step(elapsed, &self.master.view(), self.hand_force);
+        let view = self.seen();
+        let reading = self.operator.step(elapsed, &view, self.hand_force);
         let silence = self.master_link.end().silence(self.now);
         let tick = self.master.tick(self.now, reading, silence);
         self.hand_force = tick.hand_force;
         self.outcome.on_hand.push(tick.hand_force);
+        self.outcome.energy_injected_j = self.master.energy_injected_j();
+        self.outcome.observer_min_j = self.master.port().least_j();
         self.outcome.breaks.push(tick.rendered.in_contact());
         let mut bytes = [0; DATAGRAM_MAX];
         // a message that cannot be sealed is as good as lost; the ends count what they sent
@@ -311,25 +353,55 @@ impl World {
         tick
     }
 
+    /// What the operator sees; contact is felt, not seen.
+    fn seen(&mut self) -> View {
+        let model = self.master.view();
+        let Some(picture) = &mut self.picture else {
+            return model;
+        };
+        while picture.get(1).is_some_and(|(due, _)| *due <= self.now) {
+            picture.pop_front();
+        }
+        picture.front().map_or(model, |(_, scene)| View {
+            in_contact: model.in_contact,
+            ..*scene
+        })
+    }
+
+    /// The scene as it is now leaves for the operator's eyes, without loss or jitter.
+    fn show(&mut self, in_contact: bool) {
+        if let Some(picture) = &mut self.picture {
+            let environment = self.slave.environment();
+            let scene = View {
+                pose: environment.pose(),
+                footprint: environment.footprint(),
+                in_contact,
+            };
+            picture.push_back((self.now + self.down_delay, scene));
+        }
+    }
+
     fn deliver_up(&mut self) {
         while let Some(packet) = self.up.pop_due(self.now) {
             let Packet { bytes, length } = packet.payload;
             let bytes = bytes.get(..length).unwrap_or_default();
-            let arrived = packet.due + SLAVE_EPOCH;
+            let arrived = self.slave_clock.at(packet.due);
             if let Some(command) = self.slave_link.handle(arrived, bytes) {
                 for sample in command.samples.as_slice() {
-                    self.slave.handle_sample(arrived, sample);
+                    self.slave
+                        .handle_sample(arrived, sample, command.newest_update);
                 }
             }
         }
     }
 
     fn slave_tick(&mut self) -> Option<SlaveTick> {
-        let now = self.now + SLAVE_EPOCH;
+        let now = self.slave_clock.at(self.now);
         let tick = self.slave.tick(now);
         let mut bytes = [0; DATAGRAM_MAX];
         if let Some(tick) = &tick {
             self.outcome.updates.tick(tick.in_contact);
+            self.show(tick.in_contact);
             if let Some(then) = self.master.model().history().at(tick.stamp) {
                 self.outcome.pose.push(&then.motion.pose, &tick.truth);
             }

@@ -69,7 +69,7 @@ fn whole(criterion: &mut Criterion) {
                     hip: HipCounts::nearest(hip(tick)),
                     force: ForceCounts::default(),
                 };
-                side.handle_sample(now, black_box(&sample));
+                side.handle_sample(now, black_box(&sample), updates as u32);
                 let done = side.tick(now);
                 updates += u64::from(done.is_some_and(|done| done.update.is_some()));
                 done

@@ -9,6 +9,7 @@ pub mod link;
 pub mod playout;
 pub mod pose_observer;
 pub mod sensing;
+pub mod shadow;
 pub mod slave;
 pub mod square;
 pub mod trigger;

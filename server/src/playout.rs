@@ -1,13 +1,15 @@
 //! The play-out buffer: HIP samples in, as the network brings them; a steady HIP out, one per slave tick.
 //!
-//! A sample is played a fixed delay after the earliest time at which the network could have brought it,
-//! so that jitter, packing, loss and reordering turn into nothing as long as they stay below the delay.
+//! A sample is played a delay after the earliest time at which the network could have brought it, so that
+//! jitter, packing, loss and reordering turn into nothing as long as they stay below the delay. The delay
+//! follows what 99 of 100 samples need.
 //! Between samples it interpolates linearly; when they run out it goes on at constant velocity for a
 //! short while and then ramps to a stop. It must never move the tool faster than the limit, never move
 //! it on old news for longer than that, and never be blocked for good by stamps, whatever they say.
 
 mod clock;
 mod config;
+mod lateness;
 
 pub use config::{PlayoutConfig, PlayoutError};
 
@@ -20,6 +22,7 @@ use mmt_shared::wire::message::HipSample;
 use serde::{Deserialize, Serialize};
 
 use clock::SenderClock;
+use lateness::Lateness;
 
 /// Most samples kept: half a second, twice the longest delay.
 const SAMPLES_MAX: usize = 512;
@@ -35,6 +38,16 @@ const FUTURE: Duration = Duration::from_secs(1);
 const RELEARN_AFTER: Duration = Duration::from_millis(200);
 /// After the clock was learned anew, play-out waits for stamps that it has played, but not longer.
 const WAIT: Duration = Duration::from_secs(1);
+/// Room above the lateness of 99 of 100 samples, ns: the slave's ticks.
+const ROOM_NS: i64 = 2_000_000;
+/// How often the delay that is wanted is looked up, ticks: the histogram changes slowly.
+const LOOK_EVERY: u32 = 100;
+/// The delay grows by at most 1/20 of the time that passes, and shrinks by 1/100: played motion is 5 % too
+/// slow while samples come late, which a hand does not notice, and 1 % too quick afterwards.
+const GROW_DIVISOR: i64 = 20;
+const SHRINK_DIVISOR: i64 = 100;
+/// A delay stays while what is wanted is less than this below it, ns: no hunting.
+const SHRINK_BAND_NS: i64 = 2_000_000;
 /// A tick is at most this long to the speed limit: a slave that was stopped for a second must not jump.
 const TICK_MAX: Duration = Duration::from_millis(10);
 
@@ -99,6 +112,12 @@ pub struct PlayoutCounts {
 pub struct PlayoutBuffer {
     config: PlayoutConfig,
     delay_ns: i64,
+    /// Least and greatest delay, ns.
+    delay_range_ns: (i64, i64),
+    /// Where the delay slews to, ns.
+    wanted_ns: i64,
+    looked: u32,
+    lateness: Lateness,
     extrapolation: Duration,
     clock: SenderClock,
     /// In the order of their stamps, no stamp twice.
@@ -132,8 +151,13 @@ impl PlayoutBuffer {
     /// Names the first number of the configuration that is outside its range.
     pub fn try_new(config: PlayoutConfig) -> Result<Self, PlayoutError> {
         config.check()?;
+        let least = (config.delay_ms * 1e6) as i64;
         Ok(Self {
-            delay_ns: (config.delay_ms * 1e6) as i64,
+            delay_ns: least,
+            delay_range_ns: (least, least.max((config.delay_max_ms * 1e6) as i64)),
+            wanted_ns: least,
+            looked: 0,
+            lateness: Lateness::new(),
             extrapolation: Duration::from_nanos((config.extrapolation_ms * 1e6) as u64),
             config,
             clock: SenderClock::default(),
@@ -159,6 +183,10 @@ impl PlayoutBuffer {
             return;
         }
         self.clock.observe(arrived, sample.stamp);
+        if let Some(quickest) = self.clock.stamp_at(arrived) {
+            self.lateness
+                .observe(arrived, quickest.saturating_since(sample.stamp));
+        }
         self.admit(arrived, sample);
     }
 
@@ -170,6 +198,7 @@ impl PlayoutBuffer {
             .last
             .map_or(TICK, |last| now.saturating_since(last.now).min(TICK_MAX));
         self.clock.advance(now, elapsed, self.last.is_some());
+        self.adapt(elapsed);
         let due = self.clock.stamp_at(now)?.offset_by(-self.delay_ns);
         let stamp = self.no_earlier_than_played(due);
         let aim = self.aim(stamp)?;
@@ -184,10 +213,54 @@ impl PlayoutBuffer {
         Some(played)
     }
 
+    /// Where the HIP was at a stamp, m: the sample of that stamp, or what stands in for it when it is lost
+    /// or not there yet. Without the speed limit: the master's hand knows none.
+    #[must_use]
+    pub fn hip_at(&self, stamp: Time) -> Option<Vec2> {
+        self.aim(stamp).map(|aim| aim.hip)
+    }
+
+    /// The stamp of the newest sample that is not later than `stamp`.
+    #[must_use]
+    pub fn sample_before(&self, stamp: Time) -> Option<Time> {
+        let next = self.samples.partition_point(|held| held.stamp <= stamp);
+        let before = next.checked_sub(1).and_then(|i| self.samples.get(i));
+        before.map(|sample| sample.stamp)
+    }
+
     /// What happened so far.
     #[must_use]
     pub fn counts(&self) -> PlayoutCounts {
         self.counts
+    }
+
+    /// From the earliest possible arrival of a sample to its play-out, as it is now.
+    #[must_use]
+    pub fn delay(&self) -> Duration {
+        Duration::from_nanos(self.delay_ns.unsigned_abs())
+    }
+
+    /// Brings the delay towards what samples need, slowly.
+    fn adapt(&mut self, elapsed: Duration) {
+        let (least, most) = self.delay_range_ns;
+        if least == most {
+            return;
+        }
+        self.looked += 1;
+        if self.looked >= LOOK_EVERY {
+            self.looked = 0;
+            let needed = self.lateness.p99().map_or(least, |late| {
+                i64::try_from(late.as_nanos()).map_or(most, |late| late.saturating_add(ROOM_NS))
+            });
+            self.wanted_ns = needed.clamp(least, most);
+        }
+        let passed = i64::try_from(elapsed.as_nanos()).unwrap_or(i64::MAX);
+        let off = self.wanted_ns - self.delay_ns;
+        if off > 0 {
+            self.delay_ns += off.min(passed / GROW_DIVISOR);
+        } else if off < -SHRINK_BAND_NS || self.wanted_ns == least {
+            self.delay_ns += off.max(-passed / SHRINK_DIVISOR);
+        }
     }
 
     fn admit(&mut self, arrived: Time, sample: &HipSample) {
@@ -230,6 +303,8 @@ impl PlayoutBuffer {
         self.samples.push_back(*sample);
         self.clock = SenderClock::default();
         self.clock.observe(arrived, sample.stamp);
+        self.lateness = Lateness::new();
+        self.wanted_ns = self.delay_range_ns.0;
         true
     }
 

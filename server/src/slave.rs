@@ -1,12 +1,10 @@
 //! The slave's core: one tick from the HIP sample to the update.
 //!
 //! Play-out, environment, sensing, pose and parameters, shadow, trigger. Pure: the time is an argument,
-//! the seed comes with the configuration, and what it returns is all that it does. The shadow is the
-//! master's own local model, driven by the same samples, with every update applied when it is sent.
+//! the seed comes with the configuration, and what it returns is all that it does.
 
 use mmt_shared::contact::Coupling;
 use mmt_shared::geometry::{BoxFootprint, Pose, Twist, Vec2, wrap_angle};
-use mmt_shared::local_model::LocalModel;
 use mmt_shared::metrics::ForceMetrics;
 use mmt_shared::params::{ModelParams, ModelState, inertia_of_square};
 use mmt_shared::settings::{Mode, ModelSettings};
@@ -18,6 +16,7 @@ use crate::estimator::{Estimate, Estimator, EstimatorConfig, Measured, Seen};
 use crate::playout::PlayoutBuffer;
 use crate::pose_observer::{ObserverConfig, PoseObserver};
 use crate::sensing::Sensing;
+use crate::shadow::{Shadow, TriggerReference};
 use crate::trigger::{ContactDetector, Trigger, TriggerInput};
 
 mod config;
@@ -54,7 +53,12 @@ pub struct Slave {
     contact: ContactDetector,
     observer: PoseObserver,
     estimator: Estimator,
-    shadow: LocalModel,
+    shadow: Shadow,
+    reference: TriggerReference,
+    /// f_m as the newest sample said it, N.
+    echo: Vec2,
+    /// f_s at the last update, N.
+    f_s_told: Vec2,
     trigger: Trigger,
     timer_carries_pose: bool,
     /// The last parameters that were accepted.
@@ -119,7 +123,10 @@ impl Slave {
             contact: ContactDetector::new(config.trigger.contact),
             observer: PoseObserver::new(observer, pose, footprint),
             estimator: Estimator::new(&estimator),
-            shadow: LocalModel::new(settings, start),
+            shadow: Shadow::new(settings, start),
+            reference: config.trigger_reference,
+            echo: Vec2::zeros(),
+            f_s_told: Vec2::zeros(),
             trigger: Trigger::new(config.trigger),
             timer_carries_pose: config.trigger.timer_carries_pose,
             params,
@@ -138,7 +145,7 @@ impl Slave {
     /// The state that the master starts from.
     #[must_use]
     pub fn state(&self) -> &ModelState {
-        self.shadow.state()
+        self.shadow.ahead().state()
     }
 
     /// The real object. What it says is the truth: for reports, never for the estimate.
@@ -170,9 +177,9 @@ impl Slave {
         &self.playout
     }
 
-    /// The shadow of the master's model.
+    /// What is known of the master's model.
     #[must_use]
-    pub fn shadow(&self) -> &LocalModel {
+    pub fn shadow(&self) -> &Shadow {
         &self.shadow
     }
 
@@ -188,9 +195,11 @@ impl Slave {
         &self.force
     }
 
-    /// Takes in a HIP sample that arrived at `now`.
-    pub fn handle_sample(&mut self, now: Time, sample: &HipSample) {
+    /// Takes in a HIP sample that arrived at `now`, and the newest update that the master had when it
+    /// sent the sample.
+    pub fn handle_sample(&mut self, now: Time, sample: &HipSample, newest_update: u32) {
         self.playout.push(now, sample);
+        self.shadow.acknowledge(sample, newest_update);
     }
 
     /// Where the tool is before the first sample, m.
@@ -212,7 +221,8 @@ impl Slave {
             self.observer.see(&vision);
         }
         self.estimate_from(sensed.tool, sensed.force);
-        let rendered = self.shadow.step(played.stamp, played.hip);
+        self.follow_master(played.stamp);
+        self.echo = played.force.unwrap_or(self.echo);
         if let Some(f_m) = played.force {
             self.force.push(sensed.force, f_m);
         }
@@ -220,7 +230,7 @@ impl Slave {
             stamp: played.stamp,
             tool: played.hip,
             f_s: sensed.force,
-            f_shadow: rendered.force,
+            f_shadow: self.shadow.rendered().force,
             f_m: played.force,
             in_contact,
             truth,
@@ -229,6 +239,17 @@ impl Slave {
         let cause = self.trigger.decide(now, &self.trigger_input(&tick));
         tick.update = cause.map(|cause| self.send(cause, &tick));
         Some(tick)
+    }
+
+    fn follow_master(&mut self, stamp: Time) {
+        let playout = &self.playout;
+        let on_grid = playout.sample_before(stamp).unwrap_or(stamp);
+        let lost = self
+            .shadow
+            .step(on_grid, stamp, |stamp| playout.hip_at(stamp));
+        if let Some(cause) = lost {
+            self.trigger.repeat(cause);
+        }
     }
 
     fn estimate_from(&mut self, tool: Vec2, force: Vec2) {
@@ -256,26 +277,38 @@ impl Slave {
 
     fn trigger_input(&self, tick: &SlaveTick) -> TriggerInput {
         let estimate = self.estimator.estimate();
+        let shadow = self.shadow.rendered();
+        let (f_m, shadow_in_contact) = match self.reference {
+            TriggerReference::Shadow => (shadow.force, shadow.in_contact()),
+            TriggerReference::Echo => (self.echo, self.echo != Vec2::zeros()),
+            TriggerReference::None => (self.f_s_told, tick.in_contact),
+        };
+        let pose = self.shadow.ahead().state().pose;
         TriggerInput {
             f_s: tick.f_s,
-            f_m: tick.f_shadow,
+            f_m,
             slave_in_contact: tick.in_contact,
-            shadow_in_contact: self.shadow.rendered().in_contact(),
+            shadow_in_contact,
             sticking: estimate.sticking,
             speed: estimate.speed,
             acceleration: estimate.acceleration,
             force_deviation: estimate.force_deviation(),
             params: self.params,
-            shift: self.observer.pose().position - self.shadow.state().pose.position,
-            turn: wrap_angle(self.observer.pose().angle - self.shadow.state().pose.angle),
+            shift: self.observer.pose().position - pose.position,
+            turn: wrap_angle(self.observer.pose().angle - pose.angle),
         }
     }
 
     /// Makes the update and applies it to the shadow, as the master will.
     fn send(&mut self, cause: Cause, tick: &SlaveTick) -> Update {
-        if let (Cause::MasterOnlyContact, Some(touch)) = (cause, self.shadow.rendered().touch) {
+        let judged = match self.reference {
+            TriggerReference::Echo => self.shadow.confirmed(),
+            _ => self.shadow.ahead(),
+        };
+        if let (Cause::MasterOnlyContact, Some(touch)) = (cause, judged.rendered().touch) {
             self.observer.carve(tick.tool, touch.face);
         }
+        self.f_s_told = tick.f_s;
         self.sequence = self.sequence.saturating_add(1);
         let seen = ModelState {
             params: self.params,
@@ -284,10 +317,11 @@ impl Slave {
             twist: self.observer.twist(),
         };
         // what the model had at the stamp: nothing is left to be corrected there
-        let own = self.shadow.history().at(tick.stamp);
+        let ahead = self.shadow.ahead();
+        let own = ahead.history().at(tick.stamp);
         let own = own.filter(|_| cause == Cause::Timer && !self.timer_carries_pose);
         let state = own.map_or(seen, |own| ModelState {
-            footprint: self.shadow.state().footprint,
+            footprint: ahead.state().footprint,
             pose: own.motion.pose,
             twist: own.motion.twist,
             ..seen
@@ -300,7 +334,7 @@ impl Slave {
             slave_in_contact: tick.in_contact,
             state,
         };
-        self.shadow.apply(&update);
+        self.shadow.send(&update);
         update
     }
 }

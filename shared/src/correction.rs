@@ -27,12 +27,21 @@ pub const IN_CONTACT: BleedRates = BleedRates {
     turn_rad_per_s: 1.0,
     tau_s: 0.3,
 };
+/// While the HIP touches the box and what remains comes from a replay, which does not come late: three
+/// times as quick.
+pub const IN_CONTACT_REPLAYED: BleedRates = BleedRates {
+    tau_s: 0.1,
+    ..IN_CONTACT
+};
 /// While the HIP touches nothing: no hand feels it, it only must not look like a jump.
 pub const IN_FREE_SPACE: BleedRates = BleedRates {
     shift_m_per_s: 0.5,
     turn_rad_per_s: 10.0,
     tau_s: 0.02,
 };
+/// A box that is brought up to the HIP stops this far from it, m: five times the amplitude of a hand's
+/// tremor, so that a hand at rest is not touched again and again.
+pub const ROOM_M: f64 = 5e-4;
 /// Most energy that the tank holds, J: the coupling at 1000 N/m stores this at a depth of 14 mm, deeper
 /// than any push at 8 N. What is dissipated beyond it is gone.
 pub const TANK_MAX_J: f64 = 0.1;
@@ -90,8 +99,17 @@ impl Correction {
         };
     }
 
+    /// Replaces what remains by the way from the model's own pose to where it should be now.
+    pub fn aim_at(&mut self, wanted: &Pose, own: &Pose) {
+        self.remaining = PoseChange {
+            shift: wanted.position - own.position,
+            turn: wanted.angle - own.angle,
+        };
+    }
+
     /// Counts a shift of the centre that was done elsewhere, so that older answers are held against it.
     pub fn count(&mut self, shift: Vec2) {
+        self.remaining.shift -= shift;
         self.done.shift += shift;
     }
 
@@ -107,10 +125,17 @@ impl Correction {
         self.apply(pose, change);
     }
 
-    /// Bleeds one tick's worth of what remains into `pose`. `touch` is what the HIP touches now.
-    pub fn bleed(&mut self, pose: &mut Pose, touch: Option<&Touch>, coupling: &Coupling) {
+    /// Bleeds one tick's worth of what remains into `pose`. `touch` is what the HIP touches now,
+    /// `in_contact` how fast that may be done while it touches anything.
+    pub fn bleed(
+        &mut self,
+        pose: &mut Pose,
+        touch: Option<&Touch>,
+        coupling: &Coupling,
+        in_contact: BleedRates,
+    ) {
         let rates = if touch.is_some() {
-            IN_CONTACT
+            in_contact
         } else {
             IN_FREE_SPACE
         };
@@ -136,16 +161,9 @@ impl Correction {
         self.apply(pose, PoseChange { shift, turn: 0.0 });
     }
 
-    /// Takes back so much of the last bleed that a HIP which touched nothing before touches nothing now:
-    /// a correction may bring the box to the hand but not into it.
-    pub fn back_off(&mut self, pose: &mut Pose, touch: &Touch) {
-        self.apply(
-            pose,
-            PoseChange {
-                shift: touch.inward * touch.penetration,
-                turn: 0.0,
-            },
-        );
+    /// Takes back a part of the last bleed: a shift of the centre, m.
+    pub fn back_off(&mut self, pose: &mut Pose, shift: Vec2) {
+        self.apply(pose, PoseChange { shift, turn: 0.0 });
     }
 
     /// The part of a shift that is free or that the tank pays for.
@@ -200,7 +218,7 @@ mod tests {
     fn bleed(correction: &mut Correction, pose: &mut Pose, ticks: u32) {
         for _ in 0..ticks {
             let touch = touch(pose);
-            correction.bleed(pose, touch.as_ref(), &COUPLING);
+            correction.bleed(pose, touch.as_ref(), &COUPLING, IN_CONTACT);
         }
     }
 
@@ -216,7 +234,7 @@ mod tests {
         let (mut correction, mut pose) = (aimed(Vec2::new(1.0, 0.0), -3.0), Pose::default());
         let before = pose;
         let touched = touch(&pose);
-        correction.bleed(&mut pose, touched.as_ref(), &COUPLING);
+        correction.bleed(&mut pose, touched.as_ref(), &COUPLING, IN_CONTACT);
         // the shift, and what the turn about the proxy moves the centre by
         let most = IN_CONTACT.shift_m_per_s * TICK_S + IN_CONTACT.turn_rad_per_s * TICK_S * 0.2;
         assert!((pose.position - before.position).norm() <= most);
@@ -265,7 +283,7 @@ mod tests {
         for _ in 0..100 {
             let touch = touch(&pose);
             correction.remaining.shift = Vec2::zeros();
-            correction.bleed(&mut pose, touch.as_ref(), &COUPLING);
+            correction.bleed(&mut pose, touch.as_ref(), &COUPLING, IN_CONTACT);
         }
         assert!(pose.angle > 0.05);
         assert!(touch(&pose).unwrap().penetration <= start + 1e-12);

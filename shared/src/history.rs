@@ -4,6 +4,7 @@
 //! model was *then*. Entries are found by stamp, by search, never by index arithmetic, because ticks may
 //! have been skipped. It allocates once, when made.
 
+use crate::contact::GodObject;
 use crate::dynamics::Motion;
 use crate::geometry::Vec2;
 use crate::time::Time;
@@ -27,8 +28,12 @@ pub struct Moment {
     pub stamp: Time,
     /// The HIP, m.
     pub hip: Vec2,
+    /// Velocity of the HIP, m/s.
+    pub hip_velocity: Vec2,
     /// Pose and velocity that the HIP met, before the step.
     pub motion: Motion,
+    /// The proxy's memory, before the step.
+    pub god: GodObject,
     /// Sum of all corrections applied up to this sample.
     pub corrected: PoseChange,
 }
@@ -91,20 +96,50 @@ impl History {
     /// The newest moment whose stamp is not later than `stamp`; the oldest held if all are later.
     #[must_use]
     pub fn at(&self, stamp: Time) -> Option<&Moment> {
+        self.nth(self.first_after(stamp).saturating_sub(1))
+    }
+
+    /// The moment whose stamp is nearest to `stamp`; none if that lies before the oldest held.
+    #[must_use]
+    pub fn nearest(&self, stamp: Time) -> Option<&Moment> {
+        let after = self.first_after(stamp);
+        let before = self.nth(after.checked_sub(1)?)?;
+        let closer = self.nth(after).filter(|after| {
+            after.stamp.saturating_since(stamp) < stamp.saturating_since(before.stamp)
+        });
+        closer.or(Some(before))
+    }
+
+    /// Number of the first moment, counted from the oldest held, whose stamp is later than `stamp`; the
+    /// number of moments held if there is none.
+    #[must_use]
+    pub fn first_after(&self, stamp: Time) -> usize {
+        self.partition(|moment| moment.stamp <= stamp)
+    }
+
+    /// The same for the first moment whose stamp is not before `stamp`.
+    #[must_use]
+    pub fn first_not_before(&self, stamp: Time) -> usize {
+        self.partition(|moment| moment.stamp < stamp)
+    }
+
+    /// Number of the moments at the beginning for which `early` holds.
+    fn partition(&self, early: impl Fn(&Moment) -> bool) -> usize {
         let (mut low, mut high) = (0, self.len);
         while low < high {
             let middle = low.midpoint(high);
-            if self.nth(middle).is_some_and(|moment| moment.stamp <= stamp) {
+            if self.nth(middle).is_some_and(&early) {
                 low = middle + 1;
             } else {
                 high = middle;
             }
         }
-        self.nth(low.saturating_sub(1))
+        low
     }
 
     /// The moment number `index`, counted from the oldest held.
-    fn nth(&self, index: usize) -> Option<&Moment> {
+    #[must_use]
+    pub fn nth(&self, index: usize) -> Option<&Moment> {
         if index >= self.len {
             return None;
         }

@@ -5,15 +5,22 @@
 //! the trigger compares with what the hand feels. It must never set a received pose on arrival (but for
 //! the paper's literal mode), never allocate in a tick, and never see a number that was not checked.
 
-use crate::contact::{GodObject, Touch, contact_force};
-use crate::correction::Correction;
+mod body;
+mod replay;
+
+use crate::contact::Touch;
+use crate::correction::{Correction, IN_CONTACT, IN_CONTACT_REPLAYED, Tank};
 use crate::dynamics::Motion;
-use crate::geometry::{Face, Vec2, rotate};
+use crate::geometry::{Vec2, rotate};
 use crate::history::{HISTORY_TICKS, History, Moment};
 use crate::params::{ModelParams, ModelState};
 use crate::settings::{ModelSettings, PoseCorrection, Smoothing};
 use crate::time::{TICK, TICK_S, Time};
 use crate::wire::message::{Cause, Update};
+
+use body::Body;
+pub use replay::REPLAYED_PER_TICK;
+use replay::Replay;
 
 /// What the local model did with one HIP sample.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -36,16 +43,19 @@ impl Rendered {
 #[derive(Clone, Debug)]
 pub struct LocalModel {
     settings: ModelSettings,
-    /// Parameters in use, footprint, pose and velocity.
-    state: ModelState,
+    /// Parameters in use, footprint, pose, velocity, and the face that is touched.
+    body: Body,
     /// Parameters that the smoothing in time runs towards.
     target: ModelParams,
-    god: GodObject,
     correction: Correction,
     history: History,
+    /// The box as it should be, under [`PoseCorrection::Replay`].
+    replay: Replay,
     /// The previous HIP and its stamp.
     previous: Option<(Time, Vec2)>,
     rendered: Rendered,
+    /// Sum of what updates added to the model's energy beyond what the tank paid, J.
+    injected_j: f64,
 }
 
 impl LocalModel {
@@ -54,13 +64,14 @@ impl LocalModel {
     pub fn new(settings: ModelSettings, start: ModelState) -> Self {
         Self {
             settings,
-            state: start,
+            body: Body::new(start),
             target: start.params,
-            god: GodObject::default(),
             correction: Correction::default(),
             history: History::with_capacity(HISTORY_TICKS),
+            replay: Replay::new(start),
             previous: None,
             rendered: Rendered::default(),
+            injected_j: 0.0,
         }
     }
 
@@ -73,7 +84,7 @@ impl LocalModel {
     /// Parameters in use, footprint, pose and velocity now.
     #[must_use]
     pub fn state(&self) -> &ModelState {
-        &self.state
+        &self.body.state
     }
 
     /// What the last HIP sample rendered.
@@ -94,21 +105,52 @@ impl LocalModel {
         &self.history
     }
 
+    /// Energy that updates (parameters, pose, face offsets) have added to the model so far beyond what
+    /// the tank paid, J: the sum over all ticks of every excess, so that a loss never hides a gain.
+    #[must_use]
+    pub fn energy_injected_j(&self) -> f64 {
+        self.injected_j
+    }
+
+    /// Whether a received pose has been replayed up to the newest sample.
+    #[must_use]
+    pub fn is_replayed(&self) -> bool {
+        self.replay.is_live()
+    }
+
     /// Takes in an accepted update: parameters, footprint and pose.
     pub fn apply(&mut self, update: &Update) {
+        if self.settings.correction == PoseCorrection::Replay && self.replay.is_busy() {
+            self.replay.wait(update);
+            return;
+        }
+        let before = self.energy_now();
         self.take_params(&update.state.params);
         match self.settings.correction {
             PoseCorrection::Snap => self.snap(update),
             PoseCorrection::MatchedStamps => self.match_stamps(update),
+            PoseCorrection::Replay => self.restart(update),
         }
+        self.account(before, before, self.energy_now());
+    }
+
+    /// Becomes what `other` is, but for the history, which stays: both took the same samples.
+    pub fn take_over(&mut self, other: &Self) {
+        self.body = other.body;
+        self.target = other.target;
+        self.correction = other.correction;
+        self.replay = other.replay;
+        self.previous = other.previous;
+        self.rendered = other.rendered;
+        self.injected_j = other.injected_j;
     }
 
     fn take_params(&mut self, received: &ModelParams) {
         self.target = *received;
         if let Smoothing::PerPacket { lambda } = self.settings.smoothing {
             // (4)
-            self.state.params = self.state.params.blend(received, lambda);
-            self.target = self.state.params;
+            self.body.state.params = self.body.state.params.blend(received, lambda);
+            self.target = self.body.state.params;
         }
     }
 
@@ -116,18 +158,16 @@ impl LocalModel {
     /// mismatch or the timer the orientation alone (a timer packet may say the model's own).
     fn snap(&mut self, update: &Update) {
         self.aim(update);
+        let state = &mut self.body.state;
         match update.cause {
             Cause::MasterOnlyContact | Cause::SlaveOnlyContact | Cause::ContactLost => {
-                self.state.footprint = update.state.footprint;
-                self.correction.snap(&mut self.state.pose);
-                self.state.twist = update.state.twist;
+                state.footprint = update.state.footprint;
+                self.correction.snap(&mut state.pose);
+                state.twist = update.state.twist;
             }
             Cause::Deadband | Cause::EverySample | Cause::Timer => {
-                let pivot = self
-                    .rendered
-                    .touch
-                    .map_or(self.state.pose.position, |t| t.proxy);
-                self.correction.snap_turn(&mut self.state.pose, pivot);
+                let pivot = self.rendered.touch.map_or(state.pose.position, |t| t.proxy);
+                self.correction.snap_turn(&mut state.pose, pivot);
             }
         }
         self.correction.remaining = Default::default();
@@ -135,7 +175,8 @@ impl LocalModel {
 
     /// Compares at the stamp that the update answers; the ticks bleed the difference in.
     fn match_stamps(&mut self, update: &Update) {
-        self.take_footprint(update);
+        let carved = !update.slave_in_contact;
+        self.take_footprint(update, carved);
         self.aim(update);
     }
 
@@ -147,31 +188,32 @@ impl LocalModel {
             .aim(&update.state.pose, &then.motion.pose, &then.corrected);
     }
 
-    /// Takes over the face offsets. The face that the HIP touches, or is in front of, stays where it is:
-    /// the centre moves instead (which no force notices), and the bleed brings the plane to its place.
-    /// Only when the slave does not touch is a face carved at once: the force must vanish anyway.
-    fn take_footprint(&mut self, update: &Update) {
-        let received = update.state.footprint;
-        let Some((_, hip)) = self.previous else {
-            self.state.footprint = received;
-            return;
-        };
-        let face = self.god.touched().unwrap_or_else(|| self.facing(hip));
-        let growth = received.offset(face) - self.state.footprint.offset(face);
-        self.state.footprint = received;
-        if growth <= 0.0 && !update.slave_in_contact {
-            return;
-        }
-        let shift = -rotate(self.state.pose.angle, face.outward()) * growth;
-        self.state.pose.position += shift;
-        self.correction.count(shift);
+    /// Begins to replay the HIP from the sample that the update answers; the ticks go on with it.
+    fn restart(&mut self, update: &Update) {
+        self.take_footprint(update, false);
+        self.replay.begin(update, &self.history);
     }
 
-    fn facing(&self, hip: Vec2) -> Face {
-        self.state
-            .footprint
-            .nearest(self.state.pose.point_to_object(hip))
-            .0
+    /// Takes over the face offsets. The face that the HIP touches, or is in front of, stays where it is:
+    /// the centre moves instead (which no force notices), and the bleed brings the plane to its place.
+    /// Only where it is to be `carved` does a face that recedes do so at once.
+    fn take_footprint(&mut self, update: &Update, carved: bool) {
+        let received = update.state.footprint;
+        let Some((_, hip)) = self.previous else {
+            self.body.state.footprint = received;
+            return;
+        };
+        let touched = self.body.god.touched();
+        let face = touched.unwrap_or_else(|| self.body.gap(hip).0);
+        let state = &mut self.body.state;
+        let growth = received.offset(face) - state.footprint.offset(face);
+        state.footprint = received;
+        if growth <= 0.0 && carved {
+            return;
+        }
+        let shift = -rotate(state.pose.angle, face.outward()) * growth;
+        state.pose.position += shift;
+        self.correction.count(shift);
     }
 
     /// One sample period: the HIP (m, world) with its stamp in, the force out.
@@ -181,47 +223,72 @@ impl LocalModel {
     pub fn step(&mut self, stamp: Time, hip: Vec2) -> Rendered {
         let hip_velocity = self.hip_velocity(stamp, hip);
         self.previous = Some((stamp, hip));
-        if let Smoothing::InTime { tau_s } = self.settings.smoothing {
-            let keep = libm::exp(-TICK_S / tau_s);
-            self.state.params = self.state.params.blend(&self.target, keep);
-        }
-        if self.settings.correction == PoseCorrection::MatchedStamps {
-            self.bleed(hip);
-        }
-        let motion = Motion {
-            pose: self.state.pose,
-            twist: self.state.twist,
+        self.smooth(hip);
+        self.correct(hip);
+        self.remember(stamp, hip, hip_velocity);
+        let (rendered, dissipated_w) = self.body.step(&self.settings, hip, hip_velocity);
+        self.correction.tank.fill(dissipated_w * TICK_S);
+        self.rendered = rendered;
+        self.go_on_replaying();
+        rendered
+    }
+
+    /// Smoothing in time. What heavier parameters add to a moving box is paid from the tank, or the box
+    /// is slowed by as much.
+    fn smooth(&mut self, hip: Vec2) {
+        let Smoothing::InTime { tau_s } = self.settings.smoothing else {
+            return;
         };
-        let corrected = self.correction.done;
-        self.history.push(Moment {
-            stamp,
-            hip,
-            motion,
-            corrected,
+        let keep = libm::exp(-TICK_S / tau_s);
+        let params = self.body.state.params.blend(&self.target, keep);
+        self.changing(hip, |body, correction, _| {
+            body.change_params(params, &mut correction.tank);
         });
-        self.rendered = self.render(hip, hip_velocity);
-        self.advance();
-        self.rendered
     }
 
     /// One tick of pose correction. Turning about the proxy in contact costs nothing; in free space the
     /// box may come up to the HIP but not over it.
-    fn bleed(&mut self, hip: Vec2) {
-        let touch = self
-            .god
-            .touch_at(&self.state.footprint, &self.state.pose, hip);
-        self.correction.bleed(
-            &mut self.state.pose,
-            touch.as_ref(),
-            &self.settings.coupling,
-        );
-        if touch.is_none() {
-            let after = self
-                .god
-                .touch_at(&self.state.footprint, &self.state.pose, hip);
-            if let Some(after) = after {
-                self.correction.back_off(&mut self.state.pose, &after);
+    fn correct(&mut self, hip: Vec2) {
+        let rates = match self.settings.correction {
+            PoseCorrection::Snap => return,
+            PoseCorrection::MatchedStamps => IN_CONTACT,
+            PoseCorrection::Replay => IN_CONTACT_REPLAYED,
+        };
+        self.changing(hip, |body, correction, settings| {
+            let touch = body.touch(hip);
+            let (_, gap) = body.gap(hip);
+            let pose = &mut body.state.pose;
+            correction.bleed(pose, touch.as_ref(), &settings.coupling, rates);
+            if touch.is_none() {
+                body.keep_off(hip, gap, correction);
             }
+        });
+    }
+
+    /// Does a change and accounts for the energy that it adds.
+    fn changing(
+        &mut self,
+        hip: Vec2,
+        change: impl FnOnce(&mut Body, &mut Correction, &ModelSettings),
+    ) {
+        let coupling = self.settings.coupling;
+        let before = self.body.energy_j(&coupling, Some(hip));
+        let tank = self.correction.tank;
+        change(&mut self.body, &mut self.correction, &self.settings);
+        let after = self.body.energy_j(&coupling, Some(hip));
+        self.account(before, paid(&tank, &self.correction.tank) + before, after);
+    }
+
+    fn energy_now(&self) -> f64 {
+        let hip = self.previous.map(|(_, hip)| hip);
+        self.body.energy_j(&self.settings.coupling, hip)
+    }
+
+    /// Adds what lies above `allowed`, unless it is the last bit of a sum of `before`.
+    fn account(&mut self, before: f64, allowed: f64, after: f64) {
+        let excess = after - allowed;
+        if excess > 1e-12 * before.max(1e-3) {
+            self.injected_j += excess;
         }
     }
 
@@ -233,251 +300,38 @@ impl LocalModel {
         })
     }
 
-    fn render(&mut self, hip: Vec2, hip_velocity: Vec2) -> Rendered {
-        let state = &self.state;
-        let touch = self.god.follow(&state.footprint, &state.pose, hip);
-        // (6)
-        let force = touch.map_or(Vec2::zeros(), |touch| {
-            let coupling = &self.settings.coupling;
-            contact_force(
-                coupling,
-                &touch,
-                hip_velocity,
-                &state.twist,
-                state.pose.position,
-            )
+    fn remember(&mut self, stamp: Time, hip: Vec2, hip_velocity: Vec2) {
+        let state = &self.body.state;
+        self.history.push(Moment {
+            stamp,
+            hip,
+            hip_velocity,
+            motion: Motion {
+                pose: state.pose,
+                twist: state.twist,
+            },
+            god: self.body.god,
+            corrected: self.correction.done,
         });
-        Rendered { force, touch }
     }
 
-    fn advance(&mut self) {
-        let lever = self
-            .rendered
-            .touch
-            .map_or(Vec2::zeros(), |t| t.proxy - self.state.pose.position);
-        let before = Motion {
-            pose: self.state.pose,
-            twist: self.state.twist,
-        };
-        let law = self.settings.friction;
-        let after = before.step(law, &self.state.params, self.rendered.force, lever);
-        self.correction
-            .tank
-            .fill(after.dissipation(law, &self.state.params) * TICK_S);
-        self.state.pose = after.pose;
-        self.state.twist = after.twist;
+    /// Brings the replay on; what remains to be corrected is what it is away from the box that is felt.
+    fn go_on_replaying(&mut self) {
+        if self.settings.correction != PoseCorrection::Replay {
+            return;
+        }
+        if let Some(pose) = self.replay.advance(&self.settings, &self.history) {
+            self.correction.aim_at(&pose, &self.body.state.pose);
+            if let Some(update) = self.replay.take_waiting() {
+                self.apply(&update);
+            }
+        }
     }
+}
+
+fn paid(before: &Tank, after: &Tank) -> f64 {
+    before.level_j() - after.level_j()
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::contact::Coupling;
-    use crate::geometry::{BoxFootprint, Pose, Twist};
-    use crate::settings::Mode;
-
-    const COUPLING: Coupling = Coupling {
-        stiffness_n_per_m: 1000.0,
-        damping_ns_per_m: 10.0,
-    };
-
-    fn state(m: f64, b: f64, c: f64) -> ModelState {
-        let params = ModelParams::of_square(m, b, c, 0.4, &COUPLING).unwrap();
-        ModelState::try_new(
-            params,
-            BoxFootprint::square(0.4),
-            Pose::default(),
-            Twist::default(),
-        )
-        .unwrap()
-    }
-
-    fn model(mode: Mode, correction: PoseCorrection) -> LocalModel {
-        let settings = ModelSettings {
-            correction,
-            ..mode.model_settings(COUPLING)
-        };
-        LocalModel::new(settings, state(0.7, 3.0, 2.06))
-    }
-
-    fn update(cause: Cause, answers_ms: u64, state: ModelState) -> Update {
-        Update {
-            sequence: 1,
-            cause,
-            answers: Time::from_millis(answers_ms),
-            newest_command: 1,
-            slave_in_contact: true,
-            state,
-        }
-    }
-
-    /// Pushes the west face at 0.1 m/s from a stand-off of 1 cm; ticks from 1 to `until`.
-    fn push(model: &mut LocalModel, ticks: std::ops::RangeInclusive<u64>) -> Rendered {
-        let mut last = Rendered::default();
-        for n in ticks {
-            let hip = Vec2::new(-0.21 + 1e-4 * n as f64, 0.0);
-            last = model.step(Time::from_millis(n), hip);
-        }
-        last
-    }
-
-    #[test]
-    fn a_steady_push_is_met_by_friction_and_damping() {
-        let mut model = model(Mode::Recommended, PoseCorrection::MatchedStamps);
-        let rendered = push(&mut model, 1..=3000);
-        // c + b v = 2.06 + 3·0.1
-        assert!(
-            (rendered.force.x - 2.36).abs() < 1e-6,
-            "{:?}",
-            rendered.force
-        );
-        assert!(rendered.force.y.abs() < 1e-12);
-    }
-
-    #[test]
-    fn equation_4_blends_once_per_packet() {
-        let mut model = model(Mode::Paper, PoseCorrection::Snap);
-        push(&mut model, 1..=10);
-        model.apply(&update(Cause::Timer, 10, state(0.9, 1.0, 4.06)));
-        let params = model.state().params;
-        assert!((params.m() - 0.8).abs() < 1e-12);
-        assert!((params.b() - 2.0).abs() < 1e-12);
-        assert!((params.c() - 3.06).abs() < 1e-12);
-        push(&mut model, 11..=50);
-        assert_eq!(model.state().params, params, "time alone changes nothing");
-    }
-
-    #[test]
-    fn smoothing_in_time_has_its_time_constant() {
-        let mut model = model(Mode::Recommended, PoseCorrection::MatchedStamps);
-        push(&mut model, 1..=10);
-        model.apply(&update(Cause::Timer, 10, state(1.7, 3.0, 2.06)));
-        push(&mut model, 11..=30);
-        let expected = 0.7 + 1.0 * (1.0 - libm::exp(-1.0));
-        assert!((model.state().params.m() - expected).abs() < 1e-9);
-    }
-
-    #[test]
-    fn a_received_pose_is_never_set_on_arrival() {
-        let mut far = state(0.7, 3.0, 2.06);
-        far.pose = Pose::new(-0.05, 0.03, 0.3);
-        let jump = |correction| {
-            let mut model = model(Mode::Recommended, correction);
-            push(&mut model, 1..=1000);
-            let before = model.rendered().force;
-            model.apply(&update(Cause::SlaveOnlyContact, 1000, far));
-            (push(&mut model, 1001..=1001).force - before).norm()
-        };
-        assert!(jump(PoseCorrection::Snap) > 10.0, "the effect exists");
-        assert!(jump(PoseCorrection::MatchedStamps) < 0.5);
-    }
-
-    #[test]
-    fn the_pose_is_held_against_what_the_model_was_at_the_stamp() {
-        // the slave says, late, exactly what the model was: nothing must be corrected
-        let mut model = model(Mode::Recommended, PoseCorrection::MatchedStamps);
-        push(&mut model, 1..=1000);
-        let then = model
-            .history()
-            .at(Time::from_millis(700))
-            .unwrap()
-            .motion
-            .pose;
-        let mut late = *model.state();
-        late.pose = then;
-        model.apply(&update(Cause::Deadband, 700, late));
-        assert!(model.correction().remaining.shift.norm() < 1e-15);
-        assert!(
-            model.state().pose.position.x - then.position.x > 0.01,
-            "the box has moved on"
-        );
-    }
-
-    #[test]
-    fn a_learned_offset_does_not_move_the_touched_face() {
-        let mut model = model(Mode::Recommended, PoseCorrection::MatchedStamps);
-        let before = push(&mut model, 1..=1000).touch.unwrap();
-        let mut learned = *model.state();
-        learned.footprint = BoxFootprint::square(0.36);
-        learned.pose = model
-            .history()
-            .at(Time::from_millis(1000))
-            .unwrap()
-            .motion
-            .pose;
-        learned.pose.position.x -= 0.02;
-        model.apply(&update(Cause::Deadband, 1000, learned));
-        let after = push(&mut model, 1001..=1001).touch.unwrap();
-        assert!((after.penetration - before.penetration).abs() < 1e-5);
-        assert_eq!(model.state().footprint.west, 0.18);
-        assert!(
-            model.correction().remaining.shift.norm() < 1e-9,
-            "plane and centre agree already"
-        );
-    }
-
-    #[test]
-    fn mismatch_case_1_releases_the_master() {
-        // the slave is free where the master touches: the carved face lets go at once
-        let mut model = model(Mode::Recommended, PoseCorrection::MatchedStamps);
-        assert!(push(&mut model, 1..=105).in_contact());
-        let mut carved = *model.state();
-        carved.pose = model
-            .history()
-            .at(Time::from_millis(105))
-            .unwrap()
-            .motion
-            .pose;
-        carved.footprint.west -= 0.005;
-        let free = Update {
-            slave_in_contact: false,
-            ..update(Cause::MasterOnlyContact, 105, carved)
-        };
-        model.apply(&free);
-        assert!(!push(&mut model, 106..=106).in_contact());
-    }
-
-    #[test]
-    fn mismatch_case_2_brings_the_model_to_the_hand() {
-        let mut model = model(Mode::Paper, PoseCorrection::Snap);
-        push(&mut model, 1..=50);
-        let mut near = *model.state();
-        near.pose.position.x -= 0.008;
-        assert!(!model.rendered().in_contact());
-        model.apply(&update(Cause::SlaveOnlyContact, 50, near));
-        assert!(push(&mut model, 51..=51).in_contact());
-    }
-
-    #[test]
-    fn in_free_space_the_box_comes_up_to_the_hip_and_not_over_it() {
-        let mut model = model(Mode::Recommended, PoseCorrection::MatchedStamps);
-        // not a whole number of the bleed's steps away
-        let hip = Vec2::new(-0.2053, 0.0);
-        let rest = |model: &mut LocalModel, ticks: std::ops::RangeInclusive<u64>| {
-            ticks
-                .map(|n| model.step(Time::from_millis(n), hip).force.norm())
-                .fold(0.0, f64::max)
-        };
-        rest(&mut model, 1..=10);
-        let mut nearer = *model.state();
-        nearer.pose.position.x -= 0.020;
-        model.apply(&update(Cause::SlaveOnlyContact, 10, nearer));
-        // the tank is empty: nothing has been dissipated yet
-        let largest = rest(&mut model, 11..=500);
-        let moved = model.state().pose.position.x;
-        assert!((moved + 0.0053).abs() < 1e-6, "up to the HIP: {moved}");
-        assert!(largest < 1e-6, "not over it: {largest} N");
-    }
-
-    #[test]
-    fn two_models_with_the_same_samples_and_updates_are_equal_to_the_bit() {
-        let run = || {
-            let mut model = model(Mode::Recommended, PoseCorrection::MatchedStamps);
-            push(&mut model, 1..=500);
-            model.apply(&update(Cause::Deadband, 400, state(0.9, 1.0, 3.0)));
-            push(&mut model, 501..=1500);
-            *model.state()
-        };
-        assert_eq!(run(), run());
-    }
-}
+mod tests;

@@ -51,6 +51,9 @@ pub enum PoseCorrection {
     Snap,
     /// Compared at the stamp of the HIP sample that the update answers, and bled in.
     MatchedStamps,
+    /// The model is restarted at that sample, the HIP samples since are replayed, and the difference is
+    /// bled in.
+    Replay,
 }
 
 /// The settings of a session's local model.
@@ -120,7 +123,7 @@ impl Mode {
                 coupling,
                 friction: FrictionLaw::LimitSurface,
                 smoothing: Smoothing::InTime { tau_s: 0.020 },
-                correction: PoseCorrection::MatchedStamps,
+                correction: PoseCorrection::Replay,
             },
         }
     }

@@ -169,7 +169,7 @@ def welcome(r):
               "friction": r.choice(["sign", "limit_surface"]),
               "smoothing": r.choice(["per_packet", "in_time"])}
     fields["lambda" if fields["smoothing"] == "per_packet" else "tau_s"] = r.f64()
-    return {**fields, "correction": r.choice(["snap", "matched_stamps"]), "state": state(r),
+    return {**fields, "correction": r.choice(["snap", "matched_stamps", "replay"]), "state": state(r),
             "scheme": r.text(), "program": r.text()}
 
 

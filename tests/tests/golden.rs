@@ -198,6 +198,7 @@ fn of_welcome(raw: &RawWelcome) -> (Value, Vec<u8>) {
         "correction": match settings.correction {
             PoseCorrection::Snap => "snap",
             PoseCorrection::MatchedStamps => "matched_stamps",
+            PoseCorrection::Replay => "replay",
         },
         "state": state(&welcome.state),
         "scheme": welcome.scheme, "program": welcome.program,

@@ -22,10 +22,10 @@ use mmt_client::operator::scripted::{Scripted, ScriptedConfig};
 use mmt_server::estimator::{Estimator, EstimatorConfig, Measured, Seen};
 use mmt_server::link::SlaveLink;
 use mmt_server::playout::{PlayoutBuffer, PlayoutConfig};
+use mmt_server::shadow::Shadow;
 use mmt_server::slave::{Slave, SlaveConfig, SlaveTick};
 use mmt_server::trigger::{Trigger, TriggerConfig, TriggerInput};
 use mmt_shared::geometry::Vec2;
-use mmt_shared::local_model::LocalModel;
 use mmt_shared::settings::Mode;
 use mmt_shared::time::{TICK, Time};
 use mmt_shared::wire::{Command, DATAGRAM_MAX, HipSample, Label, Welcome};
@@ -178,11 +178,11 @@ impl Loop {
     /// The slave's tick: what it read, what it did, what it sends.
     fn slave_tick(&mut self, now: Time, up: Option<&Packet>) -> Slaved {
         let command = up.and_then(|packet| self.slave_link.handle(now, packet.as_slice()));
-        for sample in command
-            .iter()
-            .flat_map(|command| command.samples.as_slice())
-        {
-            self.slave.handle_sample(now, sample);
+        if let Some(command) = &command {
+            for sample in command.samples.as_slice() {
+                let newest = command.newest_update;
+                self.slave.handle_sample(now, sample, newest);
+            }
         }
         let tick = self.slave.tick(now);
         let update = tick.and_then(|tick| tick.update);
@@ -248,7 +248,7 @@ fn the_haptic_tick_never_allocates() {
 struct Parts {
     estimators: [Estimator; 2],
     trigger: Trigger,
-    shadow: LocalModel,
+    shadow: Shadow,
     playout: PlayoutBuffer,
     link: SlaveLink,
     decided: u64,
@@ -261,7 +261,7 @@ impl Parts {
         Self {
             estimators: [estimator(Mode::Paper), estimator(Mode::Recommended)],
             trigger: Trigger::new(TriggerConfig::of_mode(Mode::Recommended)),
-            shadow: LocalModel::new(*slave.settings(), *slave.state()),
+            shadow: Shadow::new(*slave.settings(), *slave.state()),
             playout: PlayoutBuffer::try_new(PlayoutConfig::default()).unwrap(),
             link: SlaveLink::new(Time::ZERO),
             decided: 0,
@@ -271,14 +271,18 @@ impl Parts {
     fn take_in(&mut self, now: Time, up: Option<&Packet>) -> Option<HipSample> {
         let command = up.and_then(|packet| self.link.handle(now, packet.as_slice()))?;
         let samples = command.samples.as_slice();
-        samples.iter().for_each(|s| self.playout.push(now, s));
+        for sample in samples {
+            self.playout.push(now, sample);
+            self.shadow.acknowledge(sample, command.newest_update);
+        }
         command.samples.last().copied()
     }
 
     fn step(&mut self, now: Time, met: &SlaveTick, measured: &Measured) -> Option<Packet> {
         self.playout.advance(now).unwrap();
         let [_, estimate] = self.estimators.each_mut().map(|e| e.step(measured));
-        let rendered = self.shadow.step(met.stamp, met.tool);
+        self.shadow.step(met.stamp, met.stamp, |_| Some(met.tool));
+        let rendered = *self.shadow.rendered();
         let input = TriggerInput {
             f_s: met.f_s,
             f_m: rendered.force,
@@ -288,13 +292,13 @@ impl Parts {
             speed: estimate.speed,
             acceleration: estimate.acceleration,
             force_deviation: 0.0,
-            params: self.shadow.state().params,
+            params: self.shadow.ahead().state().params,
             shift: Vec2::zeros(),
             turn: 0.0,
         };
         self.decided += u64::from(self.trigger.decide(now, &input).is_some());
         let update = met.update?;
-        self.shadow.apply(&update);
+        self.shadow.send(&update);
         let link = &mut self.link;
         Packet::of(|out| link.send_update(now, &update, out).ok())
     }

@@ -15,7 +15,7 @@ use super::hand::Hand;
 use super::route;
 use super::stroke::Stroke;
 
-pub use config::{ScriptedConfig, ScriptedError};
+pub use config::{Picture, ScriptedConfig, ScriptedError};
 
 /// A push or an approach that takes longer is given up, s: the box is blocked or not there.
 const GIVE_UP_S: f64 = 10.0;

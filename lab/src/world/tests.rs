@@ -9,7 +9,7 @@ mod estimation;
 
 /// The default network: 50 ms ± 5 ms each way, 1 % loss.
 const WAN: &str = "delay 50ms 5ms loss 1%";
-const SEEDS: std::ops::RangeInclusive<u64> = 1..=6;
+pub(super) const SEEDS: std::ops::RangeInclusive<u64> = 1..=6;
 
 fn link(words: &str) -> LinkConfig {
     words.parse().unwrap()
@@ -166,6 +166,7 @@ fn a_play_out_delay_above_the_jitter_takes_the_force_error_of_jitter_away() {
     };
     let newest_held = PlayoutConfig {
         delay_ms: 0.0,
+        delay_max_ms: 0.0,
         extrapolation_ms: 0.0,
         ..PlayoutConfig::default()
     };
@@ -235,3 +236,6 @@ fn loss_on_the_way_up_changes_no_draw_on_the_way_down() {
     );
     assert_eq!(faulty.0, faulty.1, "whatever happens on the way up");
 }
+
+mod delay;
+mod hard;

@@ -39,8 +39,8 @@ pub(super) struct Finished {
     pub(super) ticker: TickerReport,
 }
 
-/// A HIP sample and when it arrived.
-pub(super) type Arrived = (Time, HipSample);
+/// When a HIP sample arrived, the sample, and the newest update that the master had then.
+pub(super) type Arrived = (Time, HipSample, u32);
 
 /// Tokio's side of the thread. Dropping it ends the thread.
 pub(super) struct Worker {
@@ -157,8 +157,8 @@ impl Inside {
 
     /// One tick, at its deadline: the stamp is free of wake-up jitter.
     fn turn(&mut self, tick: Tick, slave: &mut Slave) -> Option<SlaveTick> {
-        while let Ok((arrived, sample)) = self.samples.pop() {
-            slave.handle_sample(arrived, &sample);
+        while let Ok((arrived, sample, newest_update)) = self.samples.pop() {
+            slave.handle_sample(arrived, &sample, newest_update);
         }
         slave.tick(tick.deadline)
     }

@@ -18,8 +18,11 @@ const DECELERATION_M_PER_S2: (f64, f64) = (0.1, 1000.0);
 #[serde(default, deny_unknown_fields)]
 pub struct PlayoutConfig {
     /// From the earliest possible arrival of a sample to its play-out, ms. Default 16: ten samples to a
-    /// packet and 5 ms of jitter.
+    /// packet and 5 ms of jitter. Never less than this.
     pub delay_ms: f64,
+    /// The delay grows to what 99 of 100 samples need, but not beyond this, ms. Default 100: more would
+    /// be a link that stands. At or below `delay_ms` the delay is fixed.
+    pub delay_max_ms: f64,
     /// How long an underrun is bridged at constant velocity, ms. Default 30: the slave never moves on
     /// older news.
     pub extrapolation_ms: f64,
@@ -44,6 +47,7 @@ impl PlayoutConfig {
         let packing = f64::from(samples_per_command.saturating_sub(1));
         Self {
             delay_ms: (packing + jitter.as_secs_f64() * 1e3 + 2.0).min(DELAY_MS.1),
+            delay_max_ms: 100.0,
             extrapolation_ms: 30.0,
             speed_max_m_per_s: 0.6,
             deceleration_m_per_s2: 10.0,
@@ -53,6 +57,7 @@ impl PlayoutConfig {
     pub(super) fn check(&self) -> Result<(), PlayoutError> {
         for (name, unit, value, (min, max)) in [
             ("delay", "ms", self.delay_ms, DELAY_MS),
+            ("longest delay", "ms", self.delay_max_ms, DELAY_MS),
             (
                 "extrapolation",
                 "ms",

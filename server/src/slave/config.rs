@@ -8,6 +8,7 @@ use crate::environment::{EnvironmentConfig, EnvironmentError};
 use crate::estimator::{EstimatorConfig, SettingOutOfRange};
 use crate::playout::{PlayoutConfig, PlayoutError};
 use crate::sensing::{SensingConfig, SensingError};
+use crate::shadow::TriggerReference;
 use crate::trigger::TriggerConfig;
 
 /// What the local model starts from before anything is known of the object.
@@ -54,6 +55,8 @@ pub struct SlaveConfig {
     pub estimator: Option<EstimatorConfig>,
     /// When updates are sent.
     pub trigger: TriggerConfig,
+    /// What the trigger compares the measured force with.
+    pub trigger_reference: TriggerReference,
     /// What the local model starts from.
     pub start: StartModel,
 }
@@ -70,6 +73,7 @@ impl SlaveConfig {
             playout: PlayoutConfig::default(),
             estimator: None,
             trigger: TriggerConfig::of_mode(mode),
+            trigger_reference: TriggerReference::default(),
             start: StartModel::default(),
         }
     }

@@ -138,6 +138,8 @@ pub struct Trigger {
     mismatch: Option<Mismatch>,
     /// What the last update left unsaid, summed over contact: relative force error times s.
     unsaid: f64,
+    /// Cause of the last update, if that was lost.
+    repeat: Option<Cause>,
 }
 
 impl Trigger {
@@ -151,7 +153,14 @@ impl Trigger {
             was_in_contact: false,
             mismatch: None,
             unsaid: 0.0,
+            repeat: None,
         }
+    }
+
+    /// The last update, which had this cause, did not arrive: what is known now is said instead, at once
+    /// and under every scheme.
+    pub fn repeat(&mut self, cause: Cause) {
+        self.repeat = Some(cause);
     }
 
     /// Whether an update is to be sent now, and why. An answer counts as sent.
@@ -162,10 +171,12 @@ impl Trigger {
         }
         let cause = self
             .geometry(now, input)
-            .or_else(|| self.scheme(now, input));
+            .or_else(|| self.scheme(now, input))
+            .or(self.repeat);
         if cause.is_some() {
             self.last = Some((now, input.params));
             self.unsaid = 0.0;
+            self.repeat = None;
         }
         cause
     }

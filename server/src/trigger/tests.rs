@@ -327,3 +327,29 @@ fn adaptive_does_not_send_what_the_estimate_does_not_know() {
         assert_eq!(trigger.decide(Time::from_millis(n), &unsure), None);
     }
 }
+
+#[test]
+fn what_was_lost_is_said_again_once_at_once_and_under_every_scheme() {
+    let free = TriggerInput {
+        slave_in_contact: false,
+        shadow_in_contact: false,
+        ..input(0.0, 0.0)
+    };
+    for scheme in [
+        "deadband 10%",
+        "useful 10% 10s",
+        "adaptive 10% 10s",
+        "timer 10s",
+    ] {
+        let mut trigger = trigger(scheme, Mode::Recommended);
+        assert_eq!(trigger.decide(Time::from_millis(1), &free), None);
+        trigger.repeat(Cause::ContactLost);
+        let said = trigger.decide(Time::from_millis(2), &free);
+        assert_eq!(said, Some(Cause::ContactLost), "{scheme}");
+        assert_eq!(
+            trigger.decide(Time::from_millis(3), &free),
+            None,
+            "{scheme}"
+        );
+    }
+}

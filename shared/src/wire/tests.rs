@@ -490,7 +490,11 @@ fn numbers_of_choices_are_pinned() {
         Smoothing::PerPacket { lambda: 0.0 },
         Smoothing::InTime { tau_s: 0.0 },
     ]);
-    pinned([PoseCorrection::Snap, PoseCorrection::MatchedStamps]);
+    pinned([
+        PoseCorrection::Snap,
+        PoseCorrection::MatchedStamps,
+        PoseCorrection::Replay,
+    ]);
     let named = [
         Cause::Deadband,
         Cause::Timer,

@@ -5,6 +5,18 @@ use serde::{Deserialize, Serialize};
 use crate::operator::hand::HandConfig;
 use crate::operator::route::CLOSE_M;
 
+/// What the scripted operator looks at.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Picture {
+    /// The local model: where the box is felt.
+    #[default]
+    Model,
+    /// The remote scene as it arrives, a round trip behind the hand. Only a world in virtual time can show
+    /// it to a script; contact is felt at the model all the same.
+    Delayed,
+}
+
 /// What the scripted operator does. The defaults are those of the design study unless said otherwise.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -41,6 +53,8 @@ pub struct ScriptedConfig {
     pub press_max_n: f64,
     /// Beyond this distance from where it began the box is pushed back, m. Default 1 (a choice).
     pub home_radius_m: f64,
+    /// What it looks at. Default the model.
+    pub view: Picture,
     /// The hand.
     pub hand: HandConfig,
 }
@@ -64,6 +78,7 @@ impl Default for ScriptedConfig {
             acceleration_m_per_s2: 1.5,
             press_max_n: 8.0,
             home_radius_m: 1.0,
+            view: Picture::Model,
             hand: HandConfig::default(),
         }
     }
@@ -120,7 +135,7 @@ impl ScriptedConfig {
             ),
             ("hand.damping_ns_per_m", hand.damping_ns_per_m, (1.0, 100.0)),
             ("hand.tremor_hz", hand.tremor_hz, (0.0, 20.0)),
-            ("hand.tremor_m", hand.tremor_m, (0.0, 1e-3)),
+            ("hand.tremor_m", hand.tremor_m, (0.0, 5e-3)),
         ] {
             if !(min..=max).contains(&value) {
                 return Err(ScriptedError {

@@ -70,7 +70,10 @@ impl Session<'_> {
             return;
         };
         for sample in command.samples.as_slice() {
-            let taken = self.worker.samples.push((now, *sample));
+            let taken = self
+                .worker
+                .samples
+                .push((now, *sample, command.newest_update));
             self.lost.samples += u64::from(taken.is_err());
         }
     }

@@ -1,0 +1,218 @@
+//! The hard cases of delay, each a scenario with a law; `docs/limits.md` says what is not made good.
+
+use super::*;
+use mmt_client::operator::scripted::Phase;
+use mmt_server::environment::Wall;
+
+/// What came of a scenario.
+#[derive(Clone, Copy, Debug)]
+struct Felt {
+    /// Largest force on the hand, N, and largest step of it.
+    peak_n: f64,
+    step_n: f64,
+    breaks_per_push: f64,
+    pushes: u64,
+    pose_rms_mm: f64,
+    relative_error: f64,
+    injected_mj: f64,
+    observer_min_mj: f64,
+    /// Largest force between the tool and the object, N.
+    slave_peak_n: f64,
+}
+
+/// Runs 25 s and calls `before` before every tick. No scenario gives the hand energy or stops the work.
+fn felt(name: &str, config: &WorldConfig, mut before: impl FnMut(&mut World)) -> Felt {
+    let mut world = World::try_new(config).unwrap();
+    let mut slave_peak_n = 0.0_f64;
+    for _ in 0..25_000 {
+        before(&mut world);
+        let tick = world.step();
+        slave_peak_n = slave_peak_n.max(tick.slave.map_or(0.0, |slave| slave.f_s.norm()));
+    }
+    let outcome = world.outcome();
+    let pushes = world.operator().pushes_completed().unwrap();
+    let felt = Felt {
+        peak_n: outcome.on_hand.largest_n().unwrap(),
+        step_n: outcome.on_hand.largest_step_n().unwrap(),
+        breaks_per_push: outcome.breaks.per_push(pushes).unwrap(),
+        pushes,
+        pose_rms_mm: outcome.pose.position_rms_m().unwrap() * 1e3,
+        relative_error: relative_error(&world),
+        injected_mj: outcome.energy_injected_j * 1e3,
+        observer_min_mj: outcome.observer_min_j * 1e3,
+        slave_peak_n,
+    };
+    println!("{name:40} {felt:.3?}");
+    assert!(felt.injected_mj <= 1e-6, "{name}: {felt:?}");
+    assert!(felt.observer_min_mj >= -1.0, "{name}: {felt:?}");
+    assert!(felt.pushes >= 1, "{name}: {felt:?}");
+    felt
+}
+
+fn delayed(one_way_ms: u64) -> WorldConfig {
+    over(&format!("delay {one_way_ms}ms"), 1)
+}
+
+fn is_pushing(world: &World) -> bool {
+    let Operator::Scripted(scripted) = world.operator() else {
+        return false;
+    };
+    scripted.phase() == Phase::Push && world.master.model().rendered().in_contact()
+}
+
+#[test]
+fn a_hand_deep_inside_the_model_after_a_long_delay_is_not_thrown_out() {
+    // the model's faces are 7 cm too far out, or 5 cm too far in: a round trip of pushing what is not there
+    for (one_way_ms, breaks) in [(0, 1.1), (1000, 2.5)] {
+        for side_m in [0.50, 0.26] {
+            let mut config = delayed(one_way_ms);
+            config.slave.start.side_m = side_m;
+            let felt = felt(
+                &format!("{one_way_ms} ms, side {side_m} m"),
+                &config,
+                |_| {},
+            );
+            assert!(felt.peak_n <= 4.0, "{felt:?}");
+            assert!(felt.pose_rms_mm <= 30.0, "{felt:?}");
+            assert!(felt.step_n <= 1.6, "{felt:?}");
+            assert!(felt.breaks_per_push <= breaks, "{felt:?}");
+        }
+    }
+}
+
+#[test]
+fn a_face_that_is_changed_during_the_delay_is_the_one_that_is_felt() {
+    // the way to the next face takes 3.2 s, a round trip 4 s
+    let felt = felt("face change within a round trip", &delayed(2000), |_| {});
+    assert!(
+        felt.peak_n <= 4.0 && felt.breaks_per_push <= 1.1,
+        "{felt:?}"
+    );
+}
+
+#[test]
+fn a_wall_that_the_model_does_not_know_is_felt_no_harder_than_the_hand_presses() {
+    for one_way_ms in [0, 500] {
+        let mut config = delayed(one_way_ms);
+        // the first push meets it after 12 cm
+        config.slave.environment.wall = Some(Wall {
+            distance_m: 0.30,
+            angle_rad: 0.0,
+        });
+        let felt = felt(&format!("{one_way_ms} ms, a wall"), &config, |_| {});
+        assert!(felt.peak_n <= 8.0 + 1e-9, "{felt:?}");
+        assert!(felt.breaks_per_push <= 6.0, "{felt:?}");
+    }
+}
+
+#[test]
+fn mass_and_friction_that_change_in_mid_push_are_felt_without_a_jolt() {
+    for one_way_ms in [0, 500] {
+        for (name, m, mu, most_n, breaks) in [
+            ("twice the mass", 1.4, 0.3, 6.5, 1.1),
+            ("twice the friction", 0.7, 0.6, 6.5, 1.1),
+            ("half the mass, half the friction", 0.35, 0.15, 4.0, 1.5),
+        ] {
+            let mut changed = false;
+            let name = format!("{one_way_ms} ms, {name}");
+            let felt = felt(&name, &delayed(one_way_ms), |world| {
+                if !changed && world.now > Time::from_millis(9_000) && is_pushing(world) {
+                    changed = true;
+                    world.environment_mut().set_mass(m).unwrap();
+                    world.environment_mut().set_friction(mu).unwrap();
+                }
+            });
+            assert!(changed);
+            assert!(felt.peak_n <= most_n, "{felt:?}");
+            assert!(felt.step_n <= 0.8, "{felt:?}");
+            assert!(felt.breaks_per_push <= breaks, "{felt:?}");
+        }
+    }
+}
+
+#[test]
+fn a_hand_that_shakes_at_8_hz_is_not_answered_by_larger_forces_at_any_delay() {
+    let shaken = |one_way_ms| {
+        let mut config = delayed(one_way_ms);
+        config.operator.hand.tremor_hz = 8.0;
+        config.operator.hand.tremor_m = 3e-3;
+        felt(&format!("{one_way_ms} ms, 3 mm at 8 Hz"), &config, |_| {})
+    };
+    let near = shaken(0);
+    for one_way_ms in [250, 1000] {
+        let far = shaken(one_way_ms);
+        assert!(far.peak_n <= 1.1 * near.peak_n, "{far:?}");
+        // it lets go of the box by itself, near or far
+        assert!(far.breaks_per_push <= 2.0 * near.breaks_per_push, "{far:?}");
+    }
+}
+
+#[test]
+fn a_contact_that_is_made_and_lost_within_one_round_trip_is_one_contact() {
+    for one_way_ms in [0, 1000] {
+        let mut config = delayed(one_way_ms);
+        (config.operator.push_m, config.operator.hold_s) = (0.02, 0.0);
+        let felt = felt(&format!("{one_way_ms} ms, touch and go"), &config, |_| {});
+        assert!(felt.pushes >= 5, "{felt:?}");
+        assert!(
+            felt.peak_n <= 4.0 && felt.breaks_per_push <= 1.1,
+            "{felt:?}"
+        );
+    }
+}
+
+#[test]
+fn clocks_that_drift_apart_by_200_ppm_change_nothing() {
+    for one_way_ms in [0, 500] {
+        let still = felt("clocks together", &delayed(one_way_ms), |_| {});
+        let drifting = felt("200 ppm", &delayed(one_way_ms), |world| {
+            world.slave_clock.drift_ppm = 200;
+        });
+        assert!(drifting.peak_n <= 1.05 * still.peak_n, "{drifting:?}");
+        assert!(drifting.relative_error <= 1.05 * still.relative_error + 0.005);
+        assert!(drifting.breaks_per_push <= still.breaks_per_push + 1e-9);
+    }
+}
+
+#[test]
+fn a_step_of_the_slaves_clock_is_survived_and_the_tool_stays_below_its_speed() {
+    let at = Time::from_millis(10_000);
+    for one_way_ms in [0, 500] {
+        for forward in [true, false] {
+            let name = format!("{one_way_ms} ms, 300 ms forward: {forward}");
+            let felt = felt(&name, &delayed(one_way_ms), |world| {
+                let by = Duration::from_millis(300);
+                let ahead = &mut world.slave_clock.ahead;
+                match (world.now == at, forward) {
+                    (true, true) => *ahead += by,
+                    (true, false) => *ahead -= by,
+                    (false, _) => {}
+                }
+            });
+            assert!(
+                felt.peak_n <= 4.0 && felt.breaks_per_push <= 1.2,
+                "{felt:?}"
+            );
+            assert!(felt.slave_peak_n <= 15.0, "{felt:?}");
+        }
+    }
+}
+
+#[test]
+fn after_an_outage_of_60_ms_the_speed_limit_keeps_the_force_on_the_object_low() {
+    let peak = |one_way_ms, speed_max_m_per_s| {
+        let mut config = delayed(one_way_ms);
+        config.slave.playout.speed_max_m_per_s = speed_max_m_per_s;
+        let name = format!("{one_way_ms} ms, outages, {speed_max_m_per_s} m/s");
+        let felt = felt(&name, &config, |world| {
+            let outage = world.now.as_nanos() / 1_000_000 % 700 < 60;
+            while outage && world.up.pop_due(world.now + TICK).is_some() {}
+        });
+        felt.slave_peak_n
+    };
+    for one_way_ms in [50, 500] {
+        let (limited, free) = (peak(one_way_ms, 0.6), peak(one_way_ms, 10.0));
+        assert!(free > 30.0, "the effect exists: {free} N");
+        assert!(limited <= 15.0, "{limited} N");
+    }
+}

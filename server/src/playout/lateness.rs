@@ -1,0 +1,107 @@
+//! How late samples are: what the play-out delay has to be for 99 of 100 of them to be in time.
+//!
+//! A sample's lateness is its transit less the quickest of the last seconds: jitter, and the time that it
+//! waited for its packet to be full. It must never make the delay jump: who uses the quantile slews to it.
+
+use std::time::Duration;
+
+use mmt_shared::time::{Time, duration_nanos};
+
+/// Width of a bin, ns.
+const BIN_NS: u64 = 1_000_000;
+/// Bins; the last takes all that is later.
+const BINS: usize = 256;
+/// One part of the window, ns.
+const SLICE_NS: u64 = 1_000_000_000;
+/// Parts of the window: it forgets a spell of jitter after five seconds.
+const SLICES: usize = 5;
+/// Samples that the quantile wants before it says anything: half a second of them.
+const SAMPLES_MIN: u32 = 500;
+/// One sample in this many may be too late.
+const LATE_ONE_IN: u32 = 100;
+
+/// Histogram of lateness over the last seconds.
+#[derive(Clone, Debug)]
+pub(super) struct Lateness {
+    slices: [[u32; BINS]; SLICES],
+    newest: u64,
+}
+
+impl Lateness {
+    pub(super) fn new() -> Self {
+        Self {
+            slices: [[0; BINS]; SLICES],
+            newest: 0,
+        }
+    }
+
+    /// Takes one sample that came `late` after the quickest would have, at `now`.
+    pub(super) fn observe(&mut self, now: Time, late: Duration) {
+        self.turn(now);
+        let bin = usize::try_from(duration_nanos(late) / BIN_NS).map_or(BINS - 1, |bin| bin);
+        let slice = usize::try_from(self.newest % SLICES as u64).ok();
+        let slice = slice.and_then(|index| self.slices.get_mut(index));
+        if let Some(count) = slice.and_then(|slice| slice.get_mut(bin.min(BINS - 1))) {
+            *count = count.saturating_add(1);
+        }
+    }
+
+    /// The lateness that 99 of 100 samples did not exceed, rounded up to whole bins; none before there
+    /// have been enough of them.
+    pub(super) fn p99(&self) -> Option<Duration> {
+        let in_bin = |bin: usize| -> u32 { self.slices.iter().filter_map(|s| s.get(bin)).sum() };
+        let total: u32 = (0..BINS).map(in_bin).sum();
+        if total < SAMPLES_MIN {
+            return None;
+        }
+        let mut later = total;
+        for bin in 0..BINS {
+            later -= in_bin(bin);
+            if later <= total / LATE_ONE_IN {
+                return Some(Duration::from_nanos((bin as u64 + 1) * BIN_NS));
+            }
+        }
+        None
+    }
+
+    /// Clears the slices that `now` begins.
+    fn turn(&mut self, now: Time) {
+        let number = now.as_nanos() / SLICE_NS;
+        let begun = number.saturating_sub(self.newest).min(SLICES as u64);
+        for passed in 0..begun {
+            let index = usize::try_from((number - passed) % SLICES as u64).ok();
+            if let Some(slice) = index.and_then(|index| self.slices.get_mut(index)) {
+                *slice = [0; BINS];
+            }
+        }
+        self.newest = self.newest.max(number);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_quantile_leaves_one_in_a_hundred_out_and_forgets() {
+        let mut lateness = Lateness::new();
+        let at = Time::from_millis;
+        for n in 0..1000 {
+            assert_eq!(lateness.p99().is_some(), n >= 500);
+            // ten in a thousand are 40 ms late, the others up to 9.5 ms
+            let late = if n % 100 == 0 { 40_000 } else { n % 20 * 500 };
+            lateness.observe(at(n), Duration::from_micros(late));
+        }
+        assert_eq!(lateness.p99(), Some(Duration::from_millis(10)));
+        lateness.observe(at(1000), Duration::from_millis(40));
+        assert_eq!(lateness.p99(), Some(Duration::from_millis(41)));
+        for n in 1001..=1010 {
+            lateness.observe(at(n), Duration::from_secs(9));
+        }
+        assert_eq!(lateness.p99(), Some(Duration::from_millis(41)));
+        for n in 6000..6999 {
+            lateness.observe(at(n), Duration::ZERO);
+        }
+        assert_eq!(lateness.p99(), Some(Duration::from_millis(1)));
+    }
+}

@@ -1,0 +1,109 @@
+//! The box itself: state, contact, force and motion, without anything that corrects it.
+//!
+//! The box that is felt and the box that is replayed are both this type, so that a replay does to the one
+//! what the ticks did to the other. It must never change its parameters for more energy than was paid.
+
+use super::Rendered;
+use crate::contact::{Coupling, GodObject, Touch, contact_force};
+use crate::correction::{Correction, ROOM_M, Tank};
+use crate::dynamics::Motion;
+use crate::geometry::{Face, Vec2, rotate};
+use crate::params::{ModelParams, ModelState};
+use crate::settings::ModelSettings;
+
+/// A box and the proxy on it.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Body {
+    pub(super) state: ModelState,
+    pub(super) god: GodObject,
+}
+
+impl Body {
+    pub(super) fn new(state: ModelState) -> Self {
+        Self {
+            state,
+            god: GodObject::default(),
+        }
+    }
+
+    /// What the HIP touches with the box as it is; changes nothing.
+    pub(super) fn touch(&self, hip: Vec2) -> Option<Touch> {
+        self.god
+            .touch_at(&self.state.footprint, &self.state.pose, hip)
+    }
+
+    /// ½ k_p pen² + ½ m |v|² + ½ I omega², J: all that the hand could get back.
+    pub(super) fn energy_j(&self, coupling: &Coupling, hip: Option<Vec2>) -> f64 {
+        let touch = hip.and_then(|hip| self.touch(hip));
+        let elastic = touch.map_or(0.0, |touch| coupling.energy(touch.penetration));
+        elastic + self.kinetic_j(&self.state.params)
+    }
+
+    fn kinetic_j(&self, params: &ModelParams) -> f64 {
+        let twist = &self.state.twist;
+        0.5 * (params.m() * twist.linear.norm_squared()
+            + params.inertia() * twist.angular * twist.angular)
+    }
+
+    /// Takes over parameters. Kinetic energy that a larger m or I would add is paid from the tank; if it
+    /// cannot be, the box is slowed until there is no more of it than before.
+    pub(super) fn change_params(&mut self, params: ModelParams, tank: &mut Tank) {
+        let before = self.kinetic_j(&self.state.params);
+        let after = self.kinetic_j(&params);
+        self.state.params = params;
+        if after > before && !tank.pay(after - before) {
+            let share = (before / after).sqrt();
+            self.state.twist.linear *= share;
+            self.state.twist.angular *= share;
+        }
+    }
+
+    /// The face that a HIP is in front of and how far, m; negative inside.
+    pub(super) fn gap(&self, hip: Vec2) -> (Face, f64) {
+        let hip_in_object = self.state.pose.point_to_object(hip);
+        self.state.footprint.nearest(hip_in_object)
+    }
+
+    /// Takes back so much of a correction that a HIP in free space, which was `before` away from the box,
+    /// is no nearer to it than [`ROOM_M`], or than it was: a correction may bring the box to the hand but
+    /// not into it.
+    pub(super) fn keep_off(&mut self, hip: Vec2, before: f64, correction: &mut Correction) {
+        let (face, gap) = self.gap(hip);
+        let wanted = before.min(ROOM_M);
+        if gap < wanted {
+            let inward = -rotate(self.state.pose.angle, face.outward());
+            correction.back_off(&mut self.state.pose, inward * (wanted - gap));
+        }
+    }
+
+    /// One sample period. Returns what was rendered and the power that the ground took, W.
+    pub(super) fn step(
+        &mut self,
+        settings: &ModelSettings,
+        hip: Vec2,
+        hip_velocity: Vec2,
+    ) -> (Rendered, f64) {
+        let state = &mut self.state;
+        let touch = self.god.follow(&state.footprint, &state.pose, hip);
+        let centre = state.pose.position;
+        // (6)
+        let force = touch.map_or(Vec2::zeros(), |touch| {
+            contact_force(
+                &settings.coupling,
+                &touch,
+                hip_velocity,
+                &state.twist,
+                centre,
+            )
+        });
+        let lever = touch.map_or(Vec2::zeros(), |touch| touch.proxy - centre);
+        let before = Motion {
+            pose: state.pose,
+            twist: state.twist,
+        };
+        let after = before.step(settings.friction, &state.params, force, lever);
+        (state.pose, state.twist) = (after.pose, after.twist);
+        let dissipated_w = after.dissipation(settings.friction, &state.params);
+        (Rendered { force, touch }, dissipated_w)
+    }
+}

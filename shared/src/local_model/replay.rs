@@ -1,0 +1,101 @@
+//! The box as it should be: restarted where the slave saw it, then taken through the HIP samples since.
+//!
+//! An update says where the object was at one HIP sample of the past. From there the stored samples are
+//! replayed with the received parameters, a bounded number per tick, until the replay has caught up; from
+//! then on it takes each new sample as well. What it is away from the box that is felt is what remains to
+//! be corrected. It must never touch the box that is felt, and never take longer in a tick than its share.
+
+use super::body::Body;
+use crate::geometry::Pose;
+use crate::history::History;
+use crate::params::ModelState;
+use crate::settings::ModelSettings;
+use crate::time::Time;
+use crate::wire::message::Update;
+
+/// Most samples replayed in a tick, each at the cost of the model's own step: well within a haptic tick's
+/// budget of 10 µs. A second of history, 1000 samples and one more a tick, is caught up with in 53 ticks.
+/// Counted, not timed, so that both sides replay alike.
+pub const REPLAYED_PER_TICK: usize = 20;
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Progress {
+    /// No update yet.
+    Idle,
+    /// The next sample to replay is the first that is not before this stamp.
+    Behind(Time),
+    /// The newest sample has been replayed; it was of this stamp.
+    Live(Time),
+}
+
+/// A replay and the update that waits for it to catch up.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Replay {
+    body: Body,
+    progress: Progress,
+    waiting: Option<Update>,
+}
+
+impl Replay {
+    pub(super) fn new(start: ModelState) -> Self {
+        Self {
+            body: Body::new(start),
+            progress: Progress::Idle,
+            waiting: None,
+        }
+    }
+
+    /// Whether a replay has not caught up yet.
+    pub(super) fn is_busy(&self) -> bool {
+        matches!(self.progress, Progress::Behind(_))
+    }
+
+    /// Whether what it says is of the newest sample.
+    pub(super) fn is_live(&self) -> bool {
+        matches!(self.progress, Progress::Live(_))
+    }
+
+    /// Puts an update off until the replay has caught up; a newer one takes the place of an older one.
+    pub(super) fn wait(&mut self, update: &Update) {
+        self.waiting = Some(*update);
+    }
+
+    /// The update that waits, once.
+    pub(super) fn take_waiting(&mut self) -> Option<Update> {
+        self.waiting.take()
+    }
+
+    /// Restarts at the sample that an update answers. One that is older than the history says nothing of
+    /// where the box is now.
+    pub(super) fn begin(&mut self, update: &Update, history: &History) {
+        let Some(then) = history.nearest(update.answers) else {
+            return;
+        };
+        self.body = Body {
+            state: update.state,
+            god: then.god,
+        };
+        self.progress = Progress::Behind(then.stamp);
+    }
+
+    /// Replays a tick's share of samples; where the box should be, once the newest has been replayed.
+    pub(super) fn advance(&mut self, settings: &ModelSettings, history: &History) -> Option<Pose> {
+        let from = match self.progress {
+            Progress::Idle => return None,
+            Progress::Behind(stamp) => history.first_not_before(stamp),
+            Progress::Live(stamp) => history.first_after(stamp),
+        };
+        let until = history.len().min(from + REPLAYED_PER_TICK);
+        for moment in (from..until).filter_map(|index| history.nth(index)) {
+            self.body.step(settings, moment.hip, moment.hip_velocity);
+        }
+        let next = history.nth(until).map(|moment| moment.stamp);
+        let newest = history.newest().map(|moment| moment.stamp);
+        self.progress = match (next, newest) {
+            (Some(next), _) => Progress::Behind(next),
+            (None, Some(newest)) => Progress::Live(newest),
+            (None, None) => Progress::Idle,
+        };
+        self.is_live().then_some(self.body.state.pose)
+    }
+}
