@@ -314,6 +314,10 @@ impl World {
     fn deliver_down(&mut self) {
         let mut newest: Option<Update> = None;
         while let Some(packet) = self.down.pop_due(self.now) {
+            // QUIC drops what does not authenticate
+            if packet.corrupted_bit.is_some() {
+                continue;
+            }
             let Packet { bytes, length } = packet.payload;
             let bytes = bytes.get(..length).unwrap_or_default();
             if let Some(FromSlave::Update(update)) = self.master_link.handle(packet.due, bytes) {
@@ -383,6 +387,9 @@ impl World {
 
     fn deliver_up(&mut self) {
         while let Some(packet) = self.up.pop_due(self.now) {
+            if packet.corrupted_bit.is_some() {
+                continue;
+            }
             let Packet { bytes, length } = packet.payload;
             let bytes = bytes.get(..length).unwrap_or_default();
             let arrived = self.slave_clock.at(packet.due);

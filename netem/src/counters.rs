@@ -1,6 +1,6 @@
 //! What became of packets: counts of packets and bytes, drops by cause.
 //!
-//! The law that holds at any moment: offered = delivered + the sum of the drops.
+//! The law that holds at any moment: offered + duplicated = delivered + the sum of the drops.
 
 use serde::Serialize;
 
@@ -37,6 +37,14 @@ impl Tally {
 pub struct Drops {
     /// [`DropCause::Loss`].
     pub loss: Tally,
+    /// [`DropCause::Outage`].
+    pub outage: Tally,
+    /// [`DropCause::Mtu`].
+    pub mtu: Tally,
+    /// [`DropCause::Queue`].
+    pub queue: Tally,
+    /// [`DropCause::Codel`].
+    pub codel: Tally,
     /// [`DropCause::Limit`].
     pub limit: Tally,
 }
@@ -44,16 +52,37 @@ pub struct Drops {
 impl Drops {
     /// Counts one packet of `bytes` bytes under its cause.
     pub fn count(&mut self, cause: DropCause, bytes: usize) {
+        let tally = match cause {
+            DropCause::Loss => &mut self.loss,
+            DropCause::Outage => &mut self.outage,
+            DropCause::Mtu => &mut self.mtu,
+            DropCause::Queue => &mut self.queue,
+            DropCause::Codel => &mut self.codel,
+            DropCause::Limit => &mut self.limit,
+        };
+        tally.count(bytes);
+    }
+
+    /// The count of one cause.
+    #[must_use]
+    pub fn of(&self, cause: DropCause) -> Tally {
         match cause {
-            DropCause::Loss => self.loss.count(bytes),
-            DropCause::Limit => self.limit.count(bytes),
+            DropCause::Loss => self.loss,
+            DropCause::Outage => self.outage,
+            DropCause::Mtu => self.mtu,
+            DropCause::Queue => self.queue,
+            DropCause::Codel => self.codel,
+            DropCause::Limit => self.limit,
         }
     }
 
     /// All causes together.
     #[must_use]
     pub fn total(&self) -> Tally {
-        self.loss.plus(self.limit)
+        let causes = DropCause::ALL.into_iter();
+        causes
+            .map(|cause| self.of(cause))
+            .fold(Tally::default(), Tally::plus)
     }
 }
 
@@ -62,8 +91,12 @@ impl Drops {
 pub struct LinkCounters {
     /// Packets offered to the link.
     pub offered: Tally,
-    /// Packets that the link delivers, now or later; a copy of a packet does not count again.
+    /// Copies that the link made of them.
+    pub duplicated: Tally,
+    /// Packets and copies that the link delivers, now or later.
     pub delivered: Tally,
-    /// Packets that the link dropped.
+    /// Those among them with a bit turned over.
+    pub corrupted: Tally,
+    /// Packets and copies that the link dropped.
     pub dropped: Drops,
 }

@@ -10,11 +10,15 @@ use mmt_shared::time::Time;
 use serde::Serialize;
 
 use crate::config::{ConfigError, LinkConfig, Order};
-use crate::link::LinkId;
+use crate::counters::Drops;
+use crate::link::{DropCause, Fate, LinkId};
 use crate::pipe::Pipe;
+use crate::record::summary::{mean_run, nearest_rank, runs};
 
 /// Packets sampled. The mean of a delay is then known to 0.4 % of its standard deviation.
 pub const PACKETS: u32 = 60_000;
+/// The length of the packets sampled, bytes: that of a small update. It matters where there is a rate.
+pub const BYTES: usize = 100;
 /// The rates that can be asked for, packets per second; others are taken to the nearest.
 pub const RATE_RANGE_HZ: (f64, f64) = (0.01, 1e6);
 
@@ -33,8 +37,13 @@ pub struct Effect {
     pub p99_ms: f64,
     /// How much of the mean is waiting for predecessors (`order fifo`), ms.
     pub waiting_ms: f64,
-    /// Share of packets lost on the way, 0 to 1: expected, not sampled.
+    /// Share of packets lost on the way, 0 to 1: what the settings say in the long run; sampled where
+    /// it depends on the number or the time of a packet.
     pub loss: f64,
+    /// Mean length of runs of lost packets, packets; 0 if none was lost.
+    pub burst_packets: f64,
+    /// Share of packets that the bottleneck dropped (queue full, `CoDel`), 0 to 1.
+    pub queue_drops: f64,
     /// Share of packets dropped because of the limit, 0 to 1, in a stream of [`PACKETS`] packets.
     pub over_limit: f64,
     /// Share of what arrives that arrives after a packet sent later (RFC 4737, section 3), 0 to 1.
@@ -52,21 +61,42 @@ pub fn effect(config: &LinkConfig, rate_hz: f64) -> Result<Effect, ConfigError> 
         order: Order::Free,
         ..config.clone()
     };
-    let free_mean_ms = match config.order {
-        Order::Fifo => mean(&Stream::through(&unordered, rate_hz)?.delays_ms),
-        Order::Free => mean(&stream.delays_ms),
-    };
     let mean_ms = mean(&stream.delays_ms);
+    let free_mean_ms = match config.order {
+        // a wait is only that of the order where nothing else waits
+        Order::Fifo if config.profile.is_empty() => {
+            mean(&Stream::through(&unordered, rate_hz)?.delays_ms)
+        }
+        Order::Fifo | Order::Free => mean_ms,
+    };
+    let of_all = |packets: u64| packets as f64 / f64::from(PACKETS);
+    let known = config.loss.share().filter(|_| {
+        config.outages.is_empty() && config.replay.is_none() && config.profile.is_empty()
+    });
+    let drops = &stream.drops;
+    let sampled = drops.loss.plus(drops.outage).plus(drops.mtu).packets;
     Ok(Effect {
         rate_hz,
         mean_ms,
         sd_ms: standard_deviation(&stream.delays_ms, mean_ms),
         p99_ms: p99(&stream.delays_ms),
         waiting_ms: (mean_ms - free_mean_ms).max(0.0),
-        loss: config.loss.probability().get(),
-        over_limit: stream.over_limit as f64 / f64::from(PACKETS),
+        loss: known.unwrap_or(of_all(sampled)),
+        burst_packets: mean_run(&runs(stream.lost.iter().copied())),
+        queue_drops: of_all(drops.queue.plus(drops.codel).packets),
+        over_limit: of_all(drops.limit.packets),
         reordered: stream.reordered as f64 / stream.delays_ms.len().max(1) as f64,
     })
+}
+
+impl LinkConfig {
+    /// What these settings do to packets sent at `packet_rate_hz`: the same as [`effect`].
+    ///
+    /// # Errors
+    /// A setting out of its range.
+    pub fn expected(&self, packet_rate_hz: f64) -> Result<Effect, ConfigError> {
+        effect(self, packet_rate_hz)
+    }
 }
 
 fn clamp_rate(rate_hz: f64) -> f64 {
@@ -84,7 +114,9 @@ struct Stream {
     /// Delays of what arrived, ms, in order of arrival.
     delays_ms: Vec<f64>,
     reordered: u64,
-    over_limit: u64,
+    drops: Drops,
+    /// Which packets were lost on the way, in order of sending.
+    lost: Vec<bool>,
 }
 
 impl Stream {
@@ -93,16 +125,20 @@ impl Stream {
         let mut stream = Self {
             delays_ms: Vec::with_capacity(PACKETS as usize),
             reordered: 0,
-            over_limit: 0,
+            drops: Drops::default(),
+            lost: Vec::with_capacity(PACKETS as usize),
         };
         let mut newest = 0;
         for packet in 0..PACKETS {
             let now = Time::ZERO + Duration::from_secs_f64(f64::from(packet) / rate_hz);
             stream.collect(&mut pipe, now, &mut newest);
-            pipe.push(now, 0, ());
+            let fate = pipe.push(now, BYTES, ());
+            let on_the_way = [DropCause::Loss, DropCause::Outage, DropCause::Mtu];
+            let lost = on_the_way.iter().any(|cause| fate == Fate::Drop(*cause));
+            stream.lost.push(lost);
         }
         stream.collect(&mut pipe, Time::MAX, &mut newest);
-        stream.over_limit = pipe.counters().dropped.limit.packets;
+        stream.drops = pipe.counters().dropped;
         Ok(stream)
     }
 
@@ -129,8 +165,7 @@ fn standard_deviation(values: &[f64], mean: f64) -> f64 {
 fn p99(values: &[f64]) -> f64 {
     let mut sorted = values.to_vec();
     sorted.sort_unstable_by(f64::total_cmp);
-    let rank = (values.len() * 99).div_ceil(100);
-    sorted.get(rank.saturating_sub(1)).copied().unwrap_or(0.0)
+    nearest_rank(&sorted, 0.99)
 }
 
 /// One line for a person.
@@ -138,19 +173,29 @@ impl fmt::Display for Effect {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(
             f,
-            "at {} packets/s: delay mean {:.2} ms, s.d. {:.2} ms, p99 {:.2} ms; loss {:.3} %; reordered {:.1} %",
+            "at {} packets/s: delay mean {:.2} ms, s.d. {:.2} ms, p99 {:.2} ms; loss {:.3} %",
             self.rate_hz,
             self.mean_ms,
             self.sd_ms,
             self.p99_ms,
             100.0 * self.loss,
-            100.0 * self.reordered
         )?;
+        if self.burst_packets > 0.0 {
+            write!(f, " in bursts of {:.2} packets", self.burst_packets)?;
+        }
+        write!(f, "; reordered {:.1} %", 100.0 * self.reordered)?;
         if self.waiting_ms >= 0.005 {
             write!(
                 f,
                 "; keeping order adds {:.2} ms to the mean",
                 self.waiting_ms
+            )?;
+        }
+        if self.queue_drops > 0.0 {
+            write!(
+                f,
+                "; {:.1} % dropped by the queue",
+                100.0 * self.queue_drops
             )?;
         }
         if self.over_limit > 0.0 {

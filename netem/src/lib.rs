@@ -7,12 +7,16 @@
 
 pub mod config;
 pub mod counters;
+pub mod distribution;
 pub mod effect;
 #[cfg(feature = "io")]
 pub mod io;
 pub mod link;
 pub mod pipe;
+pub mod presets;
 mod quantile;
+pub mod record;
+pub mod trace;
 pub mod words;
 
 pub use config::{Delay, LinkConfig, Loss, Order, Probability};

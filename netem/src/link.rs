@@ -1,30 +1,55 @@
 //! One direction of an emulated path, as a pure state machine.
 //!
 //! A packet is offered with the time of its arrival, and its fate is known at once: a drop with its
-//! cause, or the times at which it leaves. The order of the stages is that of a real path: loss, limit,
-//! propagation with jitter, order. The times are theoretical: whoever releases packets late must not
-//! feed its lateness back, so it does not add up.
+//! cause, or the times at which it leaves. The order of the stages is that of a real path: MTU, copy,
+//! loss, limit, corruption, bottleneck with its queue, propagation with jitter, order. The times are
+//! theoretical: whoever releases packets late must not feed its lateness back, so it does not add up.
 //!
 //! It must never sleep, read a clock, touch a socket or allocate.
 
-use mmt_shared::rng::Substream;
-use mmt_shared::time::Time;
-use serde::Serialize;
+use std::time::Duration;
 
-use crate::config::{ConfigError, LinkConfig, Loss, Order};
+use mmt_shared::time::Time;
+use serde::{Deserialize, Serialize};
+
+use crate::config::{ConfigError, LinkConfig};
 use crate::counters::LinkCounters;
 
-/// The most deliveries one packet can have: itself and one copy.
-pub const DELIVERIES_MAX: usize = 2;
+mod bottleneck;
+mod catch_up;
+mod codel;
+mod correlated;
+mod fate;
+mod losing;
+mod stages;
+mod streams;
+mod timeline;
+
+pub use fate::{DELIVERIES_MAX, Deliveries, Delivery, DropCause, Fate, turn_bit};
+
+use stages::{Passing, Stages};
+use streams::Streams;
+use timeline::Timeline;
 
 /// Which way packets go.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Direction {
     /// From master to slave.
     Up,
     /// From slave to master.
     Down,
+}
+
+impl Direction {
+    /// The direction as the words spell it.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Up => "up",
+            Self::Down => "down",
+        }
+    }
 }
 
 /// Which link this is among those of one seed: two links of one seed draw different numbers.
@@ -47,15 +72,6 @@ impl LinkId {
     pub const fn first(direction: Direction) -> Self {
         Self { path: 0, direction }
     }
-
-    /// The substream of one feature of this link.
-    fn substream(self, seed: u64, up: &'static str, down: &'static str) -> Substream {
-        let name = match self.direction {
-            Direction::Up => up,
-            Direction::Down => down,
-        };
-        Substream::new(seed, name, self.path)
-    }
 }
 
 /// What a link must know about a packet.
@@ -67,139 +83,44 @@ pub struct PacketMeta {
     pub in_flight: usize,
 }
 
-/// What becomes of a packet.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Fate {
-    /// It leaves, once or more.
-    Deliver(Deliveries),
-    /// It never leaves.
-    Drop(DropCause),
-}
-
-impl Fate {
-    /// The time at which the packet itself leaves, if it does.
-    #[must_use]
-    pub fn due(&self) -> Option<Time> {
-        match self {
-            Self::Deliver(deliveries) => Some(deliveries.itself().due),
-            Self::Drop(_) => None,
-        }
-    }
-}
-
-/// Why a link dropped a packet.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum DropCause {
-    /// Lost on the way by chance.
-    Loss,
-    /// As many packets in flight as the limit allows.
-    Limit,
-}
-
-impl DropCause {
-    /// The cause as reports spell it.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Loss => "loss",
-            Self::Limit => "limit",
-        }
-    }
-}
-
-/// One departure of a packet.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[non_exhaustive]
-pub struct Delivery {
-    /// The theoretical time of departure, on the clock of the offers.
-    pub due: Time,
-}
-
-/// The departures of one packet: at least one, at most [`DELIVERIES_MAX`], the packet itself first.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Deliveries {
-    itself: Delivery,
-    copies: [Option<Delivery>; DELIVERIES_MAX - 1],
-}
-
-impl Deliveries {
-    /// One departure, no copy.
-    #[must_use]
-    pub fn one(due: Time) -> Self {
-        Self {
-            itself: Delivery { due },
-            copies: [None; DELIVERIES_MAX - 1],
-        }
-    }
-
-    /// The departure of the packet itself.
-    #[must_use]
-    pub fn itself(&self) -> Delivery {
-        self.itself
-    }
-
-    /// The departures of its copies.
-    pub fn copies(&self) -> impl Iterator<Item = Delivery> + '_ {
-        self.copies.iter().copied().flatten()
-    }
-}
-
-/// The random substreams of a link, one for each feature.
-///
-/// Each packet takes one draw from every stream, whatever the settings and whatever its fate, so that
-/// the n-th packet meets the same numbers under all settings of one seed.
-#[derive(Clone, Debug)]
-struct Streams {
-    loss: Substream,
-    delay: Substream,
-}
-
-/// The draws of one packet, uniform in [0, 1).
-struct Draws {
-    loss: f64,
-    delay: f64,
-}
-
-impl Streams {
-    fn new(seed: u64, id: LinkId) -> Self {
-        Self {
-            loss: id.substream(seed, "netem/up/loss", "netem/down/loss"),
-            delay: id.substream(seed, "netem/up/delay", "netem/down/delay"),
-        }
-    }
-
-    fn draw(&mut self) -> Draws {
-        Draws {
-            loss: self.loss.uniform(),
-            delay: self.delay.uniform(),
-        }
-    }
-}
-
 /// One direction of an emulated path. A pure function of its settings, its seed and its offers.
 #[derive(Clone, Debug)]
 pub struct Link {
     config: LinkConfig,
+    timeline: Timeline,
     streams: Streams,
-    /// The latest departure promised so far.
-    latest_due: Time,
+    stages: Stages,
+    origin: Time,
+    offers: u64,
     counters: LinkCounters,
 }
 
 impl Link {
-    /// A link with these settings. The draws depend on `seed` and `id` alone.
+    /// A link with these settings. The draws depend on `seed` and `id` alone. Its time begins at
+    /// [`Time::ZERO`]; see [`Self::set_origin`].
     ///
     /// # Errors
     /// A setting out of its range.
     pub fn try_new(config: LinkConfig, seed: u64, id: LinkId) -> Result<Self, ConfigError> {
         config.check()?;
+        let timeline = Timeline::new(&config);
+        let mut stages = Stages::new(seed, id);
+        stages.prepare(timeline.settings());
         Ok(Self {
             config,
+            timeline,
             streams: Streams::new(seed, id),
-            latest_due: Time::ZERO,
+            stages,
+            origin: Time::ZERO,
+            offers: 0,
             counters: LinkCounters::default(),
         })
+    }
+
+    /// Says when the time of the link begins, before the first offer: profiles, outages, replays and all
+    /// that is correlated in time count from there.
+    pub fn set_origin(&mut self, origin: Time) {
+        self.origin = origin;
     }
 
     /// Decides what becomes of the packet that arrives at `now`.
@@ -209,30 +130,86 @@ impl Link {
     pub fn offer(&mut self, now: Time, meta: PacketMeta) -> Fate {
         self.counters.offered.count(meta.bytes);
         let draws = self.streams.draw();
-        if let Some(cause) = self.drop_cause(&draws, meta) {
-            self.counters.dropped.count(cause, meta.bytes);
-            return Fate::Drop(cause);
+        let elapsed = now.saturating_since(self.origin);
+        let config = self.timeline.at(elapsed, &self.config);
+        let passing = Passing {
+            number: self.offers,
+            elapsed,
+            bytes: meta.bytes,
+            in_flight: meta.in_flight,
+        };
+        self.offers = self.offers.saturating_add(1);
+        let (itself, copy) = self.stages.pass(config, passing, &draws);
+        self.settle(meta.bytes, itself, copy)
+    }
+
+    /// Counts the packet and its copy, and joins their fates.
+    fn settle(
+        &mut self,
+        bytes: usize,
+        itself: Result<Departure, DropCause>,
+        copy: Option<Result<Departure, DropCause>>,
+    ) -> Fate {
+        if copy.is_some() {
+            self.counters.duplicated.count(bytes);
         }
-        self.counters.delivered.count(meta.bytes);
-        Fate::Deliver(Deliveries::one(self.departure(now, &draws)))
+        for result in [Some(itself), copy].into_iter().flatten() {
+            match result {
+                Ok(departure) => {
+                    self.counters.delivered.count(bytes);
+                    if departure.corrupted_bit.is_some() {
+                        self.counters.corrupted.count(bytes);
+                    }
+                }
+                Err(cause) => self.counters.dropped.count(cause, bytes),
+            }
+        }
+        let delivery = |departure: Departure| Delivery {
+            due: self.origin + departure.after,
+            corrupted_bit: departure.corrupted_bit,
+        };
+        let copy = copy.and_then(Result::ok).map(delivery);
+        match (itself.map(delivery), copy) {
+            (Ok(itself), copy) => Fate::Deliver(Deliveries::of(itself, copy)),
+            // the copy stands in for the packet
+            (Err(_), Some(copy)) => Fate::Deliver(Deliveries::of(copy, None)),
+            (Err(cause), None) => Fate::Drop(cause),
+        }
     }
 
     /// Takes new settings for the packets offered from now on. Packets in flight keep their times, the
-    /// counters and the random streams go on, and under [`Order::Fifo`] no packet overtakes an earlier
-    /// one, not even one of the old settings.
+    /// counters and the random streams go on, and under [`crate::Order::Fifo`] no packet overtakes an
+    /// earlier one, not even one of the old settings. Time is still counted from the origin.
     ///
     /// # Errors
     /// A setting out of its range; the old settings stay.
     pub fn reconfigure(&mut self, config: LinkConfig) -> Result<(), ConfigError> {
         config.check()?;
+        self.timeline = Timeline::new(&config);
+        self.stages.prepare(self.timeline.settings());
         self.config = config;
         Ok(())
     }
 
-    /// The settings in force.
+    /// The settings, with all that they say about later.
     #[must_use]
     pub fn config(&self) -> &LinkConfig {
         &self.config
+    }
+
+    /// When the settings in force at `now` change next because of their profile; the fates of packets
+    /// need no call at that time, only who shows settings does.
+    #[must_use]
+    pub fn next_change(&self, now: Time) -> Option<Time> {
+        let elapsed = now.saturating_since(self.origin);
+        let next = self.timeline.next_change(elapsed)?;
+        Some(self.origin + next)
+    }
+
+    /// Packets before the bottleneck and being sent, as of the last offer.
+    #[must_use]
+    pub fn backlog(&self) -> usize {
+        self.stages.backlog()
     }
 
     /// What the link decided so far.
@@ -240,27 +217,13 @@ impl Link {
     pub fn counters(&self) -> LinkCounters {
         self.counters
     }
+}
 
-    fn drop_cause(&self, draws: &Draws, meta: PacketMeta) -> Option<DropCause> {
-        let lost = match self.config.loss {
-            Loss::None => false,
-            Loss::Independent { probability } => draws.loss < probability.get(),
-        };
-        if lost {
-            return Some(DropCause::Loss);
-        }
-        (meta.in_flight >= self.config.limit as usize).then_some(DropCause::Limit)
-    }
-
-    fn departure(&mut self, now: Time, draws: &Draws) -> Time {
-        let own = now + self.config.delay.quantile(draws.delay);
-        let latest = own.max(self.latest_due);
-        self.latest_due = latest;
-        match self.config.order {
-            Order::Fifo => latest,
-            Order::Free => own,
-        }
-    }
+/// When a packet leaves, counted from the origin.
+#[derive(Clone, Copy, Debug)]
+struct Departure {
+    after: Duration,
+    corrupted_bit: Option<u64>,
 }
 
 #[cfg(test)]

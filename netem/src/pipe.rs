@@ -2,7 +2,7 @@
 //!
 //! The *sim* driver is nothing but this, stepped in virtual time. Still pure: time is an argument.
 //!
-//! The law that holds at any moment: offered = dropped + in flight + released (without copies).
+//! The law that holds at any moment: offered + duplicated = dropped + in flight + released.
 
 use std::cmp::{Ordering, Reverse};
 use std::collections::BinaryHeap;
@@ -11,7 +11,7 @@ use mmt_shared::time::Time;
 
 use crate::config::{ConfigError, LinkConfig};
 use crate::counters::{LinkCounters, Tally};
-use crate::link::{Fate, Link, LinkId, PacketMeta};
+use crate::link::{Delivery, Fate, Link, LinkId, PacketMeta};
 
 /// One direction of a path in virtual time, as the lab drives it.
 pub type SimPath<T> = Pipe<T>;
@@ -39,6 +39,11 @@ pub struct Released<T> {
     pub number: u64,
     /// Its length, bytes.
     pub bytes: usize,
+    /// Whether it is a copy.
+    pub copy: bool,
+    /// The bit that was turned over on the way: whoever knows the bytes of the payload turns it
+    /// ([`crate::link::turn_bit`]), or treats the packet as its checksum would.
+    pub corrupted_bit: Option<u64>,
     /// What it carries.
     pub payload: T,
 }
@@ -68,18 +73,20 @@ impl<T: Clone> Pipe<T> {
         self.offers = self.offers.saturating_add(1);
         let fate = self.link.offer(now, meta);
         if let Fate::Deliver(deliveries) = &fate {
-            let released = |due, payload| Released {
-                due,
+            let released = |delivery: Delivery, copy, payload| Released {
+                due: delivery.due,
                 offered_at: now,
                 number,
                 bytes,
+                copy,
+                corrupted_bit: delivery.corrupted_bit,
                 payload,
             };
             for copy in deliveries.copies() {
-                let copy = released(copy.due, payload.clone());
+                let copy = released(copy, true, payload.clone());
                 self.in_flight.push(Reverse(InFlight(copy)));
             }
-            let itself = released(deliveries.itself().due, payload);
+            let itself = released(deliveries.itself(), false, payload);
             self.in_flight.push(Reverse(InFlight(itself)));
         }
         fate
@@ -115,6 +122,17 @@ impl<T> Pipe<T> {
         self.link.counters()
     }
 
+    /// Says when the time of the link begins, see [`Link::set_origin`].
+    pub fn set_origin(&mut self, origin: Time) {
+        self.link.set_origin(origin);
+    }
+
+    /// Packets before the bottleneck, see [`Link::backlog`].
+    #[must_use]
+    pub fn backlog(&self) -> usize {
+        self.link.backlog()
+    }
+
     /// Packets taken out so far.
     #[must_use]
     pub fn released(&self) -> Tally {
@@ -136,13 +154,13 @@ impl<T> Pipe<T> {
     }
 }
 
-/// A packet in the heap: ordered by departure, then by number of offer.
+/// A packet in the heap: ordered by departure, then by number of offer, a copy last.
 #[derive(Clone, Debug)]
 struct InFlight<T>(Released<T>);
 
 impl<T> InFlight<T> {
-    fn key(&self) -> (Time, u64) {
-        (self.0.due, self.0.number)
+    fn key(&self) -> (Time, u64, bool) {
+        (self.0.due, self.0.number, self.0.copy)
     }
 }
 

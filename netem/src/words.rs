@@ -1,33 +1,29 @@
-//! The words in which people write a link down: those of `tc netem`, and `order` beside them.
+//! The words in which people write a link down: those of `tc netem`, and some of our own beside them.
 //!
 //! The arithmetic behind the words is our own; `docs/netem.md` says where it differs from tc's. A word
-//! that tc knows and this crate does not is an error of its own, never ignored.
+//! that tc knows and this crate does not is an error of its own, never ignored. No file is read here:
+//! whoever may read files hands over a function that does.
 
 use std::iter::Peekable;
 use std::str::FromStr;
 use std::time::Duration;
 
 mod error;
+mod number;
 mod print;
+mod said;
+mod sentence;
 #[cfg(test)]
 mod tests;
 
 pub use error::{ParseError, Reason};
 
-use crate::config::{
-    DELAY_MAX, Delay, LIMIT_DEFAULT, LIMIT_MAX, LinkConfig, Loss, Order, Probability,
-};
+use crate::config::{LinkConfig, Profile, STEPS_MAX, Step};
+use number::time;
+use said::Said;
 
 /// What tc knows and this crate does not, by its first word.
-const NOT_YET: [(&str, &str); 8] = [
-    ("corrupt", "corruption"),
-    ("duplicate", "duplicates"),
-    (
-        "reorder",
-        "reordering by share (`order free` lets jitter reorder)",
-    ),
-    ("gap", "reordering by gap"),
-    ("rate", "a rate"),
+const NOT_YET: [(&str, &str); 3] = [
     ("slot", "slots"),
     ("ecn", "marking instead of dropping"),
     (
@@ -36,21 +32,27 @@ const NOT_YET: [(&str, &str); 8] = [
     ),
 ];
 
-const A_WORD: &str = "delay, loss, order, limit or none";
-const A_TIME: &str = "a time with its unit, such as 50ms (s, ms, us, ns)";
-const A_TIME_HAS_A_UNIT: &str =
-    "a unit after the number, such as 50ms: tc reads a bare number as us or as ns, by its version";
-const A_PERCENTAGE: &str = "a percentage, such as 1%";
+const A_WORD: &str = "delay, loss, outage, order, reorder, duplicate, corrupt, mtu, rate, queue, codel, \
+                      limit, trace, preset or none";
+
+/// Reads the text of a file by the name that the words give it, or says why not.
+pub type ReadFile<'a> = dyn FnMut(&str) -> Result<String, String> + 'a;
+
+/// Settings from words that may name files.
+///
+/// # Errors
+/// The first word that is wrong, or a file that is.
+pub fn parse<'r>(text: &str, read: &'r mut ReadFile<'r>) -> Result<LinkConfig, ParseError> {
+    Parser::new(text, read).link()
+}
 
 impl FromStr for LinkConfig {
     type Err = ParseError;
 
     fn from_str(text: &str) -> Result<Self, ParseError> {
-        let mut parser = Parser::new(text);
-        while let Some(word) = parser.next() {
-            parser.sentence(word)?;
-        }
-        parser.finish()
+        parse(text, &mut |_| {
+            Err("files can be named on the command line only".to_owned())
+        })
     }
 }
 
@@ -62,7 +64,7 @@ impl TryFrom<String> for LinkConfig {
     }
 }
 
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug)]
 struct Word<'a> {
     text: &'a str,
     column: usize,
@@ -91,26 +93,14 @@ impl Word<'_> {
     }
 }
 
-/// What has been said so far.
-struct Parser<'a> {
+struct Parser<'a, 'r> {
     words: Peekable<std::vec::IntoIter<Word<'a>>>,
     end: Word<'a>,
-    none: Option<Word<'a>>,
-    delay: Option<(Duration, Option<Duration>)>,
-    distribution: Option<(Word<'a>, Shape)>,
-    loss: Option<Loss>,
-    order: Option<Order>,
-    limit: Option<u32>,
+    read: &'r mut ReadFile<'r>,
 }
 
-#[derive(Clone, Copy)]
-enum Shape {
-    Uniform,
-    Normal,
-}
-
-impl<'a> Parser<'a> {
-    fn new(text: &'a str) -> Self {
+impl<'a, 'r> Parser<'a, 'r> {
+    fn new(text: &'a str, read: &'r mut ReadFile<'r>) -> Self {
         let end = Word {
             text: "",
             column: text.chars().count().saturating_add(1),
@@ -118,17 +108,8 @@ impl<'a> Parser<'a> {
         Self {
             words: split(text).into_iter().peekable(),
             end,
-            none: None,
-            delay: None,
-            distribution: None,
-            loss: None,
-            order: None,
-            limit: None,
+            read,
         }
-    }
-
-    fn next(&mut self) -> Option<Word<'a>> {
-        self.words.next()
     }
 
     /// The next word, or the end of the text as an empty one.
@@ -136,199 +117,99 @@ impl<'a> Parser<'a> {
         self.words.next().unwrap_or(self.end)
     }
 
-    fn sentence(&mut self, word: Word<'a>) -> Result<(), ParseError> {
-        if self.none.is_some() {
-            return Err(word.expected("nothing beside none"));
-        }
-        match word.text {
-            "none" if self.said_nothing() => self.none = Some(word),
-            "none" => return Err(word.expected("nothing beside none")),
-            "delay" | "latency" => {
-                let delay = self.delay_arguments()?;
-                once(&mut self.delay, delay, word)?;
-            }
-            "distribution" => {
-                let shape = self.shape()?;
-                once(&mut self.distribution, (word, shape), word)?;
-            }
-            "loss" | "drop" => {
-                let loss = self.loss_arguments()?;
-                once(&mut self.loss, loss, word)?;
-            }
-            "order" => {
-                let order = self.order_argument()?;
-                once(&mut self.order, order, word)?;
-            }
-            "limit" => {
-                let limit = limit(self.argument())?;
-                once(&mut self.limit, limit, word)?;
-            }
-            text => {
-                let known = NOT_YET.iter().find(|(name, _)| *name == text);
-                return Err(known.map_or_else(
-                    || word.expected(A_WORD),
-                    |(_, feature)| word.not_yet(feature),
-                ));
+    /// The next word if it is a number.
+    fn number(&mut self) -> Option<Word<'a>> {
+        self.words.next_if(|word| word.starts_a_number())
+    }
+
+    /// Whether the next word is this one; then it is taken.
+    fn takes(&mut self, text: &str) -> bool {
+        self.words.next_if(|word| word.text == text).is_some()
+    }
+
+    /// Everything: settings, and what changes later.
+    fn link(&mut self) -> Result<LinkConfig, ParseError> {
+        let mut config = self.settings()?;
+        let mut profile = Profile::default();
+        while let Some(semicolon) = self.words.next() {
+            let word = self.argument();
+            match word.text {
+                "at" if profile.repeat.is_none() && profile.steps.len() < STEPS_MAX => {
+                    self.step(&mut profile)?;
+                }
+                "loop" if profile.repeat.is_none() && !profile.is_empty() => {
+                    profile.repeat = Some(self.loop_time(&profile)?);
+                }
+                _ if profile.repeat.is_some() => {
+                    return Err(semicolon.expected("nothing after the loop"));
+                }
+                "loop" => return Err(word.expected("at TIME before a loop")),
+                _ => return Err(word.expected("at TIME and settings, or loop TIME")),
             }
         }
+        config.profile = profile;
+        Ok(config)
+    }
+
+    fn step(&mut self, profile: &mut Profile) -> Result<(), ParseError> {
+        let word = self.argument();
+        let at = time(word)?;
+        if profile
+            .steps
+            .last()
+            .is_some_and(|last| at < last.at + last.ramp)
+        {
+            return Err(word.expected("a time after the step before it and its ramp"));
+        }
+        let ramp = match self.takes("over") {
+            true => time(self.argument())?,
+            false => Duration::ZERO,
+        };
+        let settings = self.settings()?;
+        profile.steps.push(Step { at, ramp, settings });
         Ok(())
     }
 
-    fn said_nothing(&self) -> bool {
-        self.delay.is_none()
-            && self.distribution.is_none()
-            && self.loss.is_none()
-            && self.order.is_none()
-            && self.limit.is_none()
-    }
-
-    fn delay_arguments(&mut self) -> Result<(Duration, Option<Duration>), ParseError> {
-        let delay = time(self.argument())?;
-        let Some(word) = self.words.next_if(|word| word.starts_a_number()) else {
-            return Ok((delay, None));
-        };
-        let jitter = time(word)?;
-        match self.words.next_if(|word| word.starts_a_number()) {
-            Some(word) => Err(word.not_yet("correlated delay")),
-            None => Ok((delay, Some(jitter))),
-        }
-    }
-
-    fn shape(&mut self) -> Result<Shape, ParseError> {
+    fn loop_time(&mut self, profile: &Profile) -> Result<Duration, ParseError> {
         let word = self.argument();
-        match word.text {
-            "uniform" => Ok(Shape::Uniform),
-            "normal" => Ok(Shape::Normal),
-            "pareto" | "paretonormal" | "experimental" => {
-                Err(word.not_yet("this delay distribution"))
-            }
-            _ => Err(word.expected("uniform or normal")),
+        let repeat = time(word)?;
+        match profile.steps.last() {
+            Some(last) if repeat > last.at + last.ramp => Ok(repeat),
+            _ => Err(word.expected("a time after the last step and its ramp")),
         }
     }
 
-    fn loss_arguments(&mut self) -> Result<Loss, ParseError> {
-        let mut word = self.argument();
-        match word.text {
-            "random" => word = self.argument(),
-            "state" => return Err(word.not_yet("the four-state loss model")),
-            "gemodel" => return Err(word.not_yet("the Gilbert-Elliott loss model")),
-            _ => {}
+    /// The settings up to a semicolon or the end.
+    fn settings(&mut self) -> Result<LinkConfig, ParseError> {
+        let mut said = Said::default();
+        while let Some(word) = self.words.next_if(|word| word.text != ";") {
+            self.sentence(&mut said, word)?;
         }
-        let probability = percentage(word)?;
-        match self.words.next_if(|word| word.starts_a_number()) {
-            Some(word) => Err(word.not_yet("correlated loss")),
-            None => Ok(Loss::Independent { probability }),
-        }
-    }
-
-    fn order_argument(&mut self) -> Result<Order, ParseError> {
-        let word = self.argument();
-        match word.text {
-            "fifo" => Ok(Order::Fifo),
-            "free" => Ok(Order::Free),
-            _ => Err(word.expected("fifo or free")),
-        }
-    }
-
-    fn finish(self) -> Result<LinkConfig, ParseError> {
-        let delay = match (self.delay, self.distribution) {
-            (Some((mean, Some(jitter))), Some((_, Shape::Normal))) => Delay::Normal {
-                mean,
-                sigma: jitter,
-            },
-            (Some((mean, Some(jitter))), _) => Delay::Uniform {
-                mean,
-                half_width: jitter,
-            },
-            (_, Some((word, _))) => {
-                return Err(word.expected("delay with a jitter beside a distribution"));
-            }
-            (Some((delay, None)), None) => Delay::Constant { delay },
-            (None, None) => Delay::default(),
-        };
-        Ok(LinkConfig {
-            delay,
-            order: self.order.unwrap_or_default(),
-            loss: self.loss.unwrap_or_default(),
-            limit: self.limit.unwrap_or(LIMIT_DEFAULT),
-        })
+        said.finish()
     }
 }
 
+/// Words with their columns; a semicolon is a word of its own.
 fn split(text: &str) -> Vec<Word<'_>> {
     let mut column = 1;
     let mut words = Vec::new();
-    for piece in text.split(char::is_whitespace) {
-        if !piece.is_empty() {
+    for piece in text.split_inclusive(|c: char| c.is_whitespace() || c == ';') {
+        let ends_in_semicolon = piece.ends_with(';');
+        let plain = piece.trim_end_matches(|c: char| c.is_whitespace() || c == ';');
+        let length = plain.chars().count();
+        if !plain.is_empty() {
             words.push(Word {
-                text: piece,
+                text: plain,
                 column,
             });
         }
-        // the piece and the one white character that ends it
-        column += piece.chars().count() + 1;
+        if ends_in_semicolon {
+            words.push(Word {
+                text: ";",
+                column: column + length,
+            });
+        }
+        column += piece.chars().count();
     }
     words
-}
-
-fn once<T>(slot: &mut Option<T>, value: T, word: Word<'_>) -> Result<(), ParseError> {
-    match slot.replace(value) {
-        Some(_) => Err(word.wrong(Reason::Repeated)),
-        None => Ok(()),
-    }
-}
-
-/// Digits with at most one point: no sign, no exponent, no `inf`.
-fn decimal(text: &str) -> Option<f64> {
-    let plain = text.chars().all(|c| c.is_ascii_digit() || c == '.');
-    plain.then(|| text.parse().ok()).flatten()
-}
-
-fn time(word: Word<'_>) -> Result<Duration, ParseError> {
-    let unit_at = word
-        .text
-        .find(|c: char| c.is_alphabetic())
-        .unwrap_or(word.text.len());
-    let (number, unit) = word.text.split_at(unit_at);
-    let number = decimal(number).ok_or_else(|| word.expected(A_TIME))?;
-    let nanos_per_unit = match unit.to_ascii_lowercase().as_str() {
-        "s" | "sec" | "secs" => 1e9,
-        "ms" | "msec" | "msecs" => 1e6,
-        "us" | "usec" | "usecs" => 1e3,
-        "ns" | "nsec" | "nsecs" => 1.0,
-        "" if number == 0.0 => 1.0,
-        "" => return Err(word.expected(A_TIME_HAS_A_UNIT)),
-        _ => return Err(word.expected(A_TIME)),
-    };
-    // The cast saturates.
-    let time = Duration::from_nanos((number * nanos_per_unit + 0.5) as u64);
-    if time > DELAY_MAX {
-        let range = format!("{DELAY_MAX:?} at most");
-        return Err(word.wrong(Reason::OutOfRange { range }));
-    }
-    Ok(time)
-}
-
-fn percentage(word: Word<'_>) -> Result<Probability, ParseError> {
-    let number = word.text.strip_suffix('%').unwrap_or(word.text);
-    let percent = decimal(number).ok_or_else(|| word.expected(A_PERCENTAGE))?;
-    match Probability::from_percent(percent) {
-        Some(probability) if percent == 0.0 || probability > Probability::ZERO => Ok(probability),
-        _ => Err(word.wrong(Reason::OutOfRange {
-            range: "0%, or 0.0000001% to 100%".to_owned(),
-        })),
-    }
-}
-
-fn limit(word: Word<'_>) -> Result<u32, ParseError> {
-    let digits = !word.text.is_empty() && word.text.chars().all(|c| c.is_ascii_digit());
-    if !digits {
-        return Err(word.expected("a number of packets, such as 10000"));
-    }
-    match word.text.parse() {
-        Ok(limit) if (1..=LIMIT_MAX).contains(&limit) => Ok(limit),
-        _ => Err(word.wrong(Reason::OutOfRange {
-            range: format!("1 to {LIMIT_MAX} packets"),
-        })),
-    }
 }

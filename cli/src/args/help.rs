@@ -56,7 +56,11 @@ Examples:
   mmt netem --listen 127.0.0.1:0 --to localhost:4433 --up \"delay 80ms 10ms distribution normal\" --json
 
 Masters use the slave's pairing string with the relay's address in it.
-Words: delay TIME [JITTER [distribution normal]], loss PERCENT, order free, limit PACKETS, none.
+Words, those of tc netem and more: delay TIME [JITTER [PERCENT | tau TIME] [distribution SHAPE]],
+loss PERCENT, loss gemodel …, loss burst PERCENT TIME, outage TIME for TIME, reorder, duplicate, corrupt,
+mtu BYTES, rate RATE, queue LIMIT, codel, order free, limit PACKETS, trace FILE [up|down], preset NAME,
+none; \"; at TIME [over TIME] WORDS; loop TIME\" for what changes.
+Presets: lan, wifi, 4g, 5g, 5g-up, 5g-down, starlink, geo, transatlantic, paper.
 stdout: the address that the relay listens on, alone on the first line; at the end the counters.";
 
 /// Examples of `mmt replay`.

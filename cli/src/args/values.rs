@@ -88,7 +88,10 @@ pub(super) fn duration(text: &str) -> Result<Duration, String> {
 
 /// A link in netem's words; a caret line points at the wrong one.
 pub(super) fn netem(text: &str) -> Result<LinkConfig, String> {
-    text.parse().map_err(|error: mmt_netem::words::ParseError| {
+    let mut read = |name: &str| {
+        std::fs::read_to_string(name).map_err(|error| format!("cannot read it: {error}"))
+    };
+    mmt_netem::words::parse(text, &mut read).map_err(|error| {
         let pointer = error.pointer(text).replace('\n', "\n    ");
         format!("{error}\n\n    {pointer}\n\nwrite it as \"delay 50ms 5ms loss 1%\", or none")
     })

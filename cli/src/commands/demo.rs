@@ -6,7 +6,6 @@ use std::time::{Duration, Instant};
 use mmt_client::device::DeviceProfile;
 use mmt_client::io::{MasterOptions, OperatorChoice};
 use mmt_client::operator::scripted::ScriptedConfig;
-use mmt_netem::{Delay, LinkConfig};
 use mmt_server::io::SlaveOptions;
 use mmt_server::playout::PlayoutConfig;
 use mmt_server::slave::SlaveConfig;
@@ -76,21 +75,11 @@ fn slave_config(arguments: &DemoArguments) -> SlaveConfig {
     let mut config = SlaveConfig::of_mode(arguments.mode.into());
     config.seed = arguments.seed;
     config.playout =
-        PlayoutConfig::for_packing_and_jitter(SAMPLES_PER_COMMAND, jitter(&arguments.netem));
+        PlayoutConfig::for_packing_and_jitter(SAMPLES_PER_COMMAND, arguments.netem.jitter_span());
     if let Some(scheme) = arguments.scheme {
         config.trigger.scheme = scheme;
     }
     config
-}
-
-/// The jitter that the play-out has to take, peak to peak; of the normal distribution 99 % of it.
-fn jitter(netem: &LinkConfig) -> Duration {
-    let (_, jitter) = netem.delay.parts();
-    match netem.delay {
-        Delay::Constant { .. } => Duration::ZERO,
-        Delay::Uniform { .. } => jitter.saturating_mul(2),
-        Delay::Normal { .. } => jitter.saturating_mul(5),
-    }
 }
 
 fn caption(arguments: &DemoArguments, config: &SlaveConfig) -> Caption {
@@ -142,7 +131,10 @@ mod tests {
 
     #[test]
     fn the_play_out_waits_for_packing_and_the_whole_jitter() {
-        let peak_to_peak = |text: &str| jitter(&text.parse().unwrap());
+        let peak_to_peak = |text: &str| {
+            let link: mmt_netem::LinkConfig = text.parse().unwrap();
+            link.jitter_span()
+        };
         assert_eq!(peak_to_peak("delay 50ms"), Duration::ZERO);
         assert_eq!(peak_to_peak("delay 50ms 5ms"), Duration::from_millis(10));
         let normal = peak_to_peak("delay 50ms 4ms distribution normal");

@@ -178,6 +178,8 @@ impl Ended {
             ("netem_abandoned", socket.abandoned.packets),
             ("netem_limit", socket.limit.packets),
             ("netem_loss", socket.loss.packets),
+            ("netem_mtu", socket.mtu.packets),
+            ("netem_queue", socket.queue.packets),
             ("samples_off_grid", u64::from(link.samples_refused())),
             ("samples_ring_full", self.haptic.samples_dropped),
             ("samples_unsent", link.pending() as u64),

@@ -7,13 +7,10 @@ use mmt_shared::time::{Time, duration_nanos};
 use serde::Serialize;
 
 use super::lock;
+pub use crate::record::summary::{MAX_DEGRADED_US, P99_DEGRADED_US};
 
 /// The longest lateness told apart from a longer one, 10 s.
 const MAX_NANOS: u64 = 10_000_000_000;
-/// Beyond this p99 the emulation is degraded.
-pub const P99_DEGRADED_US: f64 = 250.0;
-/// Beyond this maximum the emulation is degraded: one tick of the loops.
-pub const MAX_DEGRADED_US: f64 = 1000.0;
 
 /// Release lateness in microseconds: from the theoretical departure to the moment of sending.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]

@@ -13,7 +13,7 @@ use std::time::Duration;
 
 use serde::Serialize;
 
-use super::alarm::Alarm;
+use super::alarm::{Alarm, now};
 use super::lateness::{Lateness, Recorder};
 use super::lock;
 use crate::config::{ConfigError, LinkConfig};
@@ -97,7 +97,7 @@ pub struct RelaySnapshot {
 
 /// One direction of the relay. Bytes are UDP payload.
 ///
-/// `offered = dropped by the link + in_flight + forwarded + blocked + failed + orphaned`.
+/// `offered + duplicated = dropped by the link + in_flight + forwarded + blocked + failed + orphaned`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct DirectionCounters {
     /// What the link decided.
@@ -131,10 +131,13 @@ impl Relay {
         down: LinkConfig,
         seed: u64,
     ) -> Result<RelayHandle, RelayError> {
-        let (up, down) = (
+        let (mut up, mut down) = (
             Pipe::try_new(up, seed, LinkId::UP)?,
             Pipe::try_new(down, seed, LinkId::DOWN)?,
         );
+        let origin = now();
+        up.set_origin(origin);
+        down.set_origin(origin);
         if to.port() == 0 || to.ip().is_unspecified() {
             return Err(RelayError::Target { to });
         }

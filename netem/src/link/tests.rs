@@ -3,7 +3,14 @@
 use std::time::Duration;
 
 use super::*;
-use crate::config::{Delay, Probability};
+use crate::config::{Delay, Loss, Order, Probability};
+
+mod bottleneck;
+mod jitter;
+mod losses;
+mod order;
+mod over_time;
+mod same_network;
 
 const N: u64 = 100_000;
 const MS: Duration = Duration::from_millis(1);

@@ -32,6 +32,12 @@ pub enum Reason {
     /// The word was given before.
     #[error("given twice; once is enough")]
     Repeated,
+    /// A file that the words name is of no use.
+    #[error("{reason}")]
+    File {
+        /// Why.
+        reason: String,
+    },
     /// tc knows this, this emulator does not yet.
     #[error("{feature}: tc knows this, this emulator does not support it yet")]
     NotSupportedYet {

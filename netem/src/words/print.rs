@@ -3,7 +3,12 @@
 use std::fmt;
 use std::time::Duration;
 
-use crate::config::{Delay, LIMIT_DEFAULT, LinkConfig, Loss, Order, Probability};
+use crate::config::{
+    Chance, Codel, Correlation, Delay, LIMIT_DEFAULT, LinkConfig, Loss, Order, Outage, Probability,
+    Profile, Queue, Rate, Service,
+};
+use crate::distribution::Cdf;
+use crate::trace::path::Replay;
 
 impl From<LinkConfig> for String {
     fn from(config: LinkConfig) -> Self {
@@ -13,34 +18,204 @@ impl From<LinkConfig> for String {
 
 impl fmt::Display for LinkConfig {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let mut sentences = Vec::new();
-        if self.delay != Delay::default() {
-            sentences.push(self.delay.to_string());
-        }
-        if let Loss::Independent { probability } = self.loss {
-            sentences.push(format!("loss {probability}"));
-        }
-        if self.order == Order::Free {
-            sentences.push("order free".to_owned());
-        }
-        if self.limit != LIMIT_DEFAULT {
-            sentences.push(format!("limit {}", self.limit));
-        }
+        let sentences: Vec<String> = self.sentences().into_iter().flatten().collect();
         match sentences.is_empty() {
-            true => f.write_str("none"),
-            false => f.write_str(&sentences.join(" ")),
+            true => f.write_str("none")?,
+            false => f.write_str(&sentences.join(" "))?,
+        }
+        self.profile.fmt(f)
+    }
+}
+
+impl LinkConfig {
+    fn sentences(&self) -> Vec<Option<String>> {
+        let chance = |name, chance: Chance| {
+            (chance != Chance::default()).then(|| format!("{name} {}", Said(chance)))
+        };
+        let gap = |gap| match gap {
+            1 => String::new(),
+            gap => format!(" gap {gap}"),
+        };
+        let mut sentences = vec![
+            (self.delay != Delay::default()).then(|| delay(&self.delay, self.correlation)),
+            loss(&self.loss),
+            self.replay.as_ref().map(replay),
+        ];
+        sentences.extend(self.outages.iter().map(|outage| Some(outage_words(outage))));
+        sentences.extend([
+            (self.order == Order::Free).then(|| "order free".to_owned()),
+            self.reorder
+                .map(|reorder| format!("reorder {}{}", Said(reorder.chance), gap(reorder.gap))),
+            chance("duplicate", self.duplicate),
+            chance("corrupt", self.corrupt),
+            self.mtu.map(|mtu| format!("mtu {mtu}")),
+            self.rate.as_ref().map(rate),
+            queue(&self.queue),
+            self.queue.codel.map(codel),
+            (self.limit != LIMIT_DEFAULT).then(|| format!("limit {}", self.limit)),
+        ]);
+        sentences
+    }
+}
+
+impl fmt::Display for Profile {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for step in &self.steps {
+            write!(f, "; at {}", Exact(step.at))?;
+            if !step.ramp.is_zero() {
+                write!(f, " over {}", Exact(step.ramp))?;
+            }
+            write!(f, " {}", step.settings)?;
+        }
+        match self.repeat {
+            Some(repeat) => write!(f, "; loop {}", Exact(repeat)),
+            None => Ok(()),
         }
     }
 }
 
-impl fmt::Display for Delay {
+fn delay(delay: &Delay, correlation: Correlation) -> String {
+    if let Delay::Empirical(cdf) = delay {
+        return format!("delay cdf {}{}", points(cdf), correlated(correlation));
+    }
+    let (mean, jitter) = delay.parts();
+    let mean = Exact(mean);
+    let shape = match delay {
+        Delay::Constant { .. } => return format!("delay {mean}"),
+        Delay::Uniform { .. } | Delay::Empirical(_) => String::new(),
+        Delay::Normal { .. } => " distribution normal".to_owned(),
+        Delay::Pareto { .. } => " distribution pareto".to_owned(),
+        Delay::ParetoNormal { .. } => " distribution paretonormal".to_owned(),
+        Delay::LogNormal { .. } => " distribution lognormal".to_owned(),
+        Delay::Table { table, .. } => format!(" distribution table {}", table.name()),
+    };
+    let correlated = correlated(correlation);
+    format!("delay {mean} {}{correlated}{shape}", Exact(jitter))
+}
+
+fn correlated(correlation: Correlation) -> String {
+    match correlation {
+        Correlation::None => String::new(),
+        Correlation::PerPacket(rho) => format!(" {rho}"),
+        Correlation::InTime(tau) => format!(" tau {}", Exact(tau)),
+    }
+}
+
+fn points(cdf: &Cdf) -> String {
+    if let Some(name) = cdf.name() {
+        return name.to_owned();
+    }
+    let point = |(delay, share): (u64, f64)| {
+        let share = Probability::from_percent(100.0 * share).unwrap_or_default();
+        format!("{}@{share}", Exact(Duration::from_nanos(delay)))
+    };
+    cdf.points().map(point).collect::<Vec<_>>().join(",")
+}
+
+fn loss(loss: &Loss) -> Option<String> {
+    Some(match loss {
+        Loss::None => return None,
+        Loss::Independent { probability } => format!("loss {probability}"),
+        Loss::Correlated {
+            probability,
+            correlation,
+        } => format!("loss {probability} {correlation}"),
+        Loss::Gemodel(c) => format!(
+            "loss gemodel {} {} {} {}",
+            c.to_bad, c.to_good, c.loss_in_bad, c.loss_in_good
+        ),
+        Loss::FourState(c) => format!(
+            "loss state {} {} {} {} {}",
+            c.p13, c.p31, c.p32, c.p23, c.p14
+        ),
+        Loss::Bursts(b) => format!(
+            "loss burst {} {} {} {}",
+            b.share,
+            Exact(b.mean),
+            b.loss_inside,
+            b.loss_between
+        ),
+        Loss::Every(n) => format!("loss every {n}"),
+        Loss::Listed(list) => {
+            let range = |(first, last): &(u64, u64)| match first == last {
+                true => first.to_string(),
+                false => format!("{first}-{last}"),
+            };
+            let ranges: Vec<String> = list.ranges().iter().map(range).collect();
+            format!("loss list {}", ranges.join(","))
+        }
+    })
+}
+
+fn replay(replay: &Replay) -> String {
+    let direction = replay.direction.map(|direction| direction.name());
+    match direction {
+        Some(direction) => format!("trace {} {direction}", replay.name),
+        None => format!("trace {}", replay.name),
+    }
+}
+
+fn outage_words(outage: &Outage) -> String {
+    let (at, length) = (Exact(outage.at), Exact(outage.length));
+    match outage.every {
+        Some(every) => format!("outage {at} for {length} every {}", Exact(every)),
+        None => format!("outage {at} for {length}"),
+    }
+}
+
+fn rate(rate: &Rate) -> String {
+    let service = match &rate.service {
+        Service::Constant { bits_per_second } => bits(*bits_per_second),
+        Service::Opportunities(trace) => format!("trace {}", trace.name()),
+    };
+    let framing = &rate.framing;
+    match (framing.overhead, framing.cell, framing.cell_overhead) {
+        (0, 0, 0) => format!("rate {service}"),
+        (overhead, 0, 0) => format!("rate {service} {overhead}"),
+        (overhead, cell, cell_overhead) => {
+            format!("rate {service} {overhead} {cell} {cell_overhead}")
+        }
+    }
+}
+
+/// A rate as a whole number of the largest unit that holds it exactly.
+fn bits(rate: u64) -> String {
+    let units = [
+        (1_000_000_000, "gbit"),
+        (1_000_000, "mbit"),
+        (1_000, "kbit"),
+    ];
+    let whole = units.iter().find(|(size, _)| rate.is_multiple_of(*size));
+    let (size, unit) = whole.copied().unwrap_or((1, "bit"));
+    format!("{}{unit}", rate / size)
+}
+
+fn queue(queue: &Queue) -> Option<String> {
+    let limits = [
+        queue.bytes.map(|bytes| format!("{bytes}b")),
+        queue.packets.map(|packets| format!("{packets}p")),
+        queue.wait.map(|wait| Exact(wait).to_string()),
+    ];
+    let limits: Vec<String> = limits.into_iter().flatten().collect();
+    (!limits.is_empty()).then(|| format!("queue {}", limits.join(" ")))
+}
+
+fn codel(codel: Codel) -> String {
+    match codel == Codel::default() {
+        true => "codel".to_owned(),
+        false => format!("codel {} {}", Exact(codel.target), Exact(codel.interval)),
+    }
+}
+
+/// A chance in words: its share, and its correlation if it has one.
+struct Said(Chance);
+
+impl fmt::Display for Said {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (mean, jitter) = self.parts();
-        write!(f, "delay {}", Exact(mean))?;
-        match self {
-            Self::Constant { .. } => Ok(()),
-            Self::Uniform { .. } => write!(f, " {}", Exact(jitter)),
-            Self::Normal { .. } => write!(f, " {} distribution normal", Exact(jitter)),
+        write!(f, "{}", self.0.probability)?;
+        match self.0.correlation == Probability::ZERO {
+            true => Ok(()),
+            false => write!(f, " {}", self.0.correlation),
         }
     }
 }

@@ -2,8 +2,15 @@
 
 use proptest::prelude::*;
 
+use std::sync::Arc;
+
 use super::*;
-use crate::config::ConfigError;
+use crate::config::{
+    Chance, Codel, ConfigError, Correlation, Delay, Framing, GilbertElliott, LIMIT_DEFAULT,
+    LIMIT_MAX, Loss, Order, Outage, PacketList, Probability, Queue, RATE_MAX_BIT_S, Rate, Reorder,
+    Service, TimedBursts,
+};
+use crate::distribution::Cdf;
 
 const MS: Duration = Duration::from_millis(1);
 
@@ -72,16 +79,7 @@ fn a_bare_number_is_refused_because_tc_itself_reads_it_in_two_ways() {
 #[test]
 fn what_tc_knows_and_we_do_not_is_named_and_never_ignored() {
     for (text, word) in [
-        ("delay 50ms 5ms 25%", "25%"),
-        ("loss 1% 25%", "25%"),
-        ("loss gemodel 1% 10%", "gemodel"),
-        ("loss state 1%", "state"),
-        ("delay 50ms 5ms distribution pareto", "pareto"),
-        ("delay 50ms rate 1mbit", "rate"),
-        ("duplicate 1%", "duplicate"),
-        ("corrupt 1%", "corrupt"),
-        ("delay 10ms reorder 25% 50%", "reorder"),
-        ("delay 10ms gap 5", "gap"),
+        ("delay 50ms 5ms distribution experimental", "experimental"),
         ("slot 1ms", "slot"),
         ("loss 1% ecn", "ecn"),
         ("seed 3", "seed"),
@@ -128,6 +126,31 @@ fn an_error_tells_the_word_its_column_and_what_was_expected() {
         ("none delay 5ms", 6, "delay", "nothing beside none"),
         ("delay 5ms none", 11, "none", "nothing beside none"),
         ("délai 5ms", 1, "délai", "delay, loss"),
+        ("delay 5ms; till 3s", 12, "till", "at TIME"),
+        (
+            "delay 5ms ; at 3s none; at 2s none",
+            28,
+            "2s",
+            "after the step",
+        ),
+        ("delay 5ms; loop 3s", 12, "loop", "before a loop"),
+        ("reorder 5%", 1, "reorder", "a delay beside it"),
+        ("delay 5ms gap 5", 11, "gap", "reorder beside a gap"),
+        ("queue 5ms", 1, "queue", "a rate beside it"),
+        ("rate 0", 6, "0", "1bit to 1tbit"),
+        ("rate 5furlong", 6, "5furlong", "a rate, such as"),
+        ("rate 1mbit queue 5q", 18, "5q", "a time with its unit"),
+        ("loss burst 1% 10us", 15, "10us", "1ms to 3600s"),
+        ("loss state 60% 60% 60%", 6, "state", "100% together"),
+        ("loss list 5-3", 11, "5-3", "3,17,100-120"),
+        ("outage 5s 1s", 11, "1s", "for and how long"),
+        (
+            "delay cdf 5ms@0%,4ms@100%",
+            11,
+            "5ms@0%,4ms@100%",
+            "must not fall",
+        ),
+        ("trace lan.json", 7, "lan.json", "on the command line only"),
         ("delay 5ms é", 11, "é", "delay, loss"),
     ] {
         let error = refused(text);
@@ -158,6 +181,20 @@ fn settings_print_in_the_words_they_are_written_in() {
         "delay 50ms",
         "delay 50ms 5ms",
         "delay 50ms 2500us distribution normal loss 0.25% order free limit 500",
+        "delay 50ms 5ms 25% distribution pareto",
+        "delay 50ms 5ms tau 100ms distribution paretonormal",
+        "delay cdf 40ms@0%,50ms@90%,200ms@100% tau 1s",
+        "delay 10ms reorder 25% 50% gap 5",
+        "loss 1% 25%",
+        "loss gemodel 1% 10% 70% 0.1%",
+        "loss state 1% 90% 5% 30% 0.5%",
+        "loss burst 2% 40ms 100% 0%",
+        "loss every 100",
+        "loss list 3,17,100-120 outage 10s for 500ms outage 20s for 1s every 60s",
+        "duplicate 1% 10% corrupt 0.1% mtu 1200",
+        "rate 1mbit 28 queue 64000b 100p 50ms codel limit 20",
+        "rate 64kbit -14 48 5 codel 20ms 200ms",
+        "delay 20ms; at 10s over 5s delay 80ms loss 2%; at 20s none; loop 30s",
         "loss 100%",
     ] {
         assert_eq!(parsed(text).to_string(), text);
@@ -184,24 +221,198 @@ fn any_time() -> impl Strategy<Value = Duration> {
     ]
 }
 
-fn any_config() -> impl Strategy<Value = LinkConfig> {
-    let delay = prop_oneof![
-        any_time().prop_map(|delay| Delay::Constant { delay }),
-        (any_time(), any_time()).prop_map(|(mean, half_width)| Delay::Uniform { mean, half_width }),
-        (any_time(), any_time()).prop_map(|(mean, sigma)| Delay::Normal { mean, sigma }),
-    ];
-    let loss = prop_oneof![
+fn any_share() -> impl Strategy<Value = Probability> {
+    prop_oneof![Just(0), Just(1_000_000_000), 0..=1_000_000_000_u32]
+        .prop_map(|parts| Probability::from_parts_per_billion(parts).unwrap())
+}
+
+fn any_chance() -> impl Strategy<Value = Chance> {
+    (any_share(), any_share()).prop_map(|(probability, correlation)| Chance {
+        probability,
+        correlation,
+    })
+}
+
+fn any_delay() -> impl Strategy<Value = Delay> {
+    (0..7, any_time(), any_time()).prop_map(|(kind, mean, jitter)| match kind {
+        0 => Delay::Constant { delay: mean },
+        1 => Delay::Uniform {
+            mean,
+            half_width: jitter,
+        },
+        2 => Delay::Normal {
+            mean,
+            sigma: jitter,
+        },
+        3 => Delay::Pareto {
+            mean,
+            scale: jitter,
+        },
+        4 => Delay::ParetoNormal {
+            mean,
+            scale: jitter,
+        },
+        5 => Delay::LogNormal {
+            mean,
+            sigma: jitter,
+        },
+        _ => {
+            let ns = |time: Duration| time.as_nanos() as u64;
+            let points = [(ns(mean.min(jitter)), 0.0), (ns(mean.max(jitter)), 1.0)];
+            Delay::Empirical(Arc::new(Cdf::try_new(None, &points).unwrap()))
+        }
+    })
+}
+
+fn any_correlation(delay: &Delay) -> BoxedStrategy<Correlation> {
+    let none = Just(Correlation::None);
+    let in_time = (1..3_600_000_u64).prop_map(|ms| Correlation::InTime(MS * ms as u32));
+    let per_packet = any_share().prop_map(Correlation::PerPacket);
+    match delay {
+        Delay::Constant { .. } => none.boxed(),
+        Delay::Empirical(_) => prop_oneof![none, in_time].boxed(),
+        _ => prop_oneof![none, in_time, per_packet].boxed(),
+    }
+}
+
+fn any_loss() -> impl Strategy<Value = Loss> {
+    let independent = any_share().prop_map(|probability| Loss::Independent { probability });
+    let correlated = (any_share(), 1..=1_000_000_000_u32).prop_map(|(probability, rho)| {
+        let correlation = Probability::from_parts_per_billion(rho).unwrap();
+        Loss::Correlated {
+            probability,
+            correlation,
+        }
+    });
+    let four = [any_share(), any_share(), any_share(), any_share()];
+    let gemodel = four.prop_map(|[to_bad, to_good, loss_in_bad, loss_in_good]| {
+        Loss::Gemodel(GilbertElliott {
+            to_bad,
+            to_good,
+            loss_in_bad,
+            loss_in_good,
+        })
+    });
+    let bursts = (any_share(), 1..3_600_000_u32, any_share(), any_share());
+    let bursts = bursts.prop_map(|(share, ms, loss_inside, loss_between)| {
+        Loss::Bursts(TimedBursts {
+            share,
+            mean: MS * ms,
+            loss_inside,
+            loss_between,
+        })
+    });
+    let every = (1..=u64::MAX).prop_map(Loss::Every);
+    let ranges = prop::collection::vec((0..1000_u64, 0..1000_u64), 1..5);
+    let listed = ranges.prop_map(|ranges| {
+        let ranges = ranges.into_iter().map(|(a, b)| (a.min(b), a.max(b)));
+        Loss::Listed(Arc::new(PacketList::new(ranges.collect())))
+    });
+    prop_oneof![
         Just(Loss::None),
-        (0..=1_000_000_000_u32)
-            .prop_filter_map("range", Probability::from_parts_per_billion)
-            .prop_map(|probability| Loss::Independent { probability }),
-    ];
+        independent,
+        correlated,
+        gemodel,
+        bursts,
+        every,
+        listed
+    ]
+}
+
+fn any_rate() -> impl Strategy<Value = (Option<Rate>, Queue)> {
+    let framing = (-100..100_i32, 0..100_u32, 0..9_i32);
+    let limits = (
+        prop::option::of(1..1_u64 << 40),
+        prop::option::of(1..=u32::MAX),
+        prop::option::of(any_time()),
+    );
+    let codel = prop::option::of((1..1000_u32, 1..1000_u32));
+    let rate = (1..=RATE_MAX_BIT_S, framing, limits, codel).prop_map(
+        |(bits_per_second, (overhead, cell, cell_overhead), limits, codel)| {
+            let rate = Rate {
+                service: Service::Constant { bits_per_second },
+                framing: Framing {
+                    overhead,
+                    cell,
+                    cell_overhead,
+                },
+            };
+            let queue = Queue {
+                bytes: limits.0,
+                packets: limits.1,
+                wait: limits.2,
+                codel: codel.map(|(target, interval)| Codel {
+                    target: MS * target,
+                    interval: MS * interval,
+                }),
+            };
+            (Some(rate), queue)
+        },
+    );
+    prop_oneof![Just((None, Queue::default())), rate]
+}
+
+/// Settings without a profile.
+fn any_settings() -> impl Strategy<Value = LinkConfig> {
     let order = prop_oneof![Just(Order::Fifo), Just(Order::Free)];
-    (delay, loss, order, 1..=LIMIT_MAX).prop_map(|(delay, loss, order, limit)| LinkConfig {
-        delay,
-        order,
-        loss,
-        limit,
+    let delay = any_delay().prop_flat_map(|delay| {
+        let correlation = any_correlation(&delay);
+        (Just(delay), correlation)
+    });
+    let reorder = prop::option::of((any_chance(), 1..1_000_000_u32));
+    let outage = (any_time(), 0..1000_u32, prop::option::of(1000..2000_u32));
+    let outages = prop::collection::vec(
+        outage.prop_map(|(at, length, every)| Outage {
+            at,
+            length: MS * length,
+            every: every.map(|every| MS * every),
+        }),
+        0..3,
+    );
+    let mtu = prop::option::of(1..=u32::MAX);
+    let first = (delay, order, reorder, any_loss(), outages);
+    let second = (any_chance(), any_chance(), mtu, any_rate(), 1..=LIMIT_MAX);
+    (first, second).prop_map(|(first, second)| {
+        let ((delay, correlation), order, reorder, loss, outages) = first;
+        let (duplicate, corrupt, mtu, (rate, queue), limit) = second;
+        let movable = delay != Delay::default();
+        LinkConfig {
+            reorder: reorder
+                .filter(|_| movable)
+                .map(|(chance, gap)| Reorder { chance, gap }),
+            correlation: if movable {
+                correlation
+            } else {
+                Correlation::None
+            },
+            delay,
+            order,
+            loss,
+            outages,
+            duplicate,
+            corrupt,
+            mtu,
+            rate,
+            queue,
+            limit,
+            ..LinkConfig::default()
+        }
+    })
+}
+
+fn any_config() -> impl Strategy<Value = LinkConfig> {
+    let step = (1..1000_u32, 0..1000_u32, any_settings());
+    let steps = prop::collection::vec(step, 0..3);
+    (any_settings(), steps, any::<bool>()).prop_map(|(config, steps, repeats)| {
+        let mut profile = Profile::default();
+        let mut free_from = Duration::ZERO;
+        for (after, ramp, settings) in steps {
+            let (at, ramp) = (free_from + MS * after, MS * ramp);
+            free_from = at + ramp;
+            profile.steps.push(Step { at, ramp, settings });
+        }
+        profile.repeat = (repeats && !profile.is_empty()).then(|| free_from + MS);
+        LinkConfig { profile, ..config }
     })
 }
 
@@ -221,8 +432,25 @@ fn nearly_words() -> impl Strategy<Value = String> {
             "normal",
             "uniform",
             "gemodel",
+            "state",
+            "burst",
+            "every",
+            "list",
+            "tau",
+            "cdf",
             "rate",
+            "queue",
+            "codel",
             "reorder",
+            "gap",
+            "duplicate",
+            "outage",
+            "for",
+            "preset",
+            "trace",
+            "; at",
+            "over",
+            "; loop",
             "%",
             "ms",
             "é",

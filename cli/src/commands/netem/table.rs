@@ -11,10 +11,18 @@ use super::NetemReport;
 type Count = fn(&DirectionCounters) -> Tally;
 
 /// The rows; those below the first two are left out while they are zero.
-const ROWS: [(&str, Count); 7] = [
+const ROWS: [(&str, Count); 13] = [
     ("offered", |direction| direction.link.offered),
     ("forwarded", |direction| direction.forwarded),
     ("lost on the link", |direction| direction.link.dropped.loss),
+    ("lost in an outage", |direction| {
+        direction.link.dropped.outage
+    }),
+    ("too large", |direction| direction.link.dropped.mtu),
+    ("queue full", |direction| direction.link.dropped.queue),
+    ("dropped by CoDel", |direction| direction.link.dropped.codel),
+    ("copies made", |direction| direction.link.duplicated),
+    ("corrupted", |direction| direction.link.corrupted),
     ("over the limit", |direction| direction.link.dropped.limit),
     ("socket full", |direction| direction.blocked),
     ("socket error", |direction| direction.failed),

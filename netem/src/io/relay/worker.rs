@@ -14,6 +14,7 @@ use crate::counters::Tally;
 use crate::io::alarm::{now, sharpen_deadlines, wait};
 use crate::io::lateness::Lateness;
 use crate::io::lock;
+use crate::link::turn_bit;
 use crate::pipe::{Pipe, Released};
 
 /// Batches taken from one socket before the times are looked at again.
@@ -70,6 +71,13 @@ impl Lane {
             failed: self.sent.failed,
             orphaned: self.sent.orphaned,
         }
+    }
+}
+
+/// Turns the bit over that the link says.
+fn harm(packet: &mut Released<Parcel>) {
+    if let Some(bit) = packet.corrupted_bit {
+        turn_bit(&mut packet.payload.contents, bit);
     }
 }
 
@@ -221,12 +229,14 @@ impl Worker {
     }
 
     fn release_due(&mut self) {
-        while let Some(packet) = self.up.pipe.pop_due(now()) {
+        while let Some(mut packet) = self.up.pipe.pop_due(now()) {
+            harm(&mut packet);
             self.shared.lateness.record(packet.due, now());
             let sent = self.send_up(&packet);
             self.up.sent.count(sent, packet.bytes);
         }
-        while let Some(packet) = self.down.pipe.pop_due(now()) {
+        while let Some(mut packet) = self.down.pipe.pop_due(now()) {
+            harm(&mut packet);
             self.shared.lateness.record(packet.due, now());
             let sent = self.send_down(&packet);
             self.down.sent.count(sent, packet.bytes);

@@ -14,13 +14,15 @@ use crate::link::DropCause;
 
 /// A snapshot of the counters of a socket. Bytes are UDP payload, without UDP and IP headers.
 ///
-/// `offered = sent + dropped + in flight`, for datagrams and for bytes.
+/// `offered + duplicated = sent + dropped + in flight`, for datagrams and for bytes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct SocketCounters {
     /// Datagrams that the program gave to the socket.
     pub offered_datagrams: u64,
     /// Bytes that the program gave to the socket.
     pub offered_bytes: u64,
+    /// Second copies that the emulated link lets through.
+    pub duplicated: Tally,
     /// Datagrams handed to the real socket, which took them: what a capture on the wire shows.
     pub sent_datagrams: u64,
     /// Bytes handed to the real socket, which took them.
@@ -38,6 +40,7 @@ impl SocketCounters {
     #[must_use]
     pub fn in_flight(&self) -> u64 {
         self.offered_datagrams
+            .saturating_add(self.duplicated.packets)
             .saturating_sub(self.sent_datagrams)
             .saturating_sub(self.dropped.total().packets)
     }
@@ -46,8 +49,12 @@ impl SocketCounters {
 /// Datagrams that were offered and never sent, by cause.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct SocketDrops {
-    /// Lost on the emulated link ([`DropCause::Loss`]).
+    /// Lost on the emulated link ([`DropCause::Loss`], [`DropCause::Outage`]).
     pub loss: Tally,
+    /// Larger than the MTU of the emulated link ([`DropCause::Mtu`]).
+    pub mtu: Tally,
+    /// Dropped by the emulated bottleneck ([`DropCause::Queue`], [`DropCause::Codel`]).
+    pub queue: Tally,
     /// More in flight than the emulated link holds ([`DropCause::Limit`]).
     pub limit: Tally,
     /// The real socket stayed full for longer than 10 ms.
@@ -64,6 +71,8 @@ impl SocketDrops {
     pub fn total(&self) -> Tally {
         [
             self.loss,
+            self.mtu,
+            self.queue,
             self.limit,
             self.blocked,
             self.failed,
@@ -83,7 +92,10 @@ struct Counts {
     offered: Counter,
     sent: Counter,
     received: Counter,
+    duplicated: Counter,
     loss: Counter,
+    mtu: Counter,
+    queue: Counter,
     limit: Counter,
     blocked: Counter,
     failed: Counter,
@@ -105,7 +117,10 @@ impl SocketMeter {
             offered: Counter::default(),
             sent: Counter::default(),
             received: Counter::default(),
+            duplicated: Counter::default(),
             loss: Counter::default(),
+            mtu: Counter::default(),
+            queue: Counter::default(),
             limit: Counter::default(),
             blocked: Counter::default(),
             failed: Counter::default(),
@@ -122,15 +137,18 @@ impl SocketMeter {
         let (sent, received) = (self.0.sent.read(), self.0.received.read());
         let dropped = SocketDrops {
             loss: self.0.loss.read(),
+            mtu: self.0.mtu.read(),
+            queue: self.0.queue.read(),
             limit: self.0.limit.read(),
             blocked: self.0.blocked.read(),
             failed: self.0.failed.read(),
             abandoned: self.0.abandoned.read(),
         };
-        let offered = self.0.offered.read();
+        let (offered, duplicated) = (self.0.offered.read(), self.0.duplicated.read());
         SocketCounters {
             offered_datagrams: offered.packets,
             offered_bytes: offered.bytes,
+            duplicated,
             sent_datagrams: sent.packets,
             sent_bytes: sent.bytes,
             received_datagrams: received.packets,
@@ -153,13 +171,19 @@ impl SocketMeter {
         self.0.offered.count(bytes);
     }
 
+    pub(super) fn duplicated(&self, bytes: usize) {
+        self.0.duplicated.count(bytes);
+    }
+
     pub(super) fn sent(&self, bytes: usize) {
         self.0.sent.count(bytes);
     }
 
     pub(super) fn dropped(&self, cause: DropCause, bytes: usize) {
         match cause {
-            DropCause::Loss => self.0.loss.count(bytes),
+            DropCause::Loss | DropCause::Outage => self.0.loss.count(bytes),
+            DropCause::Mtu => self.0.mtu.count(bytes),
+            DropCause::Queue | DropCause::Codel => self.0.queue.count(bytes),
             DropCause::Limit => self.0.limit.count(bytes),
         }
     }

@@ -15,7 +15,7 @@ use super::{Datagram, WrapError};
 use crate::config::LinkConfig;
 use crate::io::alarm::{Alarm, now, sharpen_deadlines};
 use crate::io::lock;
-use crate::link::{Fate, LinkId};
+use crate::link::{Fate, LinkId, turn_bit};
 use crate::pipe::{Pipe, Released};
 
 /// How long the thread waits for a full socket before it drops the datagram: long against the time in
@@ -47,9 +47,11 @@ impl Release {
         id: LinkId,
         meter: &SocketMeter,
     ) -> Result<Self, WrapError> {
+        let mut pipe = Pipe::try_new(config, seed, id)?;
+        pipe.set_origin(now());
         let shared = Arc::new(Shared {
             queue: Mutex::new(Queue {
-                pipe: Pipe::try_new(config, seed, id)?,
+                pipe,
                 closed: false,
             }),
             alarm: Arc::new(Alarm::try_new()?),
@@ -80,8 +82,13 @@ impl Release {
         let fate = queue.pipe.push(now(), bytes, datagram);
         let sooner = queue.pipe.next_due() != next;
         drop(queue);
-        if let Fate::Drop(cause) = fate {
-            self.shared.meter.dropped(cause, bytes);
+        match fate {
+            Fate::Drop(cause) => self.shared.meter.dropped(cause, bytes),
+            Fate::Deliver(deliveries) => {
+                for _ in deliveries.copies() {
+                    self.shared.meter.duplicated(bytes);
+                }
+            }
         }
         if sooner {
             self.shared.alarm.ring();
@@ -120,7 +127,7 @@ impl Sender {
         sharpen_deadlines();
         loop {
             match self.step() {
-                Step::Send(packet) => self.release(&packet),
+                Step::Send(packet) => self.release(packet),
                 // Only a program error makes the wait fail; to end beats to spin.
                 Step::Wait(until) if self.shared.alarm.wait(until).is_ok() => {}
                 Step::Wait(_) | Step::End => break self.abandon(),
@@ -139,8 +146,11 @@ impl Sender {
         }
     }
 
-    fn release(&mut self, packet: &Released<Datagram>) {
+    fn release(&mut self, mut packet: Released<Datagram>) {
         let meter = self.shared.meter.clone();
+        if let Some(bit) = packet.corrupted_bit {
+            turn_bit(&mut packet.payload.contents, bit);
+        }
         meter.recorder().record(packet.due, now());
         match self.send(&packet.payload) {
             Ok(()) => meter.sent(packet.bytes),

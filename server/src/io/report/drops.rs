@@ -39,6 +39,14 @@ pub(super) fn drops(shared: &Shared, outcome: &Outcome, traffic: &Traffic) -> Co
             netem.limit.packets.saturating_sub(before.limit.packets),
         ),
         (
+            "netem_mtu",
+            netem.mtu.packets.saturating_sub(before.mtu.packets),
+        ),
+        (
+            "netem_queue",
+            netem.queue.packets.saturating_sub(before.queue.packets),
+        ),
+        (
             "socket_blocked",
             netem.blocked.packets.saturating_sub(before.blocked.packets),
         ),

@@ -1,0 +1,109 @@
+//! Settings that change as time goes by.
+
+use std::time::Duration;
+
+use super::delay::between;
+use super::{Delay, LinkConfig, Loss, Probability, Service};
+
+/// The most steps of a profile, and the most outages of a link.
+pub const STEPS_MAX: usize = 1000;
+/// The equal parts in which a ramp is walked.
+const RAMP_PARTS: u32 = 32;
+
+/// What changes as time goes by, counted from the start of the link.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Profile {
+    /// The changes in ascending order of time, at most [`STEPS_MAX`].
+    pub steps: Vec<Step>,
+    /// After how long it begins again; none: the last step stays.
+    pub repeat: Option<Duration>,
+}
+
+/// From a time on the link has these settings, all of them: what a step does not say is not there.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Step {
+    /// When.
+    pub at: Duration,
+    /// How long the way there takes from `at` on: delay, jitter, independent loss and constant rate go
+    /// evenly, in 32 parts; everything else changes at its end. Zero: at once.
+    pub ramp: Duration,
+    /// The settings, without a profile of their own.
+    pub settings: LinkConfig,
+}
+
+impl Profile {
+    /// Whether nothing ever changes.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.steps.is_empty()
+    }
+
+    /// Every stretch of constant settings with its beginning, from `base` at zero on.
+    #[must_use]
+    pub(crate) fn stretches(&self, base: &LinkConfig) -> Vec<(Duration, LinkConfig)> {
+        let base = LinkConfig {
+            profile: Self::default(),
+            ..base.clone()
+        };
+        let mut stretches = vec![(Duration::ZERO, base.clone())];
+        let mut from = base;
+        for step in &self.steps {
+            if !step.ramp.is_zero() {
+                for part in 0..RAMP_PARTS {
+                    // the middle of each part, so that the mean over the ramp is right
+                    let share = (f64::from(part) + 0.5) / f64::from(RAMP_PARTS);
+                    let begins = step.at.saturating_add(step.ramp * part / RAMP_PARTS);
+                    stretches.push((begins, on_the_way(&from, &step.settings, share)));
+                }
+            }
+            let arrived = step.at.saturating_add(step.ramp);
+            stretches.push((arrived, step.settings.clone()));
+            from = step.settings.clone();
+        }
+        stretches
+    }
+}
+
+/// `share` of the way from one set of settings to another.
+fn on_the_way(from: &LinkConfig, to: &LinkConfig, share: f64) -> LinkConfig {
+    let mut now = from.clone();
+    now.delay = delay_on_the_way(&from.delay, &to.delay, share);
+    if let (Some(a), Some(b)) = (plain(&from.loss), plain(&to.loss)) {
+        let percent = 100.0 * (a + (b - a) * share);
+        let probability = Probability::from_percent(percent).unwrap_or_default();
+        now.loss = Loss::Independent { probability };
+    }
+    let target = to.rate.as_ref().map(|rate| &rate.service);
+    if let (Some(rate), Some(Service::Constant { bits_per_second: b })) = (&mut now.rate, target)
+        && let Service::Constant { bits_per_second: a } = &mut rate.service
+    {
+        *a = (*a as f64 + (*b as f64 - *a as f64) * share) as u64;
+    }
+    now
+}
+
+/// The loss of a kind that can be walked evenly.
+fn plain(loss: &Loss) -> Option<f64> {
+    match loss {
+        Loss::None => Some(0.0),
+        Loss::Independent { probability } => Some(probability.get()),
+        _ => None,
+    }
+}
+
+fn delay_on_the_way(from: &Delay, to: &Delay, share: f64) -> Delay {
+    let ((mean_a, jitter_a), (mean_b, jitter_b)) = (from.parts(), to.parts());
+    let (mean, jitter) = (
+        between(mean_a, mean_b, share),
+        between(jitter_a, jitter_b, share),
+    );
+    // a constant delay is any distribution without jitter
+    let kind = match (from, to) {
+        (Delay::Constant { .. }, _) => to,
+        (_, Delay::Constant { .. }) => from,
+        (a, b) if std::mem::discriminant(a) == std::mem::discriminant(b) => from,
+        _ => return from.clone(),
+    };
+    kind.with_parts(mean, jitter)
+        .unwrap_or_else(|| from.clone())
+}

@@ -1,0 +1,161 @@
+//! Every setting of a link against its range.
+
+use std::time::Duration;
+
+use super::{DELAY_MAX, LIMIT_MAX, LinkConfig, Loss, RATE_MAX_BIT_S, STEPS_MAX, Service};
+
+/// A setting of a link out of its range.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum ConfigError {
+    /// The delay is longer than [`DELAY_MAX`].
+    #[error("link delay is {delay:?}; it can be {DELAY_MAX:?} at most")]
+    DelayTooLong {
+        /// The delay given.
+        delay: Duration,
+    },
+    /// The jitter is longer than [`DELAY_MAX`].
+    #[error("link jitter is {jitter:?}; it can be {DELAY_MAX:?} at most")]
+    JitterTooLong {
+        /// The jitter given.
+        jitter: Duration,
+    },
+    /// The limit is zero or above [`LIMIT_MAX`].
+    #[error("link limit is {limit} packets in flight; it must be between 1 and {LIMIT_MAX}")]
+    LimitOutOfRange {
+        /// The limit given, packets.
+        limit: u32,
+    },
+    /// The rate is zero or above [`RATE_MAX_BIT_S`].
+    #[error("link rate is {bits_per_second} bit/s; it must be between 1 and {RATE_MAX_BIT_S}")]
+    RateOutOfRange {
+        /// The rate given.
+        bits_per_second: u64,
+    },
+    /// Another setting is out of its range.
+    #[error("{what} of a link must be {range}")]
+    OutOfRange {
+        /// The setting.
+        what: &'static str,
+        /// Its range.
+        range: &'static str,
+    },
+}
+
+impl LinkConfig {
+    /// Checks every setting against its range.
+    ///
+    /// # Errors
+    /// The first setting out of its range, with the range.
+    pub fn check(&self) -> Result<(), ConfigError> {
+        self.check_delay()?;
+        if !(1..=LIMIT_MAX).contains(&self.limit) {
+            return Err(ConfigError::LimitOutOfRange { limit: self.limit });
+        }
+        self.check_loss()?;
+        self.check_bottleneck()?;
+        self.check_profile()
+    }
+
+    fn check_delay(&self) -> Result<(), ConfigError> {
+        let (delay, jitter) = self.delay.parts();
+        if delay > DELAY_MAX {
+            return Err(ConfigError::DelayTooLong { delay });
+        }
+        if jitter > DELAY_MAX {
+            return Err(ConfigError::JitterTooLong { jitter });
+        }
+        holds(
+            self.correlation.in_range(),
+            "the time constant of jitter",
+            "1 ms to 1 h",
+        )?;
+        let gap = self.reorder.is_none_or(|reorder| reorder.gap > 0);
+        holds(gap, "the gap of reordering", "at least 1 packet")
+    }
+
+    fn check_loss(&self) -> Result<(), ConfigError> {
+        let (fits, what, range) = match &self.loss {
+            Loss::FourState(chain) => (
+                chain.is_chain(),
+                "the ways out of a loss state",
+                "100 % together at most",
+            ),
+            Loss::Bursts(bursts) => (
+                (super::BURST_MIN..=DELAY_MAX).contains(&bursts.mean),
+                "the mean burst of loss",
+                "1 ms to 1 h",
+            ),
+            Loss::Every(n) => (*n > 0, "the n of `loss every`", "at least 1"),
+            _ => {
+                return holds(
+                    self.outages.len() <= STEPS_MAX,
+                    "the outages",
+                    "1000 at most",
+                );
+            }
+        };
+        holds(fits, what, range)?;
+        holds(
+            self.outages.len() <= STEPS_MAX,
+            "the outages",
+            "1000 at most",
+        )
+    }
+
+    fn check_bottleneck(&self) -> Result<(), ConfigError> {
+        holds(self.mtu != Some(0), "the MTU", "at least 1 byte")?;
+        if let Some(codel) = self.queue.codel {
+            let fits = !codel.target.is_zero() && !codel.interval.is_zero();
+            holds(fits, "target and interval of CoDel", "above zero")?;
+        }
+        match self.rate.as_ref().map(|rate| &rate.service) {
+            Some(Service::Constant { bits_per_second })
+                if !(1..=RATE_MAX_BIT_S).contains(bits_per_second) =>
+            {
+                Err(ConfigError::RateOutOfRange {
+                    bits_per_second: *bits_per_second,
+                })
+            }
+            _ => Ok(()),
+        }
+    }
+
+    fn check_profile(&self) -> Result<(), ConfigError> {
+        let profile = &self.profile;
+        holds(
+            profile.steps.len() <= STEPS_MAX,
+            "the steps of a profile",
+            "1000 at most",
+        )?;
+        let mut free_from = Duration::ZERO;
+        for step in &profile.steps {
+            holds(
+                step.at >= free_from,
+                "the steps of a profile",
+                "in order, each after the ramp before it",
+            )?;
+            holds(
+                step.settings.profile.is_empty(),
+                "a step of a profile",
+                "without steps of its own",
+            )?;
+            step.settings.check()?;
+            free_from = step.at.saturating_add(step.ramp);
+        }
+        let long_enough = profile
+            .repeat
+            .is_none_or(|repeat| repeat > free_from && !profile.is_empty());
+        holds(
+            long_enough,
+            "the loop of a profile",
+            "longer than its steps",
+        )
+    }
+}
+
+fn holds(fits: bool, what: &'static str, range: &'static str) -> Result<(), ConfigError> {
+    match fits {
+        true => Ok(()),
+        false => Err(ConfigError::OutOfRange { what, range }),
+    }
+}

@@ -1,0 +1,81 @@
+//! The random substreams of a link, one for each feature, and the draws of one packet.
+
+use mmt_shared::rng::Substream;
+
+use super::{Direction, LinkId};
+
+/// The random substreams of a link.
+///
+/// Each packet takes one draw from every stream, whatever the settings and whatever its fate, so that
+/// the n-th packet meets the same numbers under all settings of one seed.
+#[derive(Clone, Debug)]
+pub(super) struct Streams {
+    loss: Substream,
+    delay: Substream,
+    state: Substream,
+    duplicate: Substream,
+    corrupt: Substream,
+    corrupted_bit: Substream,
+    reorder: Substream,
+    copy: Substream,
+}
+
+/// The draws of one packet, uniform in [0, 1).
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Draws {
+    /// Whether the packet is lost.
+    pub(super) loss: f64,
+    /// How long it takes.
+    pub(super) delay: f64,
+    /// Where the chain of a loss model goes.
+    pub(super) state: f64,
+    /// Whether there is a copy.
+    pub(super) duplicate: f64,
+    /// Whether a bit is turned over, and which.
+    pub(super) corrupt: f64,
+    pub(super) corrupted_bit: f64,
+    /// Whether it overtakes.
+    pub(super) reorder: f64,
+    /// Loss and delay of the copy.
+    pub(super) copy_loss: f64,
+    pub(super) copy_delay: f64,
+}
+
+impl Streams {
+    pub(super) fn new(seed: u64, id: LinkId) -> Self {
+        let stream = |up, down| substream(id, seed, up, down);
+        Self {
+            loss: stream("netem/up/loss", "netem/down/loss"),
+            delay: stream("netem/up/delay", "netem/down/delay"),
+            state: stream("netem/up/state", "netem/down/state"),
+            duplicate: stream("netem/up/duplicate", "netem/down/duplicate"),
+            corrupt: stream("netem/up/corrupt", "netem/down/corrupt"),
+            corrupted_bit: stream("netem/up/bit", "netem/down/bit"),
+            reorder: stream("netem/up/reorder", "netem/down/reorder"),
+            copy: stream("netem/up/copy", "netem/down/copy"),
+        }
+    }
+
+    pub(super) fn draw(&mut self) -> Draws {
+        Draws {
+            loss: self.loss.uniform(),
+            delay: self.delay.uniform(),
+            state: self.state.uniform(),
+            duplicate: self.duplicate.uniform(),
+            corrupt: self.corrupt.uniform(),
+            corrupted_bit: self.corrupted_bit.uniform(),
+            reorder: self.reorder.uniform(),
+            copy_loss: self.copy.uniform(),
+            copy_delay: self.copy.uniform(),
+        }
+    }
+}
+
+/// The substream of one feature of a link, by its names in the two directions.
+pub(super) fn substream(id: LinkId, seed: u64, up: &'static str, down: &'static str) -> Substream {
+    let name = match id.direction {
+        Direction::Up => up,
+        Direction::Down => down,
+    };
+    Substream::new(seed, name, id.path)
+}

@@ -1,0 +1,167 @@
+//! The record as CSV: comment lines with the heading, names of columns, a line for each packet.
+
+use std::fmt::Write;
+use std::time::Duration;
+
+use mmt_shared::time::Time;
+
+use super::{End, Entry, Heading};
+use crate::link::Direction;
+use crate::trace::TraceError;
+use crate::trace::path::{PathTrace, Sample};
+
+/// How every record and every recorded path in text begins.
+pub const OPENING: &str = "# mmt netem ";
+const RECORD: &str = "# mmt netem record 1";
+const PATH: &str = "# mmt netem path 1";
+const COLUMNS: &str = "direction,number,offered_ns,due_ns,sent_ns,bytes,backlog,fate,reason";
+const PATH_COLUMNS: &str = "at_ns,delay_ns";
+
+/// The lines before the first packet.
+#[must_use]
+pub fn heading(heading: &Heading) -> String {
+    format!(
+        "{RECORD}\n# seed {}\n# up {}\n# down {}\n{COLUMNS}\n",
+        heading.seed, heading.up, heading.down
+    )
+}
+
+/// Adds the line of a packet to `text`.
+pub fn push(text: &mut String, entry: &Entry) {
+    let (fate, reason) = entry.end.words();
+    let times = match entry.end {
+        End::Sent { due, sent, .. } => format!("{},{}", due.as_nanos(), sent.as_nanos()),
+        End::Dropped(_) | End::Unsent => ",".to_owned(),
+    };
+    // writing to a string does not fail
+    let _ = writeln!(
+        text,
+        "{},{},{},{times},{},{},{fate},{reason}",
+        entry.direction.name(),
+        entry.number,
+        entry.offered.as_nanos(),
+        entry.bytes,
+        entry.backlog,
+    );
+}
+
+/// Reads a record.
+///
+/// # Errors
+/// Line and reason.
+pub fn read(text: &str) -> Result<(Heading, Vec<Entry>), TraceError> {
+    let mut heading = Heading::default();
+    let mut entries = Vec::new();
+    let mut opened = false;
+    for (at, line) in text.lines().enumerate() {
+        let wrong = |what| TraceError::at(at + 1, what);
+        if at == 0 {
+            opened = line == RECORD;
+        } else if let Some(comment) = line.strip_prefix("# ") {
+            let (name, rest) = comment.split_once(' ').unwrap_or((comment, ""));
+            match name {
+                "seed" => {
+                    heading.seed = rest.parse().map_err(|_| wrong("the seed is no number"))?;
+                }
+                "up" => rest.clone_into(&mut heading.up),
+                "down" => rest.clone_into(&mut heading.down),
+                _ => {}
+            }
+        } else if !line.is_empty() && line != COLUMNS {
+            entries.push(entry(line).map_err(wrong)?);
+        }
+        if !opened {
+            return Err(wrong("a record of mmt begins with: # mmt netem record 1"));
+        }
+    }
+    match opened {
+        true => Ok((heading, entries)),
+        false => Err(TraceError::at(1, "the file is empty")),
+    }
+}
+
+fn entry(line: &str) -> Result<Entry, &'static str> {
+    let fields: Vec<&str> = line.split(',').collect();
+    let [
+        direction,
+        number,
+        offered,
+        due,
+        sent,
+        bytes,
+        backlog,
+        fate,
+        reason,
+    ] = fields.as_slice()
+    else {
+        return Err("expected nine fields");
+    };
+    let direction = match *direction {
+        "up" => Direction::Up,
+        "down" => Direction::Down,
+        _ => return Err("the direction is up or down"),
+    };
+    let time = |text: &str| text.parse().ok().map(Time::from_nanos);
+    let end = End::from_words(fate, reason, time(due), time(sent));
+    Ok(Entry {
+        direction,
+        number: number.parse().map_err(|_| "the number is none")?,
+        offered: time(offered).ok_or("offered_ns is no number")?,
+        bytes: bytes.parse().map_err(|_| "bytes is no number")?,
+        backlog: backlog.parse().map_err(|_| "backlog is no number")?,
+        end: end.ok_or("fate, reason and times do not go together")?,
+    })
+}
+
+/// The path that a record or a recorded path holds, one direction of it: what every packet met.
+pub(crate) fn path(text: &str, direction: Direction) -> Result<Vec<Sample>, TraceError> {
+    if text.lines().next() == Some(PATH) {
+        return recorded_path(text);
+    }
+    let (_, entries) = read(text)?;
+    let mine = entries.iter().filter(|entry| entry.direction == direction);
+    let originals = mine.filter(|entry| !matches!(entry.end, End::Sent { copy: true, .. }));
+    let sample = |entry: &Entry| Sample {
+        at: entry.offered.saturating_since(Time::ZERO),
+        delay: match entry.end {
+            End::Sent { sent, .. } => Some(sent.saturating_since(entry.offered)),
+            End::Dropped(_) | End::Unsent => None,
+        },
+    };
+    Ok(originals.map(sample).collect())
+}
+
+/// A path as text, for whoever measured one: reads back as a trace.
+#[must_use]
+pub fn path_text(path: &PathTrace) -> String {
+    let mut text = format!("{PATH}\n{PATH_COLUMNS}\n");
+    for sample in path.samples() {
+        let delay = sample.delay.map(|delay| delay.as_nanos().to_string());
+        // writing to a string does not fail
+        let _ = writeln!(
+            text,
+            "{},{}",
+            sample.at.as_nanos(),
+            delay.unwrap_or_default()
+        );
+    }
+    text
+}
+
+fn recorded_path(text: &str) -> Result<Vec<Sample>, TraceError> {
+    let mut samples = Vec::new();
+    for (line, content) in crate::trace::meaningful_lines(text) {
+        if content == PATH_COLUMNS {
+            continue;
+        }
+        let wrong = || TraceError::at(line, "expected at_ns,delay_ns, or at_ns, for a loss");
+        let (at, delay) = content.split_once(',').ok_or_else(wrong)?;
+        let delay = match delay {
+            "" => None,
+            delay => Some(Duration::from_nanos(delay.parse().map_err(|_| wrong())?)),
+        };
+        let at = Duration::from_nanos(at.parse().map_err(|_| wrong())?);
+        samples.push(Sample { at, delay });
+    }
+    Ok(samples)
+}

@@ -1,0 +1,197 @@
+//! Records of both forms read back to themselves, and their summary tells what happened.
+
+use proptest::prelude::*;
+
+use super::summary::Summary;
+use super::*;
+use crate::pipe::Pipe;
+use crate::{Fate, LinkId, effect};
+
+fn heading() -> Heading {
+    Heading {
+        seed: 7,
+        up: "delay 50ms 5ms loss 1%".to_owned(),
+        down: "none".to_owned(),
+    }
+}
+
+fn as_csv(entries: &[Entry]) -> String {
+    let mut text = csv::heading(&heading());
+    entries.iter().for_each(|entry| csv::push(&mut text, entry));
+    text
+}
+
+fn as_binary(entries: &[Entry]) -> Vec<u8> {
+    let (mut writer, mut bytes) = (binary::Writer::default(), Vec::new());
+    writer.heading(&mut bytes, &heading());
+    for entry in entries {
+        writer.push(&mut bytes, entry);
+    }
+    bytes
+}
+
+fn any_entry() -> impl Strategy<Value = Entry> {
+    let time = any::<u64>().prop_map(Time::from_nanos);
+    let sent = (time.clone(), time.clone(), any::<bool>(), any::<bool>());
+    let end = prop_oneof![
+        sent.prop_map(|(due, sent, copy, corrupted)| End::Sent {
+            due,
+            sent,
+            copy,
+            corrupted
+        }),
+        prop::sample::select(DropCause::ALL.to_vec()).prop_map(End::Dropped),
+        Just(End::Unsent),
+    ];
+    let direction = prop_oneof![Just(Direction::Up), Just(Direction::Down)];
+    let numbers = (any::<u64>(), any::<u32>(), any::<u32>());
+    (direction, time, numbers, end).prop_map(|(direction, offered, numbers, end)| Entry {
+        direction,
+        offered,
+        number: numbers.0,
+        bytes: numbers.1,
+        backlog: numbers.2,
+        end,
+    })
+}
+
+proptest! {
+    #[test]
+    fn both_forms_read_back(entries in prop::collection::vec(any_entry(), 0..20)) {
+        let expected = (heading(), entries);
+        prop_assert_eq!(read(as_csv(&expected.1).as_bytes()), Ok(expected.clone()));
+        prop_assert_eq!(read(&as_binary(&expected.1)), Ok(expected));
+    }
+
+    #[test]
+    fn a_record_cut_off_or_broken_is_told_and_never_panics(
+        entries in prop::collection::vec(any_entry(), 1..5),
+        at in any::<prop::sample::Index>(),
+        byte in any::<u8>(),
+    ) {
+        let whole = as_binary(&entries);
+        let mut broken = whole.clone();
+        broken[at.index(whole.len())] = byte;
+        let _ = read(&broken);
+        let cut = at.index(whole.len());
+        if let Ok((_, read)) = read(&whole[..cut]) {
+            prop_assert!(read.len() < entries.len());
+        }
+    }
+}
+
+/// A link driven in virtual time, every packet on record.
+fn driven(words: &str, packets: u64) -> Vec<Entry> {
+    let mut pipe = Pipe::try_new(words.parse().unwrap(), 3, LinkId::UP).unwrap();
+    let mut entries = Vec::new();
+    let entry = |number, offered, backlog, end| Entry {
+        direction: Direction::Up,
+        number,
+        offered,
+        bytes: 100,
+        backlog,
+        end,
+    };
+    for packet in 0..=packets {
+        let now = match packet == packets {
+            true => Time::MAX,
+            false => Time::from_millis(packet),
+        };
+        while let Some(out) = pipe.pop_due(now) {
+            let end = End::Sent {
+                due: out.due,
+                sent: out.due,
+                copy: out.copy,
+                corrupted: out.corrupted_bit.is_some(),
+            };
+            entries.push(entry(out.number, out.offered_at, out.payload, end));
+        }
+        if packet < packets {
+            let backlog = pipe.in_flight() as u32;
+            if let Fate::Drop(cause) = pipe.push(now, 100, backlog) {
+                entries.push(entry(packet, now, backlog, End::Dropped(cause)));
+            }
+        }
+    }
+    entries
+}
+
+#[test]
+fn a_summary_finds_what_was_configured() {
+    let words = "delay 50ms 5ms distribution normal order free loss gemodel 1% 25%";
+    let entries = driven(words, 60_000);
+    let summary = Summary::of(&entries, Direction::Up);
+    let expected = effect(&words.parse().unwrap(), 1000.0).unwrap();
+    assert_eq!(summary.offered.packets, 60_000);
+    assert!((summary.rate_hz - 1000.0).abs() < 1e-6);
+    assert!((summary.mean_ms - expected.mean_ms).abs() < 0.1);
+    assert!((summary.sd_ms - expected.sd_ms).abs() < 0.1);
+    assert!((summary.p99_ms - expected.p99_ms).abs() < 0.5);
+    assert!((summary.reordered - expected.reordered).abs() < 0.02);
+    assert!((summary.loss - expected.loss).abs() < 0.006);
+    assert!(
+        (summary.burst_packets - 4.0).abs() < 0.8,
+        "{}",
+        summary.burst_packets
+    );
+    assert_eq!(summary.lateness_us, [0.0; 3]);
+    assert!(!summary.degraded);
+    let binned: u64 = summary.delay_histogram.iter().map(|(_, n)| n).sum();
+    assert_eq!(binned, summary.sent.packets);
+    let in_runs: u64 = summary
+        .loss_bursts
+        .iter()
+        .map(|(length, n)| length * n)
+        .sum();
+    assert_eq!(in_runs, summary.dropped_by(DropCause::Loss));
+    assert!(
+        summary
+            .queue
+            .iter()
+            .all(|(_, most)| (30..80).contains(most) || *most < 80)
+    );
+    assert_eq!(Summary::of(&entries, Direction::Down), Summary::default());
+}
+
+#[test]
+fn a_late_host_marks_its_record() {
+    let mut entries = driven("delay 5ms", 1000);
+    assert!(!Summary::of(&entries, Direction::Up).degraded);
+    if let End::Sent { sent, .. } = &mut entries[500].end {
+        *sent = *sent + std::time::Duration::from_micros(1001);
+    }
+    assert!(Summary::of(&entries, Direction::Up).degraded);
+}
+
+#[test]
+fn a_record_replays_as_a_path() {
+    let entries = driven("delay 50ms 5ms loss 5%", 2000);
+    let text = as_csv(&entries);
+    let config = crate::words::parse("trace r.csv up", &mut |_| Ok(text.clone())).unwrap();
+    assert_eq!(config.to_string(), "trace r.csv up");
+    let mut link = crate::Link::try_new(config, 99, LinkId::DOWN).unwrap();
+    for entry in {
+        let mut sorted = entries.clone();
+        sorted.sort_by_key(|entry| entry.number);
+        sorted
+    } {
+        let due = link
+            .offer(entry.offered, crate::PacketMeta::default())
+            .due();
+        let expected = match entry.end {
+            End::Sent { due, .. } => Some(due),
+            _ => None,
+        };
+        assert_eq!(due, expected, "packet {}", entry.number);
+    }
+}
+
+#[test]
+fn the_binary_form_is_compact() {
+    let entries = driven("delay 50ms 5ms loss 1%", 1000);
+    let (text, bytes) = (as_csv(&entries).len(), as_binary(&entries).len());
+    assert!(
+        bytes < 20 * entries.len() && bytes * 3 < text,
+        "{bytes} {text}"
+    );
+}

@@ -1,0 +1,40 @@
+//! Recorded networks: text in, delays, losses and sending opportunities out.
+//!
+//! Formats: mahimahi, irtt, ping, LENS, and the CSV of our own recorder. What is wrong is told with its
+//! line. It reads no file: it is handed text.
+
+use std::fmt;
+
+pub mod irtt;
+pub mod lens;
+pub mod mahimahi;
+pub mod path;
+pub mod ping;
+#[cfg(test)]
+mod tests;
+
+/// Why a trace is none, and where.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("line {line}: {reason}")]
+pub struct TraceError {
+    /// The line, from 1.
+    pub line: usize,
+    /// What is wrong there.
+    pub reason: String,
+}
+
+impl TraceError {
+    /// An error in a line.
+    pub fn at(line: usize, reason: impl fmt::Display) -> Self {
+        let reason = reason.to_string();
+        Self { line, reason }
+    }
+}
+
+/// The lines that say something, with their numbers from 1: not empty, no comment.
+pub(crate) fn meaningful_lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
+    let lines = text.lines().enumerate();
+    lines
+        .map(|(at, line)| (at + 1, line.trim()))
+        .filter(|(_, line)| !line.is_empty() && !line.starts_with('#'))
+}
