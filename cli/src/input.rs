@@ -17,7 +17,24 @@ pub(crate) fn read_text(path: &Path, what: &str) -> Result<String, Failure> {
     read_bounded(path, what, BYTES_MAX)
 }
 
+/// The bytes of a file; `what` it should be is named in the error.
+///
+/// # Errors
+/// It cannot be opened or read, or is too long.
+pub(crate) fn read_bytes(path: &Path, what: &str) -> Result<Vec<u8>, Failure> {
+    bytes_bounded(path, what, BYTES_MAX)
+}
+
 fn read_bounded(path: &Path, what: &str, bytes_max: u64) -> Result<String, Failure> {
+    let bytes = bytes_bounded(path, what, bytes_max)?;
+    String::from_utf8(bytes).map_err(|error| {
+        let (shown, at) = (path.display(), error.utf8_error().valid_up_to());
+        let what = format!("{what} {shown} is no text: byte {at} is not UTF-8");
+        Failure::usage(what).remedy("check that it is the right file")
+    })
+}
+
+fn bytes_bounded(path: &Path, what: &str, bytes_max: u64) -> Result<Vec<u8>, Failure> {
     let shown = path.display();
     let unreadable = |error: std::io::Error| {
         let failure = Failure::usage(format!("cannot read {what} {shown}: {error}"));
@@ -36,11 +53,7 @@ fn read_bounded(path: &Path, what: &str, bytes_max: u64) -> Result<String, Failu
         let what = format!("{what} {shown} is longer than {bytes_max} bytes");
         return Err(Failure::usage(what).remedy("check that it is the right file"));
     }
-    String::from_utf8(bytes).map_err(|error| {
-        let at = error.utf8_error().valid_up_to();
-        let what = format!("{what} {shown} is no text: byte {at} is not UTF-8");
-        Failure::usage(what).remedy("check that it is the right file")
-    })
+    Ok(bytes)
 }
 
 #[cfg(test)]

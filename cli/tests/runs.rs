@@ -173,6 +173,62 @@ fn a_relay_prints_its_address_first_and_its_counters_when_interrupted() {
 }
 
 #[test]
+fn a_record_is_compared_with_the_settings_it_was_made_with() {
+    let home = tempfile::tempdir().unwrap();
+    let target = std::net::UdpSocket::bind("127.0.0.1:0").unwrap();
+    let to = target.local_addr().unwrap().to_string();
+    let file = home.path().join("run.csv");
+    let file = file.to_str().unwrap();
+    let arguments = [
+        "netem",
+        "--listen",
+        "127.0.0.1:0",
+        "--to",
+        &to,
+        "--up",
+        "delay 20ms loss list 3",
+        "--record",
+        file,
+    ];
+    let relay = Running::start(mmt(&home, &arguments));
+    let address: std::net::SocketAddr = relay.first_line.parse().unwrap();
+    let source = std::net::UdpSocket::bind("127.0.0.1:0").unwrap();
+    let patience = Some(std::time::Duration::from_secs(30));
+    target.set_read_timeout(patience).unwrap();
+    for number in 0..10_u8 {
+        source.send_to(&[number], address).unwrap();
+        if number != 3 {
+            let mut buffer = [0; 10];
+            assert_eq!(target.recv(&mut buffer).unwrap(), 1);
+            assert_eq!(buffer[0], number);
+        }
+    }
+    relay.interrupt();
+    let (_, code) = relay.finish();
+    assert_eq!(code, Some(0));
+
+    let output = mmt(&home, &["netem", "report", file, "--json"])
+        .output()
+        .unwrap();
+    assert!(output.status.success(), "{output:?}");
+    let document: Value = serde_json::from_slice(&output.stdout).unwrap();
+    let up = &document["up"];
+    assert_eq!(up["words"], "delay 20ms loss list 3");
+    assert_eq!(up["achieved"]["offered"]["packets"], 10);
+    assert_eq!(up["achieved"]["sent"]["packets"], 9);
+    assert_eq!(up["achieved"]["dropped"]["loss"], 1);
+    assert!(up["achieved"]["mean_ms"].as_f64().unwrap() >= 20.0);
+    assert!((up["configured"]["mean_ms"].as_f64().unwrap() - 20.0).abs() < 1e-6);
+
+    let output = mmt(&home, &["netem", "report", file]).output().unwrap();
+    let text = String::from_utf8(output.stdout).unwrap();
+    assert!(
+        text.contains("configured") && text.contains("lost in a row"),
+        "{text}"
+    );
+}
+
+#[test]
 fn a_slave_that_nobody_comes_to_prints_its_pairing_string_and_an_empty_report() {
     let home = tempfile::tempdir().unwrap();
     let arguments = [

@@ -6,7 +6,9 @@
 
 #![allow(
     clippy::disallowed_methods,
-    reason = "the other emulator counts from an Instant"
+    clippy::unwrap_used,
+    clippy::indexing_slicing,
+    reason = "a test; and the other emulator counts from an Instant"
 )]
 
 use std::time::{Duration, Instant};

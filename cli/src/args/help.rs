@@ -54,6 +54,8 @@ pub(super) const NETEM: &str = "\
 Examples:
   mmt netem --listen 0.0.0.0:4434 --to 192.0.2.1:4433 --up \"delay 50ms\" --down \"delay 50ms loss 1%\"
   mmt netem --listen 127.0.0.1:0 --to localhost:4433 --up \"delay 80ms 10ms distribution normal\" --json
+  mmt netem --listen [::]:4434 --to 192.0.2.1:4433 --up \"preset 5g-up\" --down \"preset 5g-down\" --record run.csv
+  mmt netem report run.csv
 
 Masters use the slave's pairing string with the relay's address in it.
 Words, those of tc netem and more: delay TIME [JITTER [PERCENT | tau TIME] [distribution SHAPE]],

@@ -4,6 +4,8 @@ mod help;
 mod reproduce;
 mod values;
 
+pub(crate) use values::netem as network;
+
 use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::time::Duration;
@@ -145,13 +147,16 @@ pub(crate) struct MasterArguments {
 
 /// Arguments of `mmt netem`.
 #[derive(Debug, Args)]
+#[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
 pub(crate) struct NetemArguments {
+    #[command(subcommand)]
+    pub(crate) command: Option<NetemCommand>,
     /// Address and UDP port to listen on for masters; port 0 lets the system choose
-    #[arg(long, value_name = "ADDR:PORT", value_parser = values::listen)]
-    pub(crate) listen: SocketAddr,
+    #[arg(long, value_name = "ADDR:PORT", value_parser = values::listen, required = true)]
+    pub(crate) listen: Option<SocketAddr>,
     /// The slave: host and UDP port
-    #[arg(long, value_name = "HOST:PORT", value_parser = values::address)]
-    pub(crate) to: Address,
+    #[arg(long, value_name = "HOST:PORT", value_parser = values::address, required = true)]
+    pub(crate) to: Option<Address>,
     /// Network from master to slave
     #[arg(long, value_name = "WORDS", default_value = "none", value_parser = values::netem)]
     pub(crate) up: LinkConfig,
@@ -161,10 +166,40 @@ pub(crate) struct NetemArguments {
     /// Seed of both
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub(crate) seed: u64,
+    /// Packets per second for which the effect of the networks is told at the start
+    #[arg(long, value_name = "N", default_value_t = 100.0)]
+    pub(crate) rate: f64,
+    /// Record every packet in this file: CSV if its name ends in .csv, else a compact form
+    #[arg(long, value_name = "FILE")]
+    pub(crate) record: Option<PathBuf>,
+    /// Give every master a new port toward the slave this often, as a NAT that forgets
+    #[arg(long, value_name = "TIME", value_parser = values::duration)]
+    pub(crate) rebind: Option<Duration>,
+    /// Take orders from stdin while running, one a line: up WORDS, down WORDS, rebind
+    #[arg(long)]
+    pub(crate) control: bool,
     /// How long [default: until Ctrl-C]
     #[arg(long, value_name = "TIME", value_parser = values::duration)]
     pub(crate) duration: Option<Duration>,
     /// Print the counters as JSON, after the address
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// What else `mmt netem` does.
+#[derive(Debug, Subcommand)]
+pub(crate) enum NetemCommand {
+    /// Compare a record with the settings it was made with
+    Report(NetemReportArguments),
+}
+
+/// Arguments of `mmt netem report`.
+#[derive(Debug, Args)]
+pub(crate) struct NetemReportArguments {
+    /// A record made with --record
+    #[arg(value_name = "FILE")]
+    pub(crate) file: PathBuf,
+    /// Print everything as one JSON document: the numbers, delay histogram, loss bursts, queue
     #[arg(long)]
     pub(crate) json: bool,
 }

@@ -87,9 +87,10 @@ pub(super) fn duration(text: &str) -> Result<Duration, String> {
 }
 
 /// A link in netem's words; a caret line points at the wrong one.
-pub(super) fn netem(text: &str) -> Result<LinkConfig, String> {
+pub(crate) fn netem(text: &str) -> Result<LinkConfig, String> {
     let mut read = |name: &str| {
-        std::fs::read_to_string(name).map_err(|error| format!("cannot read it: {error}"))
+        crate::input::read_text(std::path::Path::new(name), "the network's file")
+            .map_err(|failure| failure.to_string())
     };
     mmt_netem::words::parse(text, &mut read).map_err(|error| {
         let pointer = error.pointer(text).replace('\n', "\n    ");

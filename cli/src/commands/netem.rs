@@ -1,23 +1,26 @@
 //! `mmt netem`: a UDP relay that emulates a network between two hosts.
 
+use std::io::BufRead;
 use std::net::{SocketAddr, ToSocketAddrs};
+use std::path::Path;
+use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 
-use mmt_netem::io::relay::{Relay, RelayError, RelayHandle, RelaySnapshot};
-use mmt_netem::{Effect, effect};
+use mmt_netem::io::record_file::RecordFile;
+use mmt_netem::io::relay::{Extras, Relay, RelayError, RelayHandle, RelaySnapshot};
+use mmt_netem::record::Heading;
+use mmt_netem::{Effect, LinkConfig};
 use mmt_shared::pairing::Address;
 use serde::Serialize;
 
-use crate::args::NetemArguments;
+use crate::args::{NetemArguments, NetemCommand, network};
 use crate::failure::{Exit, Failure};
 use crate::output::{note, print, print_json};
 use crate::stop::Stop;
 
+mod report;
 mod table;
 
-/// The rate at which the effect of the settings is told, packets per second: that of commands of ten
-/// samples.
-const RATE_HZ: f64 = 100.0;
 /// How often the relay is looked at.
 const LOOK: Duration = Duration::from_millis(50);
 
@@ -46,20 +49,37 @@ struct NetemConfiguration {
 /// Runs `mmt netem`.
 ///
 /// # Errors
-/// The slave's name is unknown, the address cannot be had, the relay breaks.
+/// The slave's name is unknown, the address cannot be had, the record cannot be written, the relay
+/// breaks; of a report, its file is none.
 pub(crate) fn run(arguments: &NetemArguments) -> Result<(), Failure> {
-    let effect_of = |link| effect(link, RATE_HZ).map_err(Failure::usage);
+    if let Some(NetemCommand::Report(arguments)) = &arguments.command {
+        return report::run(arguments);
+    }
+    let (Some(listen), Some(to)) = (arguments.listen, &arguments.to) else {
+        return Err(Failure::usage("a relay needs --listen and --to").remedy("give both"));
+    };
+    let effect_of = |link: &LinkConfig| link.expected(arguments.rate).map_err(Failure::usage);
     let (effect_up, effect_down) = (effect_of(&arguments.up)?, effect_of(&arguments.down)?);
-    let to = resolve(&arguments.to)?;
+    let to = resolve(to)?;
     let stop = Stop::on_signals()?;
     let (up, down) = (arguments.up.clone(), arguments.down.clone());
-    let relay = Relay::bind(arguments.listen, to, up, down, arguments.seed).map_err(start_error)?;
+    let extras = Extras {
+        record: arguments
+            .record
+            .as_ref()
+            .map(|path| record(path, arguments))
+            .transpose()?,
+        rebind_every: arguments.rebind,
+    };
+    let relay = Relay::bind_with(listen, to, up, down, arguments.seed, extras);
+    let relay = relay.map_err(start_error)?;
     let local = relay.local_addr();
     note(format_args!("up   (to {to}): {effect_up}"));
     note(format_args!("down (to masters): {effect_down}"));
     print(local)?;
     let began = Instant::now();
-    wait(&relay, &stop, arguments.duration);
+    let orders = arguments.control.then(orders_from_stdin);
+    wait(&relay, &stop, arguments, orders.as_ref());
     let duration_s = began.elapsed().as_secs_f64();
     let ending = if stop.asked() {
         "interrupted"
@@ -88,14 +108,76 @@ pub(crate) fn run(arguments: &NetemArguments) -> Result<(), Failure> {
     }
 }
 
-/// Until the time is over, somebody asks for the end, or the relay breaks.
-fn wait(relay: &RelayHandle, stop: &Stop, duration: Option<Duration>) {
-    let began = Instant::now();
+fn record(path: &Path, arguments: &NetemArguments) -> Result<RecordFile, Failure> {
+    let heading = Heading {
+        seed: arguments.seed,
+        up: arguments.up.to_string(),
+        down: arguments.down.to_string(),
+    };
+    RecordFile::create(path, &heading).map_err(|error| {
+        let what = format!("cannot write the record {}: {error}", path.display());
+        Failure::usage(what).remedy("give a path that can be written")
+    })
+}
+
+/// The lines of stdin as they come, until it ends.
+fn orders_from_stdin() -> Receiver<String> {
+    let (sender, orders) = channel();
+    std::thread::spawn(move || {
+        for line in std::io::stdin().lock().lines().map_while(Result::ok) {
+            if sender.send(line).is_err() {
+                break;
+            }
+        }
+    });
+    orders
+}
+
+/// Until the time is over, somebody asks for the end, or the relay breaks; obeys orders meanwhile.
+fn wait(
+    relay: &RelayHandle,
+    stop: &Stop,
+    arguments: &NetemArguments,
+    orders: Option<&Receiver<String>>,
+) {
+    let (began, duration) = (Instant::now(), arguments.duration);
+    let mut links = (arguments.up.clone(), arguments.down.clone());
     let over = || duration.is_some_and(|duration| began.elapsed() >= duration);
     while !stop.asked() && !over() && relay.is_running() {
+        for line in orders.into_iter().flat_map(Receiver::try_iter) {
+            if let Err(what) = obey(&line, relay, &mut links) {
+                note(what);
+            }
+        }
         let left = duration.map(|duration| duration.saturating_sub(began.elapsed()));
         std::thread::sleep(left.map_or(LOOK, |left| left.min(LOOK)));
     }
+}
+
+fn obey(
+    line: &str,
+    relay: &RelayHandle,
+    links: &mut (LinkConfig, LinkConfig),
+) -> Result<(), String> {
+    let (order, words) = line.trim().split_once(' ').unwrap_or((line.trim(), ""));
+    match order {
+        "" => return Ok(()),
+        "up" => links.0 = network(words)?,
+        "down" => links.1 = network(words)?,
+        "rebind" => {
+            relay.rebind();
+            return Ok(());
+        }
+        _ => {
+            return Err(format!(
+                "no order {order:?}: up WORDS, down WORDS or rebind"
+            ));
+        }
+    }
+    let (up, down) = links.clone();
+    relay
+        .reconfigure(up, down)
+        .map_err(|error| error.to_string())
 }
 
 fn resolve(address: &Address) -> Result<SocketAddr, Failure> {

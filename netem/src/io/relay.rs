@@ -16,18 +16,21 @@ use serde::Serialize;
 use super::alarm::{Alarm, now};
 use super::lateness::{Lateness, Recorder};
 use super::lock;
+use super::record_file::RecordFile;
 use crate::config::{ConfigError, LinkConfig};
 use crate::counters::{LinkCounters, Tally};
 use crate::link::LinkId;
 use crate::pipe::Pipe;
 
 mod clients;
+mod log;
 mod port;
 #[cfg(test)]
 mod tests;
 mod worker;
 
 use clients::Clients;
+use log::Log;
 use port::Port;
 use worker::Worker;
 
@@ -91,6 +94,10 @@ pub struct RelaySnapshot {
     pub unreachable: u64,
     /// Other errors of receiving.
     pub receive_errors: u64,
+    /// Times that a client got a new port toward the target.
+    pub rebinds: u64,
+    /// Packets that the record misses, because the disk was too slow.
+    pub unrecorded: u64,
     /// How late packets left, both directions.
     pub lateness: Lateness,
 }
@@ -114,6 +121,23 @@ pub struct DirectionCounters {
     pub orphaned: Tally,
 }
 
+/// What a relay can do besides.
+#[derive(Debug, Default)]
+pub struct Extras {
+    /// Where every packet is recorded.
+    pub record: Option<RecordFile>,
+    /// How often every client gets a new port toward the target, as behind a NAT that forgets: what the
+    /// target sends to the old port is lost.
+    pub rebind_every: Option<Duration>,
+}
+
+/// What the handle asks of the thread.
+#[derive(Debug, Default)]
+struct Orders {
+    links: Option<(LinkConfig, LinkConfig)>,
+    rebind: bool,
+}
+
 /// The relay as such: [`Relay::bind`] starts one.
 #[derive(Debug)]
 pub struct Relay;
@@ -130,6 +154,21 @@ impl Relay {
         up: LinkConfig,
         down: LinkConfig,
         seed: u64,
+    ) -> Result<RelayHandle, RelayError> {
+        Self::bind_with(listen, to, up, down, seed, Extras::default())
+    }
+
+    /// Starts a relay as [`Self::bind`] does, with a record or a NAT that forgets.
+    ///
+    /// # Errors
+    /// Those of [`Self::bind`].
+    pub fn bind_with(
+        listen: SocketAddr,
+        to: SocketAddr,
+        up: LinkConfig,
+        down: LinkConfig,
+        seed: u64,
+        extras: Extras,
     ) -> Result<RelayHandle, RelayError> {
         let (mut up, mut down) = (
             Pipe::try_new(up, seed, LinkId::UP)?,
@@ -151,10 +190,14 @@ impl Relay {
         let shared = Arc::new(Shared {
             alarm: Alarm::try_new().map_err(RelayError::Thread)?,
             stopping: AtomicBool::new(false),
+            orders: Mutex::new(Orders::default()),
             board: Mutex::new(RelaySnapshot::default()),
             lateness: Recorder::try_new()?,
         });
-        let worker = Worker::new(port, Clients::new(to), up, down, shared.clone());
+        let log = Log::new(extras.record, origin);
+        let clients = Clients::new(to);
+        let mut worker = Worker::new(port, clients, up, down, log, shared.clone());
+        worker.rebind_every(extras.rebind_every, origin);
         let thread = std::thread::Builder::new()
             .name("netem-relay".to_owned())
             .spawn(move || worker.run())
@@ -186,6 +229,7 @@ pub struct RelayHandle {
 struct Shared {
     alarm: Alarm,
     stopping: AtomicBool,
+    orders: Mutex<Orders>,
     /// The counts as of the thread's last look around, without the lateness.
     board: Mutex<RelaySnapshot>,
     lateness: Recorder,
@@ -205,6 +249,24 @@ impl RelayHandle {
             lateness: self.shared.lateness.summary(),
             ..*lock(&self.shared.board)
         }
+    }
+
+    /// New settings for both directions, for the packets to come ([`crate::Link::reconfigure`]).
+    ///
+    /// # Errors
+    /// A setting out of its range; the old settings stay.
+    pub fn reconfigure(&self, up: LinkConfig, down: LinkConfig) -> Result<(), ConfigError> {
+        up.check()?;
+        down.check()?;
+        lock(&self.shared.orders).links = Some((up, down));
+        self.shared.alarm.ring();
+        Ok(())
+    }
+
+    /// Gives every client a new port toward the target, once, now.
+    pub fn rebind(&self) {
+        lock(&self.shared.orders).rebind = true;
+        self.shared.alarm.ring();
     }
 
     /// Whether the relay is at work; false after an error that [`Self::stop`] tells.

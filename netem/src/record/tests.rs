@@ -158,7 +158,7 @@ fn a_late_host_marks_its_record() {
     let mut entries = driven("delay 5ms", 1000);
     assert!(!Summary::of(&entries, Direction::Up).degraded);
     if let End::Sent { sent, .. } = &mut entries[500].end {
-        *sent = *sent + std::time::Duration::from_micros(1001);
+        *sent += std::time::Duration::from_micros(1001);
     }
     assert!(Summary::of(&entries, Direction::Up).degraded);
 }

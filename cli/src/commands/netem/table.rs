@@ -68,6 +68,8 @@ impl NetemReport {
             ("refused", counters.refused.packets),
             ("target unreachable", counters.unreachable),
             ("receive errors", counters.receive_errors),
+            ("new ports (NAT)", counters.rebinds),
+            ("not on record", counters.unrecorded),
         ] {
             if count > 0 {
                 writeln!(f, "{label:20} {count:>12}")?;

@@ -99,6 +99,20 @@ impl Clients {
         Some(number)
     }
 
+    /// Gives every client a new port toward the target; one that can get none keeps the old one. Returns
+    /// how many got one.
+    pub(super) fn rebind(&mut self) -> u64 {
+        let to = self.to;
+        let mut rebound = 0;
+        for client in self.by_number.values_mut() {
+            if let Ok(port) = port_toward(to) {
+                client.port = port;
+                rebound += 1;
+            }
+        }
+        rebound
+    }
+
     /// Forgets the clients that were idle for too long.
     pub(super) fn expire(&mut self, now: Time) {
         self.by_number

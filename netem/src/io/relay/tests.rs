@@ -46,7 +46,8 @@ fn offered_is_accounted_for(counters: &DirectionCounters) {
         + counters.blocked.packets
         + counters.failed.packets
         + counters.orphaned.packets;
-    assert_eq!(counters.link.offered.packets, after, "{counters:?}");
+    let before = counters.link.offered.packets + counters.link.duplicated.packets;
+    assert_eq!(before, after, "{counters:?}");
 }
 
 fn forwards_both_ways(listen: IpAddr, target: IpAddr) {
@@ -209,4 +210,106 @@ fn what_cannot_work_is_refused_at_the_start() {
     };
     let refused = Relay::bind(any, address, config(), bad, 1);
     assert!(matches!(refused, Err(RelayError::Config(_))));
+}
+
+#[test]
+fn a_new_port_toward_the_target_looks_like_a_nat_that_forgot() {
+    let server = socket(LOCAL);
+    let relay = relay(LOCAL, server.local_addr().unwrap(), "none", "none");
+    let client = socket(LOCAL);
+    client.send_to(b"before", relay.local_addr()).unwrap();
+    let (_, before) = receive(&server);
+    relay.rebind();
+    until(&relay, |seen| seen.rebinds == 1);
+    client.send_to(b"after", relay.local_addr()).unwrap();
+    let (contents, after) = receive(&server);
+    assert_eq!(contents, b"after");
+    assert_ne!(before, after);
+    // the way back goes through the new port, and the client sees no change
+    server.send_to(b"answer", after).unwrap();
+    assert_eq!(receive(&client), (b"answer".to_vec(), relay.local_addr()));
+    let end = relay.stop().unwrap();
+    assert_eq!((end.clients_met, end.rebinds), (1, 1));
+}
+
+#[test]
+fn rebinding_goes_on_by_itself_when_asked_for() {
+    let server = socket(LOCAL);
+    let extras = Extras {
+        rebind_every: Some(Duration::from_millis(5)),
+        ..Extras::default()
+    };
+    let (any, to) = ((LOCAL, 0).into(), server.local_addr().unwrap());
+    let none = LinkConfig::default;
+    let relay = Relay::bind_with(any, to, none(), none(), 1, extras).unwrap();
+    socket(LOCAL).send_to(b"hello", relay.local_addr()).unwrap();
+    receive(&server);
+    until(&relay, |seen| seen.rebinds >= 3);
+}
+
+#[test]
+fn a_running_relay_takes_new_settings() {
+    let server = socket(LOCAL);
+    let relay = relay(LOCAL, server.local_addr().unwrap(), "loss 100%", "none");
+    let client = socket(LOCAL);
+    client.send_to(b"lost", relay.local_addr()).unwrap();
+    until(&relay, |seen| seen.up.link.dropped.loss.packets == 1);
+    let bad = LinkConfig {
+        limit: 0,
+        ..LinkConfig::default()
+    };
+    assert!(relay.reconfigure(bad, LinkConfig::default()).is_err());
+    let none = LinkConfig::default;
+    relay.reconfigure(none(), none()).unwrap();
+    // the order is obeyed soon, not at once
+    let start = Instant::now();
+    server
+        .set_read_timeout(Some(Duration::from_millis(20)))
+        .unwrap();
+    let mut buffer = [0; 10];
+    while server.recv_from(&mut buffer).is_err() {
+        assert!(start.elapsed() < PATIENCE);
+        client.send_to(b"passes", relay.local_addr()).unwrap();
+    }
+    assert_eq!(&buffer[..6], b"passes");
+}
+
+#[test]
+fn every_packet_is_on_record_in_both_forms() {
+    let directory = tempfile::tempdir().unwrap();
+    for name in ["record.csv", "record.bin"] {
+        let path = directory.path().join(name);
+        let words = "delay 2ms loss 30% duplicate 30% corrupt 20%";
+        let heading = crate::record::Heading {
+            seed: 1,
+            up: words.to_owned(),
+            down: "none".to_owned(),
+        };
+        let server = socket(LOCAL);
+        let extras = Extras {
+            record: Some(RecordFile::create(&path, &heading).unwrap()),
+            ..Extras::default()
+        };
+        let (any, to) = ((LOCAL, 0).into(), server.local_addr().unwrap());
+        let up = words.parse().unwrap();
+        let relay = Relay::bind_with(any, to, up, LinkConfig::default(), 1, extras).unwrap();
+        let client = socket(LOCAL);
+        for number in 0..100_u8 {
+            client.send_to(&[number; 50], relay.local_addr()).unwrap();
+        }
+        until(&relay, |seen| {
+            seen.up.link.offered.packets == 100 && seen.up.in_flight == 0
+        });
+        let end = relay.stop().unwrap();
+        assert_eq!(end.unrecorded, 0);
+        offered_is_accounted_for(&end.up);
+        let (read, entries) = crate::record::read(&std::fs::read(&path).unwrap()).unwrap();
+        assert_eq!(read, heading);
+        let summary = crate::record::summary::Summary::of(&entries, crate::Direction::Up);
+        assert_eq!(summary.sent, end.up.forwarded, "{name}");
+        assert!(end.up.link.duplicated.packets > 0 && end.up.link.corrupted.packets > 0);
+        assert_eq!(summary.corrupted, end.up.link.corrupted.packets);
+        let entry = |number| entries.iter().any(|entry| entry.number == number);
+        assert!((0..100).all(entry), "{name}");
+    }
 }

@@ -3,18 +3,22 @@
 use std::io;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
+use std::time::Duration;
 
 use quinn::udp::{EcnCodepoint, Transmit};
 use rustix::event::{PollFd, PollFlags};
 
+use mmt_shared::time::Time;
+
 use super::clients::Clients;
+use super::log::{Dropped, Log};
 use super::port::{Port, Receiver, Sent};
 use super::{DirectionCounters, RelaySnapshot, Shared};
 use crate::counters::Tally;
 use crate::io::alarm::{now, sharpen_deadlines, wait};
 use crate::io::lateness::Lateness;
 use crate::io::lock;
-use crate::link::turn_bit;
+use crate::link::{Direction, Fate, turn_bit};
 use crate::pipe::{Pipe, Released};
 
 /// Batches taken from one socket before the times are looked at again.
@@ -26,6 +30,8 @@ pub(super) struct Parcel {
     client: u64,
     ecn: Option<EcnCodepoint>,
     contents: Vec<u8>,
+    /// Packets in flight when it was offered.
+    pub(super) backlog: u32,
 }
 
 /// One direction: its link and what became of what left it.
@@ -55,6 +61,35 @@ impl Outcome {
 }
 
 impl Lane {
+    /// Puts a datagram on the link, and a dropped one on record.
+    fn offer(
+        &mut self,
+        log: &mut Log,
+        direction: Direction,
+        client: u64,
+        received: &super::port::Received<'_>,
+    ) {
+        let (now, bytes) = (now(), received.contents.len());
+        let backlog = u32::try_from(self.pipe.in_flight()).unwrap_or(u32::MAX);
+        let number = self.pipe.counters().offered.packets;
+        let parcel = Parcel {
+            client,
+            ecn: received.ecn,
+            contents: received.contents.to_owned(),
+            backlog,
+        };
+        if let Fate::Drop(cause) = self.pipe.push(now, bytes, parcel) {
+            let packet = Dropped {
+                number,
+                offered_at: now,
+                bytes,
+                backlog,
+                cause,
+            };
+            log.dropped(direction, &packet);
+        }
+    }
+
     fn new(pipe: Pipe<Parcel>) -> Self {
         Self {
             pipe,
@@ -88,9 +123,13 @@ pub(super) struct Worker {
     receiver: Receiver,
     up: Lane,
     down: Lane,
+    log: Log,
     refused: Tally,
     unreachable: u64,
     receive_errors: u64,
+    rebinds: u64,
+    /// How often to rebind, and when next.
+    rebind: Option<(Duration, Time)>,
     shared: Arc<Shared>,
 }
 
@@ -106,6 +145,7 @@ impl Worker {
         clients: Clients,
         up: Pipe<Parcel>,
         down: Pipe<Parcel>,
+        log: Log,
         shared: Arc<Shared>,
     ) -> Self {
         Self {
@@ -114,6 +154,9 @@ impl Worker {
             receiver: Receiver::new(),
             up: Lane::new(up),
             down: Lane::new(down),
+            log,
+            rebinds: 0,
+            rebind: None,
             refused: Tally::default(),
             unreachable: 0,
             receive_errors: 0,
@@ -121,10 +164,38 @@ impl Worker {
         }
     }
 
+    /// Gives every client a new port toward the target as often as this.
+    pub(super) fn rebind_every(&mut self, every: Option<Duration>, now: Time) {
+        let every = every.filter(|every| !every.is_zero());
+        self.rebind = every.map(|every| (every, now + every));
+    }
+
+    /// Does what the handle asks for and what is due.
+    fn obey(&mut self) {
+        let orders = std::mem::take(&mut *lock(&self.shared.orders));
+        if let Some((up, down)) = orders.links {
+            // the handle has checked them
+            let _ = self.up.pipe.reconfigure(up);
+            let _ = self.down.pipe.reconfigure(down);
+        }
+        let mut rebind = orders.rebind;
+        if let Some((every, next)) = &mut self.rebind
+            && *next <= now()
+        {
+            *next += *every;
+            rebind = true;
+        }
+        if rebind {
+            let rebound = self.clients.rebind();
+            self.rebinds = self.rebinds.saturating_add(rebound);
+        }
+    }
+
     pub(super) fn run(mut self) -> io::Result<()> {
         sharpen_deadlines();
         while !self.shared.stopping.load(Ordering::Acquire) {
             self.release_due();
+            self.obey();
             self.clients.expire(now());
             self.publish();
             let ready = self.wait()?;
@@ -144,6 +215,7 @@ impl Worker {
             self.up.pipe.next_due(),
             self.down.pipe.next_due(),
             self.clients.next_expiry(),
+            self.rebind.map(|(_, next)| next),
         ];
         let mut fds = vec![self.shared.alarm.as_poll_fd(), self.listen.as_poll_fd()];
         fds.extend(
@@ -174,21 +246,13 @@ impl Worker {
             clients,
             receiver,
             up,
+            log,
             refused,
             ..
         } = self;
-        let mut take = |received: super::port::Received<'_>| {
-            let now = now();
-            let bytes = received.contents.len();
-            let Some(client) = clients.meet(&received, now) else {
-                return refused.count(bytes);
-            };
-            let parcel = Parcel {
-                client,
-                ecn: received.ecn,
-                contents: received.contents.to_owned(),
-            };
-            up.pipe.push(now, bytes, parcel);
+        let mut take = |received: super::port::Received<'_>| match clients.meet(&received, now()) {
+            Some(client) => up.offer(log, Direction::Up, client, &received),
+            None => refused.count(received.contents.len()),
         };
         for _ in 0..BATCHES {
             if let Err(error) = receiver.receive(listen, &mut take) {
@@ -203,14 +267,9 @@ impl Worker {
             return;
         };
         for _ in 0..BATCHES {
-            let down = &mut self.down.pipe;
+            let (down, log) = (&mut self.down, &mut self.log);
             let received = self.receiver.receive(&client.port, |received| {
-                let parcel = Parcel {
-                    client: number,
-                    ecn: received.ecn,
-                    contents: received.contents.to_owned(),
-                };
-                down.push(now(), received.contents.len(), parcel);
+                down.offer(log, Direction::Down, number, &received);
             });
             match received {
                 Ok(()) => client.seen(now()),
@@ -231,14 +290,18 @@ impl Worker {
     fn release_due(&mut self) {
         while let Some(mut packet) = self.up.pipe.pop_due(now()) {
             harm(&mut packet);
-            self.shared.lateness.record(packet.due, now());
+            let moment = now();
+            self.shared.lateness.record(packet.due, moment);
             let sent = self.send_up(&packet);
+            self.log.released(Direction::Up, &packet, sent, moment);
             self.up.sent.count(sent, packet.bytes);
         }
         while let Some(mut packet) = self.down.pipe.pop_due(now()) {
             harm(&mut packet);
-            self.shared.lateness.record(packet.due, now());
+            let moment = now();
+            self.shared.lateness.record(packet.due, moment);
             let sent = self.send_down(&packet);
+            self.log.released(Direction::Down, &packet, sent, moment);
             self.down.sent.count(sent, packet.bytes);
         }
     }
@@ -278,6 +341,8 @@ impl Worker {
             refused: self.refused,
             unreachable: self.unreachable,
             receive_errors: self.receive_errors,
+            rebinds: self.rebinds,
+            unrecorded: self.log.missed(),
             // the handle reads the histogram itself
             lateness: Lateness::default(),
         };

@@ -1,0 +1,171 @@
+//! `mmt netem report`: what a record shows, held against the settings it was made with.
+
+use std::fmt;
+use std::path::Path;
+
+use mmt_netem::record::summary::Summary;
+use mmt_netem::record::{self, Heading};
+use mmt_netem::{Direction, Effect};
+use serde::Serialize;
+
+use crate::args::{NetemReportArguments, network};
+use crate::failure::Failure;
+use crate::input::read_bytes;
+use crate::output::{print, print_json};
+
+/// The document of a record.
+#[derive(Debug, Serialize)]
+pub(super) struct RecordReport {
+    version: &'static str,
+    command: &'static str,
+    heading: Heading,
+    /// Whether the host was too slow in either direction for this to be about the links.
+    degraded: bool,
+    up: DirectionReport,
+    down: DirectionReport,
+}
+
+/// One direction: what the settings say, and what came of it.
+#[derive(Debug, Serialize)]
+struct DirectionReport {
+    words: String,
+    /// What the settings do at the rate of the record; none without packets, or where a file that they
+    /// name cannot be read any more.
+    configured: Option<Effect>,
+    achieved: Summary,
+}
+
+/// Runs `mmt netem report`.
+///
+/// # Errors
+/// The file cannot be read or is no record.
+pub(super) fn run(arguments: &NetemReportArguments) -> Result<(), Failure> {
+    let report = RecordReport::of_file(&arguments.file)?;
+    match arguments.json {
+        true => print_json(&report),
+        false => print(&report),
+    }
+}
+
+impl RecordReport {
+    fn of_file(path: &Path) -> Result<Self, Failure> {
+        let bytes = read_bytes(path, "the record")?;
+        let (heading, entries) = record::read(&bytes).map_err(|error| {
+            let what = format!("{} is no record: {error}", path.display());
+            Failure::usage(what).remedy("give a file made with mmt netem --record")
+        })?;
+        let direction = |words: &str, direction| {
+            let achieved = Summary::of(&entries, direction);
+            let configured = network(words)
+                .ok()
+                .filter(|_| achieved.rate_hz > 0.0)
+                .and_then(|link| link.expected(achieved.rate_hz).ok());
+            DirectionReport {
+                words: words.to_owned(),
+                configured,
+                achieved,
+            }
+        };
+        let up = direction(&heading.up, Direction::Up);
+        let down = direction(&heading.down, Direction::Down);
+        Ok(Self {
+            version: env!("CARGO_PKG_VERSION"),
+            command: "netem report",
+            degraded: up.achieved.degraded || down.achieved.degraded,
+            heading,
+            up,
+            down,
+        })
+    }
+}
+
+impl fmt::Display for RecordReport {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(
+            f,
+            "mmt {} {}, seed {}",
+            self.command, self.version, self.heading.seed
+        )?;
+        for (name, direction) in [("up", &self.up), ("down", &self.down)] {
+            writeln!(f, "\n{name}: {}", direction.words)?;
+            direction.fmt(f)?;
+        }
+        match self.degraded {
+            true => write!(
+                f,
+                "\ndegraded: this host was too slow for the emulation, do not trust its delays"
+            ),
+            false => Ok(()),
+        }
+    }
+}
+
+impl fmt::Display for DirectionReport {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let seen = &self.achieved;
+        if seen.offered.packets == 0 {
+            return writeln!(f, "  no packet");
+        }
+        writeln!(
+            f,
+            "  {} packets offered at {:.1} /s, {} sent ({} copies, {} corrupted)",
+            seen.offered.packets, seen.rate_hz, seen.sent.packets, seen.copies, seen.corrupted
+        )?;
+        for (cause, packets) in &seen.dropped {
+            writeln!(f, "  dropped ({cause}) {packets}")?;
+        }
+        writeln!(f, "  {:22} {:>12} {:>12}", "", "configured", "achieved")?;
+        type Number = (&'static str, fn(&Effect) -> f64, f64);
+        let rows: [Number; 6] = [
+            ("mean delay, ms", |e| e.mean_ms, seen.mean_ms),
+            ("standard deviation, ms", |e| e.sd_ms, seen.sd_ms),
+            ("p99, ms", |e| e.p99_ms, seen.p99_ms),
+            (
+                "dropped, %",
+                |e| 100.0 * (e.loss + e.queue_drops + e.over_limit),
+                100.0 * seen.loss,
+            ),
+            ("burst, packets", |e| e.burst_packets, seen.burst_packets),
+            (
+                "reordered, %",
+                |e| 100.0 * e.reordered,
+                100.0 * seen.reordered,
+            ),
+        ];
+        for (label, configured, achieved) in rows {
+            let said = self.configured.as_ref().map(configured);
+            let said = said.map_or_else(|| "-".to_owned(), |said| format!("{said:.3}"));
+            writeln!(f, "  {label:22} {said:>12} {achieved:>12.3}")?;
+        }
+        let [p50, p99, max] = seen.lateness_us;
+        writeln!(
+            f,
+            "  released late: p50 {p50:.0} us, p99 {p99:.0} us, max {max:.0} us"
+        )?;
+        bars(f, "  delay, ms from", &seen.delay_histogram, 2)?;
+        let bursts = seen.loss_bursts.iter();
+        let bursts: Vec<(f64, u64)> = bursts.map(|(length, n)| (*length as f64, *n)).collect();
+        bars(f, "  lost in a row", &bursts, 0)?;
+        let most = seen.queue.iter().map(|(_, most)| *most).max();
+        writeln!(f, "  most in flight: {} packets", most.unwrap_or(0))
+    }
+}
+
+/// A bar for each row that is not empty, at most 40 rows.
+fn bars(
+    f: &mut fmt::Formatter<'_>,
+    label: &str,
+    rows: &[(f64, u64)],
+    decimals: usize,
+) -> fmt::Result {
+    const WIDTH: f64 = 40.0;
+    const ROWS: usize = 40;
+    let most = rows.iter().map(|(_, n)| *n).max().unwrap_or(0).max(1) as f64;
+    let filled = rows.iter().filter(|(_, n)| *n > 0).take(ROWS);
+    for (at, (value, n)) in filled.enumerate() {
+        let label = if at == 0 { label } else { "" };
+        let bar = "#".repeat((*n as f64 / most * WIDTH).ceil() as usize);
+        writeln!(f, "{label:16} {value:>10.decimals$} {n:>8} {bar}")?;
+    }
+    Ok(())
+}
