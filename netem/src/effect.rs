@@ -9,13 +9,14 @@ use std::time::Duration;
 use mmt_shared::time::Time;
 use serde::Serialize;
 
-use crate::config::{ConfigError, LinkConfig, Order};
+use crate::config::{ConfigError, Correlation, LinkConfig, Loss, Order};
 use crate::counters::Drops;
 use crate::link::{DropCause, Fate, LinkId};
 use crate::pipe::Pipe;
 use crate::record::summary::{mean_run, nearest_rank, runs};
 
-/// Packets sampled. The mean of a delay is then known to 0.4 % of its standard deviation.
+/// Packets sampled. The mean of a delay is then known to 0.4 % of its standard deviation; where delays or
+/// losses hang together in time, ten times as many are.
 pub const PACKETS: u32 = 60_000;
 /// The length of the packets sampled, bytes: that of a small update. It matters where there is a rate.
 pub const BYTES: usize = 100;
@@ -40,11 +41,12 @@ pub struct Effect {
     /// Share of packets lost on the way, 0 to 1: what the settings say in the long run; sampled where
     /// it depends on the number or the time of a packet.
     pub loss: f64,
-    /// Mean length of runs of lost packets, packets; 0 if none was lost.
+    /// Mean length of runs of lost packets, packets; 0 if none is lost. Sampled where the model has no
+    /// formula for it.
     pub burst_packets: f64,
     /// Share of packets that the bottleneck dropped (queue full, `CoDel`), 0 to 1.
     pub queue_drops: f64,
-    /// Share of packets dropped because of the limit, 0 to 1, in a stream of [`PACKETS`] packets.
+    /// Share of packets dropped because of the limit, 0 to 1, in the stream sampled.
     pub over_limit: f64,
     /// Share of what arrives that arrives after a packet sent later (RFC 4737, section 3), 0 to 1.
     pub reordered: f64,
@@ -69,10 +71,11 @@ pub fn effect(config: &LinkConfig, rate_hz: f64) -> Result<Effect, ConfigError> 
         }
         Order::Fifo | Order::Free => mean_ms,
     };
-    let of_all = |packets: u64| packets as f64 / f64::from(PACKETS);
-    let known = config.loss.share().filter(|_| {
-        config.outages.is_empty() && config.replay.is_none() && config.profile.is_empty()
-    });
+    let of_all = |packets: u64| packets as f64 / f64::from(sample_size(config));
+    let only_the_model =
+        config.outages.is_empty() && config.replay.is_none() && config.profile.is_empty();
+    let known = config.loss.share().filter(|_| only_the_model);
+    let known_burst = config.loss.mean_burst(rate_hz).filter(|_| only_the_model);
     let drops = &stream.drops;
     let sampled = drops.loss.plus(drops.outage).plus(drops.mtu).packets;
     Ok(Effect {
@@ -82,7 +85,7 @@ pub fn effect(config: &LinkConfig, rate_hz: f64) -> Result<Effect, ConfigError> 
         p99_ms: p99(&stream.delays_ms),
         waiting_ms: (mean_ms - free_mean_ms).max(0.0),
         loss: known.unwrap_or(of_all(sampled)),
-        burst_packets: mean_run(&runs(stream.lost.iter().copied())),
+        burst_packets: known_burst.unwrap_or_else(|| mean_run(&runs(stream.lost.iter().copied()))),
         queue_drops: of_all(drops.queue.plus(drops.codel).packets),
         over_limit: of_all(drops.limit.packets),
         reordered: stream.reordered as f64 / stream.delays_ms.len().max(1) as f64,
@@ -109,6 +112,15 @@ fn clamp_rate(rate_hz: f64) -> f64 {
     }
 }
 
+/// How many packets show what these settings do.
+fn sample_size(config: &LinkConfig) -> u32 {
+    let in_time = matches!(config.correlation, Correlation::InTime(_))
+        || matches!(config.loss, Loss::Bursts(_))
+        || !config.outages.is_empty()
+        || !config.profile.is_empty();
+    if in_time { 10 * PACKETS } else { PACKETS }
+}
+
 /// An even stream after the link.
 struct Stream {
     /// Delays of what arrived, ms, in order of arrival.
@@ -129,7 +141,7 @@ impl Stream {
             lost: Vec::with_capacity(PACKETS as usize),
         };
         let mut newest = 0;
-        for packet in 0..PACKETS {
+        for packet in 0..sample_size(config) {
             let now = Time::ZERO + Duration::from_secs_f64(f64::from(packet) / rate_hz);
             stream.collect(&mut pipe, now, &mut newest);
             let fate = pipe.push(now, BYTES, ());

@@ -43,7 +43,7 @@ pub(crate) enum Command {
     Master(MasterArguments),
     /// Emulate a network between two hosts: a UDP relay
     #[command(after_help = help::NETEM)]
-    Netem(NetemArguments),
+    Netem(Box<NetemArguments>),
     /// Replay recorded pushes of a real object through estimator and trigger
     #[command(after_help = help::REPLAY)]
     Replay(ReplayArguments),

@@ -188,6 +188,37 @@ impl Loss {
         }
     }
 
+    /// The mean length of a run of lost packets in an even stream, packets; `None` where no formula is
+    /// known for it.
+    #[must_use]
+    pub fn mean_burst(&self, rate_hz: f64) -> Option<f64> {
+        match self {
+            Self::Independent { probability } if *probability > Probability::ZERO => {
+                Some(1.0 / (1.0 - probability.get()))
+            }
+            Self::Gemodel(chain)
+                if (chain.loss_in_bad, chain.loss_in_good)
+                    == (Probability::ONE, Probability::ZERO)
+                    && chain.to_bad > Probability::ZERO =>
+            {
+                Some(1.0 / chain.to_good.get())
+            }
+            Self::Bursts(bursts)
+                if (bursts.loss_inside, bursts.loss_between)
+                    == (Probability::ONE, Probability::ZERO)
+                    && bursts.share > Probability::ZERO =>
+            {
+                // a run goes on if the burst lasts, or is over and a new one has begun, at the next packet
+                let (bad, interval) = (bursts.share.get(), 1.0 / rate_hz);
+                let relaxation = bursts.mean.as_secs_f64() * (1.0 - bad);
+                let stays = bad + (1.0 - bad) * libm::exp(-interval / relaxation);
+                Some(1.0 / (1.0 - stays))
+            }
+            _ => None,
+        }
+        .filter(|packets| packets.is_finite())
+    }
+
     pub(super) fn never(&self) -> bool {
         self.share() == Some(0.0)
     }

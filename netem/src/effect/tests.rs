@@ -78,3 +78,36 @@ fn the_line_reads_as_documented() {
          bursts of 1.01 packets; reordered 0.0 %; keeping order adds 1.86 ms to the mean"
     );
 }
+
+#[test]
+fn the_formula_for_bursts_is_what_a_stream_meets() {
+    for (words, rate_hz) in [
+        ("loss 20%", 1000.0),
+        ("loss gemodel 2% 25%", 1000.0),
+        ("loss burst 5% 40ms", 1000.0),
+        ("loss burst 5% 40ms", 50.0),
+        ("loss burst 30% 40ms", 10.0),
+    ] {
+        let config: LinkConfig = words.parse().unwrap();
+        let known = config.expected(rate_hz).unwrap().burst_packets;
+        let stream = Stream::through(&config, rate_hz).unwrap();
+        let met = mean_run(&runs(stream.lost.iter().copied()));
+        assert!((met / known - 1.0).abs() < 0.15, "{words}: {met} {known}");
+    }
+}
+
+#[test]
+fn a_bottleneck_that_is_too_slow_shows() {
+    // 128 bytes at 64 kbit/s: 62.5 of 1000 packets a second
+    let effect = at_1_khz("rate 64kbit 28 queue 200ms");
+    assert!((effect.queue_drops - 0.9375).abs() < 0.001, "{effect}");
+    assert!((200.0..217.0).contains(&effect.p99_ms), "{effect}");
+    assert!(effect.to_string().contains("dropped by the queue"));
+}
+
+#[test]
+fn what_happens_on_time_is_sampled() {
+    let effect = at_1_khz("outage 1s for 500ms every 10s");
+    assert!((effect.loss - 0.05).abs() < 0.001, "{effect}");
+    assert!((effect.burst_packets - 500.0).abs() < 1.0, "{effect}");
+}
