@@ -65,6 +65,35 @@ fn wrong_arguments_are_refused_with_the_option_and_what_would_be_right() {
 }
 
 #[test]
+fn a_wrong_trace_or_record_is_refused_with_its_line() {
+    let home = tempfile::tempdir().unwrap();
+    let write = |name: &str, text: &str| std::fs::write(home.path().join(name), text).unwrap();
+    write("lens.csv", "timestamp,rtt\n1.0,5\n2.0,x\n");
+    write("record.csv", "# mmt netem record 1\nup,1\n");
+    for (arguments, parts) in [
+        (
+            &["demo", "--netem", "trace lens.csv"][..],
+            &["--netem", "^^^^^^^^", "line 3"][..],
+        ),
+        (
+            &["demo", "--netem", "rate trace none.up"],
+            &["none.up", "check the path"],
+        ),
+        (
+            &["netem", "report", "record.csv"],
+            &["record.csv", "line 2", "nine fields"],
+        ),
+        (
+            &["netem", "report", "none.csv"],
+            &["none.csv", "check the path"],
+        ),
+        (&["netem"], &["--listen"]),
+    ] {
+        complains(&command(&home).args(arguments).output().unwrap(), 2, parts);
+    }
+}
+
+#[test]
 fn a_wrong_pairing_string_is_refused_without_showing_its_secret() {
     let whole = pairing();
     let cut = &whole[..whole.len() - 1];

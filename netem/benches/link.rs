@@ -9,11 +9,15 @@ use criterion::{Criterion, criterion_group, criterion_main};
 use mmt_netem::{Link, LinkId, PacketMeta, Pipe};
 use mmt_shared::time::{TICK, Time};
 
-const SETTINGS: [&str; 4] = [
+const SETTINGS: [&str; 8] = [
     "none",
     "delay 50ms",
     "delay 50ms 5ms loss 1%",
     "delay 50ms 5ms distribution normal loss 1%",
+    "delay 50ms 5ms 50% distribution paretonormal loss gemodel 1% 10%",
+    "delay 50ms 5ms tau 100ms distribution lognormal loss burst 1% 40ms",
+    "delay 50ms rate 10mbit 28 queue 100ms codel duplicate 1% corrupt 1%",
+    "delay 50ms 5ms loss 1%; at 1s over 2s delay 80ms; loop 5s",
 ];
 
 fn offer(criterion: &mut Criterion) {

@@ -9,6 +9,7 @@ use std::str::FromStr;
 use std::time::Duration;
 
 mod error;
+mod losing;
 mod number;
 mod print;
 mod said;

@@ -18,7 +18,7 @@ use super::{master, slave};
 use crate::args::DemoArguments;
 use crate::failure::Failure;
 use crate::log::Messages;
-use crate::output::{print, print_json};
+use crate::output::{note, print, print_json};
 use crate::stop::Stop;
 use crate::view::{Caption, Snapshot};
 
@@ -26,6 +26,8 @@ mod joined;
 
 /// Samples in a command.
 const SAMPLES_PER_COMMAND: u8 = 10;
+/// Commands per second, for which the effect of the network is told.
+const COMMANDS_HZ: f64 = 100.0;
 /// How long the slave may take to notice that the master has ended before it is asked to end as well.
 const FAREWELL: Duration = Duration::from_secs(3);
 
@@ -36,6 +38,11 @@ const FAREWELL: Duration = Duration::from_secs(3);
 pub(crate) fn run(arguments: DemoArguments, messages: &Messages) -> Result<(), Failure> {
     let config = slave_config(&arguments);
     let caption = caption(&arguments, &config);
+    let effect = arguments.netem.expected(COMMANDS_HZ);
+    let effect = effect.map_err(Failure::usage)?;
+    // two lines: each direction draws its own numbers
+    note(format_args!("network up:   {effect}"));
+    note(format_args!("network down: {effect}"));
     let (stop, stop_slave) = (Stop::on_signals()?, Stop::new());
     let options = slave_options(&arguments, config)?;
     let (slave, started) = slave::start(options, None, stop_slave.receiver())?;
