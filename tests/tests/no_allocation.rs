@@ -347,3 +347,26 @@ fn the_slaves_own_parts_never_allocate() {
         assert!(estimator.estimate().samples > 1000, "the estimators worked");
     }
 }
+
+#[test]
+fn an_emulated_link_decides_without_allocating() {
+    for words in [
+        "delay 50ms 5ms 50% distribution paretonormal loss gemodel 1% 10% duplicate 5% corrupt 5%",
+        "delay cdf 1ms@0%,3ms@50%,250ms@100% tau 100ms loss burst 5% 40ms reorder 5% order free",
+        "delay 5ms rate 64kbit 28 queue 100ms 50p codel limit 100 outage 1s for 50ms every 3s",
+        "delay 50ms loss state 1%; at 1s over 2s delay 80ms 9ms rate 1mbit; loop 5s",
+    ] {
+        let config = words.parse().unwrap();
+        let mut link = mmt_netem::Link::try_new(config, 1, mmt_netem::LinkId::UP).unwrap();
+        let ((), calls) = counted(|| {
+            for packet in 0..20_000 {
+                let meta = mmt_netem::PacketMeta {
+                    bytes: 100,
+                    in_flight: 0,
+                };
+                black_box(link.offer(Time::from_millis(packet), meta));
+            }
+        });
+        assert_eq!(calls, 0, "{words}");
+    }
+}
