@@ -72,8 +72,10 @@ pub fn effect(config: &LinkConfig, rate_hz: f64) -> Result<Effect, ConfigError> 
         Order::Fifo | Order::Free => mean_ms,
     };
     let of_all = |packets: u64| packets as f64 / f64::from(sample_size(config));
-    let only_the_model =
-        config.outages.is_empty() && config.replay.is_none() && config.profile.is_empty();
+    let only_the_model = config.outages.is_empty()
+        && config.mtu.is_none()
+        && config.replay.is_none()
+        && config.profile.is_empty();
     let known = config.loss.share().filter(|_| only_the_model);
     let known_burst = config.loss.mean_burst(rate_hz).filter(|_| only_the_model);
     let drops = &stream.drops;
