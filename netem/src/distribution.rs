@@ -205,7 +205,7 @@ mod tests {
             [-5461.0, -4362.0, -2622.0, 955.0]
         );
         assert_eq!(entry(1.0), 32_767.0);
-        // its mean is zero before the cut, and lower after it by the tail: 1 / (6 (4/3 ...)^2)
+        // the cut at 4 J takes the tail away, and with it a little of the mean, which was zero
         let tail = |x: f64| 1.0 - 1.0 / (0.75 * x + 1.5_f64).powi(3);
         assert!(pareto(tail(4.1)) < 4.0 && pareto(tail(3.9)) < 3.91);
         let shortfall = mean(pareto);

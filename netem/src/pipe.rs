@@ -127,12 +127,6 @@ impl<T> Pipe<T> {
         self.link.set_origin(origin);
     }
 
-    /// Packets before the bottleneck, see [`Link::backlog`].
-    #[must_use]
-    pub fn backlog(&self) -> usize {
-        self.link.backlog()
-    }
-
     /// Packets taken out so far.
     #[must_use]
     pub fn released(&self) -> Tally {

@@ -135,16 +135,23 @@ impl Outage {
     }
 }
 
-/// Packets by their numbers: ranges in ascending order, both ends included.
+/// Packets by their numbers: ranges in ascending order that do not overlap, both ends included.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct PacketList(Vec<(u64, u64)>);
 
 impl PacketList {
-    /// A list of ranges; sorted here.
+    /// A list of ranges in any order; those that overlap are joined.
     #[must_use]
     pub fn new(mut ranges: Vec<(u64, u64)>) -> Self {
         ranges.sort_unstable();
-        Self(ranges)
+        let mut joined: Vec<(u64, u64)> = Vec::with_capacity(ranges.len());
+        for (first, last) in ranges {
+            match joined.last_mut() {
+                Some((_, end)) if first <= *end => *end = last.max(*end),
+                _ => joined.push((first, last)),
+            }
+        }
+        Self(joined)
     }
 
     /// The ranges.
@@ -157,9 +164,8 @@ impl PacketList {
     #[must_use]
     pub fn holds(&self, number: u64) -> bool {
         let begun = self.0.partition_point(|(first, _)| *first <= number);
-        let (before, _) = self.0.split_at(begun);
-        // a long range may hide behind shorter ones that begin later
-        before.iter().rev().any(|(_, last)| number <= *last)
+        let last_begun = begun.checked_sub(1).and_then(|at| self.0.get(at));
+        last_begun.is_some_and(|(_, last)| number <= *last)
     }
 }
 

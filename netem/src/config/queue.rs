@@ -75,14 +75,6 @@ pub struct Queue {
     pub codel: Option<Codel>,
 }
 
-impl Queue {
-    /// Whether nothing is said of the queue.
-    #[must_use]
-    pub fn is_default(&self) -> bool {
-        *self == Self::default()
-    }
-}
-
 /// Controlled delay (RFC 8289).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Codel {

@@ -130,7 +130,7 @@ fn bursts_in_time_have_their_share_and_their_length_at_any_rate() {
 
 #[test]
 fn named_packets_and_scheduled_outages_are_lost_and_no_others() {
-    let listed = lost("loss list 3,10-12", 1);
+    let listed = lost("loss list 11-12,3,10-11", 1);
     let at: Vec<usize> = (0..listed.len()).filter(|at| listed[*at]).collect();
     assert_eq!(at, [3, 10, 11, 12]);
     let every = lost("loss every 100", 1);
