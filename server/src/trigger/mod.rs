@@ -240,7 +240,7 @@ impl Trigger {
                 let timed = due.then_some(Cause::Timer);
                 self.violated(input, delta)
                     .or(timed)
-                    .filter(|_| self.useful(now, input))
+                    .filter(|_| self.useful(now, input, delta))
             }
             Scheme::Useful { delta, t_update } => {
                 let timed = || {
@@ -249,7 +249,7 @@ impl Trigger {
                 };
                 self.violated(input, delta)
                     .or_else(timed)
-                    .filter(|_| self.useful(now, input))
+                    .filter(|_| self.useful(now, input, delta))
             }
         }
     }
@@ -293,8 +293,8 @@ impl Trigger {
     }
 
     /// Whether the hand would feel what an update says: by the force that the changed parameters would
-    /// give in the present motion, or by the direction of the face.
-    fn useful(&self, now: Time, input: &TriggerInput) -> bool {
+    /// give in the present motion, by the direction of the face, or by its place while the object is held.
+    fn useful(&self, now: Time, input: &TriggerInput, delta: f64) -> bool {
         let Some((time, sent)) = self.last else {
             return true;
         };
@@ -304,6 +304,15 @@ impl Trigger {
         let change = force_change(input, &sent);
         change > USEFUL_SHARE * input.f_s.norm().max(USEFUL_FLOOR_N)
             || input.turn.abs() > USEFUL_TURN_RAD
+            || self.is_held_wrongly(input, delta)
+    }
+
+    /// What friction holds is pushed back by the depth of the HIP alone: a force that is off by more than Delta
+    /// says that the face is not where the model has it.
+    fn is_held_wrongly(&self, input: &TriggerInput, delta: f64) -> bool {
+        let scale = input.f_s.norm().max(self.config.force_floor_n);
+        let beyond = (input.f_s - input.f_m).norm() > delta * scale;
+        input.sticking && input.both_in_contact() && beyond
     }
 }
 

@@ -353,3 +353,22 @@ fn what_was_lost_is_said_again_once_at_once_and_under_every_scheme() {
         );
     }
 }
+
+#[test]
+fn useful_says_where_a_held_face_is_once_a_period_while_the_force_is_wrong() {
+    let mut trigger = trigger("useful 10% 150ms", Mode::Recommended);
+    let held = |f_m: f64| TriggerInput {
+        sticking: true,
+        speed: 0.0,
+        acceleration: 0.0,
+        ..input(1.0, f_m)
+    };
+    let first = trigger.decide(Time::ZERO, &input(1.0, 2.0));
+    assert_eq!(first, Some(Cause::Deadband));
+    let sent = |trigger: &mut Trigger, f_m: f64, from: u64, to: u64| -> Vec<u64> {
+        let fires = |n: &u64| trigger.decide(Time::from_millis(*n), &held(f_m)).is_some();
+        (from..to).filter(fires).collect()
+    };
+    assert_eq!(sent(&mut trigger, 0.8, 1, 500), [150, 300, 450]);
+    assert_eq!(sent(&mut trigger, 0.95, 500, 1000), [0; 0]);
+}
