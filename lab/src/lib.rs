@@ -10,6 +10,7 @@ pub mod io;
 pub mod replay;
 pub mod reproduce;
 pub mod statistics;
+pub mod sweep;
 pub mod table;
 pub mod trial;
 pub mod world;

@@ -1,0 +1,1 @@
+//! Plans right and wrong, and rows however they are cut.
