@@ -7,6 +7,7 @@ pub mod physics;
 pub mod replay;
 pub mod reproduce;
 pub mod statistics;
+pub mod sweep;
 pub mod table;
 pub mod trial;
 pub mod world;

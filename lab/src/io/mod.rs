@@ -8,7 +8,9 @@
 mod cost;
 mod folder;
 mod pool;
+mod sheets;
 
 pub use cost::estimator_tick_ms;
 pub use folder::Folder;
 pub use pool::Pool;
+pub use sheets::{SheetError, Sheets};

@@ -1,0 +1,21 @@
+//! A grid over configuration: which trials a plan asks for, in which order, and what its table of results holds.
+//!
+//! Pure: a row is a function of the plan and the row's number. It must never depend on which rows ran before, on
+//! which machine or in which shard, so that results come out the same byte for byte however the work is cut.
+
+mod error;
+mod measures;
+mod overlay;
+mod plan;
+mod reader;
+mod results;
+mod shard;
+
+pub use error::PlanError;
+pub use measures::MEASURES;
+pub use plan::{Axis, Plan, ROWS_MAX, Row, Seeds, Start};
+pub use results::{Line, PartError, Results, part_header};
+pub use shard::{Shard, ShardError};
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,341 @@
+//! Reads a plan's text into configurations, and says of each wrong key or value where it stands.
+//!
+//! Whatever a run could refuse must be refused here, before anything runs.
+
+use std::ops::Range;
+use std::time::Duration;
+
+use serde::Deserialize;
+use serde::de::IgnoredAny;
+use toml::Spanned;
+use toml::de::{DeTable, DeValue, Deserializer};
+
+use super::error::PlanError;
+use super::overlay::{effective, lay_at};
+use super::plan::{Axis, Plan, ROWS_MAX, Seeds, Start, steps};
+use crate::trial::{Change, Trial, TrialError};
+use crate::world::WorldConfig;
+
+/// Accepted length of a run, s: one tick to a week.
+const DURATION_S: (f64, f64) = (0.001, 604_800.0);
+/// What the seeds of a plan set.
+const SEED_KEYS: [&str; 3] = ["seed", "slave.seed", "operator.seed"];
+
+/// The plan of a text.
+pub(super) fn read(text: &str) -> Result<Plan, PlanError> {
+    let root = DeTable::parse(text).map_err(|error| PlanError::of(text, &error))?;
+    let head = Head::deserialize(Deserializer::from(root.clone()))
+        .map_err(|error| PlanError::of(text, &error))?;
+    let duration = head.duration(text)?;
+    let reader = Reader::new(text, &root, &head)?;
+    reader.check_size(head.seeds.get_ref(), &head.seeds.span())?;
+    let change = head.change(text)?;
+    Ok(Plan {
+        duration,
+        seeds: *head.seeds.get_ref(),
+        change,
+        points: reader.points(change)?,
+        axes: reader.axes.iter().map(|axis| axis.plain(text)).collect(),
+    })
+}
+
+/// What a plan holds beside the values, which keep their places.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Head {
+    duration_s: Spanned<f64>,
+    seeds: Spanned<Seeds>,
+    #[serde(default)]
+    start: Start,
+    base: Option<Spanned<IgnoredAny>>,
+    #[serde(default)]
+    axis: Vec<Spanned<AxisHead>>,
+    change: Option<Spanned<Change>>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct AxisHead {
+    key: Option<Spanned<String>>,
+    keys: Option<Spanned<Vec<Spanned<String>>>>,
+    values: Spanned<Vec<IgnoredAny>>,
+}
+
+impl Head {
+    fn duration(&self, text: &str) -> Result<Duration, PlanError> {
+        let (least, most) = DURATION_S;
+        let seconds = *self.duration_s.get_ref();
+        if !(least..=most).contains(&seconds) {
+            let what = format!("duration_s is {seconds}; it must be {least} to {most}");
+            return Err(PlanError::at(text, Some(self.duration_s.span()), what));
+        }
+        Ok(Duration::from_secs_f64(seconds))
+    }
+
+    fn change(&self, text: &str) -> Result<Option<Change>, PlanError> {
+        let Some(change) = &self.change else {
+            return Ok(None);
+        };
+        let contact_s = change.get_ref().contact_s;
+        if !(contact_s.is_finite() && contact_s >= 0.0) {
+            let what = format!("contact_s of the change is {contact_s}; it must be at least 0");
+            return Err(PlanError::at(text, Some(change.span()), what));
+        }
+        Ok(Some(*change.get_ref()))
+    }
+}
+
+/// An axis with the places of its keys and values.
+struct PlacedAxis<'i> {
+    keys: Vec<Spanned<String>>,
+    /// Per step a value for every key.
+    steps: Vec<Vec<Spanned<DeValue<'i>>>>,
+}
+
+impl PlacedAxis<'_> {
+    fn plain(&self, text: &str) -> Axis {
+        let written = |step: &Vec<_>| step.iter().map(|value| written(text, value)).collect();
+        Axis {
+            keys: self.keys.iter().map(|key| key.get_ref().clone()).collect(),
+            values: self.steps.iter().map(written).collect(),
+        }
+    }
+}
+
+/// A value as the plan writes it; of a string what is between the quotes.
+fn written(text: &str, value: &Spanned<DeValue>) -> String {
+    match value.get_ref() {
+        DeValue::String(string) => string.to_string(),
+        _ => text.get(value.span()).unwrap_or_default().to_owned(),
+    }
+}
+
+/// Turns the placed keys and values into configurations.
+struct Reader<'i> {
+    text: &'i str,
+    start: Start,
+    base: Spanned<DeTable<'i>>,
+    axes: Vec<PlacedAxis<'i>>,
+}
+
+impl<'i> Reader<'i> {
+    fn new(text: &'i str, root: &Spanned<DeTable<'i>>, head: &Head) -> Result<Self, PlanError> {
+        let base = match (root.get_ref().get("base"), &head.base) {
+            (Some(base), Some(place)) => match base.get_ref() {
+                DeValue::Table(table) => Spanned::new(place.span(), table.clone()),
+                _ => {
+                    return Err(PlanError::at(
+                        text,
+                        Some(place.span()),
+                        "base must be a table",
+                    ));
+                }
+            },
+            _ => Spanned::new(text.len() + 1..text.len() + 1, DeTable::new()),
+        };
+        let placed = root
+            .get_ref()
+            .get("axis")
+            .and_then(|axes| axes.get_ref().as_array());
+        let placed = placed.into_iter().flat_map(|axes| axes.iter());
+        let axes = head.axis.iter().zip(placed);
+        let axes = axes.map(|(head, placed)| placed_axis(text, head, placed.get_ref()));
+        let reader = Self {
+            text,
+            start: head.start,
+            base,
+            axes: axes.collect::<Result<_, _>>()?,
+        };
+        reader.check_keys()?;
+        Ok(reader)
+    }
+
+    /// No key twice or within another, and no seed.
+    fn check_keys(&self) -> Result<(), PlanError> {
+        let keys: Vec<&Spanned<String>> = self.axes.iter().flat_map(|axis| &axis.keys).collect();
+        for (n, key) in keys.iter().enumerate() {
+            let name = key.get_ref();
+            let refuse = |what: String| Err(PlanError::at(self.text, Some(key.span()), what));
+            if name.split('.').any(str::is_empty) {
+                return refuse(format!(
+                    "`{name}` is no key; write it as slave.trigger.scheme"
+                ));
+            }
+            if SEED_KEYS.contains(&name.as_str()) {
+                return refuse(format!(
+                    "`{name}` is no axis: the seeds of a plan are `seeds`"
+                ));
+            }
+            let overlaps = |other: &&&Spanned<String>| {
+                let other = other.get_ref();
+                let within =
+                    |a: &str, b: &str| a.strip_prefix(b).is_some_and(|rest| rest.starts_with('.'));
+                name == other || within(name, other) || within(other, name)
+            };
+            if let Some(other) = keys.iter().take(n).find(overlaps) {
+                return refuse(format!(
+                    "`{name}` varies what `{}` varies already",
+                    other.get_ref()
+                ));
+            }
+        }
+        for key in SEED_KEYS {
+            let mut inner = Some(self.base.get_ref());
+            let (path, last) = key.rsplit_once('.').unwrap_or(("", key));
+            if !path.is_empty() {
+                inner = inner.and_then(|base| base.get(path)?.get_ref().as_table());
+            }
+            if let Some((place, _)) = inner.and_then(|base| base.get_key_value(last)) {
+                let what = format!("`{key}` is not for base: the seeds of a plan are `seeds`");
+                return Err(PlanError::at(self.text, Some(place.span()), what));
+            }
+        }
+        Ok(())
+    }
+
+    fn check_size(&self, seeds: &Seeds, place: &Range<usize>) -> Result<(), PlanError> {
+        let refuse = |what: String| Err(PlanError::at(self.text, Some(place.clone()), what));
+        if seeds.count == 0 {
+            return refuse("count of seeds is 0; it must be at least 1".to_owned());
+        }
+        if seeds.first.checked_add(seeds.count).is_none() {
+            return refuse("the last seed is no number of 64 bits".to_owned());
+        }
+        let sizes = self.axes.iter().map(|axis| axis.steps.len() as u64);
+        let rows = sizes.fold(seeds.count, u64::saturating_mul);
+        match rows > ROWS_MAX {
+            true => refuse(format!(
+                "{rows} rows are too many; a plan has at most {ROWS_MAX}"
+            )),
+            false => Ok(()),
+        }
+    }
+
+    /// The configuration at every point of the grid, each tried.
+    fn points(&self, change: Option<Change>) -> Result<Vec<WorldConfig>, PlanError> {
+        let sizes: Vec<usize> = self.axes.iter().map(|axis| axis.steps.len()).collect();
+        let points = 0..sizes.iter().product();
+        points
+            .map(|point| {
+                let steps: Vec<Option<usize>> =
+                    steps(point, &sizes).into_iter().map(Some).collect();
+                let config = self.config(&steps)?;
+                match attempt(&config, change) {
+                    Ok(()) => Ok(config),
+                    Err(error) => Err(self.refused(&steps, change, &error)),
+                }
+            })
+            .collect()
+    }
+
+    /// The configuration with each axis at a step, or left out.
+    fn config(&self, steps: &[Option<usize>]) -> Result<WorldConfig, PlanError> {
+        let mut given = self.base.clone();
+        for (key, value) in self.assignments(steps) {
+            lay_at(given.get_mut(), key.get_ref(), &key.span(), value.clone());
+        }
+        effective(self.start, given, self.text.len())
+            .map_err(|error| PlanError::of(self.text, &error).context(&self.told(steps)))
+    }
+
+    fn assignments(
+        &self,
+        steps: &[Option<usize>],
+    ) -> impl Iterator<Item = (&Spanned<String>, &Spanned<DeValue<'i>>)> {
+        let placed = self.axes.iter().zip(steps);
+        let placed = placed.filter_map(|(axis, step)| Some((axis, axis.steps.get((*step)?)?)));
+        placed.flat_map(|(axis, values)| axis.keys.iter().zip(values))
+    }
+
+    /// Where the grid stands, for people.
+    fn told(&self, steps: &[Option<usize>]) -> String {
+        let told = self.assignments(steps).map(|(key, value)| {
+            let value = self.text.get(value.span()).unwrap_or_default();
+            format!("{} = {value}", key.get_ref())
+        });
+        told.collect::<Vec<_>>().join(", ")
+    }
+
+    /// An error with the place that is to blame: the base, or the first axis whose value is refused without the
+    /// other axes, or no place where only values together are.
+    fn refused(
+        &self,
+        steps: &[Option<usize>],
+        change: Option<Change>,
+        error: &TrialError,
+    ) -> PlanError {
+        let refuses = |steps: &[Option<usize>]| {
+            let config = self.config(steps);
+            config.is_ok_and(|config| attempt(&config, change).is_err())
+        };
+        if refuses(&vec![None; steps.len()]) {
+            return PlanError::at(self.text, Some(self.base.span()), error);
+        }
+        let alone = |axis: usize| -> Vec<Option<usize>> {
+            let kept = |(n, step): (usize, &Option<usize>)| step.filter(|_| n == axis);
+            steps.iter().enumerate().map(kept).collect()
+        };
+        let to_blame = (0..steps.len()).map(alone).find(|steps| refuses(steps));
+        let place = to_blame.and_then(|steps| {
+            let mut spans = self.assignments(&steps).map(|(_, value)| value.span());
+            let first = spans.next()?;
+            Some(first.start..spans.last().map_or(first.end, |last| last.end))
+        });
+        PlanError::at(self.text, place, error).context(&self.told(steps))
+    }
+}
+
+fn placed_axis<'i>(
+    text: &str,
+    head: &Spanned<AxisHead>,
+    placed: &DeValue<'i>,
+) -> Result<PlacedAxis<'i>, PlanError> {
+    let axis = head.get_ref();
+    let refuse = |span, what: &str| Err(PlanError::at(text, Some(span), what));
+    let keys = match (&axis.key, &axis.keys) {
+        (Some(key), None) => vec![key.clone()],
+        (None, Some(keys)) if !keys.get_ref().is_empty() => keys.get_ref().clone(),
+        _ => return refuse(head.span(), "an axis has either `key` or `keys`"),
+    };
+    let values = placed.as_table().and_then(|axis| axis.get("values"));
+    let values = values.and_then(|values| values.get_ref().as_array());
+    let values: Vec<_> = values
+        .into_iter()
+        .flat_map(|values| values.iter())
+        .collect();
+    if values.is_empty() {
+        return refuse(axis.values.span(), "an axis needs at least one value");
+    }
+    let mut steps = Vec::new();
+    for value in values {
+        match (&axis.keys, value.get_ref()) {
+            (None, _) => steps.push(vec![value.clone()]),
+            (Some(_), DeValue::Array(row)) if row.len() == keys.len() => steps.push(row.to_vec()),
+            _ => {
+                return refuse(
+                    value.span(),
+                    "with `keys`, a value is a list with one value per key",
+                );
+            }
+        }
+    }
+    Ok(PlacedAxis { keys, steps })
+}
+
+/// Makes the world, and where there is a change makes it at once: whatever a run could refuse is refused here.
+fn attempt(config: &WorldConfig, change: Option<Change>) -> Result<(), TrialError> {
+    let at_once = change.map(|change| Change {
+        after_pushes: 0,
+        contact_s: 0.0,
+        ..change
+    });
+    let tick = match at_once {
+        Some(_) => Duration::from_millis(1),
+        None => Duration::ZERO,
+    };
+    let trial = Trial {
+        change: at_once,
+        ..Trial::new(config.clone(), tick)
+    };
+    trial.run().map(|_| ())
+}
