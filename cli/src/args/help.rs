@@ -36,7 +36,7 @@ stdout: the pairing string, alone on the first line; with --json the report afte
 The pairing string is a secret: whoever has it can operate this slave.
 
 Schemes: \"deadband 10%\", \"hybrid 10% 150ms\", \"timer 150ms\", every-sample, \"dis 0.3N 1s\",
-\"useful 10% 150ms\".";
+\"useful 10% 150ms\", \"adaptive 10% 50ms\".";
 
 /// Examples of `mmt master`.
 pub(super) const MASTER: &str = "\
@@ -76,7 +76,9 @@ Examples:
 pub(super) const REPRODUCE: &str = "\
 Examples:
   mmt reproduce fig5
+  mmt reproduce all --out figures
   mmt reproduce fig5 --seeds 1 --duration 10s --samples --out trial
+  mmt reproduce physics --mass 1.4 --mu 0.2
 
 Every run is a function of its configuration and seed: the files are the same, byte for byte, on every
 machine and with any number of threads. manifest.json says what was run and holds the files' SHA-256.";
