@@ -4,10 +4,11 @@
 //! the seed comes with the configuration, and what it returns is all that it does.
 
 use mmt_shared::contact::Coupling;
+use mmt_shared::correction::IN_CONTACT;
 use mmt_shared::geometry::{BoxFootprint, Pose, Twist, Vec2, wrap_angle};
 use mmt_shared::metrics::ForceMetrics;
 use mmt_shared::params::{ModelParams, ModelState, inertia_of_square};
-use mmt_shared::settings::{Mode, ModelSettings};
+use mmt_shared::settings::{Mode, ModelSettings, PoseCorrection};
 use mmt_shared::time::Time;
 use mmt_shared::wire::{Cause, HipSample, Update};
 
@@ -299,6 +300,17 @@ impl Slave {
         }
     }
 
+    /// Where the model is to be: ahead of the object by as much as its correction lags behind.
+    fn pose_to_tell(&self) -> Pose {
+        match self.settings.correction {
+            PoseCorrection::Snap => self.observer.pose(),
+            PoseCorrection::MatchedStamps => {
+                let omega = self.shadow.state().twist.angular;
+                self.observer.pose_ahead(omega, IN_CONTACT.tau_s)
+            }
+        }
+    }
+
     /// Makes the update and applies it to the shadow, as the master will.
     fn send(&mut self, cause: Cause, tick: &SlaveTick) -> Update {
         let judged = match self.reference {
@@ -313,7 +325,7 @@ impl Slave {
         let seen = ModelState {
             params: self.params,
             footprint: self.observer.footprint(),
-            pose: self.observer.pose(),
+            pose: self.pose_to_tell(),
             twist: self.observer.twist(),
         };
         // what the model had at the stamp: nothing is left to be corrected there
