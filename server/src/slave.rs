@@ -262,13 +262,16 @@ impl Slave {
             turning: self.observer.twist().angular,
             side,
         });
-        let Estimate { m, b, c, .. } = self.estimator.step(&Measured {
+        let Estimate {
+            m, b, c, holding, ..
+        } = self.estimator.step(&Measured {
             tool,
             force,
             normal,
             seen,
         });
         let inertia = inertia_of_square(m, side);
+        let c = holding.unwrap_or(c);
         let e = c * self.observer.friction_radius();
         match ModelParams::try_new(m, b, c, inertia, e, &self.settings.coupling) {
             Ok(params) => self.params = params,
@@ -290,7 +293,11 @@ impl Slave {
             f_m,
             slave_in_contact: tick.in_contact,
             shadow_in_contact,
-            sticking: estimate.sticking,
+            // a model that does not stand where the object does is a mismatch although the object sticks
+            sticking: estimate.sticking
+                && estimate
+                    .holding
+                    .is_none_or(|c| self.shadow.ahead().state().params.c() > 0.5 * c),
             speed: estimate.speed,
             acceleration: estimate.acceleration,
             force_deviation: estimate.force_deviation(),
