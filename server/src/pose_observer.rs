@@ -150,6 +150,12 @@ impl PoseObserver {
         self.twist
     }
 
+    /// Rate at which the object itself turns, rad/s: unlike a stand-in's, whose tangent may turn on it.
+    #[must_use]
+    pub fn body_rate(&self) -> f64 {
+        self.stand_in.body_rate(self.twist.angular)
+    }
+
     /// Distances from the centre to the faces, as far as known.
     #[must_use]
     pub fn footprint(&self) -> BoxFootprint {
@@ -362,12 +368,13 @@ impl PoseObserver {
         let gone_by = vision.pose.position - then.pose.position;
         let seen = vision.pose.angle + self.stand_in.turned();
         let turn = wrap_angle(seen - then.pose.angle);
-        if then.touching.is_some() && self.stand_in.see(turn, self.config.vision_noise_rad) {
+        let noise = self.config.vision_noise_rad;
+        if then.touching.is_some() && self.stand_in.see(vision.taken, turn, noise) {
             self.become_stand_in(gone_by);
             return;
         }
         if then.touching.is_none() || !self.stand_in.is_active() {
-            self.measure_angle(turn, self.config.vision_noise_rad.powi(2));
+            self.measure_angle(turn, noise * noise);
         }
         let variance = self.config.vision_noise_m.powi(2);
         let gain = if variance > 0.0 {

@@ -260,6 +260,7 @@ impl Slave {
         let seen = Some(Seen {
             centre: self.observer.pose().position,
             turning: self.observer.twist().angular,
+            body_turning: self.observer.body_rate(),
             side,
         });
         let Estimate {

@@ -6,7 +6,7 @@
 //! take a box for anything else because of one bad image, and never be asked in paper mode.
 
 use mmt_shared::geometry::wrap_angle;
-use mmt_shared::time::TICK_S;
+use mmt_shared::time::{TICK, TICK_S, Time};
 
 /// Disagreement about theta that no box causes, rad; six standard deviations of vision's noise if that is more.
 const DISAGREEMENT_RAD: f64 = 0.05;
@@ -16,8 +16,11 @@ const IMAGES: u32 = 3;
 const FRESH_TICKS: u32 = 30;
 /// Time constant of the rate at which the tangent turns, s.
 const RATE_S: f64 = 0.050;
-/// Weight of an image in what the stand-in is turned by, and least weight in the offset of a contact.
-const IMAGE_WEIGHT: (f64, f64) = (0.3, 0.1);
+/// Weight of an image in what the stand-in is turned by, and in the rate of that: an alpha-beta filter of
+/// critical memory, beta = alpha²/(2 − alpha).
+const TURNED_WEIGHT: (f64, f64) = (0.3, 0.053);
+/// Least weight of an image in the offset of a contact.
+const OFFSET_WEIGHT: f64 = 0.1;
 
 /// What is known of the stand-in.
 #[derive(Clone, Copy, Debug, Default)]
@@ -26,6 +29,10 @@ pub(super) struct StandIn {
     active: bool,
     /// By how much the stand-in is turned against the body that vision sees, rad.
     turned: f64,
+    /// Rate of that, rad/s: 0 on the flat edge of a polygon, but not on a disc.
+    slip: f64,
+    /// When the last image of this contact was taken.
+    seen: Option<Time>,
     /// Ticks until the normal of this contact has settled.
     fresh: u32,
     /// Images since it has.
@@ -54,11 +61,17 @@ impl StandIn {
         self.rate
     }
 
+    /// Rate at which the body itself turns under a tangent that turns at `omega`, rad/s.
+    pub(super) fn body_rate(&self, omega: f64) -> f64 {
+        omega - self.slip
+    }
+
     /// A new contact, or one whose normal jumped.
     pub(super) fn begin(&mut self) {
         self.fresh = FRESH_TICKS;
         self.images = 0;
         self.rate = 0.0;
+        self.seen = None;
     }
 
     /// One tick of touch with the tangent turning at `omega` (rad/s).
@@ -70,11 +83,11 @@ impl StandIn {
         }
     }
 
-    /// Takes the angle (rad) by which an image of a touched body differs from what touch said; `noise` is
-    /// vision's, rad r.m.s. Says whether this image is the one that shows that the body is no box.
-    pub(super) fn see(&mut self, turn: f64, noise: f64) -> bool {
+    /// Takes the angle (rad) by which an image of a touched body, taken at `taken`, differs from what touch
+    /// said then; `noise` is vision's, rad r.m.s. Says whether this image shows that the body is no box.
+    pub(super) fn see(&mut self, taken: Time, turn: f64, noise: f64) -> bool {
         if self.active {
-            self.turned = wrap_angle(self.turned - turn * IMAGE_WEIGHT.0);
+            self.follow(taken, turn);
             return false;
         }
         let disagrees = turn.abs() > DISAGREEMENT_RAD.max(6.0 * noise);
@@ -88,9 +101,25 @@ impl StandIn {
         true
     }
 
+    fn follow(&mut self, taken: Time, turn: f64) {
+        if self.is_fresh() {
+            return;
+        }
+        let Some(before) = self.seen.replace(taken) else {
+            self.turned = wrap_angle(self.turned - turn);
+            return;
+        };
+        let seconds = taken.saturating_since(before).max(TICK).as_secs_f64();
+        let predicted = self.slip * seconds;
+        let (alpha, beta) = TURNED_WEIGHT;
+        let error = -turn - predicted;
+        self.turned = wrap_angle(self.turned + predicted + alpha * error);
+        self.slip += beta * error / seconds;
+    }
+
     /// Weight of the next image in the offset of this contact.
     pub(super) fn offset_weight(&mut self) -> f64 {
         self.images = self.images.saturating_add(1);
-        (1.0 / f64::from(self.images)).max(IMAGE_WEIGHT.1)
+        (1.0 / f64::from(self.images)).max(OFFSET_WEIGHT)
     }
 }
