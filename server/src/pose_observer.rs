@@ -451,9 +451,12 @@ impl PoseObserver {
     /// been touched is not where it was thought to be and is carved back; a known face, or any in the
     /// paper's mode, means that the box is further away.
     pub fn carve(&mut self, tool: Vec2, face: Face) {
-        let depth = -self
-            .footprint
-            .distance(face, self.pose.point_to_object(tool));
+        let tool = self.pose.point_to_object(tool);
+        if self.config.learn && !self.footprint.within_ends(face, tool) {
+            // slipped past the end of the face: the box is not further away, but aside
+            return;
+        }
+        let depth = -self.footprint.distance(face, tool);
         let depth = depth + self.carve_margin;
         if depth <= 0.0 {
             return;

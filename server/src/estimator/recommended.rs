@@ -14,7 +14,7 @@ use super::creep::Creep;
 use super::direction::{DirectionConfig, ForceDirection};
 use super::filter::{Row, StateVariableFilter, stage_weight};
 use super::gate::{Gate, GateConfig, Passage};
-use super::obstacle::Obstacle;
+use super::obstacle::{Moving, Obstacle};
 use super::recursive::{Recursive, RecursiveConfig, Verdict};
 use super::surface::{Surface, SurfaceMotion};
 use super::turning::{self, Seen};
@@ -159,11 +159,15 @@ impl RecommendedEstimator {
 
     /// Whether something beyond friction holds the object against this force, N.
     fn stand(&mut self, force: f64) {
-        let slides = self.gate.slides(self.estimate.speed);
-        let c = self.recursive.estimate().z;
-        let sticks = self.estimate.sticking;
-        if self.obstacle.step(force, sticks, slides, c) {
-            let [older, _] = self.copies;
+        let moving = if self.gate.slides(self.estimate.speed) {
+            Moving::Slides
+        } else if self.estimate.sticking {
+            Moving::Sticks
+        } else {
+            Moving::Slowly
+        };
+        let [older, _] = self.copies;
+        if self.obstacle.step(force, moving, older.estimate().z) {
             self.recursive = older;
             self.copies = [older; 2];
         }
