@@ -278,10 +278,7 @@ impl PoseObserver {
     /// one that the tool is at, which is the one that the master pushes.
     fn face_of(&self, tool: Vec2, force: Vec2) -> Face {
         if self.stand_in.is_active() {
-            return self
-                .footprint
-                .nearest(self.pose.point_to_object(tool))
-                .0;
+            return self.footprint.nearest(self.pose.point_to_object(tool)).0;
         }
         let in_object = rotate(-self.pose.angle, force);
         let mut best = (Face::East, f64::NEG_INFINITY);
