@@ -4,7 +4,7 @@
 //! the seed comes with the configuration, and what it returns is all that it does.
 
 use mmt_shared::contact::Coupling;
-use mmt_shared::correction::IN_CONTACT;
+use mmt_shared::correction::{IN_CONTACT, IN_CONTACT_REPLAYED};
 use mmt_shared::geometry::{BoxFootprint, Pose, Twist, Vec2, wrap_angle};
 use mmt_shared::metrics::ForceMetrics;
 use mmt_shared::params::{ModelParams, ModelState, inertia_of_square};
@@ -310,13 +310,13 @@ impl Slave {
 
     /// Where the model is to be: ahead of the object by as much as its correction lags behind.
     fn pose_to_tell(&self) -> Pose {
-        match self.settings.correction {
-            PoseCorrection::Snap => self.observer.pose(),
-            PoseCorrection::MatchedStamps => {
-                let omega = self.shadow.state().twist.angular;
-                self.observer.pose_ahead(omega, IN_CONTACT.tau_s)
-            }
-        }
+        let lag_s = match self.settings.correction {
+            PoseCorrection::Snap => 0.0,
+            PoseCorrection::MatchedStamps => IN_CONTACT.tau_s,
+            PoseCorrection::Replay => IN_CONTACT_REPLAYED.tau_s,
+        };
+        let omega = self.shadow.ahead().state().twist.angular;
+        self.observer.pose_ahead(omega, lag_s)
     }
 
     /// Makes the update and applies it to the shadow, as the master will.
