@@ -38,6 +38,8 @@ const CARVE_MARGIN_M: (f64, f64) = (1e-3, 8e-3);
 /// Spread of the normal of a new contact with a body that is no box, rad, and the jump of it that begins one.
 const ANY_NORMAL_RAD: f64 = 0.5;
 const JUMP_RAD: f64 = 0.2;
+/// The next contact with a body that is no box is looked for this much nearer than any so far, m.
+const GUESS_MARGIN_M: f64 = 0.01;
 /// Past that is kept for late vision, ticks: 256 ms.
 const PAST: usize = 256;
 
@@ -339,7 +341,8 @@ impl PoseObserver {
     }
 
     fn let_go(&mut self, params: &ModelParams) {
-        if self.touching.take().is_some() {
+        if let Some(was) = self.touching.take() {
+            self.guess_faces(was.face);
             self.slide_var += COAST.0 * COAST.0;
             self.angle_cov = [self.angle_cov[0] + COAST.1 * COAST.1, 0.0, 0.0];
         }
@@ -352,6 +355,19 @@ impl PoseObserver {
         let next = motion.step(law, params, Vec2::zeros(), Vec2::zeros());
         self.pose = next.pose;
         self.twist = next.twist;
+    }
+
+    /// Of a body that is no box the next contact will be another: its face is guessed to be nearer than any
+    /// so far. A face that the tool meets too early is brought up to it at once; one that is met too late
+    /// may recede from the hand only slowly.
+    fn guess_faces(&mut self, touched: Face) {
+        if !self.stand_in.is_active() {
+            return;
+        }
+        let guess = self.stand_in.least_offset(self.footprint.offset(touched)) - GUESS_MARGIN_M;
+        for face in Face::ALL {
+            self.footprint.set_offset(face, guess.max(FACE_OFFSET_M.0));
+        }
     }
 
     /// Takes in what vision saw some time ago, if this mode uses it.

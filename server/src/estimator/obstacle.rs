@@ -8,8 +8,7 @@
 const FRICTION_HOLDS: (f64, f64) = (1.25, 0.3);
 /// How long a force beyond that must be held, ticks: a press rises through static friction sooner.
 const HOLD_TICKS: u32 = 20;
-/// Force beyond which even an object that moves has run up against something, likewise: no push of the speed
-/// of a hand needs it.
+/// Force beyond that of the motion with which even an object that slides has run up against something, likewise.
 const PUSH_NEEDS: (f64, f64) = (3.0, 1.0);
 /// How long that must last, ticks.
 const IMPACT_TICKS: u32 = 5;
@@ -22,6 +21,8 @@ const MOST_N: f64 = 150.0;
 /// What a tick of contact is like, as [`Obstacle`] takes it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Moving {
+    /// It slides for certain, and has for so long that its acceleration is known.
+    SlidesOn,
     /// It slides for certain.
     Slides,
     /// Too slow to tell.
@@ -40,10 +41,12 @@ pub struct Obstacle {
 }
 
 impl Obstacle {
-    /// Takes force (N), how the object moves and c (N) as it was estimated before. True in the tick in which
-    /// the object is found to stand against an obstacle.
-    pub fn step(&mut self, force: f64, moving: Moving, c: f64) -> bool {
-        if self.stands && moving != Moving::Slides {
+    /// Takes the force and the share m a + b v of it that the motion needs (N), how the object moves, and c
+    /// (N) as it was estimated before. True in the tick in which the object is found to stand against an
+    /// obstacle.
+    pub fn step(&mut self, force: f64, motion: f64, moving: Moving, c: f64) -> bool {
+        let slides = matches!(moving, Moving::Slides | Moving::SlidesOn);
+        if self.stands && !slides {
             let (most, enough) = MARGIN;
             if self.holding.is_none_or(|holding| force > enough * holding) {
                 self.holding = Some((most * force).min(MOST_N));
@@ -58,7 +61,7 @@ impl Obstacle {
             self.holding = Some((MARGIN.0 * force).min(MOST_N));
             return true;
         }
-        let hard = beyond(force, PUSH_NEEDS, c);
+        let hard = moving == Moving::SlidesOn && beyond(force - motion, PUSH_NEEDS, c);
         self.hard_ticks = if hard { self.hard_ticks + 1 } else { 0 };
         self.holding = (self.hard_ticks >= IMPACT_TICKS).then_some(force.min(MOST_N));
         false
@@ -91,7 +94,7 @@ mod tests {
         let mut obstacle = Obstacle::default();
         let rise = (most / rate) as u32;
         for n in 0..rise + 100 {
-            obstacle.step((rate * f64::from(n)).min(most), Moving::Sticks, C);
+            obstacle.step((rate * f64::from(n)).min(most), 0.0, Moving::Sticks, C);
         }
         obstacle
     }
@@ -108,19 +111,19 @@ mod tests {
     fn static_friction_that_gives_way_within_20_ms_is_no_obstacle() {
         let mut obstacle = Obstacle::default();
         for _ in 0..19 {
-            assert!(!obstacle.step(1.5 * C, Moving::Sticks, C));
+            assert!(!obstacle.step(1.5 * C, 0.0, Moving::Sticks, C));
         }
-        obstacle.step(1.5 * C, Moving::Slides, C);
-        assert!(!obstacle.step(1.5 * C, Moving::Sticks, C));
+        obstacle.step(1.5 * C, 0.0, Moving::Slides, C);
+        assert!(!obstacle.step(1.5 * C, 0.0, Moving::Sticks, C));
         assert_eq!(obstacle.holding(), None);
     }
 
     #[test]
     fn a_noisy_speed_does_not_end_it_and_sliding_does() {
         let mut obstacle = press(0.02, 5.0);
-        obstacle.step(5.0, Moving::Slowly, C);
+        obstacle.step(5.0, 0.0, Moving::Slowly, C);
         assert!(obstacle.holding().is_some());
-        obstacle.step(5.0, Moving::Slides, C);
+        obstacle.step(5.0, 0.0, Moving::Slides, C);
         assert_eq!(obstacle.holding(), None);
     }
 
@@ -129,11 +132,16 @@ mod tests {
         let mut obstacle = Obstacle::default();
         for (force, told) in [(3.0 * C + 1.0, None), (10.0, Some(10.0))] {
             for _ in 0..5 {
-                assert!(!obstacle.step(force, Moving::Slides, C));
+                assert!(!obstacle.step(force, 0.0, Moving::SlidesOn, C));
             }
             assert_eq!(obstacle.holding(), told);
         }
-        obstacle.step(2.0, Moving::Slides, C);
+        obstacle.step(2.0, 0.0, Moving::SlidesOn, C);
         assert_eq!(obstacle.holding(), None);
+        for _ in 0..5 {
+            obstacle.step(10.0, 5.0, Moving::SlidesOn, C);
+            obstacle.step(10.0, 0.0, Moving::Slides, C);
+        }
+        assert_eq!(obstacle.holding(), None, "a quick hand is no obstacle");
     }
 }

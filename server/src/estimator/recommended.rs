@@ -22,7 +22,7 @@ use super::{Estimate, Measured, STICK_SPEED};
 
 /// Rows between two copies of the regression. On an obstacle the older copy returns: what was learned while
 /// the object ran up against it is no friction.
-const COPY_ROWS: u64 = 500;
+const COPY_ROWS: u64 = 250;
 
 /// Settings of [`RecommendedEstimator`].
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -154,20 +154,26 @@ impl RecommendedEstimator {
             .gate
             .step(motion.row.force, self.estimate.speed, creeps);
         self.slide(passage, &self.row(&motion, normal, measured.seen.as_ref()));
-        self.stand(motion.row.force);
+        self.stand(motion.row.force, passage == Passage::Open);
     }
 
-    /// Whether something beyond friction holds the object against this force, N.
-    fn stand(&mut self, force: f64) {
-        let moving = if self.gate.slides(self.estimate.speed) {
-            Moving::Slides
-        } else if self.estimate.sticking {
-            Moving::Sticks
-        } else {
-            Moving::Slowly
-        };
+    /// Whether something beyond friction holds the object against this force, N. Before friction has been
+    /// seen for a while, nobody can say.
+    fn stand(&mut self, force: f64, slides_on: bool) {
         let [older, _] = self.copies;
-        if self.obstacle.step(force, moving, older.estimate().z) {
+        if older.samples() == 0 {
+            return;
+        }
+        let slides = self.gate.slides(self.estimate.speed);
+        let moving = match (slides, self.estimate.sticking) {
+            (true, _) if slides_on => Moving::SlidesOn,
+            (true, _) => Moving::Slides,
+            (false, true) => Moving::Sticks,
+            (false, false) => Moving::Slowly,
+        };
+        let known = older.estimate();
+        let motion = known.x * self.estimate.acceleration + known.y * self.estimate.speed;
+        if self.obstacle.step(force, motion, moving, known.z) {
             self.recursive = older;
             self.copies = [older; 2];
         }

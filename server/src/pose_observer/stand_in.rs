@@ -38,6 +38,8 @@ pub(super) struct StandIn {
     /// Images since it has.
     images: u32,
     rate: f64,
+    /// Least offset of a contact so far, m.
+    least: Option<f64>,
 }
 
 impl StandIn {
@@ -115,6 +117,13 @@ impl StandIn {
         let error = -turn - predicted;
         self.turned = wrap_angle(self.turned + predicted + alpha * error);
         self.slip += beta * error / seconds;
+    }
+
+    /// The least offset (m) of the contacts so far, of which the last had `offset`.
+    pub(super) fn least_offset(&mut self, offset: f64) -> f64 {
+        let least = self.least.map_or(offset, |least| least.min(offset));
+        self.least = Some(least);
+        least
     }
 
     /// Weight of the next image in the offset of this contact.

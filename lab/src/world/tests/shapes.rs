@@ -11,14 +11,16 @@ use mmt_shared::settings::Mode;
 
 const SEEDS: std::ops::RangeInclusive<u64> = 1..=3;
 const SECONDS: u64 = 20;
-/// Bodies that the box of the local model is not, or not alone: highest relative error and packet rate, 1/s.
-const OTHERS: [(&str, f64, f64); 3] = [
-    ("disc", 0.18, 10.0),
-    ("polygon", 0.20, 10.0),
-    ("wall", 0.20, 10.0),
+/// Highest relative error and packet rate, 1/s, where the square that the slave begins with is far from the
+/// object. The brick's is mostly that of first touches: its unknown faces are up to 8 cm too far out.
+const OTHERS: [(&str, f64, f64); 4] = [
+    ("brick", 0.36, 5.0),
+    ("disc", 0.20, 10.0),
+    ("polygon", 0.26, 10.0),
+    ("wall", 0.15, 10.0),
 ];
 /// The same for all the others.
-const BOX: (f64, f64) = (0.15, 5.0);
+const BOX: (f64, f64) = (0.19, 5.0);
 
 /// What the runs of a scenario come to on average.
 struct Found {
