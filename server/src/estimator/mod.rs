@@ -183,6 +183,10 @@ impl EstimatorConfig {
 
 /// The slave's estimator of m, b and c.
 #[derive(Clone, Debug)]
+#[allow(
+    clippy::large_enum_variant,
+    reason = "there is one, and it never moves"
+)]
 pub enum Estimator {
     /// Section II-A as printed.
     Paper(PaperEstimator),
