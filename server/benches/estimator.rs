@@ -30,6 +30,7 @@ fn push() -> Vec<Measured> {
         let seen = Seen {
             centre: Vec2::new(position + 0.18, 0.0),
             turning: 0.01,
+            body_turning: 0.01,
             side: 0.36,
         };
         let force = 0.7 * a + 3.0 * v + 2.06;

@@ -5,6 +5,7 @@
 //! coordinate. Vision (slow, late, noisy) corrects what touch cannot see and teaches the distance from
 //! the centre to each face. Pure; it must never use the true pose.
 
+mod stand_in;
 mod turning;
 
 use mmt_shared::contact::Coupling;
@@ -15,6 +16,7 @@ use mmt_shared::settings::FrictionLaw;
 use mmt_shared::time::{TICK_S, Time};
 
 use crate::sensing::VisionSample;
+use stand_in::StandIn;
 use turning::{Push, Turning};
 
 /// Force below which its direction says nothing, N: fifteen times the default sensor noise.
@@ -33,6 +35,11 @@ const COAST: (f64, f64) = (3e-3, 0.02);
 /// A carved face lies this far behind the tool that did not touch it, m; twice as far each time that the
 /// tool still touches nothing, up to the most: the real face is found in a few steps, not in a hundred.
 const CARVE_MARGIN_M: (f64, f64) = (1e-3, 8e-3);
+/// Spread of the normal of a new contact with a body that is no box, rad, and the jump of it that begins one.
+const ANY_NORMAL_RAD: f64 = 0.5;
+const JUMP_RAD: f64 = 0.2;
+/// The next contact with a body that is no box is looked for this much nearer than any so far, m.
+const GUESS_MARGIN_M: f64 = 0.01;
 /// Past that is kept for late vision, ticks: 256 ms.
 const PAST: usize = 256;
 
@@ -82,6 +89,7 @@ pub struct PoseObserver {
     touching: Option<Touching>,
     penetration: f64,
     turning: Turning,
+    stand_in: StandIn,
     /// How far behind the tool the next carved face will lie, m.
     carve_margin: f64,
     /// Covariance of (theta, omega): [theta², theta·omega, omega²].
@@ -109,6 +117,7 @@ impl PoseObserver {
             touching: None,
             penetration: 0.0,
             turning: Turning::new(),
+            stand_in: StandIn::default(),
             carve_margin: CARVE_MARGIN_M.0,
             angle_cov: [angle_var, 0.0, 0.0],
             slide_var: shift_var,
@@ -123,10 +132,30 @@ impl PoseObserver {
         self.pose
     }
 
+    /// The pose to be told to a model that turns at `omega` (rad/s) and bleeds a turn in with the time
+    /// constant `tau_s`: of a stand-in, where its tangent will be by then; else the pose.
+    #[must_use]
+    pub fn pose_ahead(&self, omega: f64, tau_s: f64) -> Pose {
+        let Some(touching) = self.touching.filter(|_| self.stand_in.is_active()) else {
+            return self.pose;
+        };
+        let turn = (self.stand_in.rate() - omega) * tau_s;
+        Pose {
+            position: touching.surface + rotate(turn, self.pose.position - touching.surface),
+            angle: self.pose.angle + turn,
+        }
+    }
+
     /// Velocity of the object.
     #[must_use]
     pub fn twist(&self) -> Twist {
         self.twist
+    }
+
+    /// Rate at which the object itself turns, rad/s: unlike a stand-in's, whose tangent may turn on it.
+    #[must_use]
+    pub fn body_rate(&self) -> f64 {
+        self.stand_in.body_rate(self.twist.angular)
     }
 
     /// Distances from the centre to the faces, as far as known.
@@ -180,22 +209,25 @@ impl PoseObserver {
         if self.touching.is_none() {
             self.penetration = size / self.config.coupling.stiffness_n_per_m;
         }
+        if self.touching.is_none() && self.stand_in.is_active() {
+            self.begin_tangent();
+        }
         let face = self
             .touching
-            .map_or_else(|| self.face_of(force), |touching| touching.face);
+            .map_or_else(|| self.face_of(tool, force), |touching| touching.face);
         let unknown = self.turn(force, params);
         self.follow_angle(face, force, size, unknown);
         let inward = -rotate(self.pose.angle, face.outward());
         self.follow_penetration(force.dot(&inward));
         let surface = tool - inward * self.penetration;
-        let before = self.pose.position;
-        let gap = inward.dot(&(surface - before)) + self.footprint.offset(face);
-        self.pose.position += inward * gap;
-        if self.touching.is_some() {
-            let velocity = (self.pose.position - before) / TICK_S;
-            // 20 ms, as long as the parameters' smoothing
-            self.twist.linear += (velocity - self.twist.linear) * (TICK_S / 0.020);
+        if self.stand_in.is_fresh() {
+            self.pose.position += self.twist.linear * TICK_S;
+            let offset = inward.dot(&(self.pose.position - surface));
+            self.footprint.set_offset(face, offset.max(FACE_OFFSET_M.0));
+        } else {
+            self.follow_plane(face, inward, surface);
         }
+        self.stand_in.touch(self.twist.angular);
         self.slide_var += SLIDE_DRIFT_M * SLIDE_DRIFT_M * TICK_S;
         self.touching = Some(Touching {
             face,
@@ -204,11 +236,31 @@ impl PoseObserver {
         });
     }
 
+    /// Moves the centre so that the face lies where the tool touches it.
+    fn follow_plane(&mut self, face: Face, inward: Vec2, surface: Vec2) {
+        let before = self.pose.position;
+        let gap = inward.dot(&(surface - before)) + self.footprint.offset(face);
+        self.pose.position += inward * gap;
+        if self.touching.is_some() {
+            let velocity = (self.pose.position - before) / TICK_S;
+            // 20 ms, as long as the parameters' smoothing
+            self.twist.linear += (velocity - self.twist.linear) * (TICK_S / 0.020);
+        }
+    }
+
+    /// The normal of a new contact with a body that is no box may be any.
+    fn begin_tangent(&mut self) {
+        self.stand_in.begin();
+        self.twist.angular = 0.0;
+        self.angle_cov = [ANY_NORMAL_RAD * ANY_NORMAL_RAD, 0.0, 0.0];
+    }
+
     /// Turns the box by the moment of the push, where that can be reckoned, and returns the turning
     /// acceleration that remains unknown, rad/s².
     fn turn(&mut self, force: Vec2, params: &ModelParams) -> f64 {
         let (all, rest) = TURN_ACCELERATION;
-        let Some(touching) = self.touching.filter(|_| self.config.learn) else {
+        let reckoned = self.config.learn && !self.stand_in.is_active();
+        let Some(touching) = self.touching.filter(|_| reckoned) else {
             return all;
         };
         let push = Push {
@@ -224,7 +276,12 @@ impl PoseObserver {
         rest
     }
 
-    fn face_of(&self, force: Vec2) -> Face {
+    /// The face that a new touch is at: of a box the one that the force is normal to, of a stand-in the
+    /// one that the tool is at, which is the one that the master pushes.
+    fn face_of(&self, tool: Vec2, force: Vec2) -> Face {
+        if self.stand_in.is_active() {
+            return self.footprint.nearest(self.pose.point_to_object(tool)).0;
+        }
         let in_object = rotate(-self.pose.angle, force);
         let mut best = (Face::East, f64::NEG_INFINITY);
         for face in Face::ALL {
@@ -260,6 +317,9 @@ impl PoseObserver {
         }
         let direction = libm::atan2(-force.y, -force.x) - face.outward_angle();
         let innovation = wrap_angle(direction - self.pose.angle);
+        if self.stand_in.is_active() && !self.stand_in.is_fresh() && innovation.abs() > JUMP_RAD {
+            self.begin_tangent();
+        }
         let spread = self.config.force_noise_n / size;
         self.measure_angle(innovation, spread * spread + DIRECTION_FLOOR_RAD.powi(2));
     }
@@ -281,7 +341,8 @@ impl PoseObserver {
     }
 
     fn let_go(&mut self, params: &ModelParams) {
-        if self.touching.take().is_some() {
+        if let Some(was) = self.touching.take() {
+            self.guess_faces(was.face);
             self.slide_var += COAST.0 * COAST.0;
             self.angle_cov = [self.angle_cov[0] + COAST.1 * COAST.1, 0.0, 0.0];
         }
@@ -296,6 +357,19 @@ impl PoseObserver {
         self.twist = next.twist;
     }
 
+    /// Of a body that is no box the next contact will be another: its face is guessed to be nearer than any
+    /// so far. A face that the tool meets too early is brought up to it at once; one that is met too late
+    /// may recede from the hand only slowly.
+    fn guess_faces(&mut self, touched: Face) {
+        if !self.stand_in.is_active() {
+            return;
+        }
+        let guess = self.stand_in.least_offset(self.footprint.offset(touched)) - GUESS_MARGIN_M;
+        for face in Face::ALL {
+            self.footprint.set_offset(face, guess.max(FACE_OFFSET_M.0));
+        }
+    }
+
     /// Takes in what vision saw some time ago, if this mode uses it.
     pub fn see(&mut self, vision: &VisionSample) {
         if !self.config.learn {
@@ -305,8 +379,16 @@ impl PoseObserver {
             return;
         };
         let gone_by = vision.pose.position - then.pose.position;
-        let turn = wrap_angle(vision.pose.angle - then.pose.angle);
-        self.measure_angle(turn, self.config.vision_noise_rad.powi(2));
+        let seen = vision.pose.angle + self.stand_in.turned();
+        let turn = wrap_angle(seen - then.pose.angle);
+        let noise = self.config.vision_noise_rad;
+        if then.touching.is_some() && self.stand_in.see(vision.taken, turn, noise) {
+            self.become_stand_in(gone_by);
+            return;
+        }
+        if then.touching.is_none() || !self.stand_in.is_active() {
+            self.measure_angle(turn, noise * noise);
+        }
         let variance = self.config.vision_noise_m.powi(2);
         let gain = if variance > 0.0 {
             self.slide_var / (self.slide_var + variance)
@@ -328,9 +410,24 @@ impl PoseObserver {
         }
     }
 
+    /// The body is no box: the centre is where vision sees it, and what was learned of turning is void.
+    fn become_stand_in(&mut self, gone_by: Vec2) {
+        self.pose.position += gone_by;
+        self.slide_var = self.config.vision_noise_m.powi(2);
+        self.turning = Turning::new();
+    }
+
     /// Running mean of a face's offset. Until a face has been learned itself, the first face's offset is
     /// the best guess for it (a square is assumed).
     fn learn_offset(&mut self, face: Face, offset: f64) {
+        if self.stand_in.is_active() {
+            if !self.stand_in.is_fresh() {
+                let known = self.footprint.offset(face);
+                let mean = known + (offset - known) * self.stand_in.offset_weight();
+                self.footprint.set_offset(face, mean.max(FACE_OFFSET_M.0));
+            }
+            return;
+        }
         let first = self.learned.iter().all(|count| *count == 0);
         for (other, count) in Face::ALL.into_iter().zip(&mut self.learned) {
             if other == face {
@@ -367,14 +464,18 @@ impl PoseObserver {
     /// been touched is not where it was thought to be and is carved back; a known face, or any in the
     /// paper's mode, means that the box is further away.
     pub fn carve(&mut self, tool: Vec2, face: Face) {
-        let depth = -self
-            .footprint
-            .distance(face, self.pose.point_to_object(tool));
+        let tool = self.pose.point_to_object(tool);
+        if self.config.learn && !self.footprint.within_ends(face, tool) {
+            // slipped past the end of the face: the box is not further away, but aside
+            return;
+        }
+        let depth = -self.footprint.distance(face, tool);
         let depth = depth + self.carve_margin;
         if depth <= 0.0 {
             return;
         }
-        if !self.config.learn || self.is_known(face) {
+        let known = self.is_known(face) && !self.stand_in.is_active();
+        if !self.config.learn || known {
             let inward = -rotate(self.pose.angle, face.outward());
             self.pose.position += inward * (depth - self.carve_margin + CARVE_MARGIN_M.0);
             return;

@@ -4,10 +4,11 @@
 //! the seed comes with the configuration, and what it returns is all that it does.
 
 use mmt_shared::contact::Coupling;
+use mmt_shared::correction::{IN_CONTACT, IN_CONTACT_REPLAYED};
 use mmt_shared::geometry::{BoxFootprint, Pose, Twist, Vec2, wrap_angle};
 use mmt_shared::metrics::ForceMetrics;
 use mmt_shared::params::{ModelParams, ModelState, inertia_of_square};
-use mmt_shared::settings::{Mode, ModelSettings};
+use mmt_shared::settings::{Mode, ModelSettings, PoseCorrection};
 use mmt_shared::time::Time;
 use mmt_shared::wire::{Cause, HipSample, Update};
 
@@ -259,15 +260,19 @@ impl Slave {
         let seen = Some(Seen {
             centre: self.observer.pose().position,
             turning: self.observer.twist().angular,
+            body_turning: self.observer.body_rate(),
             side,
         });
-        let Estimate { m, b, c, .. } = self.estimator.step(&Measured {
+        let Estimate {
+            m, b, c, holding, ..
+        } = self.estimator.step(&Measured {
             tool,
             force,
             normal,
             seen,
         });
         let inertia = inertia_of_square(m, side);
+        let c = holding.unwrap_or(c);
         let e = c * self.observer.friction_radius();
         match ModelParams::try_new(m, b, c, inertia, e, &self.settings.coupling) {
             Ok(params) => self.params = params,
@@ -289,7 +294,11 @@ impl Slave {
             f_m,
             slave_in_contact: tick.in_contact,
             shadow_in_contact,
-            sticking: estimate.sticking,
+            // a model that does not stand where the object does is a mismatch although the object sticks
+            sticking: estimate.sticking
+                && estimate
+                    .holding
+                    .is_none_or(|c| self.shadow.ahead().state().params.c() > 0.5 * c),
             speed: estimate.speed,
             acceleration: estimate.acceleration,
             force_deviation: estimate.force_deviation(),
@@ -297,6 +306,17 @@ impl Slave {
             shift: self.observer.pose().position - pose.position,
             turn: wrap_angle(self.observer.pose().angle - pose.angle),
         }
+    }
+
+    /// Where the model is to be: ahead of the object by as much as its correction lags behind.
+    fn pose_to_tell(&self) -> Pose {
+        let lag_s = match self.settings.correction {
+            PoseCorrection::Snap => 0.0,
+            PoseCorrection::MatchedStamps => IN_CONTACT.tau_s,
+            PoseCorrection::Replay => IN_CONTACT_REPLAYED.tau_s,
+        };
+        let omega = self.shadow.ahead().state().twist.angular;
+        self.observer.pose_ahead(omega, lag_s)
     }
 
     /// Makes the update and applies it to the shadow, as the master will.
@@ -313,7 +333,7 @@ impl Slave {
         let seen = ModelState {
             params: self.params,
             footprint: self.observer.footprint(),
-            pose: self.observer.pose(),
+            pose: self.pose_to_tell(),
             twist: self.observer.twist(),
         };
         // what the model had at the stamp: nothing is left to be corrected there

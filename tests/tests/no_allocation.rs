@@ -326,6 +326,7 @@ fn the_slaves_own_parts_never_allocate() {
             let seen = Seen {
                 centre: observer.pose().position,
                 turning: observer.twist().angular,
+                body_turning: observer.body_rate(),
                 side: observer.footprint().mean_side(),
             };
             let measured = Measured {

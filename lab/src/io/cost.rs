@@ -23,6 +23,7 @@ pub fn estimator_tick_ms(mode: Mode) -> f64 {
         let seen = Seen {
             centre: Vec2::new(0.16 * t + 0.18, 0.0),
             turning: 0.01,
+            body_turning: 0.01,
             side: 0.36,
         };
         estimator.step(&Measured {

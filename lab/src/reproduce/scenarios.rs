@@ -133,7 +133,8 @@ impl Scenario {
         world
     }
 
-    fn change(&self) -> Change {
+    /// What changes on the way.
+    pub(crate) fn change(&self) -> Change {
         let (after_pushes, contact_s) = match self.change {
             Some(_) => (1, 1.0),
             None => (0, 0.0),

@@ -6,6 +6,7 @@ use mmt_server::playout::PlayoutConfig;
 use mmt_shared::settings::Mode;
 
 mod estimation;
+mod shapes;
 
 /// The default network: 50 ms ± 5 ms each way, 1 % loss.
 const WAN: &str = "delay 50ms 5ms loss 1%";

@@ -18,6 +18,7 @@ pub mod filter;
 pub mod gate;
 pub mod kalman;
 pub mod limits;
+pub mod obstacle;
 pub mod paper;
 #[cfg(test)]
 mod plant;
@@ -96,6 +97,9 @@ pub struct Estimate {
     pub acceleration: f64,
     /// In contact, and slower than [`STICK_SPEED`]: static friction holds the object.
     pub sticking: bool,
+    /// The friction (N) that a model needs to stand as the object does, which something beyond its own
+    /// friction holds; none usually, and never in paper mode.
+    pub holding: Option<f64>,
 }
 
 impl Estimate {
@@ -113,6 +117,7 @@ impl Estimate {
             speed: 0.0,
             acceleration: 0.0,
             sticking: false,
+            holding: None,
         }
     }
 
@@ -127,6 +132,7 @@ impl Estimate {
         self.heading = None;
         (self.speed, self.acceleration) = (0.0, 0.0);
         self.sticking = false;
+        self.holding = None;
     }
 
     /// Standard deviation of m a + b v + c in the present motion, N.
@@ -177,6 +183,10 @@ impl EstimatorConfig {
 
 /// The slave's estimator of m, b and c.
 #[derive(Clone, Debug)]
+#[allow(
+    clippy::large_enum_variant,
+    reason = "there is one, and it never moves"
+)]
 pub enum Estimator {
     /// Section II-A as printed.
     Paper(PaperEstimator),

@@ -14,10 +14,15 @@ use super::creep::Creep;
 use super::direction::{DirectionConfig, ForceDirection};
 use super::filter::{Row, StateVariableFilter, stage_weight};
 use super::gate::{Gate, GateConfig, Passage};
+use super::obstacle::{Moving, Obstacle};
 use super::recursive::{Recursive, RecursiveConfig, Verdict};
 use super::surface::{Surface, SurfaceMotion};
 use super::turning::{self, Seen};
 use super::{Estimate, Measured, STICK_SPEED};
+
+/// Rows between two copies of the regression. On an obstacle the older copy returns: what was learned while
+/// the object ran up against it is no friction.
+const COPY_ROWS: u64 = 250;
 
 /// Settings of [`RecommendedEstimator`].
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -75,6 +80,9 @@ pub struct RecommendedEstimator {
     creep: Creep,
     filter: StateVariableFilter,
     recursive: Recursive,
+    /// The regression as it was, newest last.
+    copies: [Recursive; 2],
+    obstacle: Obstacle,
     estimate: Estimate,
 }
 
@@ -101,6 +109,8 @@ impl RecommendedEstimator {
             creep: Creep::new(std::f64::consts::SQRT_2 * config.position_noise_m / TICK_S),
             filter: StateVariableFilter::new(config.cutoff_rad_per_s),
             recursive,
+            copies: [recursive; 2],
+            obstacle: Obstacle::default(),
             estimate,
         }
     }
@@ -144,6 +154,30 @@ impl RecommendedEstimator {
             .gate
             .step(motion.row.force, self.estimate.speed, creeps);
         self.slide(passage, &self.row(&motion, normal, measured.seen.as_ref()));
+        self.stand(motion.row.force, passage == Passage::Open);
+    }
+
+    /// Whether something beyond friction holds the object against this force, N. Before friction has been
+    /// seen for a while, nobody can say.
+    fn stand(&mut self, force: f64, slides_on: bool) {
+        let [older, _] = self.copies;
+        if older.samples() == 0 {
+            return;
+        }
+        let slides = self.gate.slides(self.estimate.speed);
+        let moving = match (slides, self.estimate.sticking) {
+            (true, _) if slides_on => Moving::SlidesOn,
+            (true, _) => Moving::Slides,
+            (false, true) => Moving::Sticks,
+            (false, false) => Moving::Slowly,
+        };
+        let known = older.estimate();
+        let motion = known.x * self.estimate.acceleration + known.y * self.estimate.speed;
+        if self.obstacle.step(force, motion, moving, known.z) {
+            self.recursive = older;
+            self.copies = [older; 2];
+        }
+        self.estimate.holding = self.obstacle.holding();
     }
 
     /// The row of (1) that a motion gives while the object slides.
@@ -172,6 +206,10 @@ impl RecommendedEstimator {
             if self.recursive.update(&filtered) == Verdict::Changed {
                 self.gate.close();
             }
+            let [_, newer] = self.copies;
+            if self.recursive.samples() >= newer.samples() + COPY_ROWS {
+                self.copies = [newer, self.recursive];
+            }
         } else {
             self.recursive.hold();
         }
@@ -181,6 +219,7 @@ impl RecommendedEstimator {
         self.surface.reset();
         self.gate.close();
         self.creep.reset();
+        self.obstacle.clear();
         self.recursive.hold();
         self.estimate.release();
     }

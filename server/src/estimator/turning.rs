@@ -22,8 +22,10 @@ const CREEP_RADIUS: f64 = 0.30;
 pub struct Seen {
     /// Centre of the object, world frame, m.
     pub centre: Vec2,
-    /// Turning rate omega, rad/s, counter-clockwise.
+    /// Turning rate omega of the touched face or tangent, rad/s, counter-clockwise.
     pub turning: f64,
+    /// Turning rate of the object itself, rad/s: another one only where the tangent turns on a curved side.
+    pub body_turning: f64,
     /// Side l of the square that (8) and (9) are written for, m.
     pub side: f64,
 }
@@ -34,6 +36,7 @@ impl Seen {
         // written so that NaN fails
         self.centre.norm() <= POSITION_LIMIT
             && self.turning.abs() <= TURN_RATE_RAD_PER_S
+            && self.body_turning.abs() <= TURN_RATE_RAD_PER_S
             && self.side >= 2.0 * FACE_OFFSET_M.0
     }
 }
@@ -51,12 +54,13 @@ pub fn shared(motion: &SurfaceMotion, normal: Vec2, speed: f64, seen: &Seen) -> 
     let Seen {
         centre,
         turning: omega,
+        body_turning: spin,
         side,
     } = *seen;
     let lever = motion.point - centre;
     let (d, h) = (cross(lever, normal), -lever.dot(&normal));
     let carried = omega * (2.0 * cross(normal, motion.velocity) + omega * h);
-    let (force, torque) = friction(speed - omega * d, omega, side);
+    let (force, torque) = friction(speed - omega * d, spin, side);
     let per_moment = 6.0 * d / (side * side);
     let raw = motion.row.regressor;
     let s = force + per_moment * torque;
@@ -139,6 +143,7 @@ mod tests {
             let seen = Seen {
                 centre: self.pose.position,
                 turning: self.twist.angular,
+                body_turning: self.twist.angular,
                 side: SIDE,
             };
             let (pull, torque) = self.friction();
@@ -216,6 +221,7 @@ mod tests {
         let seen = Seen {
             centre: Vec2::zeros(),
             turning: 0.0,
+            body_turning: 0.0,
             side: SIDE,
         };
         let (x, raw) = (Vec2::new(1.0, 0.0), motion(Vec2::new(0.1, 0.05)));
@@ -233,6 +239,7 @@ mod tests {
             let seen = Seen {
                 centre: Vec2::new(0.0, torque / force),
                 turning: 0.0,
+                body_turning: 0.0,
                 side: SIDE,
             };
             let row = creeping(&motion(Vec2::zeros()), Vec2::new(1.0, 0.0), &seen);
@@ -246,6 +253,7 @@ mod tests {
         let good = Seen {
             centre: Vec2::zeros(),
             turning: 0.1,
+            body_turning: 0.1,
             side: SIDE,
         };
         assert!(good.is_usable());

@@ -192,3 +192,75 @@ fn the_paper_takes_e_by_9_whatever_it_feels() {
     let by_9 = friction_torque_of_square(1.0, observer.footprint().mean_side());
     assert!((observer.friction_radius() - by_9).abs() < 1e-15);
 }
+
+/// Pushes a disc of this radius that does not turn, with a normal that starts at `start` rad and turns at
+/// `rate` rad/s; vision sees the angle 0. Returns the disc's true centre and the normal's last angle.
+fn push_disc(observer: &mut PoseObserver, start: f64, rate: f64, ticks: u32) -> (Vec2, f64) {
+    let (mut centre, mut normal) = (Vec2::zeros(), start);
+    for n in 1..=ticks {
+        normal = start + rate * f64::from(n) * TICK_S;
+        let inward = rotate(normal, Vec2::new(1.0, 0.0));
+        centre += inward * 1e-4;
+        let force = inward * 2.36;
+        let tool = centre - inward * HALF + force / COUPLING.stiffness_n_per_m;
+        let now = Time::ZERO + TICK * n;
+        observer.step(now, tool, force, true, &params());
+        if n % 33 == 0 {
+            observer.see(&VisionSample {
+                taken: now,
+                pose: Pose::new(centre.x, centre.y, 0.0),
+            });
+        }
+    }
+    (centre, normal)
+}
+
+#[test]
+fn a_disc_is_known_by_its_tangent_and_its_centre_by_vision() {
+    let mut observer = observer(true);
+    let rate = -0.4;
+    let (centre, normal) = push_disc(&mut observer, -0.15, rate, 1500);
+    let pose = observer.pose();
+    let inward = observer.touching().unwrap().inward;
+    let west = observer.touching().unwrap().face;
+    assert_eq!(west, Face::West);
+    assert!(wrap_angle(pose.angle - normal).abs() < 5e-3, "{pose:?}");
+    assert!((inward - rotate(normal, Vec2::new(1.0, 0.0))).norm() < 5e-3);
+    assert!(
+        (pose.position - centre).norm() < 1.5e-3,
+        "{pose:?} {centre}"
+    );
+    assert!((observer.footprint().west - HALF).abs() < 1.5e-3);
+    assert!((observer.twist().angular - rate).abs() < 0.03);
+    assert!(
+        observer.body_rate().abs() < 0.08,
+        "{}",
+        observer.body_rate()
+    );
+    // told to a model that does not turn: ahead by what the tangent turns in a time constant
+    let ahead = observer.pose_ahead(0.0, 0.3);
+    assert!((ahead.angle - pose.angle - rate * 0.3).abs() < 0.01);
+    let face = |pose: &Pose, point: Vec2| {
+        observer
+            .footprint()
+            .distance(west, pose.point_to_object(point))
+    };
+    let surface = observer.touching().unwrap().surface;
+    assert!((face(&ahead, surface) - face(&pose, surface)).abs() < 1e-9);
+    assert_eq!(observer.pose_ahead(rate, 0.0), pose);
+}
+
+#[test]
+fn a_box_stays_a_box_after_two_bad_images_and_is_told_where_it_is() {
+    let mut observer = observer(true);
+    let truth = push(&mut observer, 100, 0.0);
+    for _ in 0..2 {
+        observer.see(&VisionSample {
+            taken: Time::ZERO + TICK * 100,
+            pose: Pose::new(truth.position.x, truth.position.y, 0.5),
+        });
+    }
+    push(&mut observer, 1000, 0.0);
+    assert_eq!(observer.pose_ahead(1.0, 0.3), observer.pose());
+    assert_eq!(observer.body_rate(), observer.twist().angular);
+}
