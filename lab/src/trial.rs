@@ -9,7 +9,7 @@ pub use recovery::Recovery;
 
 use std::time::Duration;
 
-use mmt_server::environment::EnvironmentError;
+use mmt_server::environment::{Environment, EnvironmentError};
 use mmt_server::slave::SlaveTick;
 use mmt_shared::geometry::Vec2;
 use mmt_shared::metrics::{ForceSummary, UpdateCounts};
@@ -58,6 +58,20 @@ pub enum Alteration {
     FrictionCoefficient(f64),
     /// The mass m, kg, and with it c, I and e.
     MassKg(f64),
+}
+
+impl Alteration {
+    /// Changes the object.
+    ///
+    /// # Errors
+    /// When no object can be so.
+    pub fn apply(self, environment: &mut Environment) -> Result<(), EnvironmentError> {
+        match self {
+            Self::Nothing => Ok(()),
+            Self::FrictionCoefficient(mu) => environment.set_friction(mu),
+            Self::MassKg(m) => environment.set_mass(m),
+        }
+    }
 }
 
 /// One tick of a traced trial.
@@ -157,12 +171,7 @@ impl Trial {
         if run.push_contact_s <= 0.0 || run.push_contact_s < change.contact_s {
             return Ok(());
         }
-        let environment = world.environment_mut();
-        match change.to {
-            Alteration::Nothing => {}
-            Alteration::FrictionCoefficient(mu) => environment.set_friction(mu)?,
-            Alteration::MassKg(m) => environment.set_mass(m)?,
-        }
+        change.to.apply(world.environment_mut())?;
         run.watch = Some(Watch::default());
         Ok(())
     }

@@ -13,8 +13,8 @@ use toml::de::{DeTable, DeValue, Deserializer};
 use super::error::PlanError;
 use super::overlay::{effective, lay_at};
 use super::plan::{Axis, Plan, ROWS_MAX, Seeds, Start, steps};
-use crate::trial::{Change, Trial, TrialError};
-use crate::world::WorldConfig;
+use crate::trial::{Change, TrialError};
+use crate::world::{World, WorldConfig};
 
 /// Accepted length of a run, s: one tick to a week.
 const DURATION_S: (f64, f64) = (0.001, 604_800.0);
@@ -324,18 +324,9 @@ fn placed_axis<'i>(
 
 /// Makes the world, and where there is a change makes it at once: whatever a run could refuse is refused here.
 fn attempt(config: &WorldConfig, change: Option<Change>) -> Result<(), TrialError> {
-    let at_once = change.map(|change| Change {
-        after_pushes: 0,
-        contact_s: 0.0,
-        ..change
-    });
-    let tick = match at_once {
-        Some(_) => Duration::from_millis(1),
-        None => Duration::ZERO,
-    };
-    let trial = Trial {
-        change: at_once,
-        ..Trial::new(config.clone(), tick)
-    };
-    trial.run().map(|_| ())
+    let mut world = World::try_new(config)?;
+    if let Some(change) = change {
+        change.to.apply(world.environment_mut())?;
+    }
+    Ok(())
 }
