@@ -6,6 +6,7 @@
 pub mod ablation;
 pub mod claims;
 pub mod fig5;
+pub mod netem;
 pub mod physics;
 pub mod scenarios;
 pub mod schemes;
@@ -61,6 +62,14 @@ pub enum ReproduceError {
     /// A body has no reference motions.
     #[error(transparent)]
     Physics(#[from] PhysicsError),
+    /// A network's words were not accepted.
+    #[error("network {name}: {why}")]
+    Network {
+        /// Which network.
+        name: String,
+        /// What was wrong.
+        why: String,
+    },
     /// A file could not be written.
     #[error("cannot write {name}: {why}")]
     Keep {

@@ -55,6 +55,8 @@ pub(crate) enum Experiment {
     Tupdate,
     /// Other bodies, other grounds, changes in mid-run: recovery, packets and force error in both modes
     Scenarios,
+    /// Every network preset: configured against achieved
+    Netem,
     /// What the environment does against closed forms and a fine reference, for any body
     Physics(BodyArguments),
     /// All of these, in one folder

@@ -6,8 +6,8 @@ mod manifest;
 use mmt_lab::physics::Body;
 use mmt_lab::reproduce::traces::Trace;
 use mmt_lab::reproduce::{
-    Extent, Findings, ReproduceError, ablation, claims, fig5, physics, scenarios, schemes, traces,
-    tupdate,
+    Extent, Findings, ReproduceError, ablation, claims, fig5, netem, physics, scenarios, schemes,
+    traces, tupdate,
 };
 
 use crate::args::{BodyArguments, Experiment, ReproduceArguments};
@@ -63,6 +63,7 @@ fn experiments(experiment: &Experiment) -> Vec<Experiment> {
             Experiment::Schemes,
             Experiment::Scenarios,
             Experiment::Tupdate,
+            Experiment::Netem,
         ],
         one => vec![one.clone()],
     }
@@ -88,6 +89,7 @@ fn reproduce(
         Experiment::Schemes => schemes::reproduce(desk, extent(SEEDS)),
         Experiment::Scenarios => scenarios::reproduce(desk, extent(SEEDS)),
         Experiment::Tupdate => tupdate::reproduce(desk, extent(TUPDATE_SEEDS)),
+        Experiment::Netem => netem::reproduce(desk, extent(SEEDS)),
         Experiment::Claims => claims::reproduce(desk, extent(CLAIM_SEEDS)),
     };
     findings.map_err(|error| match error {

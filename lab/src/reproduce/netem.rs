@@ -1,0 +1,192 @@
+//! Every network preset: what its settings say that it does, against what it did in virtual time.
+
+use std::time::Duration;
+
+use mmt_netem::config::LinkConfig;
+use mmt_netem::effect::Effect;
+use mmt_netem::link::{Direction, Fate, LinkId};
+use mmt_netem::pipe::Pipe;
+use mmt_netem::presets::{PRESETS, Preset};
+use mmt_netem::record::summary::Summary;
+use mmt_netem::record::{End, Entry};
+use mmt_shared::time::{TICK, Time};
+
+use super::{Extent, Findings, Laboratory, ReproduceError};
+use crate::figure::{Axis, Colour, Dot, Figure, Legend, Panel, Series, Stroke};
+use crate::statistics::Interval;
+use crate::table::{Cell, Table};
+
+/// Packets per second that are offered: a haptic stream that sends every sample.
+const RATE_HZ: f64 = 1000.0;
+/// Length of a packet, bytes: a command of one sample with its QUIC packet.
+const BYTES: usize = 90;
+
+/// Runs every preset at 1 kHz and keeps `netem.csv` and `netem.svg`.
+///
+/// # Errors
+/// When a preset's words are not accepted; as [`Laboratory::keep`].
+pub fn reproduce(laboratory: &dyn Laboratory, extent: Extent) -> Result<Findings, ReproduceError> {
+    let mut table = Table::new(
+        format!("Presets at {RATE_HZ} packets/s: configured, and achieved over the seeds (mean)"),
+        &[
+            ("preset", 0),
+            ("packets", 0),
+            ("mean_ms", 2),
+            ("mean_ms_achieved", 2),
+            ("sd_ms", 2),
+            ("sd_ms_achieved", 2),
+            ("p99_ms", 2),
+            ("p99_ms_achieved", 2),
+            ("loss", 5),
+            ("loss_achieved", 5),
+            ("burst_packets", 1),
+            ("burst_packets_achieved", 1),
+            ("reordered", 4),
+            ("reordered_achieved", 4),
+        ],
+    );
+    let mut panels = Vec::new();
+    for preset in &PRESETS {
+        let refused = |error: &dyn std::fmt::Display| ReproduceError::Network {
+            name: preset.name.to_owned(),
+            why: error.to_string(),
+        };
+        let config: LinkConfig = preset.words.parse().map_err(|error| refused(&error))?;
+        let configured = config.expected(RATE_HZ).map_err(|error| refused(&error))?;
+        let runs = (1..=extent.seeds).map(|seed| run(&config, seed, extent.duration));
+        let runs: Result<Vec<Vec<Entry>>, _> = runs.collect();
+        let runs = runs.map_err(|error| refused(&error))?;
+        let achieved: Vec<Summary> = runs
+            .iter()
+            .map(|run| Summary::of(run, Direction::Up))
+            .collect();
+        let delays = delays_ms(&runs);
+        table.push(row(preset, &configured, &achieved, &delays));
+        panels.push(panel(preset, &configured, &delays));
+    }
+    laboratory.keep("netem.csv", &table.to_csv())?;
+    let figure = Figure {
+        panels,
+        columns: 4,
+        panel_size: (330, 260),
+    };
+    laboratory.keep("netem.svg", figure.draw("netem.svg")?.as_bytes())?;
+    Ok(Findings {
+        experiment: "netem",
+        extent,
+        digest: String::new(),
+        configuration: Vec::new(),
+        tables: vec![table],
+    })
+}
+
+/// One packet a tick through the link; packets still in flight at the end are not in the record.
+fn run(
+    config: &LinkConfig,
+    seed: u64,
+    duration: Duration,
+) -> Result<Vec<Entry>, mmt_netem::config::ConfigError> {
+    let mut pipe: Pipe<()> = Pipe::try_new(config.clone(), seed, LinkId::first(Direction::Up))?;
+    let mut entries = Vec::new();
+    let take = |pipe: &mut Pipe<()>, now: Time, entries: &mut Vec<Entry>| {
+        while let Some(packet) = pipe.pop_due(now) {
+            entries.push(Entry {
+                direction: Direction::Up,
+                number: packet.number,
+                offered: packet.offered_at,
+                bytes: packet.bytes as u32,
+                backlog: 0,
+                end: End::Sent {
+                    due: packet.due,
+                    sent: packet.due,
+                    copy: packet.copy,
+                    corrupted: packet.corrupted_bit.is_some(),
+                },
+            });
+        }
+    };
+    for number in 0..duration.as_millis() as u64 {
+        let now = Time::ZERO + TICK * (number as u32 + 1);
+        take(&mut pipe, now, &mut entries);
+        if let Fate::Drop(cause) = pipe.push(now, BYTES, ()) {
+            entries.push(Entry {
+                direction: Direction::Up,
+                number,
+                offered: now,
+                bytes: BYTES as u32,
+                backlog: pipe.in_flight() as u32,
+                end: End::Dropped(cause),
+            });
+        }
+    }
+    Ok(entries)
+}
+
+/// Delays of all packets that came through, ms, by rising delay.
+fn delays_ms(runs: &[Vec<Entry>]) -> Vec<f64> {
+    let delays = runs.iter().flatten().filter_map(|entry| match entry.end {
+        End::Sent { due, .. } => Some(due.saturating_since(entry.offered).as_secs_f64() * 1e3),
+        _ => None,
+    });
+    let mut delays: Vec<f64> = delays.collect();
+    delays.sort_by(f64::total_cmp);
+    delays
+}
+
+fn quantile(sorted: &[f64], share: f64) -> Option<f64> {
+    let place = (share * sorted.len() as f64) as usize;
+    sorted.get(place.min(sorted.len().checked_sub(1)?)).copied()
+}
+
+fn row(preset: &Preset, configured: &Effect, achieved: &[Summary], delays: &[f64]) -> Vec<Cell> {
+    let mean = |of: &dyn Fn(&Summary) -> f64| {
+        Cell::from(Interval::of(achieved.iter().map(of)).map(|i| i.mean))
+    };
+    let packets: u64 = achieved.iter().map(|summary| summary.offered.packets).sum();
+    vec![
+        preset.name.into(),
+        packets.into(),
+        configured.mean_ms.into(),
+        mean(&|summary| summary.mean_ms),
+        configured.sd_ms.into(),
+        mean(&|summary| summary.sd_ms),
+        configured.p99_ms.into(),
+        quantile(delays, 0.99).into(),
+        configured.loss.into(),
+        mean(&|summary| summary.loss),
+        configured.burst_packets.into(),
+        mean(&|summary| summary.burst_packets),
+        configured.reordered.into(),
+        mean(&|summary| summary.reordered),
+    ]
+}
+
+/// The share of packets that came within a delay, with the configured mean and p99.
+fn panel(preset: &Preset, configured: &Effect, delays: &[f64]) -> Panel {
+    let steps = 200;
+    let shares = (0..=steps).map(|k| f64::from(k) / f64::from(steps));
+    let dots = shares.filter_map(|share| Some(Dot::at(quantile(delays, share)?, share)));
+    let mark = |label: &str, colour: Colour, x: f64| {
+        Series::line(label, colour, vec![Dot::at(x, 0.0), Dot::at(x, 1.0)])
+            .stroked(Stroke::Dashed, 1)
+    };
+    let largest = quantile(delays, 1.0)
+        .unwrap_or(1.0)
+        .max(configured.p99_ms)
+        .max(1e-3);
+    Panel {
+        title: preset.name.to_owned(),
+        x: Axis::linear("delay, ms").over(0.0..largest * 1.05),
+        y: Axis::linear("share of packets").over(0.0..1.0),
+        series: vec![
+            Series::line("achieved", Colour::Blue, dots.collect()),
+            mark("mean, configured", Colour::Green, configured.mean_ms),
+            mark("p99, configured", Colour::Vermilion, configured.p99_ms),
+        ],
+        legend: if preset.name == "lan" {
+            Legend::LowerRight
+        } else {
+            Legend::None
+        },
+    }
+}
