@@ -103,20 +103,7 @@ impl BilateralMaster {
         let next_v = v * 2.0 - self.last_velocity;
         self.last_velocity = v;
 
-        let mut wave = WaveSum::default();
-        let displayed = match self.baseline {
-            Baseline::PositionForce | Baseline::DeadbandForce => self.received,
-            Baseline::Tdpa | Baseline::TdpaDeadband => {
-                impedance_controller(self.received, next_v, self.port.margin_j(self.other_in_j))
-            }
-            Baseline::Waves => {
-                let w = self.waves_in.take();
-                let taken_in_j = self.waves_in.energy_j() + self.put_in_j;
-                let u = self.impedance.master_wave(v, w);
-                wave = self.waves_out.send(u, taken_in_j);
-                self.impedance.master_force(v, w)
-            }
-        };
+        let (displayed, wave) = self.law(v, next_v);
         let hand_force = self.limiter.limit(-displayed);
         self.held = -hand_force;
         BilateralTick {
@@ -131,6 +118,27 @@ impl BilateralMaster {
             },
             displayed,
             hand_force,
+        }
+    }
+
+    /// The force on the object (N) for the hand's velocity and the one that it is about to have (m/s), and all waves sent.
+    fn law(&mut self, v: Vec2, next_v: Vec2) -> (Vec2, WaveSum) {
+        match self.baseline {
+            Baseline::PositionForce | Baseline::DeadbandForce => {
+                (self.received, WaveSum::default())
+            }
+            Baseline::Tdpa | Baseline::TdpaDeadband => {
+                let margin_j = self.port.margin_j(self.other_in_j);
+                let force = impedance_controller(self.received, next_v, margin_j);
+                (force, WaveSum::default())
+            }
+            Baseline::Waves => {
+                let w = self.waves_in.take();
+                let taken_in_j = self.waves_in.energy_j() + self.put_in_j;
+                let u = self.impedance.master_wave(v, w);
+                let wave = self.waves_out.send(u, taken_in_j);
+                (self.impedance.master_force(v, w), wave)
+            }
         }
     }
 }
