@@ -1,5 +1,6 @@
 //! Experiments in virtual time: everything that is computed about the system rather than by it.
 
+pub mod architecture;
 pub mod figure;
 #[cfg(feature = "io")]
 pub mod io;

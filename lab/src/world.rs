@@ -13,6 +13,7 @@ use mmt_client::master::{Master, MasterTick};
 use mmt_client::operator::Operator;
 use mmt_client::operator::scripted::{Picture, Scripted, ScriptedConfig, ScriptedError, View};
 use mmt_netem::config::{ConfigError, LinkConfig};
+use mmt_netem::counters::Tally;
 use mmt_netem::link::{Direction, LinkId};
 use mmt_netem::pipe::SimPath;
 use mmt_server::environment::Environment;
@@ -258,6 +259,12 @@ impl World {
     #[must_use]
     pub fn slave_link(&self) -> &SlaveLink {
         &self.slave_link
+    }
+
+    /// Datagrams sent up and down, as long as their payload.
+    #[must_use]
+    pub fn sent(&self) -> [Tally; 2] {
+        [self.up.counters().offered, self.down.counters().offered]
     }
 
     /// The operator.

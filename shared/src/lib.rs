@@ -4,6 +4,7 @@
 //! the local model, metrics, wire messages. The crate is pure; clocks, threads and sockets live in `io`
 //! behind the feature of that name.
 
+pub mod bilateral;
 pub mod contact;
 pub mod correction;
 pub mod dynamics;

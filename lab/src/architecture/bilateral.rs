@@ -1,0 +1,260 @@
+//! A bilateral architecture in virtual time: its two cores, the operator, the device and the two directions of a link.
+//!
+//! Operator, hand, device limits, play-out, environment, sensing and emulated link are those of `World`; only what
+//! crosses the network differs. A sample goes out every tick in a packet of its own, since a force that is waited for
+//! must not wait for nine others.
+
+use std::collections::VecDeque;
+use std::time::Duration;
+
+use mmt_client::bilateral::BilateralMaster;
+use mmt_client::device::DeviceProfile;
+use mmt_client::limiter::ForceLimiter;
+use mmt_client::master::PortObserver;
+use mmt_client::operator::Operator;
+use mmt_client::operator::scripted::{Phase, Picture, Scripted, View};
+use mmt_netem::config::{LinkConfig, Loss};
+use mmt_netem::counters::Tally;
+use mmt_netem::link::{Direction, LinkId};
+use mmt_netem::pipe::SimPath;
+use mmt_server::bilateral::{BilateralSlave, BilateralSlaveTick};
+use mmt_server::environment::Environment;
+use mmt_server::slave::SlaveError;
+use mmt_shared::bilateral::Baseline;
+use mmt_shared::bilateral::message::{ToMaster, ToSlave, wire_bytes};
+use mmt_shared::geometry::Vec2;
+use mmt_shared::metrics::{ContactBreaks, ForcePeak, ForceSummary};
+use mmt_shared::time::{TICK, Time};
+
+use super::felt::FeltMasses;
+use crate::world::{WorldConfig, WorldError};
+
+/// Least smoothing of waves on a path with jitter or loss, ticks: several packets that are lost in a row.
+const SMOOTHING_TICKS: u16 = 20;
+
+/// What a run came to.
+#[derive(Clone, Debug, Default)]
+pub struct BilateralOutcome {
+    /// Breaks of contact at the tool: the hand is in contact with nothing but a force.
+    pub breaks: ContactBreaks,
+    /// Force on the hand.
+    pub on_hand: ForcePeak,
+    /// What the hand and the tool would take the object's mass for.
+    pub felt: FeltMasses,
+    /// The passivity observer at the hand.
+    pub hand_port: PortObserver,
+    /// The same at the tool: energy that the tool put into the object.
+    pub tool_port: PortObserver,
+    /// The least of what the hand had put in less what the tool had put out, J: below 0 the network made energy.
+    pub network_min_j: f64,
+}
+
+/// The world of a bilateral architecture.
+pub struct Bilateral {
+    now: Time,
+    bytes: usize,
+    master: BilateralMaster,
+    slave: BilateralSlave,
+    operator: Operator,
+    hand_force: Vec2,
+    up: SimPath<ToSlave>,
+    down: SimPath<ToMaster>,
+    /// The scene on its way to the operator's eyes, with the time of its arrival.
+    scenes: VecDeque<(Time, View)>,
+    seen: View,
+    scene_delay: Duration,
+    outcome: BilateralOutcome,
+}
+
+impl Bilateral {
+    /// A world at time zero with the scripted operator.
+    ///
+    /// There is no local model to look at: [`Picture::Delayed`] is what arrives, at the link's delay and without loss
+    /// or jitter; [`Picture::Model`] is the scene as it is, which no operator at a distance could see.
+    ///
+    /// # Errors
+    /// When a number of the configuration is not accepted.
+    pub fn try_new(
+        config: &WorldConfig,
+        baseline: Baseline,
+        picture: Picture,
+    ) -> Result<Self, WorldError> {
+        let device = DeviceProfile::default().used_with(config.stiffness_n_per_m, None)?;
+        let smoothing_up = smoothing_ticks(&config.up);
+        let mut slave_config = config.slave.clone();
+        // from nothing up, as jitter asks for; where there is none, nothing
+        slave_config.playout.delay_ms = 0.0;
+        if smoothing_up == 1 {
+            slave_config.playout.delay_max_ms = 0.0;
+        }
+        let environment =
+            Environment::try_new(config.slave.environment).map_err(SlaveError::from)?;
+        let view = View {
+            pose: environment.pose(),
+            footprint: environment.footprint(),
+            in_contact: false,
+        };
+        let scripted = Scripted::try_new(config.operator, view)?;
+        let operator = Operator::Scripted(Box::new(scripted));
+        let (down_delay, _) = config.down.delay.parts();
+        Ok(Self {
+            now: Time::ZERO,
+            bytes: wire_bytes(baseline),
+            master: BilateralMaster::new(
+                baseline,
+                smoothing_ticks(&config.down),
+                ForceLimiter::try_new(device.limits())?,
+            ),
+            slave: BilateralSlave::try_new(
+                &slave_config,
+                device.coupling(),
+                baseline,
+                smoothing_up,
+                operator.start(),
+            )?,
+            operator,
+            hand_force: Vec2::zeros(),
+            up: SimPath::try_new(config.up.clone(), config.seed, LinkId::first(Direction::Up))?,
+            down: SimPath::try_new(
+                config.down.clone(),
+                config.seed,
+                LinkId::first(Direction::Down),
+            )?,
+            scenes: VecDeque::new(),
+            seen: view,
+            scene_delay: match picture {
+                Picture::Delayed => down_delay,
+                Picture::Model => Duration::ZERO,
+            },
+            outcome: BilateralOutcome::default(),
+        })
+    }
+
+    /// What the run has come to so far.
+    #[must_use]
+    pub fn outcome(&self) -> &BilateralOutcome {
+        &self.outcome
+    }
+
+    /// The force metrics so far.
+    #[must_use]
+    pub fn force(&self) -> ForceSummary {
+        self.slave.force().summary()
+    }
+
+    /// The operator.
+    #[must_use]
+    pub fn operator(&self) -> &Operator {
+        &self.operator
+    }
+
+    /// The master.
+    #[must_use]
+    pub fn master(&self) -> &BilateralMaster {
+        &self.master
+    }
+
+    /// The slave.
+    #[must_use]
+    pub fn slave(&self) -> &BilateralSlave {
+        &self.slave
+    }
+
+    /// The force on the hand now, N.
+    #[must_use]
+    pub fn hand_force(&self) -> Vec2 {
+        self.hand_force
+    }
+
+    /// Packets sent up and down, with all headers.
+    #[must_use]
+    pub fn sent(&self) -> [Tally; 2] {
+        [self.up.counters().offered, self.down.counters().offered]
+    }
+
+    /// Runs for a duration.
+    pub fn run(&mut self, duration: Duration) {
+        let end = self.now + duration;
+        while self.now < end {
+            self.step();
+        }
+    }
+
+    /// One millisecond with the scripted operator, in the order of [`crate::world::World::step`].
+    pub fn step(&mut self) -> Option<BilateralSlaveTick> {
+        let elapsed = self.now.saturating_since(Time::ZERO);
+        self.look();
+        let view = self.seen;
+        let hip = self.operator.step(elapsed, &view, self.hand_force);
+        let pushes = match &self.operator {
+            Operator::Scripted(scripted) => scripted.phase() == Phase::Push,
+            Operator::Trace(_) => true,
+        };
+        self.step_at(hip, pushes && view.in_contact)
+    }
+
+    /// One millisecond with the hand at `hip` (m), whoever moves it; `pushes` says whether it pushes the object.
+    pub fn step_at(&mut self, hip: Vec2, pushes: bool) -> Option<BilateralSlaveTick> {
+        self.now += TICK;
+        while let Some(packet) = self.down.pop_due(self.now) {
+            if packet.corrupted_bit.is_none() {
+                self.master.receive(&packet.payload);
+            }
+        }
+        let tick = self.master.tick(self.now, hip);
+        self.hand_force = tick.hand_force;
+        let outcome = &mut self.outcome;
+        outcome.on_hand.push(tick.hand_force);
+        outcome.hand_port.push(hip, tick.hand_force);
+        outcome
+            .felt
+            .push_hand(self.now, hip, -tick.hand_force, pushes);
+        self.up.push(self.now, self.bytes, tick.message);
+        while let Some(packet) = self.up.pop_due(self.now) {
+            if packet.corrupted_bit.is_none() {
+                self.slave.receive(packet.due, &packet.payload);
+            }
+        }
+        self.slave_tick()
+    }
+
+    fn slave_tick(&mut self) -> Option<BilateralSlaveTick> {
+        let tick = self.slave.tick(self.now)?;
+        if let Some(message) = tick.message {
+            self.down.push(self.now, self.bytes, message);
+        }
+        let outcome = &mut self.outcome;
+        outcome.breaks.push(tick.in_contact);
+        outcome
+            .felt
+            .push_tool(tick.stamp, tick.tool, tick.true_force, tick.in_contact);
+        outcome.tool_port.push(tick.tool, -tick.true_force);
+        let made_j = outcome.hand_port.energy_j() - outcome.tool_port.energy_j();
+        outcome.network_min_j = outcome.network_min_j.min(made_j);
+        let environment = self.slave.environment();
+        let scene = View {
+            pose: environment.pose(),
+            footprint: environment.footprint(),
+            in_contact: tick.in_contact,
+        };
+        self.scenes.push_back((self.now + self.scene_delay, scene));
+        Some(tick)
+    }
+
+    fn look(&mut self) {
+        let now = self.now + TICK;
+        while let Some((_, scene)) = self.scenes.pop_front_if(|(due, _)| *due <= now) {
+            self.seen = scene;
+        }
+    }
+}
+
+/// The waves' smoothing over a link: none where every packet takes the same time and arrives.
+fn smoothing_ticks(link: &LinkConfig) -> u16 {
+    let (_, jitter) = link.delay.parts();
+    if jitter == Duration::ZERO && link.loss == Loss::None && link.outages.is_empty() {
+        return 1;
+    }
+    let jitter_ms = u16::try_from(2 * jitter.as_millis()).unwrap_or(u16::MAX);
+    jitter_ms.max(SMOOTHING_TICKS)
+}

@@ -1,0 +1,218 @@
+//! The slave's core of a bilateral architecture: the hand's motion in, the measured force out.
+//!
+//! Play-out, environment and sensing are those of the slave of model-mediated teleoperation. The tool goes to the
+//! played HIP (position–force), as far along it as the energy allows (TDPA), or where the waves lead the arm. A force
+//! that may be the sensor's noise goes out as none. Pure: time is an argument, the seed comes with the configuration. It must
+//! never look at the truth for anything but reports.
+
+mod arm;
+
+pub use arm::TOOL_MASS_KG;
+
+use mmt_shared::bilateral::Baseline;
+use mmt_shared::bilateral::deadband::PerceptualDeadband;
+use mmt_shared::bilateral::message::{ToMaster, ToSlave};
+use mmt_shared::bilateral::passivity::{PortEnergy, admittance_controller};
+use mmt_shared::bilateral::wave::{WaveReceiver, WaveSender, WaveSum};
+use mmt_shared::contact::Coupling;
+use mmt_shared::geometry::{Pose, Vec2};
+use mmt_shared::metrics::ForceMetrics;
+use mmt_shared::time::{TICK_S, Time};
+use mmt_shared::wire::ForceCounts;
+
+use crate::environment::{Environment, EnvironmentConfig};
+use crate::playout::{Played, PlayoutBuffer};
+use crate::sensing::Sensing;
+use crate::slave::{SlaveConfig, SlaveError};
+use crate::trigger::ContactDetector;
+use arm::Arm;
+
+/// A force below this many times the sensor's noise per axis is taken for none: three ticks in ten thousand in free
+/// space are not. It is F_min with the default sensor.
+const NOISE_DEVIATIONS: f64 = 4.0;
+
+/// What one tick of the slave gave.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BilateralSlaveTick {
+    /// Stamp of the HIP sample that is played, by the master's clock.
+    pub stamp: Time,
+    /// The tool, m.
+    pub tool: Vec2,
+    /// f_s as measured, N, on the object.
+    pub f_s: Vec2,
+    /// Contact force as it is, N: for reports.
+    pub true_force: Vec2,
+    /// Whether the slave is in contact.
+    pub in_contact: bool,
+    /// The object's true pose.
+    pub truth: Pose,
+    /// What goes to the master.
+    pub message: Option<ToMaster>,
+}
+
+/// The slave between the link and the object.
+pub struct BilateralSlave {
+    baseline: Baseline,
+    playout: PlayoutBuffer,
+    environment: Environment,
+    sensing: Sensing,
+    contact: ContactDetector,
+    noise_n: f64,
+    speed_max_m_per_s: f64,
+    tool: Vec2,
+    /// Force on the object since the last tick as the port knows it, N.
+    held: Vec2,
+    other_in_j: f64,
+    port: PortEnergy,
+    /// All the work that the tool did, J.
+    put_out_j: f64,
+    deadband: PerceptualDeadband,
+    arm: Arm,
+    waves_in: WaveReceiver,
+    waves_out: WaveSender,
+    force: ForceMetrics,
+}
+
+impl BilateralSlave {
+    /// A slave whose tool touches with `coupling` and starts at `hip` (m). `smoothing_ticks` is the waves' smoothing time.
+    ///
+    /// # Errors
+    /// When the configuration's numbers are not accepted.
+    pub fn try_new(
+        config: &SlaveConfig,
+        coupling: Coupling,
+        baseline: Baseline,
+        smoothing_ticks: u16,
+        hip: Vec2,
+    ) -> Result<Self, SlaveError> {
+        let mut playout = PlayoutBuffer::try_new(config.playout)?;
+        playout.start_at(hip);
+        let environment = Environment::try_new(EnvironmentConfig {
+            coupling,
+            ..config.environment
+        })?;
+        let speed_max_m_per_s = config.playout.speed_max_m_per_s;
+        Ok(Self {
+            baseline,
+            playout,
+            environment,
+            sensing: Sensing::try_new(config.sensing, config.seed)?,
+            contact: ContactDetector::new(config.trigger.contact),
+            noise_n: NOISE_DEVIATIONS * config.sensing.force_noise_n,
+            speed_max_m_per_s,
+            tool: hip,
+            held: Vec2::zeros(),
+            other_in_j: 0.0,
+            port: PortEnergy::default(),
+            put_out_j: 0.0,
+            deadband: PerceptualDeadband::default(),
+            arm: Arm::new(coupling.stiffness_n_per_m, speed_max_m_per_s),
+            waves_in: WaveReceiver::new(smoothing_ticks),
+            waves_out: WaveSender::default(),
+            force: ForceMetrics::default(),
+        })
+    }
+
+    /// The real object. What it says is the truth: for reports and pictures only.
+    #[must_use]
+    pub fn environment(&self) -> &Environment {
+        &self.environment
+    }
+
+    /// Force metrics over all samples whose f_m is known.
+    #[must_use]
+    pub fn force(&self) -> &ForceMetrics {
+        &self.force
+    }
+
+    /// Energy that passed the tool's port, J.
+    #[must_use]
+    pub fn port(&self) -> PortEnergy {
+        self.port
+    }
+
+    /// Takes in a message that arrived at `now`.
+    pub fn receive(&mut self, now: Time, message: &ToSlave) {
+        self.playout.push(now, &message.sample);
+        self.other_in_j = self.other_in_j.max(message.in_j);
+        self.waves_in.receive(message.wave);
+    }
+
+    /// One sample period. None before the first HIP sample is due.
+    pub fn tick(&mut self, now: Time) -> Option<BilateralSlaveTick> {
+        let played = self.playout.advance(now)?;
+        let (way, wave) = self.way(&played);
+        self.tool += way;
+        // E(k) = E(k−1) − f(k−1)·(x(k) − x(k−1)), seen from the network
+        let work_j = -self.held.dot(&way);
+        self.put_out_j -= work_j;
+        // the sensor may read low, and a tool that stops by what it reads goes on when it does
+        let doubt_j = self.doubt().dot(&way).abs();
+        self.port.push(work_j - doubt_j, self.other_in_j);
+        let truth = self.environment.pose();
+        let contact = self.environment.step(self.tool, way / TICK_S);
+        let sensed = self.sensing.sense(now, self.tool, contact.force, &truth);
+        if let Some(f_m) = played.force {
+            self.force.push(sensed.force, f_m);
+        }
+        let noise = sensed.force.norm() < self.noise_n;
+        self.held = if noise { Vec2::zeros() } else { sensed.force };
+        Some(BilateralSlaveTick {
+            stamp: played.stamp,
+            tool: self.tool,
+            f_s: sensed.force,
+            true_force: contact.force,
+            in_contact: self.contact.step(sensed.force.norm()),
+            truth,
+            message: self.message(now, wave),
+        })
+    }
+
+    /// The tool's way in this tick, m, and all waves sent.
+    fn way(&mut self, played: &Played) -> (Vec2, WaveSum) {
+        match self.baseline {
+            Baseline::PositionForce | Baseline::DeadbandForce => {
+                (played.hip - self.tool, WaveSum::default())
+            }
+            Baseline::Tdpa | Baseline::TdpaDeadband => {
+                // towards the hand, not along its velocity: where beta held the tool back, it makes up for it as soon
+                // as there is energy (Artigas, Ryu and Preusche, IROS 2010)
+                let wanted = played.hip - self.tool;
+                let most = self.speed_max_m_per_s * TICK_S;
+                let wanted = wanted * (most / wanted.norm().max(most));
+                let margin_j = self.port.margin_j(self.other_in_j);
+                let way = admittance_controller(wanted, self.held + self.doubt(), margin_j);
+                (way, WaveSum::default())
+            }
+            Baseline::Waves => {
+                let u = self.waves_in.take();
+                let (way, w) = self.arm.step(u, self.held);
+                let given_j = self.put_out_j + self.held.dot(&way);
+                let taken_in_j = self.waves_in.energy_j() - given_j;
+                (way, self.waves_out.send(w, taken_in_j))
+            }
+        }
+    }
+
+    /// By how much more than the measured force the energy is counted, N: a tool that goes W / f at a noisy f goes
+    /// sigma² / f² of it too far on average; twice that for what is taken for none.
+    fn doubt(&self) -> Vec2 {
+        let size2 = self.held.norm_squared();
+        let deviation_n = self.noise_n / NOISE_DEVIATIONS;
+        if size2 > 0.0 {
+            self.held * (2.0 * deviation_n * deviation_n / size2)
+        } else {
+            Vec2::zeros()
+        }
+    }
+
+    fn message(&mut self, now: Time, wave: WaveSum) -> Option<ToMaster> {
+        let sends = !self.baseline.has_deadband() || self.deadband.offer(now, self.held);
+        sends.then(|| ToMaster {
+            sent: now,
+            force: ForceCounts::nearest(self.held),
+            in_j: self.port.in_j,
+            wave,
+        })
+    }
+}

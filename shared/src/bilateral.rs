@@ -1,0 +1,63 @@
+//! Bilateral control, in which force itself crosses the network: the architectures that mmt is compared with.
+//!
+//! Here are the laws that both sides share; the cores of the two sides are `client::bilateral` and
+//! `server::bilateral`. Pure. Nothing here may be used by model-mediated teleoperation: no force that crosses the
+//! network is obeyed there. Where each law comes from: `docs/baselines.md`.
+
+pub mod deadband;
+pub mod message;
+pub mod passivity;
+pub mod wave;
+
+use serde::{Deserialize, Serialize};
+
+/// A bilateral architecture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Baseline {
+    /// The tool goes where the hand went, the hand gets the force that the tool met.
+    PositionForce,
+    /// The same, a force sent only when it is perceptibly another than the last one sent.
+    DeadbandForce,
+    /// Position–force, its energy watched and paid at both ports.
+    Tdpa,
+    /// The same, with the deadband on the force.
+    TdpaDeadband,
+    /// Wave variables in place of position and force.
+    Waves,
+}
+
+impl Baseline {
+    /// All of them.
+    pub const ALL: [Self; 5] = [
+        Self::PositionForce,
+        Self::DeadbandForce,
+        Self::Tdpa,
+        Self::TdpaDeadband,
+        Self::Waves,
+    ];
+
+    /// Whether forces pass a perceptual deadband.
+    #[must_use]
+    pub const fn has_deadband(self) -> bool {
+        matches!(self, Self::DeadbandForce | Self::TdpaDeadband)
+    }
+
+    /// Whether the time-domain passivity approach watches the ports.
+    #[must_use]
+    pub const fn has_passivity_control(self) -> bool {
+        matches!(self, Self::Tdpa | Self::TdpaDeadband)
+    }
+
+    /// Name in tables and arguments.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::PositionForce => "position-force",
+            Self::DeadbandForce => "deadband-force",
+            Self::Tdpa => "tdpa",
+            Self::TdpaDeadband => "tdpa-deadband",
+            Self::Waves => "waves",
+        }
+    }
+}
