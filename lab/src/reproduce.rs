@@ -5,6 +5,7 @@
 
 pub mod ablation;
 pub mod claims;
+pub mod delay;
 pub mod fig5;
 pub mod netem;
 pub mod physics;
@@ -18,9 +19,12 @@ pub use setting::{Curve, DEADBANDS, FIG5_CURVES, mode_name, paper_world};
 
 use std::time::Duration;
 
+use delay::Duel;
+
 use serde::Serialize;
 use sha2::{Digest, Sha256};
 
+use crate::architecture::DelayRow;
 use crate::physics::PhysicsError;
 use crate::table::Table;
 use crate::trial::{Measured, Trial, TrialError};
@@ -41,6 +45,12 @@ pub trait Laboratory: Sync {
         trials: &[Trial],
         each: Each,
     ) -> Result<Vec<Measured>, ReproduceError>;
+
+    /// Runs every architecture's runs and returns their rows in that order.
+    ///
+    /// # Errors
+    /// The first error of a run.
+    fn duel(&self, what: &str, duels: &[Duel]) -> Result<Vec<DelayRow>, ReproduceError>;
 
     /// Keeps a file under a name, which may have folders in it.
     ///

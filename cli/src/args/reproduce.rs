@@ -21,9 +21,9 @@ pub(crate) struct ReproduceArguments {
     /// Seeds 1 to N [default: each experiment's own]
     #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=10_000))]
     pub(crate) seeds: Option<u64>,
-    /// Length of a run, in virtual time
-    #[arg(long, global = true, value_name = "TIME", default_value = "30s", value_parser = values::duration)]
-    pub(crate) duration: Duration,
+    /// Length of a run, in virtual time [default: 30s; delay: 40s]
+    #[arg(long, global = true, value_name = "TIME", value_parser = values::duration)]
+    pub(crate) duration: Option<Duration>,
     /// Threads [default: as many as the machine has cores]
     #[arg(long, global = true, value_name = "N")]
     pub(crate) jobs: Option<NonZero<usize>>,
@@ -55,6 +55,12 @@ pub(crate) enum Experiment {
     Tupdate,
     /// Other bodies, other grounds, changes in mid-run: recovery, packets and force error in both modes
     Scenarios,
+    /// At which delay each architecture stops being usable
+    Delay {
+        /// The whole grid of delays, jitter, losses and stiffnesses: about an hour
+        #[arg(long)]
+        full: bool,
+    },
     /// Every network preset: configured against achieved
     Netem,
     /// What the environment does against closed forms and a fine reference, for any body

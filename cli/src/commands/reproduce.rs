@@ -3,11 +3,13 @@
 mod desk;
 mod manifest;
 
+use std::time::Duration;
+
 use mmt_lab::physics::Body;
 use mmt_lab::reproduce::traces::Trace;
 use mmt_lab::reproduce::{
-    Extent, Findings, ReproduceError, ablation, claims, fig5, netem, physics, scenarios, schemes,
-    traces, tupdate,
+    Extent, Findings, ReproduceError, ablation, claims, delay, fig5, netem, physics, scenarios,
+    schemes, traces, tupdate,
 };
 
 use crate::args::{BodyArguments, Experiment, ReproduceArguments};
@@ -17,10 +19,16 @@ use crate::output::{note, print, print_json};
 use desk::Desk;
 use manifest::Manifest;
 
+/// Length of a run: four or five pushes.
+const DURATION: Duration = Duration::from_secs(30);
+/// Length of a run of the delay experiment, whose pushes come later.
+const DELAY_DURATION: Duration = Duration::from_secs(40);
 /// Seeds of fig. 5: the paper's ten repetitions.
 const SEEDS: u64 = 10;
 /// Seeds of the sweep over T_update: 252 places.
 const TUPDATE_SEEDS: u64 = 5;
+/// Seeds of the delay experiment.
+const DELAY_SEEDS: u64 = 5;
 /// Seeds of the claims: with fewer, differences between the schemes are noise.
 const CLAIM_SEEDS: u64 = 40;
 
@@ -64,6 +72,7 @@ fn experiments(experiment: &Experiment) -> Vec<Experiment> {
             Experiment::Scenarios,
             Experiment::Tupdate,
             Experiment::Netem,
+            Experiment::Delay { full: false },
         ],
         one => vec![one.clone()],
     }
@@ -76,7 +85,7 @@ fn reproduce(
 ) -> Result<Findings, Failure> {
     let extent = |seeds: u64| Extent {
         seeds: arguments.seeds.unwrap_or(seeds),
-        duration: arguments.duration,
+        duration: arguments.duration.unwrap_or(DURATION),
     };
     let findings = match experiment {
         // taken apart in `experiments`
@@ -90,6 +99,13 @@ fn reproduce(
         Experiment::Scenarios => scenarios::reproduce(desk, extent(SEEDS)),
         Experiment::Tupdate => tupdate::reproduce(desk, extent(TUPDATE_SEEDS)),
         Experiment::Netem => netem::reproduce(desk, extent(SEEDS)),
+        Experiment::Delay { full } => {
+            let extent = Extent {
+                duration: arguments.duration.unwrap_or(DELAY_DURATION),
+                ..extent(DELAY_SEEDS)
+            };
+            delay::reproduce(desk, extent, *full)
+        }
         Experiment::Claims => claims::reproduce(desk, extent(CLAIM_SEEDS)),
     };
     findings.map_err(|error| match error {

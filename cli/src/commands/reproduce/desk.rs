@@ -6,9 +6,11 @@ use std::path::Path;
 use std::sync::Mutex;
 
 use indicatif::{ProgressBar, ProgressStyle};
+use mmt_lab::architecture::{self, DelayRow};
 use mmt_lab::io::{Folder, Pool, estimator_tick_ms};
+use mmt_lab::reproduce::delay::Duel;
 use mmt_lab::reproduce::{Each, Laboratory, ReproduceError};
-use mmt_lab::trial::{Measured, Trial};
+use mmt_lab::trial::{Measured, Trial, TrialError};
 use mmt_shared::settings::Mode;
 
 use super::manifest::Manifest;
@@ -87,6 +89,15 @@ fn key(trial: &Trial) -> Option<String> {
     serde_json::to_string(&all).ok().filter(|_| !trial.traced)
 }
 
+/// A bar on stderr; nothing where stderr is no terminal.
+fn progress_bar(what: &str, length: usize) -> ProgressBar {
+    let bar = ProgressBar::new(length as u64);
+    let style = ProgressStyle::with_template("{msg} [{wide_bar}] {pos}/{len} {eta}");
+    bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+    bar.set_message(what.to_owned());
+    bar
+}
+
 impl Laboratory for Desk {
     fn run(
         &self,
@@ -94,16 +105,26 @@ impl Laboratory for Desk {
         trials: &[Trial],
         each: Each,
     ) -> Result<Vec<Measured>, ReproduceError> {
-        let bar = ProgressBar::new(trials.len() as u64);
-        let style = ProgressStyle::with_template("{msg} [{wide_bar}] {pos}/{len} {eta}");
-        bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
-        bar.set_message(what.to_owned());
+        let bar = progress_bar(what, trials.len());
         let work = |index: usize, trial: &Trial| self.measure(index, trial, each);
         let measured = self
             .pool
             .run(trials, work, |done| bar.set_position(done as u64));
         bar.finish_and_clear();
         measured
+    }
+
+    fn duel(&self, what: &str, duels: &[Duel]) -> Result<Vec<DelayRow>, ReproduceError> {
+        let bar = progress_bar(what, duels.len());
+        let work = |_: usize, duel: &Duel| {
+            let row = architecture::run(duel.architecture, &duel.config, duel.duration);
+            row.map_err(|error| ReproduceError::from(TrialError::from(error)))
+        };
+        let rows = self
+            .pool
+            .run(duels, work, |done| bar.set_position(done as u64));
+        bar.finish_and_clear();
+        rows
     }
 
     fn keep(&self, name: &str, bytes: &[u8]) -> Result<(), ReproduceError> {
