@@ -5,8 +5,10 @@
 //! brought the message: its serialisation, propagation and jitter. Waiting counts, before the socket and at a
 //! bottleneck. Pure: who runs a case tells the log what happened, and nothing here knows QUIC.
 
+mod grid;
 mod log;
 
+pub use grid::cases;
 pub use log::{Log, Outcome, Sent};
 
 use std::ops::Range;
@@ -34,6 +36,9 @@ pub enum Stack {
 }
 
 impl Stack {
+    /// Both.
+    pub const ALL: [Self; 2] = [Self::Stock, Self::Ours];
+
     /// As tables spell it.
     #[must_use]
     pub fn name(self) -> &'static str {

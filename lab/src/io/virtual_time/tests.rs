@@ -27,24 +27,15 @@ fn clean(stack: Stack, flow: Flow, round_trip: Duration) -> Case {
 
 #[test]
 fn explore() {
-    for stack in [Stack::Stock, Stack::Ours] {
-        for (name, loss, jitter, outage, narrow) in [
-            ("clean", 0.0, 0, 0, false),
-            ("loss 1", 1.0, 0, 0, false),
-            ("loss 5", 5.0, 0, 0, false),
-            ("jitter 5", 0.0, 5, 0, false),
-            ("outage", 0.0, 0, 1000, false),
-            ("narrow", 0.0, 0, 0, true),
-        ] {
-            let mut case = clean(stack, Flow::EverySample, 100 * MS);
-            case.conditions.loss = Probability::from_percent(loss).unwrap();
-            case.conditions.jitter = jitter * MS;
-            case.conditions.outage = outage * MS;
-            case.conditions.bottleneck = narrow.then_some(Bottleneck::NARROW);
-            let begun = std::time::Instant::now();
-            let o = run(&case).unwrap();
-            println!("{stack:?} {name}: {:?} {:?} {:?} share {:?} stale {} fresh {:?} up {:?} down {:?} {:?} {}",
-                o.added_p50_ms, o.added_p99_ms, o.added_max_ms, o.share(), o.stale, o.fresh_ms, o.up, o.down, begun.elapsed(), &o.digest[..8]);
-        }
+    let which = std::env::var("STACK").unwrap_or_default();
+    let cases: Vec<Case> = crate::transport::cases(10_000 * MS, 1).into_iter().filter(|c| which.contains(c.stack.name())).collect();
+    let begun = std::time::Instant::now();
+    let outcomes = crate::io::Pool::new(None).run(&cases, |_, case| run(case), |_| {}).unwrap();
+    println!("{} cases {:?}", cases.len(), begun.elapsed());
+    for (case, o) in cases.iter().zip(&outcomes) {
+        let c = &case.conditions;
+        let f = |x: Option<f64>| x.map_or("-".to_owned(), |x| format!("{x:.1}"));
+        println!("{} {:4} rtt {:3} loss {:3} jit {:2} out {} narrow {} | {:>7} {:>7} {:>7} share {:.4} stale {} fresh {} up {} down {}", case.stack.name(), case.flow.rate_hz(), c.round_trip.as_millis(), c.loss.get()*100.0, c.jitter.as_millis(), u8::from(!c.outage.is_zero()), u8::from(c.bottleneck.is_some()),
+            f(o.added_p50_ms), f(o.added_p99_ms), f(o.added_max_ms), o.share().unwrap(), o.stale, f(o.fresh_ms), o.up.packets, o.down.packets);
     }
 }
