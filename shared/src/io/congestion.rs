@@ -31,7 +31,7 @@ const STANDING: Duration = Duration::from_millis(30);
 /// A queue that fell by this much since the round before is draining, and is left to it.
 const DRAINING: Duration = Duration::from_millis(5);
 /// Under congestion the queue is steered to this length: long enough to use the path, short for a hand.
-const TARGET: Duration = Duration::from_millis(15);
+const TARGET: Duration = Duration::from_millis(12);
 
 /// What a side may send, and the factory of its controllers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -59,8 +59,6 @@ pub struct Window {
     of_round: Option<(Duration, u64)>,
     /// The queue of the last round, if it stood.
     standing: Option<Duration>,
-    /// The most that was in flight in this round.
-    peak: u64,
     /// What the window gives up for one round, so that the shortest round trip is seen again.
     given_up: u64,
     /// What congestion leaves of the window; none if there was none lately.
@@ -82,7 +80,6 @@ impl Window {
             batch: None,
             of_round: None,
             standing: None,
-            peak: 0,
             given_up: 0,
             allowed: None,
             fast_until: 0,
@@ -107,7 +104,8 @@ impl Window {
         let took = now.saturating_duration_since(sent);
         self.silence.answered(sent, bytes);
         self.batch = Some(self.batch.map_or(took, |quickest| quickest.min(took)));
-        if self.round.covers(sent) {
+        // Under congestion a reading must show the window in force, else its change would be made twice.
+        if self.allowed.is_none() || self.round.covers(sent) {
             let (quickest, so_far) = self.of_round.unwrap_or((took, 0));
             self.of_round = Some((quickest.min(took), so_far.saturating_add(bytes)));
         }
@@ -123,39 +121,49 @@ impl Window {
         };
         if let Some(reading) = self.round.record(now, took, bytes, base) {
             self.steer(now, reading);
-            self.peak = self.silence.in_flight();
         }
     }
 
-    /// Begins congestion when a queue stands, and moves the window by what the queue holds too much or too little.
+    /// Begins congestion when a queue stands, and then moves the window by what the queue holds too much or too little.
     fn steer(&mut self, now: Instant, reading: Reading) {
-        let before = self.standing.take();
         self.given_up = 0;
         let Some(allowed) = self.allowed else {
-            self.standing = Some(reading.queue).filter(|queue| *queue > STANDING);
-            let stood = before.is_some_and(|before| reading.queue.saturating_add(DRAINING) > before);
-            if self.standing.is_some() && stood {
-                let used = self.peak.saturating_add(self.mtu).min(self.limit());
-                self.allow(used, reading);
+            if self.stands(reading.surely()) {
+                let shortest = self.base.shortest().unwrap_or(Duration::ZERO);
+                // a queue stands: what was answered is what the path can carry
+                let carried = bytes_in(reading.bytes_per_s, shortest.saturating_add(TARGET));
+                self.allow(carried.saturating_add(self.mtu.saturating_mul(2)));
             }
             return;
         };
-        self.allow(allowed, reading);
-        if self.allowed.is_some() && self.base.is_ageing(now) {
+        self.allow(self.steered(allowed, reading));
+        if self.base.is_ageing(now) {
             self.given_up = bytes_in(reading.bytes_per_s, TARGET.saturating_mul(2));
         }
     }
 
-    fn allow(&mut self, allowed: u64, reading: Reading) {
-        let steered = match reading.queue.checked_sub(TARGET) {
-            Some(excess) => allowed.saturating_sub(bytes_in(reading.bytes_per_s, excess)),
-            None if allowed < self.fast_until => allowed.saturating_add(allowed / 2),
+    /// Whether a queue is congestion: it is very long, or it is long for the second time and does not drain.
+    fn stands(&mut self, queue: Duration) -> bool {
+        let before = self.standing.take();
+        self.standing = Some(queue).filter(|queue| *queue > STANDING);
+        let remains = |before| queue.saturating_add(DRAINING) > before;
+        self.standing.is_some() && before.is_some_and(remains)
+    }
+
+    fn steered(&self, allowed: u64, reading: Reading) -> u64 {
+        let queue = reading.likely();
+        match TARGET.checked_sub(queue) {
+            Some(_) if allowed < self.fast_until => allowed.saturating_add(allowed / 2),
+            Some(lacking) => allowed.saturating_add(bytes_in(reading.bytes_per_s, lacking) / 2),
             None => {
-                let lacking = TARGET.saturating_sub(reading.queue);
-                allowed.saturating_add(bytes_in(reading.bytes_per_s, lacking) / 2)
+                let excess = queue.saturating_sub(TARGET);
+                allowed.saturating_sub(bytes_in(reading.bytes_per_s, excess))
             }
-        };
-        self.allowed = (steered < self.limit()).then_some(steered.max(WINDOW_MIN));
+        }
+    }
+
+    fn allow(&mut self, bytes: u64) {
+        self.allowed = (bytes < self.limit()).then_some(bytes.max(WINDOW_MIN));
     }
 
     fn shrink(&mut self, now: Instant) {
@@ -175,7 +183,6 @@ impl Window {
 impl Controller for Window {
     fn on_sent(&mut self, now: Instant, bytes: u64, _last_packet_number: u64) {
         self.silence.sent(now, bytes);
-        self.peak = self.peak.max(self.silence.in_flight());
     }
 
     fn on_ack(
@@ -199,7 +206,6 @@ impl Controller for Window {
         self.end_batch(now);
         if self.silence.heard(now, in_flight) {
             self.round = Round::new(now);
-            self.peak = 0;
         }
     }
 

@@ -63,14 +63,28 @@ impl Base {
 /// What a round says about the path.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Reading {
-    /// How long packets waited in queues.
-    pub(super) queue: Duration,
+    /// How much longer than the shortest round trip the quickest answer took.
+    pub(super) excess: Duration,
+    /// How much longer than the quickest the answers took on average.
+    pub(super) jitter: Duration,
     /// What was answered.
     pub(super) bytes_per_s: u64,
 }
 
-/// Reads the queue from the answers to what was sent since the round began, so that a reading never shows a
-/// window that is no longer in force.
+impl Reading {
+    /// The queue that there is for certain. Jitter spreads the answers and lifts even the quickest of a few above the
+    /// shortest of thousands, by less than it lies below their mean; a queue lifts all alike.
+    pub(super) fn surely(&self) -> Duration {
+        self.excess.saturating_sub(self.jitter)
+    }
+
+    /// The queue that there most likely is.
+    pub(super) fn likely(&self) -> Duration {
+        self.excess.saturating_sub(self.jitter / 3)
+    }
+}
+
+/// Reads the queue from the answers of a round.
 #[derive(Clone, Debug)]
 pub(super) struct Round {
     began: Instant,
@@ -95,7 +109,7 @@ impl Round {
         }
     }
 
-    /// Whether an answer to what was sent at `sent` belongs to this round.
+    /// Whether something sent at `sent` was sent in this round.
     pub(super) fn covers(&self, sent: Instant) -> bool {
         sent >= self.began
     }
@@ -119,17 +133,14 @@ impl Round {
         if self.acks < ROUND_ACKS || lasted < ROUND_MIN {
             return None;
         }
-        // Jitter spreads the answers and lifts even the quickest of a few above the shortest of thousands, by
-        // less than it lies below their mean. A queue lifts all alike.
-        let mean = self.sum / self.acks;
-        let jitter = mean.saturating_sub(self.quickest);
-        let queue = self.quickest.saturating_sub(base).saturating_sub(jitter);
         let per_s = u128::from(self.bytes) * 1_000_000_000 / lasted.as_nanos().max(1);
-        *self = Self::new(now);
-        Some(Reading {
-            queue,
+        let reading = Reading {
+            excess: self.quickest.saturating_sub(base),
+            jitter: (self.sum / self.acks).saturating_sub(self.quickest),
             bytes_per_s: u64::try_from(per_s).unwrap_or(u64::MAX),
-        })
+        };
+        *self = Self::new(now);
+        Some(reading)
     }
 }
 
@@ -195,11 +206,6 @@ impl Silence {
     /// Whether something sent at `sent` was sent before the last silence was broken.
     pub(super) fn of_silence(&self, sent: Instant) -> bool {
         self.broken.is_some_and(|broken| sent <= broken)
-    }
-
-    /// What is in flight.
-    pub(super) fn in_flight(&self) -> u64 {
-        self.in_flight
     }
 
     /// The window that there is in truth when congestion leaves `window`; `room` is what one more packet needs.
