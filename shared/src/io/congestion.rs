@@ -6,7 +6,8 @@
 //! wait in the network. A queue that stands is steered to a target: the window moves by what the queue holds too
 //! much, read once a round (cf. LEDBAT, RFC 6817). ECN-CE (RFC 3168) and persistent congestion (RFC 9002, section
 //! 7.6) shrink it; isolated loss is a matter of the radio, not of a queue, and does not; nor does what was sent
-//! into an outage. It must never fall below 8 kB: quinn wants a whole MTU of room for the smallest packet.
+//! into an outage. It must never stay
+//! below 8 kB: quinn wants a whole MTU of room for the smallest packet.
 
 use std::any::Any;
 use std::sync::Arc;
@@ -30,6 +31,9 @@ pub const MARGIN: Duration = Duration::from_millis(50);
 const STANDING: Duration = Duration::from_millis(30);
 /// A queue that fell by this much since the round before is draining, and is left to it.
 const DRAINING: Duration = Duration::from_millis(5);
+/// Acknowledgements in a round: few, to see a queue early, and more under congestion, to steer by.
+const WATCHING_ACKS: u32 = 8;
+const STEERING_ACKS: u32 = 16;
 /// Under congestion the queue is steered to this length: long enough to use the path, short for a hand.
 const TARGET: Duration = Duration::from_millis(12);
 
@@ -119,30 +123,37 @@ impl Window {
         let (Some((took, bytes)), Some(base)) = (of_round, self.base.shortest()) else {
             return;
         };
-        if let Some(reading) = self.round.record(now, took, bytes, base) {
+        let acks_min = match self.allowed {
+            None => WATCHING_ACKS,
+            Some(_) => STEERING_ACKS,
+        };
+        if let Some(reading) = self.round.record(now, took, bytes, base, acks_min) {
             self.steer(now, reading);
         }
     }
 
     /// Begins congestion when a queue stands, and then moves the window by what the queue holds too much or too little.
     fn steer(&mut self, now: Instant, reading: Reading) {
-        self.given_up = 0;
-        let Some(allowed) = self.allowed else {
-            if self.stands(reading.surely()) {
+        let begins = self.allowed.is_none();
+        let stands = self.stands(reading.surely());
+        match self.allowed {
+            Some(allowed) => self.allow(self.steered(allowed, reading)),
+            None if stands => {
                 let shortest = self.base.shortest().unwrap_or(Duration::ZERO);
                 // a queue stands: what was answered is what the path can carry
                 let carried = bytes_in(reading.bytes_per_s, shortest.saturating_add(TARGET));
                 self.allow(carried.saturating_add(self.mtu.saturating_mul(2)));
             }
-            return;
-        };
-        self.allow(self.steered(allowed, reading));
-        if self.base.is_ageing(now) {
-            self.given_up = bytes_in(reading.bytes_per_s, TARGET.saturating_mul(2));
+            None => {}
         }
+        let look = self.allowed.is_some() && (begins || self.base.is_ageing(now));
+        self.given_up = match look {
+            true => bytes_in(reading.bytes_per_s, TARGET.saturating_mul(2)),
+            false => 0,
+        };
     }
 
-    /// Whether a queue is congestion: it is very long, or it is long for the second time and does not drain.
+    /// Whether a queue is congestion: it is long for the second time and does not drain.
     fn stands(&mut self, queue: Duration) -> bool {
         let before = self.standing.take();
         self.standing = Some(queue).filter(|queue| *queue > STANDING);
@@ -233,9 +244,9 @@ impl Controller for Window {
     }
 
     fn window(&self) -> u64 {
-        let left = self.congested().saturating_sub(self.given_up);
         let room = self.mtu.saturating_mul(2);
-        self.silence.widen(left.max(WINDOW_MIN), room)
+        let left = self.congested().saturating_sub(self.given_up);
+        self.silence.widen(left.max(WINDOW_MIN / 2), room)
     }
 
     fn clone_box(&self) -> Box<dyn Controller> {

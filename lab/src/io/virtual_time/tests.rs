@@ -28,7 +28,7 @@ fn clean(stack: Stack, flow: Flow, round_trip: Duration) -> Case {
 #[test]
 fn explore() {
     let which = std::env::var("STACK").unwrap_or_default();
-    let cases: Vec<Case> = crate::transport::cases(10_000 * MS, 1).into_iter().filter(|c| which.contains(c.stack.name())).collect();
+    let cases: Vec<Case> = crate::transport::cases(20_000 * MS, 1).into_iter().filter(|c| which.contains(c.stack.name()) && c.conditions.bottleneck.is_some() && c.flow == Flow::EverySample).collect();
     let begun = std::time::Instant::now();
     let outcomes = crate::io::Pool::new(None).run(&cases, |_, case| run(case), |_| {}).unwrap();
     println!("{} cases {:?}", cases.len(), begun.elapsed());

@@ -4,16 +4,15 @@
 
 use std::time::{Duration, Instant};
 
-/// A round lasts at least this long from its first answer on, and this many acknowledgements.
+/// A round lasts at least this long from its first answer on.
 const ROUND_MIN: Duration = Duration::from_millis(100);
-const ROUND_ACKS: u32 = 8;
 /// Who hears nothing for this long stops counting what is in flight: three times as long as a peer may hold an
 /// acknowledgement, and short enough that a window without congestion is not full by then.
 const SILENT: Duration = Duration::from_millis(75);
 /// The shortest round trip is forgotten after one to two of these: paths change.
 const BASE_MEMORY: Duration = Duration::from_secs(10);
 /// A round trip longer by no more than this is the shortest one, seen again.
-const AGAIN: Duration = Duration::from_millis(5);
+const AGAIN: Duration = Duration::from_millis(1);
 
 /// The shortest round trip of the last 10 to 20 s.
 #[derive(Clone, Debug)]
@@ -114,13 +113,15 @@ impl Round {
         sent >= self.began
     }
 
-    /// Takes an acknowledgement, whose quickest packet took `took`; speaks when that ends the round.
+    /// Takes an acknowledgement, whose quickest packet took `took`; speaks when that ends the round, which has
+    /// `acks_min` of them at least.
     pub(super) fn record(
         &mut self,
         now: Instant,
         took: Duration,
         bytes: u64,
         base: Duration,
+        acks_min: u32,
     ) -> Option<Reading> {
         match self.first {
             None => self.first = Some(now),
@@ -130,7 +131,7 @@ impl Round {
         self.quickest = self.quickest.min(took);
         self.sum = self.sum.saturating_add(took);
         let lasted = now.saturating_duration_since(self.first?);
-        if self.acks < ROUND_ACKS || lasted < ROUND_MIN {
+        if self.acks < acks_min || lasted < ROUND_MIN {
             return None;
         }
         let per_s = u128::from(self.bytes) * 1_000_000_000 / lasted.as_nanos().max(1);
