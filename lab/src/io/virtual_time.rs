@@ -4,8 +4,8 @@
 //! sockets and its scheduler are ours. Nothing costs time but the path, so that what a message needs beyond it is
 //! what the protocol adds. A run must never read the host's clock or wait for anything.
 
-mod executor;
 mod ends;
+mod executor;
 mod path;
 mod run;
 

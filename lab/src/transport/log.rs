@@ -118,7 +118,11 @@ impl Log {
         let outage = self.case.outage(self.start);
         let into_outage = |number: &u32| outage.contains(&self.sent_at(*number));
         let possible = (0..self.sent).filter(|number| !into_outage(number)).count();
-        let stale = self.arrivals.iter().filter(|a| into_outage(&a.number)).count();
+        let stale = self
+            .arrivals
+            .iter()
+            .filter(|a| into_outage(&a.number))
+            .count();
         let mut added: Vec<Duration> = self.arrivals.iter().map(|a| a.added).collect();
         added.sort_unstable();
         Outcome {
@@ -152,13 +156,22 @@ impl Log {
         let mut hash = Sha256::new();
         for arrival in &self.arrivals {
             hash.update(arrival.number.to_le_bytes());
-            hash.update(arrival.at.saturating_since(self.start).as_nanos().to_le_bytes());
+            hash.update(
+                arrival
+                    .at
+                    .saturating_since(self.start)
+                    .as_nanos()
+                    .to_le_bytes(),
+            );
             hash.update(arrival.added.as_nanos().to_le_bytes());
         }
         for count in [up.packets, up.bytes, down.packets, down.bytes] {
             hash.update(count.to_le_bytes());
         }
-        hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect()
+        hash.finalize()
+            .iter()
+            .map(|byte| format!("{byte:02x}"))
+            .collect()
     }
 }
 

@@ -162,7 +162,7 @@ impl Window {
     }
 
     fn steered(&self, allowed: u64, reading: Reading) -> u64 {
-        let queue = reading.likely();
+        let queue = reading.excess;
         match TARGET.checked_sub(queue) {
             Some(_) if allowed < self.fast_until => allowed.saturating_add(allowed / 2),
             Some(lacking) => allowed.saturating_add(bytes_in(reading.bytes_per_s, lacking) / 2),

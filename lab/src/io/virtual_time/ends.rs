@@ -18,7 +18,8 @@ use mmt_shared::io::tls::{self, PinVerifier};
 use mmt_shared::rng::Substream;
 use quinn::udp::{RecvMeta, Transmit};
 use quinn::{
-    AsyncUdpSocket, ClientConfig, Endpoint, EndpointConfig, ServerConfig, TransportConfig, UdpPoller,
+    AsyncUdpSocket, ClientConfig, Endpoint, EndpointConfig, ServerConfig, TransportConfig,
+    UdpPoller,
 };
 
 use super::executor::{Executor, lock};

@@ -114,7 +114,11 @@ impl Executor {
                 task: id,
                 woken: Arc::clone(&self.0.woken),
             }));
-            if task.as_mut().poll(&mut Context::from_waker(&waker)).is_pending() {
+            if task
+                .as_mut()
+                .poll(&mut Context::from_waker(&waker))
+                .is_pending()
+            {
                 lock(&self.0.state).tasks.insert(id, task);
             }
         }
@@ -160,7 +164,8 @@ impl Runtime for Executor {
     }
 
     fn now(&self) -> Instant {
-        self.0.epoch + Duration::from_nanos(duration_nanos(self.time().saturating_since(Time::ZERO)))
+        self.0.epoch
+            + Duration::from_nanos(duration_nanos(self.time().saturating_since(Time::ZERO)))
     }
 }
 

@@ -93,15 +93,22 @@ impl World {
     fn new(case: &Case) -> Result<Self, VirtualTimeError> {
         let executor = Executor::new();
         let address = |host| SocketAddr::from((Ipv4Addr::new(192, 0, 2, host), 4433));
-        let way = |id| Way::try_new(&case.conditions, case.seed, id).map(|way| Arc::new(Mutex::new(way)));
+        let way =
+            |id| Way::try_new(&case.conditions, case.seed, id).map(|way| Arc::new(Mutex::new(way)));
         let (up, down) = (way(LinkId::UP)?, way(LinkId::DOWN)?);
         let master = MemorySocket::new(&executor, address(1), address(2), Arc::clone(&up));
         let slave = MemorySocket::new(&executor, address(2), address(1), Arc::clone(&down));
         let ends = ends(case, &executor, Arc::clone(&master), Arc::clone(&slave))?;
         Ok(Self {
             executor,
-            up: Lane { way: up, far: slave },
-            down: Lane { way: down, far: master },
+            up: Lane {
+                way: up,
+                far: slave,
+            },
+            down: Lane {
+                way: down,
+                far: master,
+            },
             ends,
         })
     }
@@ -109,7 +116,10 @@ impl World {
     /// The connection's two ends, once both have finished the handshake.
     fn shake_hands(&self) -> Result<Pair, VirtualTimeError> {
         let (client, address) = (self.ends.client.clone(), self.ends.slave.local_addr()?);
-        let connecting = self.ends.master.connect_with(client, address, SERVER_NAME)?;
+        let connecting = self
+            .ends
+            .master
+            .connect_with(client, address, SERVER_NAME)?;
         let mut connecting = pin!(connecting);
         let mut accepting = pin!(accept(&self.ends.slave));
         let context = &mut Context::from_waker(Waker::noop());
@@ -155,7 +165,8 @@ impl World {
                 pair.master.send_datagram(message)?;
             }
             if due == Some(now) && beat == now {
-                pair.slave.send_datagram(Bytes::from_static(&[0; HEARTBEAT_BYTES]))?;
+                pair.slave
+                    .send_datagram(Bytes::from_static(&[0; HEARTBEAT_BYTES]))?;
                 beat += HEARTBEAT;
             }
             self.executor.settle();

@@ -76,11 +76,6 @@ impl Reading {
     pub(super) fn surely(&self) -> Duration {
         self.excess.saturating_sub(self.jitter)
     }
-
-    /// The queue that there most likely is.
-    pub(super) fn likely(&self) -> Duration {
-        self.excess.saturating_sub(self.jitter / 3)
-    }
 }
 
 /// Reads the queue from the answers of a round.
