@@ -5,11 +5,15 @@
 //! brought the message: its serialisation, propagation and jitter. Waiting counts, before the socket and at a
 //! bottleneck. Pure: who runs a case tells the log what happened, and nothing here knows QUIC.
 
+mod figure;
 mod grid;
 mod log;
+mod reproduce;
+mod tables;
 
 pub use grid::cases;
 pub use log::{Log, Outcome, Sent};
+pub use reproduce::{Measure, reproduce};
 
 use std::ops::Range;
 use std::time::Duration;
@@ -29,7 +33,7 @@ const OUTAGE_AT: u32 = 4;
 /// Who carries the messages.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Stack {
-    /// quinn with its defaults: CUBIC, 1 MiB of unsent datagrams, every tenth of a window paced.
+    /// quinn with its defaults: CUBIC, and 1 MiB of unsent datagrams that wait for it in a queue.
     Stock,
     /// quinn with the settings and the congestion controller of `shared`.
     Ours,

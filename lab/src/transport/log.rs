@@ -60,7 +60,7 @@ pub struct Outcome {
     /// Messages sent while nothing got through that came all the same, once it did.
     pub stale: u64,
     /// From the first sending after the outage to the first arrival of anything sent since, without the path's own
-    /// delay, ms; none without an outage.
+    /// delay, ms; none without an outage. What the path loses by chance makes it longer.
     pub fresh_ms: Option<f64>,
     /// Packets from the master.
     pub up: Sent,

@@ -21,6 +21,7 @@ use quinn::{Connection, ConnectionError, Endpoint};
 use super::ends::{Ends, MemorySocket, ends};
 use super::executor::{Executor, lock};
 use super::path::{Arrived as Delivered, Way};
+use crate::reproduce::ReproduceError;
 use crate::transport::{Case, HEARTBEAT, HEARTBEAT_BYTES, Log, Outcome, Sent};
 
 /// Told of each packet that came: when, and what the path itself took for it.
@@ -60,6 +61,13 @@ pub enum VirtualTimeError {
     /// quinn would not take a message.
     #[error("a message could not be sent: {0}")]
     Send(#[from] quinn::SendDatagramError),
+}
+
+impl From<VirtualTimeError> for ReproduceError {
+    fn from(error: VirtualTimeError) -> Self {
+        let why = error.to_string();
+        Self::Transport { why }
+    }
 }
 
 /// Runs `case` in virtual time.
