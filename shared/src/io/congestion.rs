@@ -4,10 +4,10 @@
 //! congestion; at 1 kHz both end in seconds of queue. This one starts from what the sender may use,
 //! `clamp(rate cap × (min RTT + margin) + 2 MTU, 8 kB, 256 kB)`, so that no more than the margin can ever
 //! wait in the network. A queue that stands is steered to a target: the window moves by what the queue holds too
-//! much, read once a round (cf. LEDBAT, RFC 6817). ECN-CE (RFC 3168) and persistent congestion (RFC 9002, section
-//! 7.6) shrink it; isolated loss is a matter of the radio, not of a queue, and does not; nor does what was sent
-//! into an outage. It must never stay
-//! below 8 kB: quinn wants a whole MTU of room for the smallest packet.
+//! much or too little, read once a round (cf. LEDBAT, RFC 6817). ECN-CE (RFC 3168) and persistent congestion (RFC
+//! 9002, section 7.6) shrink it. Isolated loss is a matter of the radio, not of a queue, and does not; nor does the
+//! loss of what was sent into an outage. It must never stay below 8 kB: quinn wants a whole MTU of room for the
+//! smallest packet.
 
 use std::any::Any;
 use std::sync::Arc;
@@ -139,6 +139,7 @@ impl Window {
         match self.allowed {
             Some(allowed) => self.allow(self.steered(allowed, reading)),
             None if stands => {
+                self.fast_until = 0;
                 let shortest = self.base.shortest().unwrap_or(Duration::ZERO);
                 // a queue stands: what was answered is what the path can carry
                 let carried = bytes_in(reading.bytes_per_s, shortest.saturating_add(TARGET));

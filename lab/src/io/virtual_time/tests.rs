@@ -236,27 +236,3 @@ fn the_experiment_prints_its_promises_and_keeps_every_run() {
     assert_eq!(rows, [3, 14, 24]);
     println!("{}", findings.tables[0]);
 }
-
-/// The whole grid as the command runs it; `cargo test -p mmt-lab --lib whole_grid -- --ignored --nocapture`.
-#[test]
-#[ignore = "explores; a minute of two cores"]
-fn whole_grid() {
-    let shelf = Shelf::default();
-    let extent = Extent {
-        seeds: 1,
-        duration: 20_000 * MS,
-    };
-    let measure = |cases: &[Case]| {
-        let work = |_: usize, case: &Case| run(case).map_err(ReproduceError::from);
-        Pool::new(None).run(cases, work, |_| {})
-    };
-    let begun = std::time::Instant::now();
-    let findings = reproduce_transport(&shelf, &measure, extent).unwrap();
-    for table in &findings.tables {
-        println!("{table}");
-    }
-    println!("{} {:?}", findings.digest, begun.elapsed());
-    for (name, bytes) in shelf.0.into_inner().unwrap() {
-        std::fs::write(format!("/tmp/{name}"), bytes).unwrap();
-    }
-}

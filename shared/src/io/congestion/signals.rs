@@ -153,7 +153,7 @@ pub(super) struct Silence {
     silent: bool,
     in_flight: u64,
     /// What was sent before the last silence was broken says nothing about queues.
-    pub(super) broken: Option<Instant>,
+    broken: Option<Instant>,
     /// Bytes of that which are still in flight.
     ignored: u64,
 }
@@ -193,7 +193,7 @@ impl Silence {
         broken
     }
 
-    /// So many bytes are given up for lost, the last of them sent at `sent`.
+    /// So many bytes are given up for lost.
     pub(super) fn lost(&mut self, bytes: u64) {
         self.in_flight = self.in_flight.saturating_sub(bytes);
         self.ignored = self.ignored.saturating_sub(bytes);
