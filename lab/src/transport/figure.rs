@@ -20,6 +20,8 @@ struct Row {
     /// What it shows of each run, ms.
     what: &'static str,
     value: fn(&Outcome) -> Option<f64>,
+    /// The least that is shown, ms.
+    foot: f64,
 }
 
 const ROWS: [Row; 3] = [
@@ -28,18 +30,22 @@ const ROWS: [Row; 3] = [
         shows: |c| c.outage == Duration::ZERO && c.bottleneck.is_none(),
         what: "added delay, p99, ms (none at 0.1)",
         value: |outcome| outcome.added_p99_ms,
+        foot: 0.07,
     },
     Row {
         name: "1 s outage",
         shows: |c| c.outage > Duration::ZERO && c.bottleneck.is_none(),
         what: "added delay, p99, ms (none at 0.1)",
         value: |outcome| outcome.added_p99_ms,
+        foot: 0.07,
     },
     Row {
         name: "1 Mbit/s",
         shows: |c| c.outage == Duration::ZERO && c.bottleneck.is_some(),
         what: "added delay, median, ms",
         value: |outcome| outcome.added_p50_ms,
+        // room for the legend
+        foot: 0.008,
     },
 ];
 
@@ -57,20 +63,19 @@ pub(super) fn figure(runs: &[Run]) -> Figure {
             panels.push(Panel {
                 title: format!("{}, round trip {round_trip_ms} ms", row.name),
                 x: Axis::log("loss, % (none at 0.01)").over(0.008..8.0),
-                y: Axis::log(row.what).over(0.07..20_000.0),
+                y: Axis::log(row.what).over(row.foot..20_000.0),
                 series: curves(&shown, row.value),
                 legend: Legend::None,
             });
         }
     }
-    // where no curve comes
     if let Some(last) = panels.last_mut() {
         last.legend = Legend::LowerRight;
     }
     Figure {
         panels,
         columns: ROUND_TRIPS_MS.len(),
-        panel_size: (380, 300),
+        panel_size: (380, 340),
     }
 }
 
