@@ -56,7 +56,7 @@ impl Stack {
 /// A flow of equal messages at equal intervals.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Flow {
-    /// 1000 a second of 100 bytes: a command for each sample.
+    /// 1000 a second of 100 bytes: a command for each sample, with room for repeated ones.
     EverySample,
     /// 150 a second of 180 bytes: updates as fast as an eager scheme sends them, or commands of several samples.
     Eager,

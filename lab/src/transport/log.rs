@@ -192,3 +192,6 @@ fn quantile_ms(sorted: &[Duration], percent: usize) -> Option<f64> {
 fn millis(duration: Duration) -> f64 {
     duration_nanos(duration) as f64 * 1e-6
 }
+
+#[cfg(test)]
+mod tests;

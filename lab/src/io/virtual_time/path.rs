@@ -112,3 +112,57 @@ impl Way {
         })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use mmt_netem::Probability;
+
+    use super::*;
+
+    const MS: Duration = Duration::from_millis(1);
+
+    fn way(bottleneck: Option<Bottleneck>) -> Way {
+        let conditions = Conditions {
+            round_trip: 20 * MS,
+            loss: Probability::ZERO,
+            jitter: Duration::ZERO,
+            outage: Duration::ZERO,
+            bottleneck,
+        };
+        Way::try_new(&conditions, 1, LinkId::UP).unwrap()
+    }
+
+    fn arrivals(way: &mut Way) -> Vec<(Time, Duration)> {
+        std::iter::from_fn(|| {
+            let due = way.next_due()?;
+            way.pop_due(due).map(|arrived| (due, arrived.own))
+        })
+        .collect()
+    }
+
+    #[test]
+    fn waiting_behind_others_is_not_the_paths_own_time() {
+        let mut way = way(Some(Bottleneck::NARROW));
+        // 97 bytes and 28 of headers: 1 ms at 1 Mbit/s
+        way.take(Time::ZERO, &[0; 97], None);
+        way.take(Time::ZERO, &[0; 97], None);
+        let expected = [
+            (Time::from_millis(11), 11 * MS),
+            (Time::from_millis(12), 11 * MS),
+        ];
+        assert_eq!(arrivals(&mut way), expected);
+        assert_eq!((way.sent().packets, way.sent().bytes), (2, 250));
+    }
+
+    #[test]
+    fn a_full_queue_and_an_outage_drop() {
+        let mut narrow = way(Some(Bottleneck::NARROW));
+        (0..1500).for_each(|_| narrow.take(Time::ZERO, &[0; 97], None));
+        assert_eq!(arrivals(&mut narrow).len(), 1001);
+
+        let mut broken = way(None);
+        broken.outage = Time::from_millis(1)..Time::from_millis(3);
+        (0..5).for_each(|ms| broken.take(Time::from_millis(ms), &[0; 97], None));
+        assert_eq!(arrivals(&mut broken).len(), 3);
+    }
+}

@@ -20,12 +20,12 @@ use quinn::{Connection, ConnectionError, Endpoint};
 
 use super::ends::{Ends, MemorySocket, ends};
 use super::executor::{Executor, lock};
-use super::path::{Arrived as Delivered, Way};
+use super::path::{Arrived, Way};
 use crate::reproduce::ReproduceError;
 use crate::transport::{Case, HEARTBEAT, HEARTBEAT_BYTES, Log, Outcome, Sent};
 
 /// Told of each packet that came: when, and what the path itself took for it.
-type Arrived<'a> = &'a mut dyn FnMut(Time, Duration) -> Result<(), VirtualTimeError>;
+type Told<'a> = &'a mut dyn FnMut(Time, Duration) -> Result<(), VirtualTimeError>;
 
 /// Name given to the TLS library, which wants one; it is not sent.
 const SERVER_NAME: &str = "mmt";
@@ -75,7 +75,7 @@ impl From<VirtualTimeError> for ReproduceError {
 /// # Errors
 /// The link's settings are out of range, or quinn refuses to connect or to send.
 pub fn run(case: &Case) -> Result<Outcome, VirtualTimeError> {
-    World::new(case)?.measure(case)
+    Setup::new(case)?.measure(case)
 }
 
 /// One direction with the socket at its far end.
@@ -84,7 +84,7 @@ struct Lane {
     far: Arc<MemorySocket>,
 }
 
-struct World {
+struct Setup {
     executor: Executor,
     up: Lane,
     down: Lane,
@@ -97,7 +97,7 @@ struct Pair {
     slave: Connection,
 }
 
-impl World {
+impl Setup {
     fn new(case: &Case) -> Result<Self, VirtualTimeError> {
         let executor = Executor::new();
         let address = |host| SocketAddr::from((Ipv4Addr::new(192, 0, 2, host), 4433));
@@ -183,15 +183,15 @@ impl World {
         Ok(log.outcome(after.0.since(before.0), after.1.since(before.1)))
     }
 
-    /// Lets time go on to `now` and everything happen that is due; `arrived` is told the time and the path's own
+    /// Lets time go on to `now` and everything happen that is due; `told` hears the time and the path's own
     /// share of it for each packet, after the tasks have run.
-    fn pass(&self, now: Time, arrived: Arrived<'_>) -> Result<(), VirtualTimeError> {
+    fn pass(&self, now: Time, told: Told<'_>) -> Result<(), VirtualTimeError> {
         self.executor.jump(now);
         for lane in [&self.up, &self.down] {
             while let Some(packet) = lane.pop_due(now) {
                 lane.far.deliver(packet.packet);
                 self.executor.settle();
-                arrived(now, packet.own)?;
+                told(now, packet.own)?;
             }
         }
         self.executor.fire();
@@ -212,12 +212,12 @@ impl World {
 }
 
 impl Lane {
-    fn pop_due(&self, now: Time) -> Option<Delivered> {
+    fn pop_due(&self, now: Time) -> Option<Arrived> {
         lock(&self.way).pop_due(now)
     }
 }
 
-impl Drop for World {
+impl Drop for Setup {
     fn drop(&mut self) {
         // tasks hold the executor, which holds the tasks
         self.executor.stop();
