@@ -10,5 +10,6 @@ pub mod reproduce;
 pub mod statistics;
 pub mod sweep;
 pub mod table;
+pub mod transport;
 pub mod trial;
 pub mod world;

@@ -80,6 +80,12 @@ pub enum ReproduceError {
         /// What was wrong.
         why: String,
     },
+    /// A transport could not be measured.
+    #[error("the transport could not be measured: {why}")]
+    Transport {
+        /// What went wrong.
+        why: String,
+    },
     /// A file could not be written.
     #[error("cannot write {name}: {why}")]
     Keep {

@@ -9,6 +9,7 @@ mod cost;
 mod folder;
 mod pool;
 mod sheets;
+pub mod virtual_time;
 
 pub use cost::estimator_tick_ms;
 pub use folder::Folder;

@@ -4,18 +4,15 @@
 
 use std::time::{Duration, Instant};
 
-/// A queue is standing if the quickest answer of a round took this much longer than the quickest of the last
-/// 10 s: the peer may hold an acknowledgement for 25 ms, and the hosts add some.
-const STANDING: Duration = Duration::from_millis(40);
-/// A queue that falls by this much in a round is draining, and is left to it.
-const DRAINING: Duration = Duration::from_millis(5);
-/// Rounds in a row with a standing queue that count as sustained.
-const SUSTAINED_ROUNDS: u8 = 3;
-/// A round lasts at least this long, and a round trip, and three acknowledgements.
+/// A round lasts at least this long from its first answer on.
 const ROUND_MIN: Duration = Duration::from_millis(100);
-const ROUND_ACKS: u8 = 3;
+/// Who hears nothing for this long stops counting what is in flight: three times as long as a peer may hold an
+/// acknowledgement, and short enough that a window without congestion is not full by then.
+const SILENT: Duration = Duration::from_millis(75);
 /// The shortest round trip is forgotten after one to two of these: paths change.
 const BASE_MEMORY: Duration = Duration::from_secs(10);
+/// A round trip longer by no more than this is the shortest one, seen again.
+const AGAIN: Duration = Duration::from_millis(1);
 
 /// The shortest round trip of the last 10 to 20 s.
 #[derive(Clone, Debug)]
@@ -23,6 +20,8 @@ pub(super) struct Base {
     since: Instant,
     newer: Option<Duration>,
     older: Option<Duration>,
+    /// When a round trip hardly longer than the shortest was last seen.
+    seen: Instant,
 }
 
 impl Base {
@@ -31,6 +30,7 @@ impl Base {
             since: now,
             newer: None,
             older: None,
+            seen: now,
         }
     }
 
@@ -40,6 +40,15 @@ impl Base {
             self.since = now;
         }
         self.newer = Some(self.newer.map_or(took, |shortest| shortest.min(took)));
+        let shortest = self.shortest().unwrap_or(took);
+        if took <= shortest.saturating_add(AGAIN) {
+            self.seen = now;
+        }
+    }
+
+    /// Whether the shortest round trip will soon be forgotten unless it is seen again.
+    pub(super) fn is_ageing(&self, now: Instant) -> bool {
+        now.saturating_duration_since(self.seen) >= BASE_MEMORY / 2
     }
 
     pub(super) fn shortest(&self) -> Option<Duration> {
@@ -50,109 +59,157 @@ impl Base {
     }
 }
 
-/// What a round says about the queue.
-pub(super) enum Verdict {
-    /// None to speak of.
-    Quiet,
-    /// One, but not for long, or it is draining.
-    Unsettled,
-    /// One that stands or grows since some rounds.
-    Sustained,
+/// What a round says about the path.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Reading {
+    /// How much longer than the shortest round trip the quickest answer took.
+    pub(super) excess: Duration,
+    /// How much longer than the quickest the answers took on average.
+    pub(super) jitter: Duration,
+    /// What was answered.
+    pub(super) bytes_per_s: u64,
 }
 
-/// Watches the quickest answer of each round.
+impl Reading {
+    /// The queue that there is for certain. Jitter spreads the answers and lifts even the quickest of a few above the
+    /// shortest of thousands, by less than it lies below their mean; a queue lifts all alike.
+    pub(super) fn surely(&self) -> Duration {
+        self.excess.saturating_sub(self.jitter)
+    }
+}
+
+/// Reads the queue from the answers of a round.
 #[derive(Clone, Debug)]
 pub(super) struct Round {
-    since: Instant,
-    acks: u8,
-    quickest: Option<Duration>,
-    queue_before: Duration,
-    standing: u8,
+    began: Instant,
+    /// When the first acknowledgement of the round came.
+    first: Option<Instant>,
+    acks: u32,
+    quickest: Duration,
+    sum: Duration,
+    /// Bytes answered after the first acknowledgement.
+    bytes: u64,
 }
 
 impl Round {
     pub(super) fn new(now: Instant) -> Self {
         Self {
-            since: now,
+            began: now,
+            first: None,
             acks: 0,
-            quickest: None,
-            queue_before: Duration::ZERO,
-            standing: 0,
+            quickest: Duration::MAX,
+            sum: Duration::ZERO,
+            bytes: 0,
         }
     }
 
-    /// Takes the quickest answer of an acknowledgement; speaks when that ends a round.
+    /// Whether something sent at `sent` was sent in this round.
+    pub(super) fn covers(&self, sent: Instant) -> bool {
+        sent >= self.began
+    }
+
+    /// Takes an acknowledgement, whose quickest packet took `took`; speaks when that ends the round, which has
+    /// `acks_min` of them at least.
     pub(super) fn record(
         &mut self,
         now: Instant,
         took: Duration,
+        bytes: u64,
         base: Duration,
-    ) -> Option<Verdict> {
-        let quickest = self.quickest.map_or(took, |quickest| quickest.min(took));
-        self.quickest = Some(quickest);
+        acks_min: u32,
+    ) -> Option<Reading> {
+        match self.first {
+            None => self.first = Some(now),
+            Some(_) => self.bytes = self.bytes.saturating_add(bytes),
+        }
         self.acks = self.acks.saturating_add(1);
-        let over = now.saturating_duration_since(self.since) >= base.max(ROUND_MIN);
-        if !over || self.acks < ROUND_ACKS {
+        self.quickest = self.quickest.min(took);
+        self.sum = self.sum.saturating_add(took);
+        let lasted = now.saturating_duration_since(self.first?);
+        if self.acks < acks_min || lasted < ROUND_MIN {
             return None;
         }
-        let queue = quickest.saturating_sub(base);
-        let draining = queue.saturating_add(DRAINING) < self.queue_before;
-        *self = Self {
-            since: now,
-            acks: 0,
-            quickest: None,
-            queue_before: queue,
-            standing: self.standing,
+        let per_s = u128::from(self.bytes) * 1_000_000_000 / lasted.as_nanos().max(1);
+        let reading = Reading {
+            excess: self.quickest.saturating_sub(base),
+            jitter: (self.sum / self.acks).saturating_sub(self.quickest),
+            bytes_per_s: u64::try_from(per_s).unwrap_or(u64::MAX),
         };
-        if queue <= STANDING {
-            self.standing = 0;
-            return Some(Verdict::Quiet);
-        }
-        self.standing = if draining { 0 } else { self.standing + 1 };
-        if self.standing < SUSTAINED_ROUNDS {
-            return Some(Verdict::Unsettled);
-        }
-        self.standing = 0;
-        Some(Verdict::Sustained)
+        *self = Self::new(now);
+        Some(reading)
     }
 }
 
-/// What left the network while no acknowledgement came.
+/// What is in flight, and what of it no longer counts because the path fell silent.
 ///
-/// In an outage nothing declares packets lost, so they would fill the window and the next message would
-/// have to wait for a backed-off probe. But a byte two round trips and a second old is in no queue any
-/// more: it makes room for a new one. So a silent path gets at most one window a lifetime.
+/// In an outage nothing declares packets lost, so they would fill the window, and the first message after it would
+/// have to wait for a probe. But what was sent into silence waits in no queue that we fill: where a queue is, answers
+/// come. So on a silent path there is always room for the next message, at the application's own pace; and once the
+/// silence is broken, what was sent into it does not count against the window.
 #[derive(Clone, Debug)]
 pub(super) struct Silence {
-    since: Instant,
-    newer: u64,
-    older: u64,
-    /// Bytes that were sent so long ago that they no longer count.
-    pub(super) expired: u64,
+    /// The last answer.
+    heard: Instant,
+    silent: bool,
+    in_flight: u64,
+    /// What was sent before the last silence was broken says nothing about queues.
+    broken: Option<Instant>,
+    /// Bytes of that which are still in flight.
+    ignored: u64,
 }
 
 impl Silence {
     pub(super) fn new(now: Instant) -> Self {
         Self {
-            since: now,
-            newer: 0,
-            older: 0,
-            expired: 0,
+            heard: now,
+            silent: false,
+            in_flight: 0,
+            broken: None,
+            ignored: 0,
         }
     }
 
-    pub(super) fn sent(&mut self, now: Instant, bytes: u64, lifetime: Duration) {
-        if now.saturating_duration_since(self.since) >= lifetime {
-            self.expired = self.expired.saturating_add(self.older);
-            self.older = self.newer;
-            self.newer = 0;
-            self.since = now;
-        }
-        self.newer = self.newer.saturating_add(bytes);
+    pub(super) fn sent(&mut self, now: Instant, bytes: u64) {
+        self.silent = now.saturating_duration_since(self.heard) >= SILENT;
+        self.in_flight = self.in_flight.saturating_add(bytes);
     }
 
-    pub(super) fn broken(&mut self, now: Instant, in_flight: u64) {
-        *self = Self::new(now);
-        self.older = in_flight;
+    /// An answer to what was sent at `sent`.
+    pub(super) fn answered(&mut self, sent: Instant, bytes: u64) {
+        if self.of_silence(sent) {
+            self.ignored = self.ignored.saturating_sub(bytes);
+        }
+    }
+
+    /// The end of an acknowledgement that left so much in flight. True if it broke a silence.
+    pub(super) fn heard(&mut self, now: Instant, in_flight: u64) -> bool {
+        let broken = std::mem::replace(&mut self.silent, false);
+        self.heard = now;
+        self.in_flight = in_flight;
+        if broken {
+            self.broken = Some(now);
+            self.ignored = in_flight;
+        }
+        broken
+    }
+
+    /// So many bytes are given up for lost.
+    pub(super) fn lost(&mut self, bytes: u64) {
+        self.in_flight = self.in_flight.saturating_sub(bytes);
+        self.ignored = self.ignored.saturating_sub(bytes);
+    }
+
+    /// Whether something sent at `sent` was sent before the last silence was broken.
+    pub(super) fn of_silence(&self, sent: Instant) -> bool {
+        self.broken.is_some_and(|broken| sent <= broken)
+    }
+
+    /// The window that there is in truth when congestion leaves `window`; `room` is what one more packet needs.
+    pub(super) fn widen(&self, window: u64, room: u64) -> u64 {
+        let widened = window.saturating_add(self.ignored);
+        match self.silent {
+            true => widened.max(self.in_flight.saturating_add(room)),
+            false => widened,
+        }
     }
 }

@@ -1,0 +1,15 @@
+//! quinn in exact virtual time: one message flow over one emulated path, counted in nanoseconds.
+//!
+//! quinn itself runs here, unmodified, with its handshake, its cryptography and its timers; only its clock, its
+//! sockets and its scheduler are ours. Nothing costs time but the path, so that what a message needs beyond it is
+//! what the protocol adds. A run must never read the host's clock or wait for anything.
+
+mod ends;
+mod executor;
+mod path;
+mod run;
+
+pub use run::{VirtualTimeError, run};
+
+#[cfg(test)]
+mod tests;

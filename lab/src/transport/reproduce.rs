@@ -1,0 +1,67 @@
+//! The experiment: every case of the grid, the promises of the transport, a table and a figure of them.
+
+use sha2::{Digest, Sha256};
+
+use super::{Case, Outcome, Stack, cases, figure, tables};
+use crate::reproduce::{Extent, Findings, Laboratory, ReproduceError};
+
+/// Runs cases, in any order, and returns what they measured in the order of the cases.
+pub type Measure<'a> = &'a dyn Fn(&[Case]) -> Result<Vec<Outcome>, ReproduceError>;
+
+/// A case and what it measured.
+pub(super) type Run<'a> = (&'a Case, &'a Outcome);
+
+/// Runs the grid by `measure` and keeps `transport.csv` and `transport.svg`.
+///
+/// # Errors
+/// Those of `measure` and [`Laboratory::keep`]; the figure could not be drawn.
+pub fn reproduce(
+    laboratory: &dyn Laboratory,
+    measure: Measure,
+    extent: Extent,
+) -> Result<Findings, ReproduceError> {
+    let grids = (1..=extent.seeds).map(|seed| cases(extent.duration, seed));
+    let cases: Vec<Case> = grids.flatten().collect();
+    let outcomes = measure(&cases)?;
+    let runs: Vec<Run> = cases.iter().zip(&outcomes).collect();
+    laboratory.keep("transport.csv", &tables::all(&runs).to_csv())?;
+    let figure = figure::figure(&runs).draw("transport.svg")?;
+    laboratory.keep("transport.svg", figure.as_bytes())?;
+    Ok(Findings {
+        experiment: "transport",
+        extent,
+        digest: digest(&outcomes),
+        configuration: Vec::new(),
+        tables: vec![
+            tables::promises(&runs),
+            tables::examples(&runs),
+            tables::worst(&runs),
+        ],
+    })
+}
+
+fn digest(outcomes: &[Outcome]) -> String {
+    let mut hash = Sha256::new();
+    for outcome in outcomes {
+        hash.update(outcome.digest.as_bytes());
+    }
+    hash.finalize()
+        .iter()
+        .map(|byte| format!("{byte:02x}"))
+        .collect()
+}
+
+/// The runs of one stack.
+pub(super) fn of<'a>(runs: &[Run<'a>], stack: Stack) -> Vec<Run<'a>> {
+    let runs = runs.iter().filter(|(case, _)| case.stack == stack);
+    runs.copied().collect()
+}
+
+/// The largest of what some runs measured.
+pub(super) fn largest<'a>(
+    runs: impl IntoIterator<Item = Run<'a>>,
+    of: impl Fn(&Outcome) -> Option<f64>,
+) -> Option<f64> {
+    let values = runs.into_iter().filter_map(|(_, outcome)| of(outcome));
+    values.max_by(f64::total_cmp)
+}
