@@ -52,6 +52,7 @@ fn execute(command: Command) -> Result<(), Failure> {
         Command::Netem(arguments) => commands::netem::run(&arguments),
         Command::Replay(arguments) => commands::replay::run(&arguments),
         Command::Reproduce(arguments) => commands::reproduce::run(&arguments),
+        Command::Sweep(arguments) => commands::sweep::run(&arguments),
     }
 }
 

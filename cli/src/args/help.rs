@@ -82,3 +82,23 @@ Examples:
 
 Every run is a function of its configuration and seed: the files are the same, byte for byte, on every
 machine and with any number of threads. manifest.json says what was run and holds the files' SHA-256.";
+
+/// Examples of `mmt sweep`.
+pub(super) const SWEEP: &str = "\
+Examples:
+  mmt sweep plan.toml --dry-run
+  mmt sweep plan.toml --out loss
+  mmt sweep plan.toml --out loss --shard 2/8 --jobs 4
+  mmt sweep plan.toml --out loss --merge
+
+A plan:
+  duration_s = 30
+  seeds = { first = 1, count = 10 }
+  [base]
+  slave.mode = \"paper\"
+  [[axis]]
+  key = \"slave.trigger.scheme\"
+  values = [\"deadband 10%\", \"hybrid 10% 150ms\"]
+
+results.csv is the same, byte for byte, however the rows are cut into shards, threads and runs. Ctrl-C keeps
+what is done; the same command goes on. Exit code 1: rows are missing. docs/sweep.md tells everything.";

@@ -2,6 +2,7 @@
 
 mod help;
 mod reproduce;
+mod sweep;
 mod values;
 
 pub(crate) use values::netem as network;
@@ -18,6 +19,7 @@ use mmt_shared::pairing::{Address, Host};
 use mmt_shared::settings::Mode;
 
 pub(crate) use reproduce::{BodyArguments, Experiment, ReproduceArguments};
+pub(crate) use sweep::SweepArguments;
 pub(crate) use values::{OperatorWords, PairingWords, Period};
 
 /// The command line.
@@ -50,6 +52,9 @@ pub(crate) enum Command {
     /// Reproduce the paper's figures, and go beyond them, in virtual time
     #[command(after_help = help::REPRODUCE, subcommand_required = true, arg_required_else_help = true)]
     Reproduce(ReproduceArguments),
+    /// Run any grid over configuration in virtual time: in shards, resumable, the same bytes
+    #[command(after_help = help::SWEEP)]
+    Sweep(SweepArguments),
 }
 
 /// Arguments of `mmt demo`.

@@ -7,4 +7,5 @@ pub(crate) mod netem;
 pub(crate) mod replay;
 pub(crate) mod reproduce;
 pub(crate) mod slave;
+pub(crate) mod sweep;
 mod viewer;

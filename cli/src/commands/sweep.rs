@@ -1,0 +1,136 @@
+//! `mmt sweep`: the rows of a plan on threads, with part files and the table of results in a folder.
+//!
+//! Whatever ends a run, the rows that are done stay: the same command goes on with the others.
+
+mod summary;
+
+use std::fmt::Display;
+
+use indicatif::{ProgressBar, ProgressStyle};
+use mmt_lab::io::{Pool, SheetError, Sheets};
+use mmt_lab::sweep::{Plan, Results};
+
+use crate::args::SweepArguments;
+use crate::failure::Failure;
+use crate::input::read_text;
+use crate::output::{print, print_json};
+use crate::stop::Stop;
+
+use summary::{Preview, Summary};
+
+/// Runs `mmt sweep`.
+///
+/// # Errors
+/// The plan is wrong or not that of the folder; the folder cannot be read or written; rows are missing at the end.
+pub(crate) fn run(arguments: &SweepArguments) -> Result<(), Failure> {
+    let text = read_text(&arguments.plan, "the plan")?;
+    let plan = Plan::parse(&text).map_err(|error| {
+        Failure::usage(format!("the plan {}: {error}", arguments.plan.display()))
+            .remedy("correct that place; docs/sweep.md tells what a plan holds")
+    })?;
+    if arguments.dry_run {
+        let preview = Preview::new(&plan, arguments.shard);
+        return tell(arguments.json, &preview);
+    }
+    if arguments.merge && !arguments.out.is_dir() {
+        let what = format!("there is no folder {}", arguments.out.display());
+        return Err(Failure::usage(what).remedy("give the folder of the shards with --out"));
+    }
+    let told = |error| explain(error, arguments);
+    let sheets = Sheets::open(&arguments.out).map_err(told)?;
+    let before = sheets.results(&plan).map_err(told)?;
+    // only now: the plan of a folder that holds another plan's rows stays
+    sheets.keep_plan(&text).map_err(told)?;
+    let interrupted = match arguments.merge {
+        true => false,
+        false => run_missing(arguments, &plan, &sheets, &before)?,
+    };
+    finish(arguments, &plan, &sheets, &before, interrupted)
+}
+
+/// Runs the rows of the shard that are not done, and says whether it was interrupted.
+fn run_missing(
+    arguments: &SweepArguments,
+    plan: &Plan,
+    sheets: &Sheets,
+    before: &Results,
+) -> Result<bool, Failure> {
+    let rows: Vec<u64> = before
+        .missing(plan)
+        .filter(|row| arguments.shard.has(*row))
+        .collect();
+    let stop = Stop::on_signals()?;
+    let bar = progress_bar(rows.len());
+    let done = |done: usize| {
+        if stop.asked() {
+            bar.set_message("ending after the rows under way");
+        }
+        bar.set_position(done as u64);
+    };
+    let pool = Pool::new(arguments.jobs);
+    let ran = sheets.run(plan, arguments.shard, &rows, pool, || stop.asked(), done);
+    bar.finish_and_clear();
+    match ran {
+        Ok(()) => Ok(false),
+        Err(SheetError::Interrupted) => Ok(true),
+        Err(error) => Err(explain(error, arguments)),
+    }
+}
+
+/// Writes the table if every row is there, tells the state, and fails if rows are missing that should be there.
+fn finish(
+    arguments: &SweepArguments,
+    plan: &Plan,
+    sheets: &Sheets,
+    before: &Results,
+    interrupted: bool,
+) -> Result<(), Failure> {
+    let told = |error| explain(error, arguments);
+    let results = sheets.results(plan).map_err(told)?;
+    let table = match results.to_csv(plan) {
+        Some(csv) => Some(sheets.keep_results(&csv).map_err(told)?),
+        None => None,
+    };
+    let summary = Summary::new(plan, arguments, before, &results, table.as_deref());
+    tell(arguments.json, &summary)?;
+    let Some(missing) = summary.missing_here() else {
+        return Ok(());
+    };
+    let (plan, out) = (arguments.plan.display(), arguments.out.display());
+    Err(match interrupted {
+        true => Failure::failed(format!("interrupted: {missing}"))
+            .remedy("give the same command again: what is done is kept, and it goes on from there"),
+        false => Failure::failed(missing).remedy(format!(
+            "copy the other shards' rows/*.csv into {out}/rows, or run what is missing: mmt sweep {plan} --out {out}"
+        )),
+    })
+}
+
+fn tell(json: bool, document: &(impl Display + serde::Serialize)) -> Result<(), Failure> {
+    match json {
+        true => print_json(document),
+        false => print(document),
+    }
+}
+
+fn explain(error: SheetError, arguments: &SweepArguments) -> Failure {
+    match error {
+        SheetError::Part(_) => Failure::usage(error).remedy(
+            "give another folder with --out, or remove that file if its rows are not wanted",
+        ),
+        SheetError::File { .. } => Failure::failed(error).remedy(format!(
+            "check the folder {}: is the disk full, may you write there? What is done is kept",
+            arguments.out.display()
+        )),
+        SheetError::Trial { .. } | SheetError::Interrupted => Failure::failed(error),
+    }
+}
+
+/// A bar on stderr; nothing where stderr is no terminal.
+fn progress_bar(rows: usize) -> ProgressBar {
+    let bar = ProgressBar::new(rows as u64);
+    let style = ProgressStyle::with_template("{msg} [{wide_bar}] {pos}/{len} {eta}");
+    bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+    bar.set_message("sweep");
+    bar
+}
