@@ -27,6 +27,7 @@ use sha2::{Digest, Sha256};
 use crate::architecture::DelayRow;
 use crate::physics::PhysicsError;
 use crate::table::Table;
+use crate::transport::{Case, Outcome};
 use crate::trial::{Measured, Trial, TrialError};
 use crate::world::WorldConfig;
 
@@ -51,6 +52,12 @@ pub trait Laboratory: Sync {
     /// # Errors
     /// The first error of a run.
     fn duel(&self, what: &str, duels: &[Duel]) -> Result<Vec<DelayRow>, ReproduceError>;
+
+    /// Runs every case of the transport and returns what they measured in that order.
+    ///
+    /// # Errors
+    /// The first error of a case.
+    fn transfer(&self, what: &str, cases: &[Case]) -> Result<Vec<Outcome>, ReproduceError>;
 
     /// Keeps a file under a name, which may have folders in it.
     ///

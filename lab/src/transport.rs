@@ -13,7 +13,7 @@ mod tables;
 
 pub use grid::cases;
 pub use log::{Log, Outcome, Sent};
-pub use reproduce::{Measure, reproduce};
+pub use reproduce::reproduce;
 
 use std::ops::Range;
 use std::time::Duration;

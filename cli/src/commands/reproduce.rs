@@ -11,6 +11,7 @@ use mmt_lab::reproduce::{
     Extent, Findings, ReproduceError, ablation, claims, delay, fig5, netem, physics, scenarios,
     schemes, traces, tupdate,
 };
+use mmt_lab::transport;
 
 use crate::args::{BodyArguments, Experiment, ReproduceArguments};
 use crate::failure::Failure;
@@ -23,6 +24,8 @@ use manifest::Manifest;
 const DURATION: Duration = Duration::from_secs(30);
 /// Length of a run of the delay experiment, whose pushes come later.
 const DELAY_DURATION: Duration = Duration::from_secs(40);
+/// Length of a run of the transport experiment: 864 runs, a second of which may be an outage.
+const TRANSPORT_DURATION: Duration = Duration::from_secs(10);
 /// Seeds of fig. 5: the paper's ten repetitions.
 const SEEDS: u64 = 10;
 /// Seeds of the sweep over T_update: 252 places.
@@ -72,6 +75,7 @@ fn experiments(experiment: &Experiment) -> Vec<Experiment> {
             Experiment::Scenarios,
             Experiment::Tupdate,
             Experiment::Netem,
+            Experiment::Transport,
             Experiment::Delay { full: false },
         ],
         one => vec![one.clone()],
@@ -99,6 +103,13 @@ fn reproduce(
         Experiment::Scenarios => scenarios::reproduce(desk, extent(SEEDS)),
         Experiment::Tupdate => tupdate::reproduce(desk, extent(TUPDATE_SEEDS)),
         Experiment::Netem => netem::reproduce(desk, extent(SEEDS)),
+        Experiment::Transport => {
+            let extent = Extent {
+                duration: arguments.duration.unwrap_or(TRANSPORT_DURATION),
+                ..extent(1)
+            };
+            transport::reproduce(desk, extent)
+        }
         Experiment::Delay { full } => {
             let extent = Extent {
                 duration: arguments.duration.unwrap_or(DELAY_DURATION),

@@ -5,24 +5,17 @@ use sha2::{Digest, Sha256};
 use super::{Case, Outcome, Stack, cases, figure, tables};
 use crate::reproduce::{Extent, Findings, Laboratory, ReproduceError};
 
-/// Runs cases, in any order, and returns what they measured in the order of the cases.
-pub type Measure<'a> = &'a dyn Fn(&[Case]) -> Result<Vec<Outcome>, ReproduceError>;
-
 /// A case and what it measured.
 pub(super) type Run<'a> = (&'a Case, &'a Outcome);
 
-/// Runs the grid by `measure` and keeps `transport.csv` and `transport.svg`.
+/// Runs the grid and keeps `transport.csv` and `transport.svg`.
 ///
 /// # Errors
-/// Those of `measure` and [`Laboratory::keep`]; the figure could not be drawn.
-pub fn reproduce(
-    laboratory: &dyn Laboratory,
-    measure: Measure,
-    extent: Extent,
-) -> Result<Findings, ReproduceError> {
+/// Those of [`Laboratory::transfer`] and [`Laboratory::keep`]; the figure could not be drawn.
+pub fn reproduce(laboratory: &dyn Laboratory, extent: Extent) -> Result<Findings, ReproduceError> {
     let grids = (1..=extent.seeds).map(|seed| cases(extent.duration, seed));
     let cases: Vec<Case> = grids.flatten().collect();
-    let outcomes = measure(&cases)?;
+    let outcomes = laboratory.transfer("transport", &cases)?;
     let runs: Vec<Run> = cases.iter().zip(&outcomes).collect();
     laboratory.keep("transport.csv", &tables::all(&runs).to_csv())?;
     let figure = figure::figure(&runs).draw("transport.svg")?;

@@ -7,9 +7,10 @@ use std::sync::Mutex;
 
 use indicatif::{ProgressBar, ProgressStyle};
 use mmt_lab::architecture::{self, DelayRow};
-use mmt_lab::io::{Folder, Pool, estimator_tick_ms};
+use mmt_lab::io::{Folder, Pool, estimator_tick_ms, virtual_time};
 use mmt_lab::reproduce::delay::Duel;
 use mmt_lab::reproduce::{Each, Laboratory, ReproduceError};
+use mmt_lab::transport::{Case, Outcome};
 use mmt_lab::trial::{Measured, Trial, TrialError};
 use mmt_shared::settings::Mode;
 
@@ -125,6 +126,16 @@ impl Laboratory for Desk {
             .run(duels, work, |done| bar.set_position(done as u64));
         bar.finish_and_clear();
         rows
+    }
+
+    fn transfer(&self, what: &str, cases: &[Case]) -> Result<Vec<Outcome>, ReproduceError> {
+        let bar = progress_bar(what, cases.len());
+        let work = |_: usize, case: &Case| virtual_time::run(case).map_err(ReproduceError::from);
+        let outcomes = self
+            .pool
+            .run(cases, work, |done| bar.set_position(done as u64));
+        bar.finish_and_clear();
+        outcomes
     }
 
     fn keep(&self, name: &str, bytes: &[u8]) -> Result<(), ReproduceError> {

@@ -8,7 +8,9 @@ use std::time::Duration;
 use mmt_netem::Probability;
 
 use super::*;
+use crate::architecture::DelayRow;
 use crate::io::Pool;
+use crate::reproduce::delay::Duel;
 use crate::reproduce::{Each, Extent, Laboratory, ReproduceError};
 use crate::transport::{
     Bottleneck, Case, Conditions, Flow, Outcome, Stack, reproduce as reproduce_transport,
@@ -202,6 +204,15 @@ impl Laboratory for Shelf {
         Ok(Vec::new())
     }
 
+    fn duel(&self, _: &str, _: &[Duel]) -> Result<Vec<DelayRow>, ReproduceError> {
+        Ok(Vec::new())
+    }
+
+    fn transfer(&self, _: &str, cases: &[Case]) -> Result<Vec<Outcome>, ReproduceError> {
+        let work = |_: usize, case: &Case| run(case).map_err(ReproduceError::from);
+        Pool::new(None).run(cases, work, |_| {})
+    }
+
     fn keep(&self, name: &str, bytes: &[u8]) -> Result<(), ReproduceError> {
         self.0
             .lock()
@@ -222,11 +233,7 @@ fn the_experiment_prints_its_promises_and_keeps_every_run() {
         seeds: 1,
         duration: 200 * MS,
     };
-    let measure = |cases: &[Case]| {
-        let work = |_: usize, case: &Case| run(case).map_err(ReproduceError::from);
-        Pool::new(None).run(cases, work, |_| {})
-    };
-    let findings = reproduce_transport(&shelf, &measure, extent).unwrap();
+    let findings = reproduce_transport(&shelf, extent).unwrap();
     let files = shelf.0.into_inner().unwrap();
     let csv = String::from_utf8_lossy(&files["transport.csv"]);
     // header; 2 stacks × 3 flows × 3 round trips × 4 losses × 3 jitters × 2 × 2
