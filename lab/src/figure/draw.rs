@@ -301,8 +301,9 @@ fn draw_marks(
             let style = (FAMILY, NUMBER - 2)
                 .into_font()
                 .color(&colour)
-                .pos(Pos::new(HPos::Left, VPos::Bottom));
-            let text = EmptyElement::at(at) + Text::new(note.clone(), (6, -4), style);
+                .pos(Pos::new(HPos::Right, VPos::Top));
+            // below the falling front that a rate–error curve is
+            let text = EmptyElement::at(at) + Text::new(note.clone(), (-6, 6), style);
             chart.draw_series([text]).map(drop).map_err(told)?;
         }
     }

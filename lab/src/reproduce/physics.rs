@@ -2,7 +2,7 @@
 
 use super::{Extent, Findings, Laboratory, ReproduceError};
 use crate::figure::{Axis, Colour, Dot, Figure, Legend, Panel, Series, Stroke};
-use crate::physics::{Body, PhysicsCase, PhysicsTrace, cases, traces};
+use crate::physics::{Body, PhysicsCase, PhysicsTrace, TracePoint, cases, traces};
 use crate::table::Table;
 
 /// Runs every motion of a body and keeps `physics.csv` and `physics.svg`.
@@ -78,7 +78,7 @@ fn shown(body: &Body, cases: &[PhysicsCase]) -> Table {
 
 fn figure(traces: &[PhysicsTrace]) -> Figure {
     let panels = traces.iter().enumerate().map(|(n, trace)| {
-        let curve = |of: &dyn Fn(&crate::physics::TracePoint) -> f64| {
+        let curve = |of: &dyn Fn(&TracePoint) -> f64| {
             trace
                 .points
                 .iter()
@@ -88,11 +88,7 @@ fn figure(traces: &[PhysicsTrace]) -> Figure {
         Panel {
             title: trace.case.to_owned(),
             x: Axis::linear("time, s"),
-            y: Axis::linear(if trace.unit == "rad" {
-                "angle, rad"
-            } else {
-                "displacement, m"
-            }),
+            y: vertical(trace),
             series: vec![
                 Series::line("measured", Colour::Sky, curve(&|point| point.measured))
                     .stroked(Stroke::Solid, 4),
@@ -110,5 +106,20 @@ fn figure(traces: &[PhysicsTrace]) -> Figure {
         panels: panels.collect(),
         columns: 5,
         panel_size: (300, 260),
+    }
+}
+
+/// A body that is held moves by less than can be drawn: within a millimetre or a milliradian, as errors are given.
+fn vertical(trace: &PhysicsTrace) -> Axis {
+    let axis = Axis::linear(if trace.unit == "rad" {
+        "angle, rad"
+    } else {
+        "displacement, m"
+    });
+    let still = |point: &TracePoint| point.reference.abs().max(point.measured.abs()) < 1e-3;
+    if trace.points.iter().all(still) {
+        axis.over(-1e-3..1e-3)
+    } else {
+        axis
     }
 }

@@ -160,18 +160,19 @@ fn panel(title: &str, rows: &[TraceRow], from: f64, to: f64, legend: Legend) -> 
         line.stroked(Stroke::Solid, width)
     };
     let sent = shown.iter().filter(|row| row.update.is_some());
-    let events = sent.map(|row| Dot::at(row.t_s, 0.07 * top)).collect();
+    // a strip of its own below the forces
+    let events = sent.map(|row| Dot::at(row.t_s, -0.03 * top)).collect();
     Panel {
         title: title.to_owned(),
         x: Axis::linear("time, s").over(from..to),
-        y: Axis::linear("force, N").over(0.0..top),
+        y: Axis::linear("force, N").over(-0.1 * top..top),
         series: vec![
             Series::line("packet", Colour::Sky, events)
                 .stroked(Stroke::Events, 1)
                 .marked(Mark::None),
             curve("|f_s|", Colour::Vermilion, 2, &|row| Some(row.f_s.norm())),
-            curve("|f_m|", Colour::Green, 1, &|row| row.f_m.map(|f| f.norm())),
-            curve("|f_s − f_m|", Colour::Blue, 1, &|row| {
+            curve("|f_m|", Colour::Blue, 1, &|row| row.f_m.map(|f| f.norm())),
+            curve("|f_s − f_m|", Colour::Grey, 1, &|row| {
                 row.f_m.map(|f| (row.f_s - f).norm())
             }),
         ],
