@@ -25,7 +25,7 @@ const DURATION: Duration = Duration::from_secs(30);
 /// Length of a run of the delay experiment, whose pushes come later.
 const DELAY_DURATION: Duration = Duration::from_secs(40);
 /// Length of a run of the transport experiment: 864 runs, a second of which may be an outage.
-const TRANSPORT_DURATION: Duration = Duration::from_secs(10);
+const TRANSPORT_DURATION: Duration = Duration::from_secs(20);
 /// Seeds of fig. 5: the paper's ten repetitions.
 const SEEDS: u64 = 10;
 /// Seeds of the sweep over T_update: 252 places.

@@ -167,7 +167,7 @@ impl Trigger {
     pub fn decide(&mut self, now: Time, input: &TriggerInput) -> Option<Cause> {
         self.began.get_or_insert(now);
         if input.both_in_contact() {
-            self.unsaid += self.news(input).max(0.0) * TICK_S;
+            self.unsaid += self.news(input) * TICK_S;
         }
         let cause = self
             .geometry(now, input)
@@ -283,13 +283,19 @@ impl Trigger {
     }
 
     /// What an update would correct now, as a relative force error: the change of the force beyond the
-    /// estimate's own deviation, and the turn of its direction.
+    /// estimate's own deviation, the turn of its direction, and the error of a face that is held wrongly.
     fn news(&self, input: &TriggerInput) -> f64 {
-        let Some((_, sent)) = &self.last else {
+        let (Scheme::Adaptive { delta, .. }, Some((_, sent))) = (self.config.scheme, &self.last)
+        else {
             return 0.0;
         };
         let change = (force_change(input, sent) - input.force_deviation).max(0.0);
-        change / input.f_s.norm().max(USEFUL_FLOOR_N) + input.turn.abs()
+        let held = if self.is_held_wrongly(input, delta) {
+            (input.f_s - input.f_m).norm()
+        } else {
+            0.0
+        };
+        (change + held) / input.f_s.norm().max(USEFUL_FLOOR_N) + input.turn.abs()
     }
 
     /// Whether the hand would feel what an update says: by the force that the changed parameters would

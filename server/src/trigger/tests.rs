@@ -329,6 +329,30 @@ fn adaptive_does_not_send_what_the_estimate_does_not_know() {
 }
 
 #[test]
+fn adaptive_says_where_a_held_face_is_the_sooner_the_more_the_force_is_wrong() {
+    let first_after = |f_m: f64| {
+        let mut trigger = trigger("adaptive 10% 50ms", Mode::Recommended);
+        assert!(trigger.decide(Time::ZERO, &input(1.0, 2.0)).is_some());
+        let held = TriggerInput {
+            sticking: true,
+            speed: 0.0,
+            acceleration: 0.0,
+            ..input(1.0, f_m)
+        };
+        (1..5000).find(|n| trigger.decide(Time::from_millis(*n), &held).is_some())
+    };
+    // 10 % for 50 ms, 5e-3 s, at 25 and 50 %; never within 10 ms of the last
+    for (f_m, ticks) in [(1.25, 20), (1.5, 10)] {
+        let sent = first_after(f_m).unwrap();
+        assert!(
+            sent == ticks || sent == ticks + 1,
+            "{f_m} N after {sent} ms"
+        );
+    }
+    assert_eq!(first_after(1.05), None);
+}
+
+#[test]
 fn what_was_lost_is_said_again_once_at_once_and_under_every_scheme() {
     let free = TriggerInput {
         slave_in_contact: false,
