@@ -5,3 +5,4 @@
 
 pub mod architecture;
 pub mod process;
+pub mod tshark;
