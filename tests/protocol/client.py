@@ -37,6 +37,8 @@ from decode import Refused, decode  # noqa: E402
 from push import COUPLING, START, Push  # noqa: E402
 
 ALPN = "mmt/1"
+VERSION_PROTOCOL = "mmt/version"
+OTHER_VERSION = 1  # code of the close
 NO_APPLICATION_PROTOCOL = 0x178  # TLS alert 120 as an error of QUIC (RFC 9001, section 4.8)
 DATAGRAM_MAX, STREAM_MAX = 1024, 4096
 SAMPLES_PER_COMMAND, SAMPLES_MAX = 10, 32
@@ -156,9 +158,9 @@ class Master(QuicConnectionProtocol):
             raise said
         if isinstance(said, events.ConnectionTerminated):
             code, reason = said.error_code, said.reason_phrase
-            common = code != NO_APPLICATION_PROTOCOL
-            raise Over(1 if common else 5, outcome="closed" if common else "no protocol in common",
-                       code=code, reason=reason)
+            if code in (OTHER_VERSION, NO_APPLICATION_PROTOCOL):
+                raise Over(5, outcome="no protocol in common", code=code, reason=reason)
+            raise Over(1, outcome="closed", code=code, reason=reason)
         return said
 
     async def hear_message(self):
@@ -293,13 +295,14 @@ class Session:
                 "last_state": states[-1] if states else None, "slave_farewell": theirs}
 
 
-async def session(master, token, pin):
+async def session(master, offers, token, pin):
     handshake = await master.hear()
     offered = master.peer_pin()
     if offered != pin:
         # before the hello: the token is for the pinned slave only
         raise Over(4, outcome="wrong_pin", offered=offered.hex())
-    if handshake.alpn_protocol != ALPN:
+    if handshake.alpn_protocol == VERSION_PROTOCOL:
+        master.say(offers[0].encode())
         await master.hear()  # the slave says in its close what it speaks
     master.say(messages.hello(token, COUPLING, SAMPLES_PER_COMMAND, START, "independent client"))
     kind, fields = await master.hear_message()
@@ -321,8 +324,9 @@ async def session(master, token, pin):
 async def run(arguments, files):
     host, port, pin, token = pairing(arguments.pairing)
     register_congestion_control("fixed", FixedWindow)
+    offers = arguments.alpn or [ALPN]
     configuration = QuicConfiguration(
-        is_client=True, alpn_protocols=arguments.alpn or [ALPN], max_datagram_frame_size=65535,
+        is_client=True, alpn_protocols=offers, max_datagram_frame_size=65535,
         idle_timeout=15.0, congestion_control_algorithm="fixed",
         # no chain, names or dates to check: the pin decides. The handshake's signature is verified all the same
         verify_mode=ssl.CERT_NONE,
@@ -333,7 +337,7 @@ async def run(arguments, files):
     await loop.create_datagram_endpoint(lambda: master, local_addr=("127.0.0.1", 0))
     try:
         master.connect((host, port))
-        return await session(master, token, pin)
+        return await session(master, offers, token, pin)
     finally:
         master.close(error_code=0, reason_phrase="the session is over")
         await asyncio.wait_for(master.wait_closed(), WAIT_S)

@@ -1,0 +1,236 @@
+//! A master in another language (`tests/protocol/client.py`, written from `docs/protocol.md` alone) against the
+//! real slave, and what the dissector makes of their session.
+//!
+//! Needs Python with aioquic, and tshark: without, it says so, and with `CI` set it fails.
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a test may panic")]
+#![allow(clippy::disallowed_methods, reason = "starts processes")]
+
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
+
+use mmt_tests::architecture::repository::root;
+use mmt_tests::process::{Ended, ProcessError, Running, did_not_run, number};
+use mmt_tests::tshark::{TsharkError, tshark};
+use serde_json::{Value, json};
+
+/// For what takes seconds; the host may be busy.
+const GENEROUS: Duration = Duration::from_secs(60);
+/// Exit codes of the client, as its opening lists them.
+const REFUSED: i32 = 3;
+const WRONG_PIN: i32 = 4;
+const NO_PROTOCOL: i32 = 5;
+
+/// One session at a time: each wants two cores in real time.
+fn alone() -> MutexGuard<'static, ()> {
+    static TURN: Mutex<()> = Mutex::new(());
+    TURN.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+fn ok<T>(result: Result<T, ProcessError>) -> T {
+    result.unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// A Python that has aioquic: the checks' own, or the system's. Says so if there is none.
+fn python(test: &str) -> Option<String> {
+    let own = root().join("target/python/bin/python");
+    let pythons = [own.to_string_lossy().into_owned(), "python3".to_owned()];
+    let mut pythons = pythons.into_iter();
+    let found = pythons.find(|python| {
+        let mut command = Command::new(python);
+        command.args(["-c", "import aioquic"]).stderr(Stdio::null());
+        command.status().is_ok_and(|status| status.success())
+    });
+    if found.is_none() {
+        let how = "no Python has aioquic: make one with `python3 -m venv target/python` and \
+                   `target/python/bin/pip install -r tests/protocol/requirements.txt`";
+        did_not_run(test, how);
+    }
+    found
+}
+
+/// A slave with an identity of its own, and its pairing string.
+fn slave(place: &Path) -> (Running, String) {
+    let identity = place.join("identity");
+    let identity = identity.to_str().unwrap();
+    let listen = ["--listen", "127.0.0.1:0", "--identity", identity];
+    let arguments = [&["slave"], &listen[..], &["--once", "--json"]].concat();
+    let mut slave = ok(Running::mmt(&arguments));
+    let pairing = ok(slave.wait_for_line(GENEROUS, |line| line.starts_with("mmt://")));
+    (slave, pairing)
+}
+
+fn client(python: &str, pairing: &str, options: &[&str]) -> Ended {
+    let mut command = Command::new(python);
+    command.arg(root().join("tests/protocol/client.py"));
+    command.arg(pairing).args(options);
+    ok(ok(Running::start(command)).end(GENEROUS))
+}
+
+/// The document of a client that ended with this code.
+fn said(ended: &Ended, code: i32) -> Value {
+    assert_eq!(
+        ended.status.code(),
+        Some(code),
+        "{:?} {}",
+        ended.out,
+        ended.err
+    );
+    ok(ended.document(0))
+}
+
+fn get(document: &Value, path: &str) -> f64 {
+    number(document, path).unwrap_or_else(|| panic!("{path} in {document:#}"))
+}
+
+/// The pairing string with another first digit of `key`.
+fn altered(pairing: &str, key: &str) -> String {
+    let (head, tail) = pairing.split_once(&format!("{key}=")).unwrap();
+    let (first, rest) = tail.split_at(1);
+    let other = if first == "0" { "1" } else { "0" };
+    format!("{head}{key}={other}{rest}")
+}
+
+#[test]
+fn a_master_written_from_the_document_pushes_the_box_of_the_real_slave() {
+    let _turn = alone();
+    let test = "the session of the independent client";
+    let Some(python) = python(test) else {
+        return;
+    };
+    let place = tempfile::tempdir().unwrap();
+    let (capture, keys) = (place.path().join("session.pcap"), place.path().join("keys"));
+    let (slave, pairing) = slave(place.path());
+    let options = [
+        "--capture",
+        capture.to_str().unwrap(),
+        "--keys",
+        keys.to_str().unwrap(),
+    ];
+    let client = said(&client(&python, &pairing, &options), 0);
+    let slave = ok(slave.end(GENEROUS));
+    assert_eq!(slave.status.code(), Some(0), "{}", slave.err);
+    let slave = ok(slave.document(1));
+    assert_eq!(client.pointer("/outcome"), Some(&json!("finished")));
+    assert_eq!(slave.pointer("/ending"), Some(&json!("finished")));
+    it_pushed(&client);
+    both_counted_the_same(&client, &slave);
+    the_dissector_shows_it(test, &client, &capture, &keys, &pairing);
+}
+
+/// Contact came and went, updates told so, and what they told is what the object is.
+fn it_pushed(client: &Value) {
+    let triggered = ["master_only_contact", "slave_only_contact", "contact_lost"];
+    let counts = triggered.map(|cause| number(client, &format!("/causes/{cause}")));
+    let contact: f64 = counts.iter().flatten().sum();
+    assert!(contact >= 1.0, "{client:#}");
+    assert_eq!(client.pointer("/touched"), Some(&json!(true)), "{client:#}");
+    let applied = get(client, "/updates_applied");
+    assert!(applied >= 3.0, "{client:#}");
+    let moved = get(client, "/last_state/x") - get(client, "/welcome/state/x");
+    assert!(moved > 0.05, "the object moved by {moved} m");
+    let before = get(client, "/welcome/state/m");
+    let error = |mass: f64| (mass - get(client, "/slave_farewell/totals/mass_kg/truth")).abs();
+    let after = get(client, "/last_state/m");
+    assert!(
+        error(after) < 0.5 * error(before),
+        "mass {before}, then {after} kg"
+    );
+    assert!(get(client, "/rtt_ms") >= 0.0);
+}
+
+/// No message was malformed to either side, and what one sent the other received: nothing is lost here.
+fn both_counted_the_same(client: &Value, slave: &Value) {
+    let theirs = "/slave_farewell/totals/traffic";
+    for name in ["malformed", "too_old", "duplicates"] {
+        assert_eq!(get(client, &format!("/{name}")), 0.0, "{name}");
+        assert_eq!(get(client, &format!("{theirs}/{name}")), 0.0, "{name}");
+    }
+    assert_eq!(get(client, "/updates_dropped/rejected"), 0.0);
+    let commands = get(client, "/sent/commands");
+    assert!(commands > 100.0, "{commands}");
+    assert_eq!(
+        get(client, &format!("{theirs}/received/commands")),
+        commands
+    );
+    assert_eq!(get(slave, "/messages/up/commands"), commands);
+    assert!(get(client, "/sent/heartbeats") >= 1.0 && get(client, "/received/heartbeats") >= 1.0);
+    let updates = get(client, "/received/updates");
+    assert_eq!(get(client, &format!("{theirs}/sent/updates")), updates);
+}
+
+/// The decrypted session in tshark: every message of the client and the slave, by type, and none malformed.
+fn the_dissector_shows_it(test: &str, client: &Value, capture: &Path, keys: &Path, pairing: &str) {
+    let port = pairing
+        .split(['/', '?', ':'])
+        .find_map(|part| part.parse::<u16>().ok());
+    let mut options = vec![
+        "-o".to_owned(),
+        format!("tls.keylog_file:{}", keys.display()),
+        "-o".to_owned(),
+        format!("mmt.slave_port:{}", port.unwrap()),
+    ];
+    let columns = "-T fields -e mmt.type -e mmt.malformed";
+    options.extend(columns.split(' ').map(str::to_owned));
+    let text = match tshark(capture, &options) {
+        Ok(text) => text,
+        Err(TsharkError::Missing(error)) => {
+            return did_not_run(test, &format!("tshark does not start: {error}"));
+        }
+        Err(error) => panic!("{error}"),
+    };
+    let malformed = text.lines().filter_map(|line| line.split_once('\t'));
+    assert_eq!(
+        malformed.filter(|(_, said)| !said.is_empty()).count(),
+        0,
+        "{text}"
+    );
+    let shown = |kind| {
+        text.split([',', '\n', '\t'])
+            .filter(|name| *name == kind)
+            .count()
+    };
+    let counted = |kind: &str| get(client, kind) as usize;
+    assert_eq!(shown("command"), counted("/sent/commands"));
+    assert_eq!(shown("update"), counted("/received/updates"));
+    // before the welcome was read and after the last count there are more
+    assert!(shown("heartbeat") >= counted("/sent/heartbeats") + counted("/received/heartbeats"));
+    for kind in ["hello", "welcome", "master_farewell", "slave_farewell"] {
+        assert_eq!(shown(kind), 1, "{kind}");
+    }
+}
+
+#[test]
+fn who_has_another_pin_or_token_or_version_gets_no_session() {
+    let _turn = alone();
+    let Some(python) = python("the refusals of the independent client") else {
+        return;
+    };
+    let place = tempfile::tempdir().unwrap();
+    let (slave, pairing) = slave(place.path());
+    let refused = said(&client(&python, &altered(&pairing, "token"), &[]), REFUSED);
+    assert_eq!(
+        refused,
+        json!({ "outcome": "refused", "refusal": "wrong_token" })
+    );
+    let other = said(&client(&python, &altered(&pairing, "pin"), &[]), WRONG_PIN);
+    assert_eq!(other.pointer("/outcome"), Some(&json!("wrong_pin")));
+    let offered = other.pointer("/offered").and_then(Value::as_str).unwrap();
+    assert!(pairing.contains(&format!("pin={offered}")), "{offered}");
+    let none = said(
+        &client(&python, &pairing, &["--alpn", "mmt/2"]),
+        NO_PROTOCOL,
+    );
+    assert_eq!(none.pointer("/code"), Some(&json!(0x178)));
+    let both = ["--alpn", "mmt/2", "--alpn", "mmt/version"];
+    let told = said(&client(&python, &pairing, &both), NO_PROTOCOL);
+    assert_eq!(told.pointer("/code"), Some(&json!(1)));
+    assert_eq!(told.pointer("/reason"), Some(&json!("mmt/1")));
+    ok(slave.interrupt());
+    let slave = ok(slave.end(GENEROUS));
+    assert!(!slave.err.contains("panicked"), "{}", slave.err);
+    for what in ["WrongToken", "mmt/2"] {
+        assert!(slave.err.contains(what), "{what}: {}", slave.err);
+    }
+}
