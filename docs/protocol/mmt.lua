@@ -453,7 +453,7 @@ function mmt_stream.dissector(buffer, pinfo, tree)
         if not length or left < 4 + length then
             pinfo.desegment_offset = at
             pinfo.desegment_len = length and 4 + length - left or DESEGMENT_ONE_MORE_SEGMENT
-            return at
+            return buffer:len()
         end
         dissect(buffer:range(at, 4 + length), pinfo, tree, "stream")
         at = at + 4 + length

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """A master that pushes the box once, from docs/protocol.md alone: it shares no code with mmt.
 
-usage: client.py PAIRING [--alpn NAME] [--capture FILE.pcap --keys FILE]
+usage: client.py PAIRING [--alpn NAME] [--capture FILE.pcap --keys FILE]   (the host an IPv4 address)
 
 Checks the slave's key against the pin, says hello, moves its HIP against the object's western face, pushes,
 lets go, rests until only heartbeats go, says farewell. Prints one JSON document of what it saw.
@@ -91,12 +91,12 @@ class FixedWindow(QuicCongestionControl):
 
 
 def pairing(text):
-    """Host, port, pin and token."""
-    found = re.fullmatch(r"mmt://(\[[^\]]+\]|[^:/?\[\]]+):(\d+)\?(.*)", text)
+    """Host, port, pin and token. Names and IPv6 addresses, which the document allows, are left out here."""
+    found = re.fullmatch(r"mmt://([0-9.]+):(\d+)\?(.*)", text)
     keys = dict(part.split("=", 1) for part in found[3].split("&")) if found else {}
     secret = re.compile(r"[0-9a-fA-F]{64}")
     if set(keys) != {"pin", "token"} or not all(map(secret.fullmatch, keys.values())):
-        raise Over(1, outcome="not a pairing string")
+        raise Over(1, outcome="not a pairing string with an IPv4 address")
     return found[1], int(found[2]), bytes.fromhex(keys["pin"]), bytes.fromhex(keys["token"])
 
 
@@ -334,7 +334,7 @@ async def run(arguments, files):
     file = files.enter_context(open(arguments.capture, "wb")) if arguments.capture else None
     master = Master(QuicConnection(configuration=configuration), Capture(file))
     loop = asyncio.get_running_loop()
-    await loop.create_datagram_endpoint(lambda: master, local_addr=("127.0.0.1", 0))
+    await loop.create_datagram_endpoint(lambda: master, local_addr=("0.0.0.0", 0))
     try:
         master.connect((host, port))
         return await session(master, offers, token, pin)
