@@ -1,4 +1,4 @@
--- Dissects mmt's messages in Wireshark and tshark, from docs/protocol.md alone (version 1 of the protocol).
+-- Dissects mmt's messages in Wireshark and tshark, by what docs/protocol.md says (version 1 of the protocol).
 --
 --   tshark -X lua_script:mmt.lua -o tls.keylog_file:KEYS -r SESSION.pcap -Y mmt
 --

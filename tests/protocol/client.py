@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""A master that pushes the box once, from docs/protocol.md alone: it shares no code with mmt.
+"""A master that pushes the box once, by what docs/protocol.md says: it shares no code with mmt.
 
 usage: client.py PAIRING [--alpn NAME] [--capture FILE.pcap --keys FILE]   (the host an IPv4 address)
 

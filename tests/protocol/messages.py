@@ -1,6 +1,6 @@
-"""Writes mmt's messages, from docs/protocol.md alone: it shares no code with mmt.
+"""Writes mmt's messages by what docs/protocol.md says, and nothing else: it shares no code with mmt.
 
-Reading is the business of tests/golden/decode.py, written from the same page.
+Reading is the business of tests/golden/decode.py, which goes by the same page.
 Must never write what that decoder would refuse. Python 3.10 or later, standard library only.
 """
 

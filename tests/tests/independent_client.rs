@@ -1,4 +1,4 @@
-//! A master in another language (`tests/protocol/client.py`, written from `docs/protocol.md` alone) against the
+//! A master in another language (`tests/protocol/client.py`, which knows `docs/protocol.md` only) against the
 //! real slave, and what the dissector makes of their session.
 //!
 //! Needs Python with aioquic, and tshark: without, it says so, and with `CI` set it fails.
@@ -93,7 +93,7 @@ fn altered(pairing: &str, key: &str) -> String {
 }
 
 #[test]
-fn a_master_written_from_the_document_pushes_the_box_of_the_real_slave() {
+fn a_master_that_knows_only_the_document_pushes_the_box_of_the_real_slave() {
     let _turn = alone();
     let test = "the session of the independent client";
     let Some(python) = python(test) else {
