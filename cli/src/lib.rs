@@ -46,7 +46,7 @@ pub fn run() -> ExitCode {
 fn execute(command: Command) -> Result<(), Failure> {
     let messages = Messages::install()?;
     match command {
-        Command::Demo(arguments) => commands::demo::run(arguments, &messages),
+        Command::Demo(arguments) => commands::demo::run(&arguments, &messages),
         Command::Slave(arguments) => commands::slave::run(arguments, &messages),
         Command::Master(arguments) => commands::master::run(arguments, &messages),
         Command::Netem(arguments) => commands::netem::run(&arguments),

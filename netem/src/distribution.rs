@@ -5,6 +5,10 @@
 use crate::quantile::standard_normal;
 use crate::trace::{TraceError, meaningful_lines};
 
+mod gamma;
+
+pub(crate) use gamma::gamma;
+
 /// Where iproute2's tables end: 32767 / 8192.
 const TABLE_END: f64 = 32_767.0 / TABLE_UNIT;
 /// The table entry that stands for one J (the kernel's `NETEM_DIST_SCALE`).

@@ -10,6 +10,7 @@
 
 pub mod alarm;
 pub mod lateness;
+mod log;
 pub mod record_file;
 pub mod relay;
 pub mod socket;

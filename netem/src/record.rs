@@ -122,3 +122,19 @@ pub fn read(bytes: &[u8]) -> Result<(Heading, Vec<Entry>), TraceError> {
         .map_err(|_| TraceError::at(1, "neither a record in text nor one in binary"))?;
     csv::read(text)
 }
+
+/// The text of a file that the words of a link name: a record in binary becomes the same record as CSV,
+/// anything else stays as it is.
+///
+/// # Errors
+/// Neither text nor a record.
+pub fn as_text(bytes: Vec<u8>) -> Result<String, TraceError> {
+    if !bytes.starts_with(binary::MAGIC) {
+        let why = |_| TraceError::at(1, "neither text nor a record in binary");
+        return String::from_utf8(bytes).map_err(why);
+    }
+    let (heading, entries) = binary::read(&bytes)?;
+    let mut text = csv::heading(&heading);
+    entries.iter().for_each(|entry| csv::push(&mut text, entry));
+    Ok(text)
+}

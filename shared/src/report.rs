@@ -49,6 +49,8 @@ pub struct RunReport<C> {
     pub pose: PoseReport,
     /// The path between the two sides.
     pub link: LinkReport,
+    /// How well this run's own emulation of the network kept its times.
+    pub emulation: UpDown<EmulationReport>,
     /// The master's 1 kHz loop.
     pub haptic_loop: LoopReport,
     /// The slave's 1 kHz loop.
@@ -76,6 +78,7 @@ impl<C> RunReport<C> {
             model: ModelReport::default(),
             pose: PoseReport::default(),
             link: LinkReport::default(),
+            emulation: UpDown::default(),
             haptic_loop: LoopReport::default(),
             slave_loop: LoopReport::default(),
             drops: None,
@@ -344,6 +347,29 @@ pub struct RttReport {
     pub p50: Number,
     /// 99 % were at most this.
     pub p99: Number,
+}
+
+/// The emulated network in front of the socket that sends in a direction, in real time; null without one.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct EmulationReport {
+    /// Datagrams that left it since the socket was made.
+    pub released: Option<u64>,
+    /// How long after their times they left, µs.
+    pub late_us: LateReport,
+    /// Whether the host was too slow for the run to be about this network: p99 above 250 µs, or anything
+    /// above 1 ms.
+    pub degraded: Option<bool>,
+}
+
+/// Release lateness, µs.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct LateReport {
+    /// Median.
+    pub p50: Number,
+    /// 99 % were at most this.
+    pub p99: Number,
+    /// Largest.
+    pub max: Number,
 }
 
 /// A 1 kHz loop.

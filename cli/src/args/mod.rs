@@ -1,6 +1,7 @@
 //! The arguments of every command, as clap takes them, with help and examples.
 
 mod help;
+mod netem;
 mod reproduce;
 mod sweep;
 mod values;
@@ -18,6 +19,7 @@ use mmt_server::trigger::Scheme;
 use mmt_shared::pairing::{Address, Host};
 use mmt_shared::settings::Mode;
 
+pub(crate) use self::netem::EmulationArguments;
 pub(crate) use reproduce::{BodyArguments, Experiment, ReproduceArguments};
 pub(crate) use sweep::SweepArguments;
 pub(crate) use values::{OperatorWords, PairingWords, Period};
@@ -36,7 +38,7 @@ pub(crate) struct Arguments {
 pub(crate) enum Command {
     /// Show it at work: slave, emulated network and master on this machine
     #[command(after_help = help::DEMO)]
-    Demo(DemoArguments),
+    Demo(Box<DemoArguments>),
     /// Be the slave: the host with the object
     #[command(after_help = help::SLAVE)]
     Slave(SlaveArguments),
@@ -69,6 +71,15 @@ pub(crate) struct DemoArguments {
     /// Emulated network in each direction
     #[arg(long, value_name = "WORDS", default_value = "delay 50ms 5ms loss 1%", value_parser = values::netem)]
     pub(crate) netem: LinkConfig,
+    /// Emulated network from master to slave [default: --netem]
+    #[arg(long, value_name = "WORDS", value_parser = values::netem)]
+    pub(crate) netem_up: Option<LinkConfig>,
+    /// Emulated network from slave to master [default: --netem]
+    #[arg(long, value_name = "WORDS", value_parser = values::netem)]
+    pub(crate) netem_down: Option<LinkConfig>,
+    /// Record and control of the emulated networks
+    #[command(flatten)]
+    pub(crate) emulation: EmulationArguments,
     /// The bundle of choices
     #[arg(long, value_enum, default_value_t = ModeName::Recommended)]
     pub(crate) mode: ModeName,
@@ -98,6 +109,9 @@ pub(crate) struct SlaveArguments {
     /// Emulated network on what the slave sends
     #[arg(long, value_name = "WORDS", default_value = "none", value_parser = values::netem)]
     pub(crate) netem: LinkConfig,
+    /// Record and control of the emulated network
+    #[command(flatten)]
+    pub(crate) emulation: EmulationArguments,
     /// Seed of sensors and network [default: the file's, else 1]
     #[arg(long, value_name = "N")]
     pub(crate) seed: Option<u64>,
@@ -139,6 +153,9 @@ pub(crate) struct MasterArguments {
     /// Emulated network on what the master sends
     #[arg(long, value_name = "WORDS", default_value = "none", value_parser = values::netem)]
     pub(crate) netem: LinkConfig,
+    /// Record and control of the emulated network
+    #[command(flatten)]
+    pub(crate) emulation: EmulationArguments,
     /// Seed of operator and network
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub(crate) seed: u64,

@@ -89,8 +89,9 @@ pub(super) fn duration(text: &str) -> Result<Duration, String> {
 /// A link in netem's words; a caret line points at the wrong one.
 pub(crate) fn netem(text: &str) -> Result<LinkConfig, String> {
     let mut read = |name: &str| {
-        crate::input::read_text(std::path::Path::new(name), "the network's file")
-            .map_err(|failure| failure.to_string())
+        let bytes = crate::input::read_bytes(std::path::Path::new(name), "the network's file");
+        let bytes = bytes.map_err(|failure| failure.to_string())?;
+        mmt_netem::record::as_text(bytes).map_err(|error| error.to_string())
     };
     mmt_netem::words::parse(text, &mut read).map_err(|error| {
         let pointer = error.pointer(text).replace('\n', "\n    ");

@@ -6,6 +6,7 @@ use std::time::{Duration, Instant};
 use mmt_client::device::DeviceProfile;
 use mmt_client::io::{MasterOptions, OperatorChoice};
 use mmt_client::operator::scripted::ScriptedConfig;
+use mmt_netem::{Direction, LinkConfig};
 use mmt_server::io::SlaveOptions;
 use mmt_server::playout::PlayoutConfig;
 use mmt_server::slave::SlaveConfig;
@@ -13,6 +14,7 @@ use mmt_shared::io::identity::Identity;
 use mmt_shared::pairing::Pairing;
 use mmt_shared::settings::Mode;
 
+use super::netem::wrap::{Emulation, effect};
 use super::viewer::Viewer;
 use super::{master, slave};
 use crate::args::DemoArguments;
@@ -26,8 +28,6 @@ mod joined;
 
 /// Samples in a command.
 const SAMPLES_PER_COMMAND: u8 = 10;
-/// Commands per second, for which the effect of the network is told.
-const COMMANDS_HZ: f64 = 100.0;
 /// How long the slave may take to notice that the master has ended before it is asked to end as well.
 const FAREWELL: Duration = Duration::from_secs(3);
 
@@ -35,24 +35,25 @@ const FAREWELL: Duration = Duration::from_secs(3);
 ///
 /// # Errors
 /// A host could not start, or the session broke.
-pub(crate) fn run(arguments: DemoArguments, messages: &Messages) -> Result<(), Failure> {
-    let config = slave_config(&arguments);
-    let caption = caption(&arguments, &config);
-    let effect = arguments.netem.expected(COMMANDS_HZ);
-    let effect = effect.map_err(Failure::usage)?;
-    // two lines: each direction draws its own numbers
-    note(format_args!("network up:   {effect}"));
-    note(format_args!("network down: {effect}"));
+pub(crate) fn run(arguments: &DemoArguments, messages: &Messages) -> Result<(), Failure> {
+    let config = slave_config(arguments);
+    let caption = caption(arguments, &config);
+    let (up, down) = (up(arguments), down(arguments));
+    note(effect(Direction::Up, up)?);
+    note(effect(Direction::Down, down)?);
     let (stop, stop_slave) = (Stop::on_signals()?, Stop::new());
-    let options = slave_options(&arguments, config)?;
+    let seed = arguments.seed;
+    let emulation = Emulation::start(&arguments.emulation, seed, Some(up), Some(down))?;
+    let options = slave_options(arguments, &emulation, config)?;
     let (slave, started) = slave::start(options, None, stop_slave.receiver())?;
     let Ok(started) = started.recv() else {
         return slave.join().map(|_| ());
     };
-    let options = master_options(&arguments, started.pairing);
+    let options = master_options(arguments, &emulation, started.pairing);
     let (master, master_live) = master::start(options, stop.receiver())?;
 
-    let mut viewer = Viewer::new(caption, !arguments.json, messages, &stop);
+    let dashboard = !arguments.json && !emulation.takes_orders();
+    let mut viewer = Viewer::new(caption, dashboard, messages, &stop);
     let mut master_ended = None;
     while master.is_running() || slave.is_running() {
         // looked at first: a borrow that lives through the viewer's wait would stop the master's task
@@ -70,6 +71,7 @@ pub(crate) fn run(arguments: DemoArguments, messages: &Messages) -> Result<(), F
     }
     drop(viewer);
     let (master, slave) = (master.join(), slave.join());
+    emulation.finish()?;
     let report = joined::join(&master?, slave?.as_ref())?;
     match arguments.json {
         true => print_json(&report)?,
@@ -78,11 +80,19 @@ pub(crate) fn run(arguments: DemoArguments, messages: &Messages) -> Result<(), F
     master::judge(master_live.borrow().ended)
 }
 
+fn up(arguments: &DemoArguments) -> &LinkConfig {
+    arguments.netem_up.as_ref().unwrap_or(&arguments.netem)
+}
+
+fn down(arguments: &DemoArguments) -> &LinkConfig {
+    arguments.netem_down.as_ref().unwrap_or(&arguments.netem)
+}
+
 fn slave_config(arguments: &DemoArguments) -> SlaveConfig {
     let mut config = SlaveConfig::of_mode(arguments.mode.into());
     config.seed = arguments.seed;
     config.playout =
-        PlayoutConfig::for_packing_and_jitter(SAMPLES_PER_COMMAND, arguments.netem.jitter_span());
+        PlayoutConfig::for_packing_and_jitter(SAMPLES_PER_COMMAND, up(arguments).jitter_span());
     if let Some(scheme) = arguments.scheme {
         config.trigger.scheme = scheme;
     }
@@ -97,27 +107,40 @@ fn caption(arguments: &DemoArguments, config: &SlaveConfig) -> Caption {
         Mode::Paper => "paper",
         Mode::Recommended => "recommended",
     };
-    let (scheme, netem, seed) = (config.trigger.scheme, &arguments.netem, arguments.seed);
+    let (scheme, seed) = (config.trigger.scheme, arguments.seed);
+    let network = match (up(arguments), down(arguments)) {
+        (up, down) if up == down => format!("network each way: {up}"),
+        (up, down) => format!("network up: {up}, down: {down}"),
+    };
     Caption {
         command: "demo",
         duration_s: Some(arguments.duration.as_secs_f64()),
-        setting: format!("{mode}, {scheme}; network each way: {netem}; seed {seed}"),
+        setting: format!("{mode}, {scheme}; {network}; seed {seed}"),
         truth: Some([m, environment.damping_ns_per_m, c]),
     }
 }
 
-fn slave_options(arguments: &DemoArguments, config: SlaveConfig) -> Result<SlaveOptions, Failure> {
+fn slave_options(
+    arguments: &DemoArguments,
+    emulation: &Emulation,
+    config: SlaveConfig,
+) -> Result<SlaveOptions, Failure> {
     Ok(SlaveOptions {
         listen: SocketAddr::from((Ipv4Addr::LOCALHOST, 0)),
         identity: Identity::ephemeral().map_err(Failure::failed)?,
         config,
-        netem: arguments.netem.clone(),
+        netem: down(arguments).clone(),
         netem_seed: arguments.seed,
+        netem_extras: emulation.extras(Direction::Down),
         once: true,
     })
 }
 
-fn master_options(arguments: &DemoArguments, pairing: Pairing) -> MasterOptions {
+fn master_options(
+    arguments: &DemoArguments,
+    emulation: &Emulation,
+    pairing: Pairing,
+) -> MasterOptions {
     MasterOptions {
         pairing,
         device: DeviceProfile::default(),
@@ -127,8 +150,9 @@ fn master_options(arguments: &DemoArguments, pairing: Pairing) -> MasterOptions 
         }),
         duration: Some(arguments.duration),
         samples_per_command: SAMPLES_PER_COMMAND,
-        netem: arguments.netem.clone(),
+        netem: up(arguments).clone(),
         netem_seed: arguments.seed,
+        netem_extras: emulation.extras(Direction::Up),
     }
 }
 

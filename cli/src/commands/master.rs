@@ -8,18 +8,21 @@ use mmt_client::io::{
 };
 use mmt_client::operator::scripted::ScriptedConfig;
 use mmt_client::operator::trace::Trace;
+use mmt_netem::Direction;
+use mmt_netem::io::socket::SocketExtras;
 use mmt_shared::geometry::Vec2;
 use mmt_shared::io::connect::ConnectError;
 use mmt_shared::pairing::Pairing;
 use tokio::sync::watch;
 
 use super::host::{Host, spawn};
+use super::netem::wrap::{Emulation, effect};
 use super::viewer::Viewer;
 use crate::args::{MasterArguments, OperatorWords, PairingWords};
 use crate::failure::{Exit, Failure};
 use crate::input::read_text;
 use crate::log::Messages;
-use crate::output::{print, print_json};
+use crate::output::{note, print, print_json};
 use crate::stop::Stop;
 use crate::view::{Caption, Snapshot};
 
@@ -32,7 +35,14 @@ const TRACE_START_M: (f64, f64) = (-0.25, 0.0);
 /// # Errors
 /// Wrong input, no session, or a session that broke.
 pub(crate) fn run(arguments: MasterArguments, messages: &Messages) -> Result<(), Failure> {
-    let options = options(&arguments)?;
+    let mut options = options(&arguments)?;
+    // not before the pairing has been read from stdin: the orders come after it
+    let (netem, seed) = (Some(&arguments.netem), arguments.seed);
+    let emulation = Emulation::start(&arguments.emulation, seed, netem, None)?;
+    options.netem_extras = emulation.extras(Direction::Up);
+    if !arguments.netem.is_transparent() {
+        note(effect(Direction::Up, &arguments.netem)?);
+    }
     let caption = Caption {
         command: "master",
         duration_s: options.duration.map(|time| time.as_secs_f64()),
@@ -41,7 +51,8 @@ pub(crate) fn run(arguments: MasterArguments, messages: &Messages) -> Result<(),
     };
     let stop = Stop::on_signals()?;
     let (host, live) = start(options, stop.receiver())?;
-    let mut viewer = Viewer::new(caption, !arguments.json, messages, &stop);
+    let dashboard = !arguments.json && !emulation.takes_orders();
+    let mut viewer = Viewer::new(caption, dashboard, messages, &stop);
     while host.is_running() {
         let master = Some(*live.borrow());
         viewer.look(Snapshot {
@@ -51,6 +62,7 @@ pub(crate) fn run(arguments: MasterArguments, messages: &Messages) -> Result<(),
     }
     drop(viewer);
     let report = host.join()?;
+    emulation.finish()?;
     match arguments.json {
         true => print_json(&report)?,
         false => print(&report)?,
@@ -101,6 +113,7 @@ fn options(arguments: &MasterArguments) -> Result<MasterOptions, Failure> {
         samples_per_command: arguments.samples_per_command,
         netem: arguments.netem.clone(),
         netem_seed: arguments.seed,
+        netem_extras: SocketExtras::default(),
     })
 }
 

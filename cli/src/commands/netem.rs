@@ -1,6 +1,5 @@
 //! `mmt netem`: a UDP relay that emulates a network between two hosts.
 
-use std::io::BufRead;
 use std::net::{SocketAddr, ToSocketAddrs};
 use std::path::Path;
 use std::sync::mpsc::{Receiver, channel};
@@ -9,17 +8,21 @@ use std::time::{Duration, Instant};
 use mmt_netem::io::record_file::RecordFile;
 use mmt_netem::io::relay::{Extras, Relay, RelayError, RelayHandle, RelaySnapshot};
 use mmt_netem::record::Heading;
-use mmt_netem::{Effect, LinkConfig};
+use mmt_netem::{Direction, Effect, LinkConfig};
 use mmt_shared::pairing::Address;
 use serde::Serialize;
 
-use crate::args::{NetemArguments, NetemCommand, network};
+use crate::args::{NetemArguments, NetemCommand};
 use crate::failure::{Exit, Failure};
 use crate::output::{note, print, print_json};
 use crate::stop::Stop;
 
+pub(super) mod orders;
 mod report;
 mod table;
+pub(super) mod wrap;
+
+use orders::Order;
 
 /// How often the relay is looked at.
 const LOOK: Duration = Duration::from_millis(50);
@@ -32,6 +35,8 @@ pub(crate) struct NetemReport {
     seed: u64,
     duration_s: f64,
     ending: &'static str,
+    /// Whether this host was too slow for the run to be about these networks.
+    degraded: bool,
     counters: RelaySnapshot,
     configuration: NetemConfiguration,
 }
@@ -63,12 +68,11 @@ pub(crate) fn run(arguments: &NetemArguments) -> Result<(), Failure> {
     let to = resolve(to)?;
     let stop = Stop::on_signals()?;
     let (up, down) = (arguments.up.clone(), arguments.down.clone());
+    let record = arguments.record.as_ref();
+    let record = record.map(|path| record_file(path, &heading(arguments)));
+    let record = record.transpose()?;
     let extras = Extras {
-        record: arguments
-            .record
-            .as_ref()
-            .map(|path| record(path, arguments))
-            .transpose()?,
+        record: record.as_ref().map(RecordFile::writer),
         rebind_every: arguments.rebind,
     };
     let relay = Relay::bind_with(listen, to, up, down, arguments.seed, extras);
@@ -78,7 +82,7 @@ pub(crate) fn run(arguments: &NetemArguments) -> Result<(), Failure> {
     note(format_args!("down (to masters): {effect_down}"));
     print(local)?;
     let began = Instant::now();
-    let orders = arguments.control.then(orders_from_stdin);
+    let orders = arguments.control.then(lines_of_stdin);
     wait(&relay, &stop, arguments, orders.as_ref());
     let duration_s = began.elapsed().as_secs_f64();
     let ending = if stop.asked() {
@@ -86,13 +90,17 @@ pub(crate) fn run(arguments: &NetemArguments) -> Result<(), Failure> {
     } else {
         "finished"
     };
+    let counters = relay.stop().map_err(Failure::failed)?;
+    let written = record.map(RecordFile::finish).transpose();
+    written.map_err(|error| Failure::failed(format!("the record: {error}")))?;
     let report = NetemReport {
         version: env!("CARGO_PKG_VERSION"),
         command: "netem",
         seed: arguments.seed,
         duration_s,
         ending,
-        counters: relay.stop().map_err(Failure::failed)?,
+        degraded: counters.lateness.degraded(),
+        counters,
         configuration: NetemConfiguration {
             listen: local.to_string(),
             to: to.to_string(),
@@ -108,29 +116,30 @@ pub(crate) fn run(arguments: &NetemArguments) -> Result<(), Failure> {
     }
 }
 
-fn record(path: &Path, arguments: &NetemArguments) -> Result<RecordFile, Failure> {
-    let heading = Heading {
+fn heading(arguments: &NetemArguments) -> Heading {
+    Heading {
         seed: arguments.seed,
         up: arguments.up.to_string(),
         down: arguments.down.to_string(),
-    };
-    RecordFile::create(path, &heading).map_err(|error| {
+    }
+}
+
+/// A record to be written.
+///
+/// # Errors
+/// It cannot be.
+fn record_file(path: &Path, heading: &Heading) -> Result<RecordFile, Failure> {
+    RecordFile::create(path, heading).map_err(|error| {
         let what = format!("cannot write the record {}: {error}", path.display());
         Failure::usage(what).remedy("give a path that can be written")
     })
 }
 
 /// The lines of stdin as they come, until it ends.
-fn orders_from_stdin() -> Receiver<String> {
-    let (sender, orders) = channel();
-    std::thread::spawn(move || {
-        for line in std::io::stdin().lock().lines().map_while(Result::ok) {
-            if sender.send(line).is_err() {
-                break;
-            }
-        }
-    });
-    orders
+fn lines_of_stdin() -> Receiver<String> {
+    let (sender, lines) = channel();
+    orders::from_stdin(move |line| sender.send(line.to_owned()).is_ok());
+    lines
 }
 
 /// Until the time is over, somebody asks for the end, or the relay breaks; obeys orders meanwhile.
@@ -159,19 +168,13 @@ fn obey(
     relay: &RelayHandle,
     links: &mut (LinkConfig, LinkConfig),
 ) -> Result<(), String> {
-    let (order, words) = line.trim().split_once(' ').unwrap_or((line.trim(), ""));
-    match order {
-        "" => return Ok(()),
-        "up" => links.0 = network(words)?,
-        "down" => links.1 = network(words)?,
-        "rebind" => {
+    match Order::parse(line)? {
+        None => return Ok(()),
+        Some(Order::Link(Direction::Up, link)) => links.0 = *link,
+        Some(Order::Link(Direction::Down, link)) => links.1 = *link,
+        Some(Order::Rebind) => {
             relay.rebind();
             return Ok(());
-        }
-        _ => {
-            return Err(format!(
-                "no order {order:?}: up WORDS, down WORDS or rebind"
-            ));
         }
     }
     let (up, down) = links.clone();

@@ -3,6 +3,8 @@
 use std::sync::Arc;
 use std::sync::mpsc;
 
+use mmt_netem::Direction;
+use mmt_netem::io::socket::SocketExtras;
 use mmt_server::io::{
     SlaveConfiguration, SlaveHost, SlaveHostError, SlaveLive, SlaveOptions, SlaveReport,
 };
@@ -15,12 +17,13 @@ use tokio::runtime::Runtime;
 use tokio::sync::watch;
 
 use super::host::{Host, spawn};
+use super::netem::wrap::{Emulation, effect};
 use super::viewer::Viewer;
 use crate::args::SlaveArguments;
 use crate::config::slave_config;
 use crate::failure::{Exit, Failure};
 use crate::log::Messages;
-use crate::output::{print, print_json};
+use crate::output::{note, print, print_json};
 use crate::stop::Stop;
 use crate::view::{Caption, Snapshot};
 
@@ -29,7 +32,13 @@ use crate::view::{Caption, Snapshot};
 /// # Errors
 /// Wrong input, an address that cannot be had, a host that failed.
 pub(crate) fn run(arguments: SlaveArguments, messages: &Messages) -> Result<(), Failure> {
-    let options = options(&arguments)?;
+    let mut options = options(&arguments)?;
+    let (netem, seed) = (Some(&arguments.netem), options.netem_seed);
+    let emulation = Emulation::start(&arguments.emulation, seed, None, netem)?;
+    options.netem_extras = emulation.extras(Direction::Down);
+    if !arguments.netem.is_transparent() {
+        note(effect(Direction::Down, &arguments.netem)?);
+    }
     let unserved = unserved(&options);
     let stop = Stop::on_signals()?;
     let (host, started) = start(options, arguments.advertise, stop.receiver())?;
@@ -39,6 +48,7 @@ pub(crate) fn run(arguments: SlaveArguments, messages: &Messages) -> Result<(), 
         watch_sessions(&host, &started.live, messages, &stop);
     }
     let report = host.join()?;
+    emulation.finish()?;
     match (arguments.json, report) {
         (true, report) => print_json(&report.unwrap_or(unserved)),
         (false, Some(report)) => print(report),
@@ -117,6 +127,7 @@ fn options(arguments: &SlaveArguments) -> Result<SlaveOptions, Failure> {
         netem_seed: config.seed,
         config,
         netem: arguments.netem.clone(),
+        netem_extras: SocketExtras::default(),
         once: arguments.once,
     })
 }

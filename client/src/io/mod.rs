@@ -22,6 +22,7 @@ mod thread;
 use std::time::Duration;
 
 use mmt_netem::LinkConfig;
+use mmt_netem::io::socket::SocketExtras;
 use mmt_shared::geometry::{BoxFootprint, Pose, Vec2};
 use mmt_shared::pairing::Pairing;
 use mmt_shared::report::RunReport;
@@ -89,6 +90,8 @@ pub struct MasterOptions {
     pub netem: LinkConfig,
     /// Seed of the emulated network.
     pub netem_seed: u64,
+    /// Record and control of the emulated network.
+    pub netem_extras: SocketExtras,
 }
 
 /// A look at a running master, for a screen.

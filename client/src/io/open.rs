@@ -143,8 +143,9 @@ async fn open_at(
         SocketAddr::V6(_) => (Ipv6Addr::UNSPECIFIED, 0).into(),
     };
     let plain = socket::for_quic(socket::bind(local)?).map_err(MasterHostError::Socket)?;
-    let netem = options.netem.clone();
-    let wrapped = EmulatedSocket::try_new(plain, netem, options.netem_seed, LinkId::UP)?;
+    let (netem, extras) = (options.netem.clone(), options.netem_extras.clone());
+    let seed = options.netem_seed;
+    let wrapped = EmulatedSocket::try_new_with(plain, netem, seed, LinkId::UP, extras)?;
     let meter = wrapped.meter();
     let endpoint = client_endpoint(Arc::new(wrapped))?;
     let traffic = traffic(options.samples_per_command);

@@ -5,6 +5,7 @@
 use std::net::SocketAddr;
 use std::time::Duration;
 
+use mmt_netem::io::lateness::Lateness;
 use mmt_netem::io::socket::SocketCounters;
 use mmt_shared::io::spread::Quantiles as Spread;
 use mmt_shared::report::{
@@ -35,6 +36,8 @@ pub(super) struct Ended {
     pub(super) counts: PumpCounts,
     pub(super) told: Option<Farewell<SlaveTotals>>,
     pub(super) sockets: SocketCounters,
+    /// Of the emulated network on what the master sent.
+    pub(super) lateness: Lateness,
     pub(super) quic: ConnectionStats,
     pub(super) address: SocketAddr,
 }
@@ -92,6 +95,7 @@ impl Ended {
             };
         }
         report.link = link_report(link);
+        report.emulation.up = self.lateness.report();
         report.haptic_loop = LoopReport {
             ticks: Some(self.haptic.timing.ticks),
             skipped: Some(self.haptic.timing.skipped),

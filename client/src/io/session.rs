@@ -112,6 +112,7 @@ async fn operate(
         counts: pump.counts,
         told: pump.told,
         sockets: line.meter.snapshot(),
+        lateness: line.meter.lateness(),
         quic: line.connection.stats(),
         address: line.address,
     };
@@ -127,6 +128,7 @@ async fn operate(
     ended.quic = line.connection.stats();
     line.close(&ended.end.to_string(), patience.idle).await;
     ended.sockets = line.meter.snapshot();
+    ended.lateness = line.meter.lateness();
     pump.show(Some(ended.end));
     Ok(ended.report(options, &pump.link))
 }

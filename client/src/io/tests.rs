@@ -33,6 +33,7 @@ fn scripted(fake: &Fake) -> MasterOptions {
         samples_per_command: 10,
         netem: LinkConfig::default(),
         netem_seed: 1,
+        netem_extras: SocketExtras::default(),
     }
 }
 

@@ -6,7 +6,7 @@ use std::time::Duration;
 use mmt_shared::time::duration_nanos;
 
 use super::Probability;
-use crate::distribution::{Cdf, Table, lognormal, pareto, pareto_normal};
+use crate::distribution::{Cdf, Table, gamma, lognormal, pareto, pareto_normal};
 use crate::quantile;
 
 /// The shortest time constant of jitter: below it, neighbouring packets of 1 kHz are independent.
@@ -57,6 +57,13 @@ pub enum Delay {
         /// J: the standard deviation.
         sigma: Duration,
     },
+    /// Gamma from zero on: log-normal's lighter tail.
+    Gamma {
+        /// The mean.
+        mean: Duration,
+        /// J: the standard deviation.
+        sigma: Duration,
+    },
     /// Drawn from a table of iproute2's kind: mean + J x / 8192.
     Table {
         /// The delay at x = 0.
@@ -91,6 +98,7 @@ impl Delay {
             Self::Pareto { .. } => mean + jitter * pareto(p),
             Self::ParetoNormal { .. } => mean + jitter * pareto_normal(p),
             Self::LogNormal { .. } => lognormal(mean, jitter, p),
+            Self::Gamma { .. } => gamma(mean, jitter, p),
             Self::Table { table, .. } => mean + jitter * table.quantile(p),
             Self::Empirical(cdf) => cdf.quantile_nanos(p),
         };
@@ -104,7 +112,9 @@ impl Delay {
         match self {
             Self::Constant { delay } => (*delay, Duration::ZERO),
             Self::Uniform { mean, half_width } => (*mean, *half_width),
-            Self::Normal { mean, sigma } | Self::LogNormal { mean, sigma } => (*mean, *sigma),
+            Self::Normal { mean, sigma }
+            | Self::LogNormal { mean, sigma }
+            | Self::Gamma { mean, sigma } => (*mean, *sigma),
             Self::Pareto { mean, scale }
             | Self::ParetoNormal { mean, scale }
             | Self::Table { mean, scale, .. } => (*mean, *scale),
@@ -138,9 +148,9 @@ impl Delay {
         match &mut changed {
             Self::Constant { delay } => *delay = new_mean,
             Self::Uniform { mean, half_width } => (*mean, *half_width) = (new_mean, jitter),
-            Self::Normal { mean, sigma } | Self::LogNormal { mean, sigma } => {
-                (*mean, *sigma) = (new_mean, jitter);
-            }
+            Self::Normal { mean, sigma }
+            | Self::LogNormal { mean, sigma }
+            | Self::Gamma { mean, sigma } => (*mean, *sigma) = (new_mean, jitter),
             Self::Pareto { mean, scale }
             | Self::ParetoNormal { mean, scale }
             | Self::Table { mean, scale, .. } => (*mean, *scale) = (new_mean, jitter),

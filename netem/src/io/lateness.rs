@@ -3,6 +3,7 @@
 use std::sync::Mutex;
 
 use hdrhistogram::Histogram;
+use mmt_shared::report::{EmulationReport, LateReport};
 use mmt_shared::time::{Time, duration_nanos};
 use serde::Serialize;
 
@@ -33,6 +34,23 @@ impl Lateness {
     #[must_use]
     pub fn degraded(&self) -> bool {
         self.p99_us > P99_DEGRADED_US || self.max_us > MAX_DEGRADED_US
+    }
+
+    /// What the report of a run says of it; nothing if no packet was released.
+    #[must_use]
+    pub fn report(&self) -> EmulationReport {
+        if self.count == 0 {
+            return EmulationReport::default();
+        }
+        EmulationReport {
+            released: Some(self.count),
+            late_us: LateReport {
+                p50: self.p50_us.into(),
+                p99: self.p99_us.into(),
+                max: self.max_us.into(),
+            },
+            degraded: Some(self.degraded()),
+        }
     }
 }
 
@@ -88,5 +106,8 @@ mod tests {
         assert!((summary.p50_us / 500.0 - 1.0).abs() < 0.02, "{summary:?}");
         assert!((summary.max_us / 1000.0 - 1.0).abs() < 0.02, "{summary:?}");
         assert!(summary.degraded());
+        let report = summary.report();
+        assert_eq!((report.released, report.degraded), (Some(1001), Some(true)));
+        assert_eq!(Lateness::default().report(), EmulationReport::default());
     }
 }

@@ -1,11 +1,16 @@
-//! Writes the record of a relay to a file on a thread of its own: the relay never waits for a disk.
+//! Writes the record of a driver to a file on a thread of its own. A driver must never wait for a disk.
 
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::thread::JoinHandle;
 
+use mmt_shared::time::Time;
+
+use super::alarm::now;
 use crate::record::{Entry, Heading, binary, csv};
 
 /// Packets that may wait for the disk: 3 s at 20 000 packets a second. One more is missed and counted.
@@ -14,9 +19,37 @@ const WAITING_MAX: usize = 1 << 16;
 /// A record being written.
 #[derive(Debug)]
 pub struct RecordFile {
-    sender: Option<SyncSender<Entry>>,
+    writer: RecordWriter,
     thread: Option<JoinHandle<io::Result<()>>>,
-    missed: u64,
+}
+
+/// What puts packets into a record; copies write into the same one.
+#[derive(Clone, Debug)]
+pub struct RecordWriter {
+    /// None: the end of the record.
+    sender: SyncSender<Option<Entry>>,
+    missed: Arc<AtomicU64>,
+    origin: Time,
+}
+
+impl RecordWriter {
+    /// Hands over a packet; never waits.
+    pub(super) fn push(&self, entry: Entry) {
+        if self.sender.try_send(Some(entry)).is_err() {
+            self.missed.fetch_add(1, Ordering::Relaxed);
+        }
+    }
+
+    /// Packets that the record misses: the disk was too slow, or the record was finished before.
+    #[must_use]
+    pub fn missed(&self) -> u64 {
+        self.missed.load(Ordering::Relaxed)
+    }
+
+    /// A time of the drivers' clock as the record counts it.
+    pub(super) fn since_start(&self, time: Time) -> Time {
+        Time::ZERO + time.saturating_since(self.origin)
+    }
 }
 
 /// The form of a record.
@@ -27,7 +60,7 @@ enum Form {
 
 impl RecordFile {
     /// Creates the file, an older one of that name is overwritten. A name that ends in `.csv` makes it
-    /// CSV, any other the binary form.
+    /// CSV, any other the binary form. The times of the record count from now.
     ///
     /// # Errors
     /// The file cannot be written, or no thread is to be had.
@@ -52,37 +85,35 @@ impl RecordFile {
         let thread = std::thread::Builder::new()
             .name("netem-record".to_owned())
             .spawn(move || write(file, form, &receiver))?;
+        let writer = RecordWriter {
+            sender,
+            missed: Arc::default(),
+            origin: now(),
+        };
         Ok(Self {
-            sender: Some(sender),
+            writer,
             thread: Some(thread),
-            missed: 0,
         })
     }
 
-    /// Hands over a packet; never waits.
-    pub(crate) fn push(&mut self, entry: Entry) {
-        let sender = self.sender.as_ref();
-        if sender.is_none_or(|sender| sender.try_send(entry).is_err()) {
-            self.missed = self.missed.saturating_add(1);
-        }
-    }
-
-    /// Packets that the record misses.
+    /// For a driver.
     #[must_use]
-    pub fn missed(&self) -> u64 {
-        self.missed
+    pub fn writer(&self) -> RecordWriter {
+        self.writer.clone()
     }
 
-    /// Waits until all is written.
+    /// Waits until all that was put in so far is written; what comes later is missed. Returns how many
+    /// packets the record misses.
     ///
     /// # Errors
     /// Those of the file.
     pub fn finish(mut self) -> io::Result<u64> {
-        self.end().map(|()| self.missed)
+        self.end().map(|()| self.writer.missed())
     }
 
     fn end(&mut self) -> io::Result<()> {
-        drop(self.sender.take());
+        // It fails only when the thread has ended with an error, which joining it tells.
+        let _ = self.writer.sender.send(None);
         match self.thread.take().map(JoinHandle::join) {
             None => Ok(()),
             Some(Ok(written)) => written,
@@ -98,9 +129,13 @@ impl Drop for RecordFile {
     }
 }
 
-fn write(mut file: BufWriter<File>, mut form: Form, entries: &Receiver<Entry>) -> io::Result<()> {
+fn write(
+    mut file: BufWriter<File>,
+    mut form: Form,
+    entries: &Receiver<Option<Entry>>,
+) -> io::Result<()> {
     let (mut text, mut bytes) = (String::new(), Vec::new());
-    for entry in entries {
+    while let Ok(Some(entry)) = entries.recv() {
         match &mut form {
             Form::Csv => {
                 text.clear();

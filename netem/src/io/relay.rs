@@ -16,21 +16,20 @@ use serde::Serialize;
 use super::alarm::{Alarm, now};
 use super::lateness::{Lateness, Recorder};
 use super::lock;
-use super::record_file::RecordFile;
+use super::log::Log;
+use super::record_file::RecordWriter;
 use crate::config::{ConfigError, LinkConfig};
 use crate::counters::{LinkCounters, Tally};
 use crate::link::LinkId;
 use crate::pipe::Pipe;
 
 mod clients;
-mod log;
 mod port;
 #[cfg(test)]
 mod tests;
 mod worker;
 
 use clients::Clients;
-use log::Log;
 use port::Port;
 use worker::Worker;
 
@@ -125,7 +124,7 @@ pub struct DirectionCounters {
 #[derive(Debug, Default)]
 pub struct Extras {
     /// Where every packet is recorded.
-    pub record: Option<RecordFile>,
+    pub record: Option<RecordWriter>,
     /// How often every client gets a new port toward the target, as behind a NAT that forgets: what the
     /// target sends to the old port is lost.
     pub rebind_every: Option<Duration>,
@@ -194,7 +193,7 @@ impl Relay {
             board: Mutex::new(RelaySnapshot::default()),
             lateness: Recorder::try_new()?,
         });
-        let log = Log::new(extras.record, origin);
+        let log = Log::new(extras.record);
         let clients = Clients::new(to);
         let mut worker = Worker::new(port, clients, up, down, log, shared.clone());
         worker.rebind_every(extras.rebind_every, origin);

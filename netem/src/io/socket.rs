@@ -16,13 +16,16 @@ use quinn::udp::{EcnCodepoint, RecvMeta, Transmit};
 use quinn::{AsyncUdpSocket, UdpPoller};
 
 use crate::config::{ConfigError, LinkConfig};
+use crate::io::record_file::RecordWriter;
 use crate::link::LinkId;
 
+mod control;
 mod meter;
 mod release;
 #[cfg(test)]
 mod tests;
 
+pub use control::SocketControl;
 pub use meter::{SocketCounters, SocketDrops, SocketMeter};
 use release::Release;
 
@@ -38,6 +41,22 @@ pub enum WrapError {
     /// The lateness histogram could not be made.
     #[error("no histogram for the emulated link: {0}")]
     Histogram(#[from] hdrhistogram::CreationError),
+}
+
+/// What a wrapped socket can do besides. With any of it there is a thread even while there is nothing to
+/// emulate.
+#[derive(Clone, Debug, Default)]
+pub struct SocketExtras {
+    /// Where every datagram is recorded.
+    pub record: Option<RecordWriter>,
+    /// Who may give new settings.
+    pub control: Option<SocketControl>,
+}
+
+impl SocketExtras {
+    fn is_empty(&self) -> bool {
+        self.record.is_none() && self.control.is_none()
+    }
 }
 
 /// A socket for `quinn::Endpoint::new_with_abstract_socket` that emulates a link on what it sends.
@@ -61,11 +80,25 @@ impl EmulatedSocket {
         seed: u64,
         id: LinkId,
     ) -> Result<Self, WrapError> {
+        Self::try_new_with(inner, config, seed, id, SocketExtras::default())
+    }
+
+    /// Wraps `inner` as [`Self::try_new`] does, with a record or somebody who controls it.
+    ///
+    /// # Errors
+    /// Those of [`Self::try_new`].
+    pub fn try_new_with(
+        inner: Arc<dyn AsyncUdpSocket>,
+        config: LinkConfig,
+        seed: u64,
+        id: LinkId,
+        extras: SocketExtras,
+    ) -> Result<Self, WrapError> {
         let meter = SocketMeter::try_new()?;
         config.check()?;
-        let release = match config.is_transparent() {
+        let release = match config.is_transparent() && extras.is_empty() {
             true => None,
-            false => Some(Release::start(&inner, config, seed, id, &meter)?),
+            false => Some(Release::start(&inner, config, seed, id, &meter, extras)?),
         };
         Ok(Self {
             inner,

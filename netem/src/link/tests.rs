@@ -6,6 +6,7 @@ use super::*;
 use crate::config::{Delay, Loss, Order, Probability};
 
 mod bottleneck;
+mod codel_reference;
 mod jitter;
 mod losses;
 mod order;
@@ -223,16 +224,33 @@ fn delays_are_drawn_from_the_named_distribution() {
     assert!(kolmogorov_smirnov(&mut uniform, gauss) > 10.0);
 }
 
+/// The exact two-sided level of `k` out of `n` at probability `p`: twice the smaller tail.
+fn binomial_level(n: u64, k: u64, p: f64) -> f64 {
+    let log_factorial = |n: u64| libm::lgamma(n as f64 + 1.0);
+    let share = |k: u64| {
+        let ways = log_factorial(n) - log_factorial(k) - log_factorial(n - k);
+        (ways + k as f64 * p.ln() + (n - k) as f64 * (-p).ln_1p()).exp()
+    };
+    let at_most: f64 = (0..=k).map(share).sum();
+    let at_least = 1.0 - at_most + share(k);
+    (2.0 * at_most.min(at_least)).min(1.0)
+}
+
 #[test]
 fn loss_is_binomial() {
+    assert!((binomial_level(10, 2, 0.5) - 2.0 * 56.0 / 1024.0).abs() < 1e-12);
     for percent in [0.1, 1.0, 5.0, 50.0] {
         let lost = fates(&format!("loss {percent}%"), 19, LinkId::UP)
             .iter()
             .filter(|fate| **fate == Fate::Drop(DropCause::Loss))
-            .count() as f64;
-        let (n, p) = (N as f64, percent / 100.0);
-        let bound = 4.0 * (n * p * (1.0 - p)).sqrt();
-        assert!((lost - n * p).abs() < bound, "{percent} %: lost {lost}");
+            .count() as u64;
+        let level = binomial_level(N, lost, percent / 100.0);
+        assert!(level > 0.001, "{percent} %: lost {lost}, level {level}");
+        // and the test would notice a share that is a half off
+        assert!(
+            binomial_level(N, lost, percent / 150.0) < 1e-3,
+            "{percent} %"
+        );
     }
     let all = fates("loss 100%", 19, LinkId::UP);
     assert!(all.iter().all(|fate| *fate == Fate::Drop(DropCause::Loss)));

@@ -87,6 +87,7 @@ fn delay(delay: &Delay, correlation: Correlation) -> String {
         Delay::Pareto { .. } => " distribution pareto".to_owned(),
         Delay::ParetoNormal { .. } => " distribution paretonormal".to_owned(),
         Delay::LogNormal { .. } => " distribution lognormal".to_owned(),
+        Delay::Gamma { .. } => " distribution gamma".to_owned(),
         Delay::Table { table, .. } => format!(" distribution table {}", table.name()),
     };
     let correlated = correlated(correlation);

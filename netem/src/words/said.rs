@@ -24,6 +24,7 @@ pub(super) enum Shape {
     Pareto,
     ParetoNormal,
     LogNormal,
+    Gamma,
     Table(Table),
 }
 
@@ -120,6 +121,7 @@ impl Said<'_> {
             Some(Shape::Pareto) => Delay::Pareto { mean, scale },
             Some(Shape::ParetoNormal) => Delay::ParetoNormal { mean, scale },
             Some(Shape::LogNormal) => Delay::LogNormal { mean, sigma },
+            Some(Shape::Gamma) => Delay::Gamma { mean, sigma },
             Some(Shape::Table(table)) => {
                 let table = Arc::new(table);
                 Delay::Table { mean, scale, table }

@@ -171,14 +171,14 @@ impl<'a> Parser<'a, '_> {
             "pareto" => Ok(Shape::Pareto),
             "paretonormal" => Ok(Shape::ParetoNormal),
             "lognormal" => Ok(Shape::LogNormal),
+            "gamma" => Ok(Shape::Gamma),
             "table" => {
                 let name = self.argument();
                 self.file(name, Table::parse).map(Shape::Table)
             }
             "experimental" => Err(word.not_yet("a table by name (`distribution table FILE`)")),
-            _ => {
-                Err(word.expected("uniform, normal, pareto, paretonormal, lognormal or table FILE"))
-            }
+            _ => Err(word
+                .expected("uniform, normal, pareto, paretonormal, lognormal, gamma or table FILE")),
         }
     }
 

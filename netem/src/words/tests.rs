@@ -234,7 +234,7 @@ fn any_chance() -> impl Strategy<Value = Chance> {
 }
 
 fn any_delay() -> impl Strategy<Value = Delay> {
-    (0..7, any_time(), any_time()).prop_map(|(kind, mean, jitter)| match kind {
+    (0..8, any_time(), any_time()).prop_map(|(kind, mean, jitter)| match kind {
         0 => Delay::Constant { delay: mean },
         1 => Delay::Uniform {
             mean,
@@ -253,6 +253,10 @@ fn any_delay() -> impl Strategy<Value = Delay> {
             scale: jitter,
         },
         5 => Delay::LogNormal {
+            mean,
+            sigma: jitter,
+        },
+        6 => Delay::Gamma {
             mean,
             sigma: jitter,
         },

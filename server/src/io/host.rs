@@ -112,8 +112,9 @@ impl SlaveHost {
         };
         let inner = socket::for_quic(socket::bind(options.listen)?).map_err(unusable)?;
         let netem = options.netem.to_string();
+        let (seed, extras) = (options.netem_seed, options.netem_extras);
         let emulated =
-            EmulatedSocket::try_new(inner, options.netem, options.netem_seed, LinkId::DOWN)?;
+            EmulatedSocket::try_new_with(inner, options.netem, seed, LinkId::DOWN, extras)?;
         let meter = emulated.meter();
         let endpoint = server_endpoint(Arc::new(emulated), &options.identity, TRAFFIC)?;
         let address = endpoint.local_addr().map_err(unusable)?;

@@ -18,6 +18,7 @@ mod worker;
 use std::net::SocketAddr;
 
 use mmt_netem::LinkConfig;
+use mmt_netem::io::socket::SocketExtras;
 use mmt_shared::geometry::{BoxFootprint, Pose, Vec2};
 use mmt_shared::io::identity::Identity;
 use mmt_shared::report::RunReport;
@@ -44,6 +45,8 @@ pub struct SlaveOptions {
     pub netem: LinkConfig,
     /// Seed of the emulated network.
     pub netem_seed: u64,
+    /// Record and control of the emulated network.
+    pub netem_extras: SocketExtras,
     /// End after the first session.
     pub once: bool,
 }

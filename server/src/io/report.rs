@@ -104,6 +104,7 @@ pub(super) fn report(
     report.messages = messages(&traffic);
     report.wire = wire(outcome, &traffic);
     report.link = link(&outcome.link);
+    report.emulation.down = shared.meter.lateness().report();
     report.drops = Some(drops::drops(shared, outcome, &traffic));
     if let Some(theirs) = theirs {
         report.haptic_loop = loop_of_master(&theirs.totals.haptic_loop);

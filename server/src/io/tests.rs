@@ -35,6 +35,7 @@ fn options() -> SlaveOptions {
         config: SlaveConfig::default(),
         netem: LinkConfig::default(),
         netem_seed: 1,
+        netem_extras: SocketExtras::default(),
         once: false,
     }
 }

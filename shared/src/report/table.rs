@@ -3,8 +3,8 @@
 use std::fmt;
 
 use super::{
-    Counts, EstimateReport, LoopReport, MessagesReport, Number, QuantilesReport, RunReport,
-    WireReport,
+    Counts, EmulationReport, EstimateReport, LoopReport, MessagesReport, Number, QuantilesReport,
+    RunReport, WireReport,
 };
 
 /// Width of the first column.
@@ -75,6 +75,7 @@ impl<C> fmt::Display for RunReport<C> {
         self.force(f)?;
         self.model(f)?;
         self.network(f)?;
+        self.emulation(f)?;
         loop_rows(f, "Haptic loop", &self.haptic_loop)?;
         loop_rows(f, "Slave loop", &self.slave_loop)?;
         self.drops(f)
@@ -228,6 +229,38 @@ impl<C> RunReport<C> {
         rows.row("datagrams up", &wire_cells(&wire.up))?;
         rows.row("datagrams down", &wire_cells(&wire.down))
     }
+
+    fn emulation(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let directions = [&self.emulation.up, &self.emulation.down];
+        let mut rows = section(f, "Emulated network: released late");
+        for (label, emulation) in ["up", "down"].into_iter().zip(directions) {
+            let [p50, p99, max, degraded] = emulation_cells(emulation);
+            let mut cells = vec![p50, p99, max];
+            // a dash in this place would ask to be read
+            cells.extend(degraded.map(Some));
+            rows.row(label, &cells)?;
+        }
+        if directions.iter().any(|one| one.degraded == Some(true)) {
+            writeln!(
+                f,
+                "  This host was too slow for the emulation: delays and force errors are partly the host's."
+            )?;
+        }
+        Ok(())
+    }
+}
+
+fn emulation_cells(emulation: &EmulationReport) -> [Cell; 4] {
+    let late = &emulation.late_us;
+    [
+        after("p50", number(late.p50, 0, " us")),
+        after("p99", number(late.p99, 0, " us")),
+        after("max", number(late.max, 0, " us")),
+        emulation
+            .degraded
+            .unwrap_or(false)
+            .then(|| "degraded".to_owned()),
+    ]
 }
 
 fn estimate_cells(estimate: &EstimateReport, unit: &str) -> [Cell; 3] {

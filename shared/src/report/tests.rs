@@ -57,6 +57,19 @@ fn full() -> RunReport<Value> {
         p99: 117.9.into(),
     };
     (report.link.loss_up, report.link.loss_down) = (0.01.into(), 0.012.into());
+    report.emulation.up = EmulationReport {
+        released: Some(2100),
+        late_us: LateReport {
+            p50: 61.0.into(),
+            p99: 180.0.into(),
+            max: 402.0.into(),
+        },
+        degraded: Some(false),
+    };
+    report.emulation.down = EmulationReport {
+        degraded: Some(true),
+        ..report.emulation.up.clone()
+    };
     report.haptic_loop = LoopReport {
         ticks: Some(20_000),
         skipped: Some(2),
@@ -112,6 +125,10 @@ const REQUIRED: &str = "version command seed duration_s ending configuration dro
     model.friction_n.estimate model.friction_n.truth \
     pose.position_rms_m pose.position_max_m pose.angle_rms_rad pose.angle_max_rad \
     link.rtt_ms.p50 link.rtt_ms.p99 link.loss_up link.loss_down \
+    emulation.up.released emulation.up.late_us.p50 emulation.up.late_us.p99 \
+    emulation.up.late_us.max emulation.up.degraded \
+    emulation.down.released emulation.down.late_us.p50 emulation.down.late_us.p99 \
+    emulation.down.late_us.max emulation.down.degraded \
     haptic_loop.ticks haptic_loop.skipped \
     haptic_loop.cpu_us.p50 haptic_loop.cpu_us.p99 haptic_loop.cpu_us.p999 \
     haptic_loop.lateness_us.p50 haptic_loop.lateness_us.p99 haptic_loop.lateness_us.p999 \

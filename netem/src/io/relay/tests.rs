@@ -4,6 +4,7 @@ use std::net::{IpAddr, Ipv4Addr, Ipv6Addr};
 use std::time::Instant;
 
 use super::*;
+use crate::io::record_file::RecordFile;
 
 const PATIENCE: Duration = Duration::from_secs(30);
 const LOCAL: IpAddr = IpAddr::V4(Ipv4Addr::LOCALHOST);
@@ -166,6 +167,49 @@ fn the_relay_outlives_a_target_where_nobody_listens() {
 }
 
 #[test]
+fn the_relay_outlives_a_client_that_is_gone_and_a_target_that_begins_again() {
+    let server = socket(LOCAL);
+    let to = server.local_addr().unwrap();
+    let relay = relay(LOCAL, to, "delay 1ms", "delay 1ms");
+    let (gone, stays) = (socket(LOCAL), socket(LOCAL));
+    gone.send_to(b"here", relay.local_addr()).unwrap();
+    let (_, to_gone) = receive(&server);
+    drop(gone);
+    // the client's host answers these with "nobody listens here"
+    for _ in 0..20 {
+        server.send_to(b"for you", to_gone).unwrap();
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    stays.send_to(b"still here", relay.local_addr()).unwrap();
+    let (heard, to_stays) = receive(&server);
+    assert_eq!(heard, b"still here");
+    server.send_to(b"and you", to_stays).unwrap();
+    assert_eq!(receive(&stays).0, b"and you");
+
+    // the target dies; while it is gone, what is sent to it is lost
+    drop(server);
+    for _ in 0..20 {
+        stays.send_to(b"lost", relay.local_addr()).unwrap();
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    until(&relay, |seen| {
+        seen.unreachable > 0 && seen.up.in_flight == 0
+    });
+    let again = UdpSocket::bind(to).unwrap();
+    again.set_read_timeout(Some(PATIENCE)).unwrap();
+    stays.send_to(b"again", relay.local_addr()).unwrap();
+    let (heard, from) = receive(&again);
+    // its client has kept its port
+    assert_eq!((heard, from), (b"again".to_vec(), to_stays));
+    let seen = relay.stop().unwrap();
+    assert_eq!((seen.clients, seen.clients_met), (2, 2));
+    offered_is_accounted_for(&seen.up);
+    offered_is_accounted_for(&seen.down);
+    // forgotten or not, nothing was refused
+    assert_eq!(seen.refused, Tally::default());
+}
+
+#[test]
 fn empty_and_large_datagrams_pass_whole() {
     let server = socket(LOCAL);
     let relay = relay(LOCAL, server.local_addr().unwrap(), "delay 1ms", "none");
@@ -286,8 +330,9 @@ fn every_packet_is_on_record_in_both_forms() {
             down: "none".to_owned(),
         };
         let server = socket(LOCAL);
+        let file = RecordFile::create(&path, &heading).unwrap();
         let extras = Extras {
-            record: Some(RecordFile::create(&path, &heading).unwrap()),
+            record: Some(file.writer()),
             ..Extras::default()
         };
         let (any, to) = ((LOCAL, 0).into(), server.local_addr().unwrap());
@@ -301,7 +346,7 @@ fn every_packet_is_on_record_in_both_forms() {
             seen.up.link.offered.packets == 100 && seen.up.in_flight == 0
         });
         let end = relay.stop().unwrap();
-        assert_eq!(end.unrecorded, 0);
+        assert_eq!((end.unrecorded, file.finish().unwrap()), (0, 0));
         offered_is_accounted_for(&end.up);
         let (read, entries) = crate::record::read(&std::fs::read(&path).unwrap()).unwrap();
         assert_eq!(read, heading);

@@ -11,13 +11,13 @@ use rustix::event::{PollFd, PollFlags};
 use mmt_shared::time::Time;
 
 use super::clients::Clients;
-use super::log::{Dropped, Log};
 use super::port::{Port, Receiver, Sent};
 use super::{DirectionCounters, RelaySnapshot, Shared};
 use crate::counters::Tally;
 use crate::io::alarm::{now, sharpen_deadlines, wait};
 use crate::io::lateness::Lateness;
 use crate::io::lock;
+use crate::io::log::{Dropped, Log};
 use crate::link::{Direction, Fate, turn_bit};
 use crate::pipe::{Pipe, Released};
 
@@ -31,7 +31,7 @@ pub(super) struct Parcel {
     ecn: Option<EcnCodepoint>,
     contents: Vec<u8>,
     /// Packets in flight when it was offered.
-    pub(super) backlog: u32,
+    backlog: u32,
 }
 
 /// One direction: its link and what became of what left it.
@@ -64,7 +64,7 @@ impl Lane {
     /// Puts a datagram on the link, and a dropped one on record.
     fn offer(
         &mut self,
-        log: &mut Log,
+        log: &Log,
         direction: Direction,
         client: u64,
         received: &super::port::Received<'_>,
@@ -267,7 +267,7 @@ impl Worker {
             return;
         };
         for _ in 0..BATCHES {
-            let (down, log) = (&mut self.down, &mut self.log);
+            let (down, log) = (&mut self.down, &self.log);
             let received = self.receiver.receive(&client.port, |received| {
                 down.offer(log, Direction::Down, number, &received);
             });
@@ -288,22 +288,29 @@ impl Worker {
     }
 
     fn release_due(&mut self) {
-        while let Some(mut packet) = self.up.pipe.pop_due(now()) {
-            harm(&mut packet);
-            let moment = now();
-            self.shared.lateness.record(packet.due, moment);
-            let sent = self.send_up(&packet);
-            self.log.released(Direction::Up, &packet, sent, moment);
-            self.up.sent.count(sent, packet.bytes);
+        while let Some(packet) = self.up.pipe.pop_due(now()) {
+            self.release(Direction::Up, packet);
         }
-        while let Some(mut packet) = self.down.pipe.pop_due(now()) {
-            harm(&mut packet);
-            let moment = now();
-            self.shared.lateness.record(packet.due, moment);
-            let sent = self.send_down(&packet);
-            self.log.released(Direction::Down, &packet, sent, moment);
-            self.down.sent.count(sent, packet.bytes);
+        while let Some(packet) = self.down.pipe.pop_due(now()) {
+            self.release(Direction::Down, packet);
         }
+    }
+
+    fn release(&mut self, direction: Direction, mut packet: Released<Parcel>) {
+        harm(&mut packet);
+        let moment = now();
+        self.shared.lateness.record(packet.due, moment);
+        let sent = match direction {
+            Direction::Up => self.send_up(&packet),
+            Direction::Down => self.send_down(&packet),
+        };
+        let (took, backlog) = (sent == Some(Sent::Yes), packet.payload.backlog);
+        self.log.released(direction, &packet, backlog, took, moment);
+        let lane = match direction {
+            Direction::Up => &mut self.up,
+            Direction::Down => &mut self.down,
+        };
+        lane.sent.count(sent, packet.bytes);
     }
 
     /// Sends to the target; `None` if the client is forgotten.

@@ -11,11 +11,12 @@ use mmt_shared::time::Time;
 use quinn::{AsyncUdpSocket, UdpPoller};
 
 use super::meter::{SocketMeter, Unsent};
-use super::{Datagram, WrapError};
-use crate::config::LinkConfig;
+use super::{Datagram, SocketExtras, WrapError};
+use crate::config::{ConfigError, LinkConfig};
 use crate::io::alarm::{Alarm, now, sharpen_deadlines};
 use crate::io::lock;
-use crate::link::{Fate, LinkId, turn_bit};
+use crate::io::log::{Dropped, Log};
+use crate::link::{Direction, Fate, LinkId, turn_bit};
 use crate::pipe::{Pipe, Released};
 
 /// How long the thread waits for a full socket before it drops the datagram: long against the time in
@@ -28,15 +29,65 @@ pub(super) struct Release {
     thread: Option<JoinHandle<()>>,
 }
 
-struct Shared {
+/// What the socket, the thread and who controls them share.
+#[derive(Debug)]
+pub(super) struct Shared {
     queue: Mutex<Queue>,
     alarm: Arc<Alarm>,
     meter: SocketMeter,
+    direction: Direction,
+    log: Log,
 }
 
+#[derive(Debug)]
 struct Queue {
-    pipe: Pipe<Datagram>,
+    pipe: Pipe<Parcel>,
     closed: bool,
+}
+
+/// A datagram on the link.
+#[derive(Clone, Debug)]
+struct Parcel {
+    datagram: Datagram,
+    /// Packets in flight when it was offered.
+    backlog: u32,
+}
+
+impl Shared {
+    /// New settings for the datagrams to come.
+    ///
+    /// # Errors
+    /// A setting out of its range; the old settings stay.
+    pub(super) fn reconfigure(&self, config: LinkConfig) -> Result<(), ConfigError> {
+        lock(&self.queue).pipe.reconfigure(config)
+    }
+
+    /// Puts a datagram on the link now; also whether something is now due sooner than before.
+    fn push(&self, datagram: Datagram) -> (Fate, bool) {
+        let bytes = datagram.contents.len();
+        let mut queue = lock(&self.queue);
+        let next = queue.pipe.next_due();
+        let backlog = u32::try_from(queue.pipe.in_flight()).unwrap_or(u32::MAX);
+        let number = queue.pipe.counters().offered.packets;
+        // read under the lock: times of offers never go back
+        let offered_at = now();
+        let fate = queue
+            .pipe
+            .push(offered_at, bytes, Parcel { datagram, backlog });
+        let sooner = queue.pipe.next_due() != next;
+        drop(queue);
+        if let Fate::Drop(cause) = fate {
+            let packet = Dropped {
+                number,
+                offered_at,
+                bytes,
+                backlog,
+                cause,
+            };
+            self.log.dropped(self.direction, &packet);
+        }
+        (fate, sooner)
+    }
 }
 
 impl Release {
@@ -46,6 +97,7 @@ impl Release {
         seed: u64,
         id: LinkId,
         meter: &SocketMeter,
+        extras: SocketExtras,
     ) -> Result<Self, WrapError> {
         let mut pipe = Pipe::try_new(config, seed, id)?;
         pipe.set_origin(now());
@@ -56,7 +108,12 @@ impl Release {
             }),
             alarm: Arc::new(Alarm::try_new()?),
             meter: meter.clone(),
+            direction: id.direction,
+            log: Log::new(extras.record),
         });
+        if let Some(control) = extras.control {
+            control.attach(&shared)?;
+        }
         let sender = Sender {
             poller: inner.clone().create_io_poller(),
             inner: inner.clone(),
@@ -76,12 +133,7 @@ impl Release {
     pub(super) fn offer(&self, datagram: Datagram) {
         let bytes = datagram.contents.len();
         self.shared.meter.offered(bytes);
-        let mut queue = lock(&self.shared.queue);
-        let next = queue.pipe.next_due();
-        // read under the lock: times of offers never go back
-        let fate = queue.pipe.push(now(), bytes, datagram);
-        let sooner = queue.pipe.next_due() != next;
-        drop(queue);
+        let (fate, sooner) = self.shared.push(datagram);
         match fate {
             Fate::Drop(cause) => self.shared.meter.dropped(cause, bytes),
             Fate::Deliver(deliveries) => {
@@ -109,7 +161,7 @@ impl Drop for Release {
 
 /// What the thread does next.
 enum Step {
-    Send(Released<Datagram>),
+    Send(Released<Parcel>),
     Wait(Option<Time>),
     End,
 }
@@ -146,16 +198,21 @@ impl Sender {
         }
     }
 
-    fn release(&mut self, mut packet: Released<Datagram>) {
-        let meter = self.shared.meter.clone();
+    fn release(&mut self, mut packet: Released<Parcel>) {
+        let shared = self.shared.clone();
         if let Some(bit) = packet.corrupted_bit {
-            turn_bit(&mut packet.payload.contents, bit);
+            turn_bit(&mut packet.payload.datagram.contents, bit);
         }
-        meter.recorder().record(packet.due, now());
-        match self.send(&packet.payload) {
-            Ok(()) => meter.sent(packet.bytes),
-            Err(why) => meter.unsent(why, packet.bytes),
+        let moment = now();
+        shared.meter.recorder().record(packet.due, moment);
+        let sent = self.send(&packet.payload.datagram);
+        match sent {
+            Ok(()) => shared.meter.sent(packet.bytes),
+            Err(why) => shared.meter.unsent(why, packet.bytes),
         }
+        let backlog = packet.payload.backlog;
+        let log = &shared.log;
+        log.released(shared.direction, &packet, backlog, sent.is_ok(), moment);
     }
 
     /// Sends, waiting at most [`PATIENCE`] for room in the socket.

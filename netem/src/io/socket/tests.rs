@@ -12,6 +12,8 @@ use quinn::{ClientConfig, Endpoint, EndpointConfig, Runtime, ServerConfig, Tokio
 use super::*;
 use crate::counters::Tally;
 use crate::io::alarm;
+use crate::io::record_file::RecordFile;
+use crate::link::Direction;
 
 const PATIENCE: Duration = Duration::from_secs(30);
 const PEER: SocketAddr = SocketAddr::new(IpAddr::V4(Ipv4Addr::LOCALHOST), 9);
@@ -148,6 +150,100 @@ fn a_datagram_due_sooner_wakes_the_thread_that_waits_for_a_later_one() {
     }
     until("the first", || !inner.contents().is_empty());
     assert!(inner.contents().len() < 50);
+}
+
+fn wrap_with(inner: &Arc<Pretended>, words: &str, extras: SocketExtras) -> EmulatedSocket {
+    let config = words.parse().unwrap();
+    EmulatedSocket::try_new_with(inner.clone(), config, 1, LinkId::UP, extras).unwrap()
+}
+
+#[test]
+fn a_socket_at_work_takes_new_settings_and_keeps_the_times_of_what_is_in_flight() {
+    let control = SocketControl::default();
+    let extras = SocketExtras {
+        control: Some(control.clone()),
+        ..SocketExtras::default()
+    };
+    let inner = Arc::new(Pretended::default());
+    let socket = wrap_with(&inner, "none", extras.clone());
+    socket.try_send(&transmit(b"passes", None)).unwrap();
+    until("it passed", || inner.contents().len() == 1);
+
+    let reconfigure = |words: &str| control.reconfigure(words.parse().unwrap());
+    reconfigure("delay 20ms").unwrap();
+    let start = alarm::now();
+    socket.try_send(&transmit(b"in flight", None)).unwrap();
+    reconfigure("loss 100%").unwrap();
+    let refused = LinkConfig {
+        limit: 0,
+        ..LinkConfig::default()
+    };
+    assert!(control.reconfigure(refused).is_err());
+    socket.try_send(&transmit(b"lost", None)).unwrap();
+    until("what was in flight", || inner.contents().len() == 2);
+    let (at, contents, _) = inner.sent.lock().unwrap()[1].clone();
+    assert_eq!(contents, b"in flight");
+    assert!(at.saturating_since(start) >= Duration::from_millis(20));
+    assert_eq!(socket.meter().snapshot().dropped.loss.packets, 1);
+
+    // a socket made later begins with the newest settings, not with its own
+    let later = wrap_with(&inner, "none", extras);
+    later.try_send(&transmit(b"lost too", None)).unwrap();
+    assert_eq!(later.meter().snapshot().dropped.loss.packets, 1);
+    // and one that is gone is in nobody's way
+    drop(socket);
+    reconfigure("none").unwrap();
+}
+
+#[test]
+fn what_a_socket_met_is_on_record_and_is_met_again_by_a_replay() {
+    let directory = tempfile::tempdir().unwrap();
+    let path = directory.path().join("session");
+    let words = "delay 2ms 1ms loss 30% limit 200";
+    let heading = crate::record::Heading {
+        seed: 1,
+        up: words.to_owned(),
+        down: String::new(),
+    };
+    let file = RecordFile::create(&path, &heading).unwrap();
+    let extras = SocketExtras {
+        record: Some(file.writer()),
+        ..SocketExtras::default()
+    };
+    let inner = Arc::new(Pretended::default());
+    let socket = wrap_with(&inner, words, extras);
+    for number in 0..100 {
+        socket.try_send(&transmit(&[number], None)).unwrap();
+        std::thread::sleep(Duration::from_micros(100));
+    }
+    let meter = socket.meter();
+    until("all decided", || meter.snapshot().in_flight() == 0);
+    // the thread writes the last one down after it has counted it
+    drop(socket);
+    assert_eq!(file.finish().unwrap(), 0);
+
+    let bytes = std::fs::read(&path).unwrap();
+    let (read, entries) = crate::record::read(&bytes).unwrap();
+    assert_eq!((read, entries.len()), (heading, 100));
+    let summary = crate::record::summary::Summary::of(&entries, Direction::Up);
+    let counters = meter.snapshot();
+    assert_eq!(summary.sent.packets, counters.sent_datagrams);
+    assert!(counters.dropped.loss.packets > 10);
+    // the binary form replays as the CSV does
+    let text = crate::record::as_text(bytes).unwrap();
+    let replay = crate::words::parse("trace session up", &mut |_| Ok(text.clone())).unwrap();
+    let mut link = crate::Link::try_new(replay, 9, LinkId::UP).unwrap();
+    link.set_origin(entries.iter().map(|entry| entry.offered).min().unwrap());
+    let mut sorted = entries;
+    sorted.sort_by_key(|entry| entry.number);
+    for entry in sorted {
+        let fate = link.offer(entry.offered, crate::PacketMeta::default());
+        let sent = match entry.end {
+            crate::record::End::Sent { sent, .. } => Some(sent),
+            _ => None,
+        };
+        assert_eq!(fate.due(), sent, "packet {}", entry.number);
+    }
 }
 
 #[test]

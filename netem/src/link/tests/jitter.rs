@@ -43,6 +43,30 @@ fn the_heavy_tails_are_those_named() {
 }
 
 #[test]
+fn gamma_is_met_and_is_not_the_lognormal_of_its_moments() {
+    // shape 4, scale 10 ms: the closed form of a whole shape
+    let mut values = drawn("delay 40ms 20ms distribution gamma order free", 211);
+    let erlang = |x: f64| {
+        let x = x / 10.0;
+        1.0 - (-x).exp() * (1.0 + x + x * x / 2.0 + x * x * x / 6.0)
+    };
+    let ks = kolmogorov_smirnov(&mut values, erlang);
+    assert!(ks < 1.95, "{ks}");
+    let (mean, sd) = mean_and_sd(&values);
+    assert!(
+        (mean - 40.0).abs() < 4.0 * 20.0 / (N as f64).sqrt(),
+        "{mean}"
+    );
+    // the kurtosis of a gamma distribution of shape 4 is 4.5
+    assert!(
+        (sd / 20.0 - 1.0).abs() < 4.0 * (3.5 / 4.0 / N as f64).sqrt(),
+        "{sd}"
+    );
+    let mut lognormal = drawn("delay 40ms 20ms distribution lognormal order free", 211);
+    assert!(kolmogorov_smirnov(&mut lognormal, erlang) > 5.0);
+}
+
+#[test]
 fn a_measured_distribution_is_met() {
     let mut values = drawn("delay cdf 40ms@0%,50ms@80%,100ms@100% order free", 107);
     let cdf = |x: f64| match x < 50.0 {
