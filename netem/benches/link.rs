@@ -34,6 +34,7 @@ fn offer(criterion: &mut Criterion) {
                 let meta = PacketMeta {
                     bytes: 100,
                     in_flight: 50,
+                    ecn_capable: false,
                 };
                 link.offer(black_box(now), black_box(meta))
             });

@@ -12,6 +12,7 @@ mod probability;
 mod profile;
 mod queue;
 mod range;
+mod slot;
 #[cfg(test)]
 mod tests;
 
@@ -21,6 +22,7 @@ pub use probability::Probability;
 pub use profile::{Profile, STEPS_MAX, Step};
 pub use queue::{Codel, Framing, Queue, RATE_MAX_BIT_S, Rate, Service};
 pub use range::ConfigError;
+pub use slot::{Slot, SlotGap};
 
 use crate::trace::path::Replay;
 
@@ -47,8 +49,13 @@ pub struct LinkConfig {
     pub order: Order,
     /// Packets that overtake on purpose.
     pub reorder: Option<Reorder>,
+    /// Times at which packets leave in batches.
+    pub slot: Option<Slot>,
     /// Loss on the way.
     pub loss: Loss,
+    /// What `loss` or `CoDel` would drop is marked instead if its sender understands that
+    /// ([`crate::PacketMeta::ecn_capable`]).
+    pub ecn: bool,
     /// Times at which everything is lost, at most [`STEPS_MAX`].
     pub outages: Vec<Outage>,
     /// Packets of which a second one leaves.
@@ -65,6 +72,8 @@ pub struct LinkConfig {
     pub limit: u32,
     /// A recorded path that stands in the place of `delay` and `loss`.
     pub replay: Option<Replay>,
+    /// The seed of this link's draws, in the place of the one that the link is made with.
+    pub seed: Option<u64>,
     /// What changes as time goes by.
     pub profile: Profile,
 }
@@ -85,7 +94,9 @@ impl Default for LinkConfig {
             correlation: Correlation::default(),
             order: Order::default(),
             reorder: None,
+            slot: None,
             loss: Loss::default(),
+            ecn: false,
             outages: Vec::new(),
             duplicate: Chance::default(),
             corrupt: Chance::default(),
@@ -94,6 +105,7 @@ impl Default for LinkConfig {
             queue: Queue::default(),
             limit: LIMIT_DEFAULT,
             replay: None,
+            seed: None,
             profile: Profile::default(),
         }
     }
@@ -106,6 +118,7 @@ impl LinkConfig {
     #[must_use]
     pub fn is_transparent(&self) -> bool {
         self.delay.is_zero()
+            && self.slot.is_none()
             && self.loss.never()
             && self.outages.is_empty()
             && self.duplicate.probability == Probability::ZERO
@@ -124,6 +137,8 @@ impl LinkConfig {
             Some(replay) => replay.path.span(),
             None => self.delay.span(),
         };
+        let turn = self.slot.as_ref().map_or(Duration::ZERO, |s| s.gap(0.995));
+        let own = own.saturating_add(turn);
         let later = self.profile.steps.iter();
         later
             .map(|step| step.settings.jitter_span())

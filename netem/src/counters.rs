@@ -97,6 +97,8 @@ pub struct LinkCounters {
     pub delivered: Tally,
     /// Those among them with a bit turned over.
     pub corrupted: Tally,
+    /// Those among them marked as having met congestion.
+    pub marked: Tally,
     /// Packets and copies that the link dropped.
     pub dropped: Drops,
 }

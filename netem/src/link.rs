@@ -21,6 +21,7 @@ mod codel;
 mod correlated;
 mod fate;
 mod losing;
+mod slots;
 mod stages;
 mod streams;
 mod timeline;
@@ -81,6 +82,8 @@ pub struct PacketMeta {
     pub bytes: usize,
     /// Packets offered earlier that have not left yet; whoever holds them counts them.
     pub in_flight: usize,
+    /// Whether its sender takes a mark for a loss (ECN, RFC 3168).
+    pub ecn_capable: bool,
 }
 
 /// One direction of an emulated path. A pure function of its settings, its seed and its offers.
@@ -96,13 +99,15 @@ pub struct Link {
 }
 
 impl Link {
-    /// A link with these settings. The draws depend on `seed` and `id` alone. Its time begins at
+    /// A link with these settings. The draws depend on the seed (`seed`, or that of the settings if they have
+    /// one) and `id` alone. Its time begins at
     /// [`Time::ZERO`]; see [`Self::set_origin`].
     ///
     /// # Errors
     /// A setting out of its range.
     pub fn try_new(config: LinkConfig, seed: u64, id: LinkId) -> Result<Self, ConfigError> {
         config.check()?;
+        let seed = config.seed.unwrap_or(seed);
         let timeline = Timeline::new(&config);
         let mut stages = Stages::new(seed, id);
         stages.prepare(timeline.settings());
@@ -137,6 +142,7 @@ impl Link {
             elapsed,
             bytes: meta.bytes,
             in_flight: meta.in_flight,
+            ecn_capable: meta.ecn_capable,
         };
         self.offers = self.offers.saturating_add(1);
         let (itself, copy) = self.stages.pass(config, passing, &draws);
@@ -160,6 +166,9 @@ impl Link {
                     if departure.corrupted_bit.is_some() {
                         self.counters.corrupted.count(bytes);
                     }
+                    if departure.marked {
+                        self.counters.marked.count(bytes);
+                    }
                 }
                 Err(cause) => self.counters.dropped.count(cause, bytes),
             }
@@ -167,6 +176,7 @@ impl Link {
         let delivery = |departure: Departure| Delivery {
             due: self.origin + departure.after,
             corrupted_bit: departure.corrupted_bit,
+            marked: departure.marked,
         };
         let copy = copy.and_then(Result::ok).map(delivery);
         match (itself.map(delivery), copy) {
@@ -179,7 +189,8 @@ impl Link {
 
     /// Takes new settings for the packets offered from now on. Packets in flight keep their times, the
     /// counters and the random streams go on, and under [`crate::Order::Fifo`] no packet overtakes an
-    /// earlier one, not even one of the old settings. Time is still counted from the origin.
+    /// earlier one, not even one of the old settings. Time is still counted from the origin, and a seed
+    /// among the new settings changes nothing.
     ///
     /// # Errors
     /// A setting out of its range; the old settings stay.
@@ -224,6 +235,7 @@ impl Link {
 struct Departure {
     after: Duration,
     corrupted_bit: Option<u64>,
+    marked: bool,
 }
 
 #[cfg(test)]

@@ -44,6 +44,8 @@ pub struct Released<T> {
     /// The bit that was turned over on the way: whoever knows the bytes of the payload turns it
     /// ([`crate::link::turn_bit`]), or treats the packet as its checksum would.
     pub corrupted_bit: Option<u64>,
+    /// Whether it met congestion on the way and is to be marked so, instead of having been lost.
+    pub marked: bool,
     /// What it carries.
     pub payload: T,
 }
@@ -65,9 +67,15 @@ impl<T: Clone> Pipe<T> {
     /// Offers a packet at `now`. Take out what is due first ([`Self::pop_due`]): what is still in the
     /// pipe counts against the limit.
     pub fn push(&mut self, now: Time, bytes: usize, payload: T) -> Fate {
+        self.push_ecn(now, bytes, false, payload)
+    }
+
+    /// Offers a packet as [`Self::push`] does, and says whether its sender takes a mark for a loss.
+    pub fn push_ecn(&mut self, now: Time, bytes: usize, ecn_capable: bool, payload: T) -> Fate {
         let meta = PacketMeta {
             bytes,
             in_flight: self.in_flight.len(),
+            ecn_capable,
         };
         let number = self.offers;
         self.offers = self.offers.saturating_add(1);
@@ -80,6 +88,7 @@ impl<T: Clone> Pipe<T> {
                 bytes,
                 copy,
                 corrupted_bit: delivery.corrupted_bit,
+                marked: delivery.marked,
                 payload,
             };
             for copy in deliveries.copies() {

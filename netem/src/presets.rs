@@ -24,7 +24,7 @@ pub const PRESETS: [Preset; 10] = [
     },
     Preset {
         name: "wifi",
-        words: "delay cdf 1ms@0%,3ms@50%,20ms@90%,250ms@99%,300ms@100% tau 100ms loss burst 0.1% 20ms",
+        words: "delay cdf 1ms@0%,3ms@50%,20ms@90%,250ms@99%,300ms@100% tau 1s loss burst 0.1% 20ms",
         source: "median 3 ms, p90 20 ms, p99 250 ms: Sui et al., MobiSys 2016; ends, time constant and loss: our choice",
     },
     Preset {
@@ -49,7 +49,7 @@ pub const PRESETS: [Preset; 10] = [
     },
     Preset {
         name: "starlink",
-        words: "delay cdf 10ms@0%,20ms@25%,25ms@50%,30ms@75%,60ms@100% tau 1s loss burst 0.5% 50ms outage 15s for 100ms every 15s",
+        words: "delay cdf 10ms@0%,20ms@25%,25ms@50%,30ms@75%,60ms@100% tau 1s loss burst 0.5% 50ms outage 7500ms for 100ms every 15s",
         source: "half of round trips of 20 (least), 40, 50 and 60 ms (quartiles): Michel et al., IMC 2022; a change every 15 s: Mohan et al., WWW 2024; its 100 ms, the loss and the tail: our choice",
     },
     Preset {

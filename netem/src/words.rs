@@ -1,7 +1,7 @@
 //! The words in which people write a link down: those of `tc netem`, and some of our own beside them.
 //!
-//! The arithmetic behind the words is our own; `docs/netem.md` says where it differs from tc's. A word
-//! that tc knows and this crate does not is an error of its own, never ignored. No file is read here:
+//! The arithmetic behind the words is our own; `docs/netem.md` says where it differs from tc's. What tc
+//! knows and this crate does not is an error of its own, never ignored. No file is read here:
 //! whoever may read files hands over a function that does.
 
 use std::iter::Peekable;
@@ -23,18 +23,8 @@ use crate::config::{LinkConfig, Profile, STEPS_MAX, Step};
 use number::time;
 use said::Said;
 
-/// What tc knows and this crate does not, by its first word.
-const NOT_YET: [(&str, &str); 3] = [
-    ("slot", "slots"),
-    ("ecn", "marking instead of dropping"),
-    (
-        "seed",
-        "a seed among the words (it is an option of its own)",
-    ),
-];
-
 const A_WORD: &str = "delay, loss, outage, order, reorder, duplicate, corrupt, mtu, rate, queue, codel, \
-                      limit, trace, preset or none";
+                      slot, ecn, limit, trace, seed, preset or none";
 
 /// Reads the text of a file by the name that the words give it, or says why not.
 pub type ReadFile<'a> = dyn FnMut(&str) -> Result<String, String> + 'a;
@@ -167,6 +157,9 @@ impl<'a, 'r> Parser<'a, 'r> {
             false => Duration::ZERO,
         };
         let settings = self.settings()?;
+        if settings.seed.is_some() {
+            return Err(word.expected("steps without a seed: the first settings have it"));
+        }
         profile.steps.push(Step { at, ramp, settings });
         Ok(())
     }

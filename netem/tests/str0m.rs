@@ -49,6 +49,7 @@ fn ours(words: &str) -> Vec<Option<f64>> {
         let meta = PacketMeta {
             bytes: BYTES,
             in_flight: 0,
+            ecn_capable: false,
         };
         let due = link.offer(now, meta).due();
         due.map(|due| due.saturating_since(now).as_secs_f64() * 1e3)
@@ -154,6 +155,7 @@ fn packets_at_a_rate_are_equally_far_apart() {
     let meta = PacketMeta {
         bytes: BYTES,
         in_flight: 0,
+        ecn_capable: false,
     };
     let ours: Vec<Duration> = (0..10)
         .filter_map(|_| link.offer(Time::ZERO, meta).due())

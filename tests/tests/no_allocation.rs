@@ -364,6 +364,7 @@ fn an_emulated_link_decides_without_allocating() {
                 let meta = mmt_netem::PacketMeta {
                     bytes: 100,
                     in_flight: 0,
+                    ecn_capable: false,
                 };
                 black_box(link.offer(Time::from_millis(packet), meta));
             }

@@ -20,6 +20,7 @@ pub(super) const DEMO: &str = "\
 Examples:
   mmt demo
   mmt demo --duration 60s --netem \"delay 200ms 20ms distribution normal loss 5%\"
+  mmt demo --netem-up \"preset 5g-up\" --netem-down \"preset 5g-down\" --netem-record run.csv
   mmt demo --mode paper --scheme \"hybrid 10% 150ms\"
   mmt demo --json > report.json
 
@@ -52,18 +53,33 @@ object's west face. Quotes around the pairing string keep the shell from ending 
 /// Examples of `mmt netem`.
 pub(super) const NETEM: &str = "\
 Examples:
-  mmt netem --listen 0.0.0.0:4434 --to 192.0.2.1:4433 --up \"delay 50ms\" --down \"delay 50ms loss 1%\"
-  mmt netem --listen 127.0.0.1:0 --to localhost:4433 --up \"delay 80ms 10ms distribution normal\" --json
-  mmt netem --listen [::]:4434 --to 192.0.2.1:4433 --up \"preset 5g-up\" --down \"preset 5g-down\" --record run.csv
+  mmt netem --listen 0.0.0.0:4434 --to 192.0.2.1:4433 --up \"delay 50ms 5ms\" --down \"loss 1%\"
+  mmt netem --listen [::]:4434 --to 192.0.2.1:4433 --up \"preset 5g-up\" --record run.csv
+  mmt netem --listen 127.0.0.1:0 --to localhost:4433 --down \"delay 80ms order free\" --json
   mmt netem report run.csv
 
-Masters use the slave's pairing string with the relay's address in it.
-Words, those of tc netem and more: delay TIME [JITTER [PERCENT | tau TIME] [distribution SHAPE]],
-loss PERCENT, loss gemodel …, loss burst PERCENT TIME, outage TIME for TIME, reorder, duplicate, corrupt,
-mtu BYTES, rate RATE, queue LIMIT, codel, order free, limit PACKETS, trace FILE [up|down], preset NAME,
-none; \"; at TIME [over TIME] WORDS; loop TIME\" for what changes.
-Presets: lan, wifi, 4g, 5g, 5g-up, 5g-down, starlink, geo, transatlantic, paper.
-stdout: the address that the relay listens on, alone on the first line; at the end the counters.";
+Masters use the slave's pairing string with the relay's address in it. Other UDP goes through, too.
+
+The words of tc netem and more, in any order:
+  delay TIME [JITTER [PERCENT | tau TIME] [distribution SHAPE]]
+      SHAPE: uniform, normal, lognormal, gamma, pareto, paretonormal, table FILE
+  delay cdf FILE [tau TIME]             a measured distribution
+  order free, reorder PERCENT [gap N]   jitter keeps the order unless told otherwise
+  slot TIME [TIME] [packets N]          packets leave in batches
+  loss PERCENT, loss burst PERCENT TIME, loss gemodel P [R [1-H [1-K]]],
+  loss state P13 [P31 [P32 [P23 [P14]]]], loss every N, loss list 3,17,100-120
+  ecn                                   mark instead of losing what says that it understands
+  outage TIME for TIME [every TIME]
+  duplicate PERCENT, corrupt PERCENT, mtu BYTES, limit PACKETS
+  rate RATE [OVERHEAD], rate trace FILE, queue 64kb 50p 20ms, codel [TARGET INTERVAL]
+  trace FILE [up | down]                a recorded path: irtt, ping -D, LENS, a record of mmt
+  preset NAME                           lan, wifi, 4g, 5g, 5g-up, 5g-down, starlink, geo,
+                                        transatlantic, paper
+  ; at TIME [over TIME] WORDS           these settings from then on; over: step by step
+  ; loop TIME                           and again
+
+stderr: what the words will really do. stdout: the address that the relay listens on, alone on the
+first line; at the end the counters.";
 
 /// Examples of `mmt replay`.
 pub(super) const REPLAY: &str = "\

@@ -69,6 +69,12 @@ impl LinkConfig {
             "the time constant of jitter",
             "1 ms to 1 h",
         )?;
+        let slot = self.slot.as_ref().is_none_or(super::Slot::in_range);
+        holds(
+            slot,
+            "a slot",
+            "of gaps up to 1 h, the first no longer than the second, for 1 packet or byte at least",
+        )?;
         let gap = self.reorder.is_none_or(|reorder| reorder.gap > 0);
         holds(gap, "the gap of reordering", "at least 1 packet")
     }
@@ -138,6 +144,11 @@ impl LinkConfig {
                 step.settings.profile.is_empty(),
                 "a step of a profile",
                 "without steps of its own",
+            )?;
+            holds(
+                step.settings.seed.is_none(),
+                "a step of a profile",
+                "without a seed of its own",
             )?;
             step.settings.check()?;
             free_from = step.at.saturating_add(step.ramp);

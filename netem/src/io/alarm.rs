@@ -1,28 +1,20 @@
-//! The clock of the drivers, and waiting for a deadline or a call, whichever comes first.
+//! The clock of the drivers, and waiting for a deadline or a call, whichever comes first. It must never
+//! spin.
 
 use std::io;
-use std::num::NonZeroU64;
 use std::os::fd::{AsFd, OwnedFd};
 use std::sync::Arc;
 use std::task::Wake;
 
+use mmt_shared::io::clock::Clock;
 use mmt_shared::time::Time;
 use rustix::event::{EventfdFlags, PollFd, PollFlags, Timespec, eventfd, poll};
-use rustix::time::{ClockId, clock_gettime};
 
 /// The time of `CLOCK_MONOTONIC`, which is the clock of every `Time` in the drivers.
 #[must_use]
 pub fn now() -> Time {
-    let time = clock_gettime(ClockId::Monotonic);
-    let seconds = u64::try_from(time.tv_sec).unwrap_or(0);
-    let nanos = u64::try_from(time.tv_nsec).unwrap_or(0);
-    Time::from_nanos(seconds.saturating_mul(1_000_000_000).saturating_add(nanos))
-}
-
-/// Asks the kernel to wake the calling thread at its deadlines instead of up to 50 us after them.
-pub(crate) fn sharpen_deadlines() {
-    // Refused nowhere that matters; the lateness histogram would show it.
-    let _ = rustix::thread::set_current_timer_slack(NonZeroU64::new(1));
+    const CLOCK: Clock = Clock::since_boot();
+    CLOCK.now()
 }
 
 /// Waits until one of `fds` is ready or the deadline has passed. May return early.

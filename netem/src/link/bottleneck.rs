@@ -44,14 +44,16 @@ impl Bottleneck {
         self.waiting.len()
     }
 
-    /// When the packet that arrives at `now` leaves the bottleneck, or why it does not.
+    /// When the packet that arrives at `now` leaves the bottleneck, or why it does not; also whether `CoDel`
+    /// marks it, which it does instead of dropping if `spared`.
     pub(super) fn pass(
         &mut self,
         rate: &Rate,
         queue: &Queue,
         now: Duration,
         bytes: usize,
-    ) -> Result<Duration, DropCause> {
+        spared: bool,
+    ) -> Result<(Duration, bool), DropCause> {
         self.forget(now);
         let weight = rate.framing.weight(bytes);
         let idle = self.free_at <= now;
@@ -60,17 +62,20 @@ impl Bottleneck {
         if self.is_full(queue, weight, wait) {
             return Err(DropCause::Queue);
         }
+        let mut marked = false;
         if let Some(codel) = queue.codel {
             let target = codel.target.max(sending_time(&rate.service, MTU_BYTES));
             let interval = codel.interval;
-            if self.codel.drops(target, interval, begins, wait, idle) {
+            let hit = self.codel.drops(target, interval, begins, wait, idle);
+            if hit && !spared {
                 self.wait(begins, weight);
                 return Err(DropCause::Codel);
             }
+            marked = hit;
         }
         let gone = self.send(&rate.service, begins, weight);
         self.wait(gone, weight);
-        Ok(gone)
+        Ok((gone, marked))
     }
 
     fn forget(&mut self, now: Duration) {

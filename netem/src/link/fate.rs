@@ -77,6 +77,8 @@ pub struct Delivery {
     pub due: Time,
     /// The bit of the packet that is turned over on the way, from 0; whoever holds the packet turns it.
     pub corrupted_bit: Option<u64>,
+    /// Whether it is marked as having met congestion (RFC 3168); whoever holds the packet marks it.
+    pub marked: bool,
 }
 
 impl Delivery {
@@ -86,6 +88,7 @@ impl Delivery {
         Self {
             due,
             corrupted_bit: None,
+            marked: false,
         }
     }
 }

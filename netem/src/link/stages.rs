@@ -8,6 +8,7 @@ use super::bottleneck::Bottleneck;
 use super::correlated::{ByPacket, InTime};
 use super::fate::DropCause;
 use super::losing::{Losing, Verdict};
+use super::slots::Slots;
 use super::streams::{Draws, substream};
 use super::{Departure, LinkId};
 use crate::config::{Correlation, LinkConfig, Order, Reorder};
@@ -19,6 +20,7 @@ pub(super) struct Passing {
     pub(super) elapsed: Duration,
     pub(super) bytes: usize,
     pub(super) in_flight: usize,
+    pub(super) ecn_capable: bool,
 }
 
 /// The states of the stages.
@@ -32,6 +34,7 @@ pub(super) struct Stages {
     jitter_in_time: InTime,
     reordering: ByPacket,
     since_overtaking: u32,
+    slots: Slots,
     /// The latest departure promised so far.
     latest: Duration,
 }
@@ -50,6 +53,7 @@ impl Stages {
             jitter_in_time: InTime::new(stream("netem/up/jitter", "netem/down/jitter")),
             reordering: ByPacket::default(),
             since_overtaking: 0,
+            slots: Slots::new(stream("netem/up/slot", "netem/down/slot")),
             latest: Duration::ZERO,
         }
     }
@@ -116,7 +120,11 @@ impl Stages {
         if config.outages.iter().any(out) {
             return Err(DropCause::Outage);
         }
-        if verdict.draw < verdict.probability || replayed == Some(None) {
+        let (hit, spared) = (
+            verdict.draw < verdict.probability,
+            config.ecn && packet.ecn_capable,
+        );
+        if (hit && !spared) || replayed == Some(None) {
             return Err(DropCause::Loss);
         }
         if packet.in_flight >= config.limit as usize {
@@ -125,20 +133,26 @@ impl Stages {
         let corrupt = self.corrupting.happens(config.corrupt, draws.corrupt) && packet.bytes > 0;
         let corrupted_bit =
             corrupt.then_some((draws.corrupted_bit * packet.bytes as f64 * 8.0) as u64);
-        let sent = match &config.rate {
-            None => packet.elapsed,
+        let (sent, queue_marks) = match &config.rate {
+            None => (packet.elapsed, false),
             Some(rate) => {
+                let (now, bytes) = (packet.elapsed, packet.bytes);
                 self.bottleneck
-                    .pass(rate, &config.queue, packet.elapsed, packet.bytes)?
+                    .pass(rate, &config.queue, now, bytes, spared)?
             }
         };
         let after = match replayed.flatten() {
             Some(delay) => self.in_order(config.order, sent.saturating_add(delay)),
             None => self.propagate(config, sent, draws),
         };
+        let after = match &config.slot {
+            Some(slot) => self.slots.leave(slot, after, packet.bytes),
+            None => after,
+        };
         Ok(Departure {
             after,
             corrupted_bit,
+            marked: hit || queue_marks,
         })
     }
 

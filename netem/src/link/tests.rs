@@ -12,6 +12,7 @@ mod losses;
 mod order;
 mod over_time;
 mod same_network;
+mod tc_words;
 
 const N: u64 = 100_000;
 const MS: Duration = Duration::from_millis(1);
@@ -107,6 +108,7 @@ fn a_packet_takes_one_draw_of_each_feature_whatever_the_settings() {
             let meta = PacketMeta {
                 bytes: 100,
                 in_flight: 1,
+                ecn_capable: false,
             };
             let fate = link.offer(Time::from_millis(packet), meta);
             assert!(
@@ -291,6 +293,7 @@ fn every_packet_is_counted_once() {
         let meta = PacketMeta {
             bytes: packet,
             in_flight: packet % 5,
+            ecn_capable: false,
         };
         link.offer(Time::from_millis(packet as u64), meta);
     }
@@ -311,6 +314,7 @@ fn the_ends_of_time_do_not_panic() {
         let meta = PacketMeta {
             bytes: usize::MAX,
             in_flight: 0,
+            ecn_capable: false,
         };
         link.offer(now, meta);
         link.offer(now, meta);

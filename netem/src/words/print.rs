@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use crate::config::{
     Chance, Codel, Correlation, Delay, LIMIT_DEFAULT, LinkConfig, Loss, Order, Outage, Probability,
-    Profile, Queue, Rate, Service,
+    Profile, Queue, Rate, Service, Slot, SlotGap,
 };
 use crate::distribution::Cdf;
 use crate::trace::path::Replay;
@@ -38,7 +38,9 @@ impl LinkConfig {
         };
         let mut sentences = vec![
             (self.delay != Delay::default()).then(|| delay(&self.delay, self.correlation)),
+            self.slot.as_ref().map(slot),
             loss(&self.loss),
+            self.ecn.then(|| "ecn".to_owned()),
             self.replay.as_ref().map(replay),
         ];
         sentences.extend(self.outages.iter().map(|outage| Some(outage_words(outage))));
@@ -53,6 +55,7 @@ impl LinkConfig {
             queue(&self.queue),
             self.queue.codel.map(codel),
             (self.limit != LIMIT_DEFAULT).then(|| format!("limit {}", self.limit)),
+            self.seed.map(|seed| format!("seed {seed}")),
         ]);
         sentences
     }
@@ -82,16 +85,44 @@ fn delay(delay: &Delay, correlation: Correlation) -> String {
     let mean = Exact(mean);
     let shape = match delay {
         Delay::Constant { .. } => return format!("delay {mean}"),
-        Delay::Uniform { .. } | Delay::Empirical(_) => String::new(),
-        Delay::Normal { .. } => " distribution normal".to_owned(),
-        Delay::Pareto { .. } => " distribution pareto".to_owned(),
-        Delay::ParetoNormal { .. } => " distribution paretonormal".to_owned(),
-        Delay::LogNormal { .. } => " distribution lognormal".to_owned(),
-        Delay::Gamma { .. } => " distribution gamma".to_owned(),
-        Delay::Table { table, .. } => format!(" distribution table {}", table.name()),
+        Delay::Uniform { .. } => String::new(),
+        other => format!(" distribution {}", shape(other)),
     };
     let correlated = correlated(correlation);
     format!("delay {mean} {}{correlated}{shape}", Exact(jitter))
+}
+
+/// The name of a distribution.
+fn shape(delay: &Delay) -> String {
+    let name = match delay {
+        Delay::Constant { .. } | Delay::Uniform { .. } | Delay::Empirical(_) => "uniform",
+        Delay::Normal { .. } => "normal",
+        Delay::Pareto { .. } => "pareto",
+        Delay::ParetoNormal { .. } => "paretonormal",
+        Delay::LogNormal { .. } => "lognormal",
+        Delay::Gamma { .. } => "gamma",
+        Delay::Table { table, .. } => return format!("table {}", table.name()),
+    };
+    name.to_owned()
+}
+
+fn slot(slot: &Slot) -> String {
+    let mut words = match &slot.gap {
+        SlotGap::Uniform { least, most } if least == most => format!("slot {}", Exact(*least)),
+        SlotGap::Uniform { least, most } => format!("slot {} {}", Exact(*least), Exact(*most)),
+        SlotGap::Drawn(gap) => {
+            let (mean, jitter) = gap.parts();
+            let (mean, jitter) = (Exact(mean), Exact(jitter));
+            format!("slot distribution {} {mean} {jitter}", shape(gap))
+        }
+    };
+    if let Some(packets) = slot.packets {
+        words.push_str(&format!(" packets {packets}"));
+    }
+    if let Some(bytes) = slot.bytes {
+        words.push_str(&format!(" bytes {bytes}"));
+    }
+    words
 }
 
 fn correlated(correlation: Correlation) -> String {

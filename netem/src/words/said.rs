@@ -5,7 +5,8 @@ use std::time::Duration;
 
 use super::{ParseError, Reason, Word};
 use crate::config::{
-    Chance, Codel, Correlation, Delay, LinkConfig, Loss, Order, Outage, Queue, Rate, Reorder,
+    Chance, Codel, Correlation, Delay, LinkConfig, Loss, Order, Outage, Probability, Queue, Rate,
+    Reorder, Slot,
 };
 use crate::distribution::{Cdf, Table};
 use crate::trace::path::Replay;
@@ -28,6 +29,25 @@ pub(super) enum Shape {
     Table(Table),
 }
 
+impl Shape {
+    /// The distribution of this shape.
+    pub(super) fn delay(self, mean: Duration, jitter: Duration) -> Delay {
+        let (sigma, scale, half_width) = (jitter, jitter, jitter);
+        match self {
+            Self::Uniform => Delay::Uniform { mean, half_width },
+            Self::Normal => Delay::Normal { mean, sigma },
+            Self::Pareto => Delay::Pareto { mean, scale },
+            Self::ParetoNormal => Delay::ParetoNormal { mean, scale },
+            Self::LogNormal => Delay::LogNormal { mean, sigma },
+            Self::Gamma => Delay::Gamma { mean, sigma },
+            Self::Table(table) => {
+                let table = Arc::new(table);
+                Delay::Table { mean, scale, table }
+            }
+        }
+    }
+}
+
 /// What has been said, with the word that said it where it may turn out to be out of place.
 #[derive(Default)]
 pub(super) struct Said<'a> {
@@ -40,7 +60,10 @@ pub(super) struct Said<'a> {
     pub(super) order: Option<Order>,
     pub(super) reorder: Option<(Word<'a>, Chance)>,
     pub(super) gap: Option<(Word<'a>, u32)>,
+    pub(super) slot: Option<Slot>,
     pub(super) loss: Option<(Word<'a>, Loss)>,
+    pub(super) ecn: Option<Word<'a>>,
+    pub(super) seed: Option<(Word<'a>, u64)>,
     pub(super) outages: Vec<Outage>,
     pub(super) duplicate: Option<Chance>,
     pub(super) corrupt: Option<Chance>,
@@ -73,6 +96,7 @@ impl Said<'_> {
             config.correlation = self.correlation.unwrap_or_default();
         }
         self.finish_order(&mut config)?;
+        config.slot = self.slot.take().or(config.slot);
         if let Some((_, loss)) = self.loss {
             config.loss = loss;
         }
@@ -87,6 +111,7 @@ impl Said<'_> {
         config.corrupt = self.corrupt.unwrap_or(config.corrupt);
         config.mtu = self.mtu.or(config.mtu);
         config.rate = self.rate.or(config.rate);
+        config.seed = self.seed.map(|(_, seed)| seed);
         config.limit = self.limit.unwrap_or(config.limit);
         if let Some((word, queue)) = self.queue {
             with_rate(word, &config)?;
@@ -95,6 +120,12 @@ impl Said<'_> {
         if let Some((word, codel)) = self.codel {
             with_rate(word, &config)?;
             config.queue.codel = Some(codel);
+        }
+        if let Some(word) = self.ecn {
+            if config.loss == Loss::None && config.queue.codel.is_none() {
+                return Err(word.expected("loss or codel beside it: nothing else marks"));
+            }
+            config.ecn = true;
         }
         Ok(config)
     }
@@ -114,35 +145,27 @@ impl Said<'_> {
             }
             (None, None) => return Ok(None),
         };
-        let (sigma, scale, half_width) = (jitter, jitter, jitter);
-        Ok(Some(match shape.map(|(_, shape)| shape) {
-            None | Some(Shape::Uniform) => Delay::Uniform { mean, half_width },
-            Some(Shape::Normal) => Delay::Normal { mean, sigma },
-            Some(Shape::Pareto) => Delay::Pareto { mean, scale },
-            Some(Shape::ParetoNormal) => Delay::ParetoNormal { mean, scale },
-            Some(Shape::LogNormal) => Delay::LogNormal { mean, sigma },
-            Some(Shape::Gamma) => Delay::Gamma { mean, sigma },
-            Some(Shape::Table(table)) => {
-                let table = Arc::new(table);
-                Delay::Table { mean, scale, table }
-            }
-        }))
+        let shape = shape.map_or(Shape::Uniform, |(_, shape)| shape);
+        Ok(Some(shape.delay(mean, jitter)))
     }
 
     fn finish_order(&mut self, config: &mut LinkConfig) -> Result<(), ParseError> {
         config.order = self.order.unwrap_or(config.order);
-        match (self.reorder, self.gap) {
-            (Some((word, _)), _) if config.delay == Delay::default() => {
-                Err(word.expected("a delay beside it: without one nothing can overtake"))
-            }
-            (Some((_, chance)), gap) => {
-                let gap = gap.map_or(1, |(_, gap)| gap);
-                config.reorder = Some(Reorder { chance, gap });
-                Ok(())
-            }
-            (None, Some((word, _))) => Err(word.expected("reorder beside a gap")),
-            (None, None) => Ok(()),
+        // a gap alone: every candidate overtakes, as in tc
+        let certain = Chance {
+            probability: Probability::ONE,
+            correlation: Probability::ZERO,
+        };
+        let alone = self.gap.map(|(word, _)| (word, certain));
+        let Some((word, chance)) = self.reorder.or(alone) else {
+            return Ok(());
+        };
+        if config.delay == Delay::default() {
+            return Err(word.expected("a delay beside it: without one nothing can overtake"));
         }
+        let gap = self.gap.map_or(1, |(_, gap)| gap);
+        config.reorder = Some(Reorder { chance, gap });
+        Ok(())
     }
 }
 

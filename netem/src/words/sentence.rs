@@ -6,10 +6,10 @@ use super::number::{
     QueueLimit, bits_per_second, percentage, queue_limit, signed_bytes, time, time_from, whole,
 };
 use super::said::{DelaySaid, Said, Shape, once};
-use super::{A_WORD, NOT_YET, ParseError, Parser, Reason, Word};
+use super::{A_WORD, ParseError, Parser, Reason, Word};
 use crate::config::{
     Chance, Codel, Correlation, Framing, LIMIT_MAX, Order, Probability, Queue, Rate, STEPS_MAX,
-    Service, TAU_MIN,
+    Service, Slot, SlotGap, TAU_MIN,
 };
 use crate::distribution::{Cdf, Table};
 use crate::link::Direction;
@@ -99,13 +99,16 @@ impl<'a> Parser<'a, '_> {
                 let replay = self.replay()?;
                 once(&mut said.replay, (word, replay), word)
             }
-            text => {
-                let known = NOT_YET.iter().find(|(name, _)| *name == text);
-                Err(known.map_or_else(
-                    || word.expected(A_WORD),
-                    |(_, feature)| word.not_yet(feature),
-                ))
+            "slot" => {
+                let slot = self.slot()?;
+                once(&mut said.slot, slot, word)
             }
+            "ecn" => once(&mut said.ecn, word, word),
+            "seed" => {
+                let seed = whole(self.argument(), 0, u64::MAX, "of 64 bits")?;
+                once(&mut said.seed, (word, seed), word)
+            }
+            _ => Err(word.expected(A_WORD)),
         }
     }
 
@@ -179,6 +182,39 @@ impl<'a> Parser<'a, '_> {
             "experimental" => Err(word.not_yet("a table by name (`distribution table FILE`)")),
             _ => Err(word
                 .expected("uniform, normal, pareto, paretonormal, lognormal, gamma or table FILE")),
+        }
+    }
+
+    fn slot(&mut self) -> Result<Slot, ParseError> {
+        let gap = match self.takes("distribution") {
+            true => {
+                let shape = self.shape()?;
+                let (mean, jitter) = (time(self.argument())?, time(self.argument())?);
+                SlotGap::Drawn(shape.delay(mean, jitter))
+            }
+            false => {
+                let least = time(self.argument())?;
+                let most = match self.number() {
+                    Some(word) => time_from(word, least)?,
+                    None => least,
+                };
+                SlotGap::Uniform { least, most }
+            }
+        };
+        let (mut packets, mut bytes) = (None, None);
+        loop {
+            if self.takes("packets") {
+                let most = whole(self.argument(), 1, u32::MAX.into(), "packets")?;
+                packets = Some(u32::try_from(most).unwrap_or(u32::MAX));
+            } else if self.takes("bytes") {
+                bytes = Some(whole(self.argument(), 1, u64::MAX, "bytes")?);
+            } else {
+                return Ok(Slot {
+                    gap,
+                    packets,
+                    bytes,
+                });
+            }
         }
     }
 

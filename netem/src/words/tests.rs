@@ -8,7 +8,7 @@ use super::*;
 use crate::config::{
     Chance, Codel, ConfigError, Correlation, Delay, Framing, GilbertElliott, LIMIT_DEFAULT,
     LIMIT_MAX, Loss, Order, Outage, PacketList, Probability, Queue, RATE_MAX_BIT_S, Rate, Reorder,
-    Service, TimedBursts,
+    Service, Slot, SlotGap, TimedBursts,
 };
 use crate::distribution::Cdf;
 
@@ -76,13 +76,65 @@ fn a_bare_number_is_refused_because_tc_itself_reads_it_in_two_ways() {
     assert_eq!(parsed("delay 0").delay, Delay::default());
 }
 
+/// The examples of the manual page tc-netem(8), and a sentence for each of its synopsis.
+#[test]
+fn what_the_manual_of_tc_shows_is_taken_as_it_stands() {
+    for (text, printed) in [
+        ("delay 100ms", "delay 100ms"),
+        ("latency 100ms 10ms", "delay 100ms 10ms"),
+        ("delay 100ms 10ms 25%", "delay 100ms 10ms 25%"),
+        (
+            "delay 100ms 20ms distribution normal",
+            "delay 100ms 20ms distribution normal",
+        ),
+        ("loss 0.1%", "loss 0.1%"),
+        ("loss random 0.3% 25%", "loss 0.3% 25%"),
+        ("drop 1% ecn", "loss 1% ecn"),
+        (
+            "loss state 1% 90% 10% 50% 0.1%",
+            "loss state 1% 90% 10% 50% 0.1%",
+        ),
+        (
+            "loss gemodel 1% 10% 70% 0.1%",
+            "loss gemodel 1% 10% 70% 0.1%",
+        ),
+        ("corrupt 0.1% 10%", "corrupt 0.1% 10%"),
+        ("duplicate 1% 5%", "duplicate 1% 5%"),
+        ("gap 5 delay 10ms", "delay 10ms reorder 100% gap 5"),
+        ("delay 10ms reorder 25% 50%", "delay 10ms reorder 25% 50%"),
+        (
+            "delay 10ms reorder 25% 50% gap 5",
+            "delay 10ms reorder 25% 50% gap 5",
+        ),
+        ("rate 5kbit 20 100 5", "rate 5kbit 20 100 5"),
+        ("slot 20ms", "slot 20ms"),
+        (
+            "slot 800us 1ms packets 5 bytes 64000",
+            "slot 800us 1ms packets 5 bytes 64000",
+        ),
+        (
+            "slot distribution normal 4ms 1ms",
+            "slot distribution normal 4ms 1ms",
+        ),
+        (
+            "delay 10ms limit 1000 seed 42",
+            "delay 10ms limit 1000 seed 42",
+        ),
+    ] {
+        assert_eq!(parsed(text).to_string(), printed, "{text}");
+    }
+    // what could not do anything is told
+    assert_eq!(refused("delay 5ms ecn").word, "ecn");
+    assert_eq!(refused("gap 5").word, "gap");
+    assert_eq!(refused("slot 2ms 1ms").word, "1ms");
+    assert_eq!(refused("delay 5ms; at 1s seed 3").word, "1s");
+}
+
 #[test]
 fn what_tc_knows_and_we_do_not_is_named_and_never_ignored() {
     for (text, word) in [
         ("delay 50ms 5ms distribution experimental", "experimental"),
-        ("slot 1ms", "slot"),
-        ("loss 1% ecn", "ecn"),
-        ("seed 3", "seed"),
+        ("slot distribution experimental 1ms 1ms", "experimental"),
     ] {
         let error = refused(text);
         assert_eq!(error.word, word, "{text}");
@@ -135,7 +187,7 @@ fn an_error_tells_the_word_its_column_and_what_was_expected() {
         ),
         ("delay 5ms; loop 3s", 12, "loop", "before a loop"),
         ("reorder 5%", 1, "reorder", "a delay beside it"),
-        ("delay 5ms gap 5", 11, "gap", "reorder beside a gap"),
+        ("gap 5", 1, "gap", "a delay beside it"),
         ("queue 5ms", 1, "queue", "a rate beside it"),
         ("rate 0", 6, "0", "1bit to 1tbit"),
         ("rate 5furlong", 6, "5furlong", "a rate, such as"),
@@ -356,6 +408,24 @@ fn any_rate() -> impl Strategy<Value = (Option<Rate>, Queue)> {
     prop_oneof![Just((None, Queue::default())), rate]
 }
 
+fn any_slot() -> impl Strategy<Value = Slot> {
+    let gap = prop_oneof![
+        (any_time(), any_time()).prop_map(|(a, b)| SlotGap::Uniform {
+            least: a.min(b),
+            most: a.max(b),
+        }),
+        (any_time(), any_time())
+            .prop_map(|(mean, sigma)| { SlotGap::Drawn(Delay::Gamma { mean, sigma }) }),
+    ];
+    let (packets, bytes) = (1..=u32::MAX, 1..=u64::MAX);
+    let most = (prop::option::of(packets), prop::option::of(bytes));
+    (gap, most).prop_map(|(gap, (packets, bytes))| Slot {
+        gap,
+        packets,
+        bytes,
+    })
+}
+
 /// Settings without a profile.
 fn any_settings() -> impl Strategy<Value = LinkConfig> {
     let order = prop_oneof![Just(Order::Fifo), Just(Order::Free)];
@@ -376,7 +446,8 @@ fn any_settings() -> impl Strategy<Value = LinkConfig> {
     let mtu = prop::option::of(1..=u32::MAX);
     let first = (delay, order, reorder, any_loss(), outages);
     let second = (any_chance(), any_chance(), mtu, any_rate(), 1..=LIMIT_MAX);
-    (first, second).prop_map(|(first, second)| {
+    let third = (prop::option::of(any_slot()), any::<bool>());
+    (first, second, third).prop_map(|(first, second, (slot, ecn))| {
         let ((delay, correlation), order, reorder, loss, outages) = first;
         let (duplicate, corrupt, mtu, (rate, queue), limit) = second;
         let movable = delay != Delay::default();
@@ -391,6 +462,8 @@ fn any_settings() -> impl Strategy<Value = LinkConfig> {
             },
             delay,
             order,
+            slot,
+            ecn: ecn && (loss != Loss::None || queue.codel.is_some()),
             loss,
             outages,
             duplicate,
@@ -407,7 +480,8 @@ fn any_settings() -> impl Strategy<Value = LinkConfig> {
 fn any_config() -> impl Strategy<Value = LinkConfig> {
     let step = (1..1000_u32, 0..1000_u32, any_settings());
     let steps = prop::collection::vec(step, 0..3);
-    (any_settings(), steps, any::<bool>()).prop_map(|(config, steps, repeats)| {
+    let seed = prop::option::of(any::<u64>());
+    (any_settings(), steps, any::<bool>(), seed).prop_map(|(config, steps, repeats, seed)| {
         let mut profile = Profile::default();
         let mut free_from = Duration::ZERO;
         for (after, ramp, settings) in steps {
@@ -416,7 +490,11 @@ fn any_config() -> impl Strategy<Value = LinkConfig> {
             profile.steps.push(Step { at, ramp, settings });
         }
         profile.repeat = (repeats && !profile.is_empty()).then(|| free_from + MS);
-        LinkConfig { profile, ..config }
+        LinkConfig {
+            profile,
+            seed,
+            ..config
+        }
     })
 }
 
@@ -452,6 +530,11 @@ fn nearly_words() -> impl Strategy<Value = String> {
             "for",
             "preset",
             "trace",
+            "slot",
+            "packets",
+            "bytes",
+            "ecn",
+            "seed",
             "; at",
             "over",
             "; loop",

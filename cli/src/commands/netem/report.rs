@@ -146,9 +146,22 @@ impl fmt::Display for DirectionReport {
         let bursts = seen.loss_bursts.iter();
         let bursts: Vec<(f64, u64)> = bursts.map(|(length, n)| (*length as f64, *n)).collect();
         bars(f, "  lost in a row", &bursts, 0)?;
+        bars(f, "  in flight at, s", &thinned(&seen.queue), 2)?;
         let most = seen.queue.iter().map(|(_, most)| *most).max();
         writeln!(f, "  most in flight: {} packets", most.unwrap_or(0))
     }
+}
+
+/// The most in flight within each twentieth of the run.
+fn thinned(queue: &[(f64, u32)]) -> Vec<(f64, u64)> {
+    const ROWS: usize = 20;
+    let most = |part: &[(f64, u32)]| {
+        let (at, _) = part.first()?;
+        let most = part.iter().map(|(_, packets)| *packets).max()?;
+        Some((*at, u64::from(most)))
+    };
+    let length = queue.len().div_ceil(ROWS).max(1);
+    queue.chunks(length).filter_map(most).collect()
 }
 
 /// A bar for each row that is not empty, at most 40 rows.

@@ -11,7 +11,7 @@ use super::NetemReport;
 type Count = fn(&DirectionCounters) -> Tally;
 
 /// The rows; those below the first two are left out while they are zero.
-const ROWS: [(&str, Count); 13] = [
+const ROWS: [(&str, Count); 14] = [
     ("offered", |direction| direction.link.offered),
     ("forwarded", |direction| direction.forwarded),
     ("lost on the link", |direction| direction.link.dropped.loss),
@@ -23,6 +23,7 @@ const ROWS: [(&str, Count); 13] = [
     ("dropped by CoDel", |direction| direction.link.dropped.codel),
     ("copies made", |direction| direction.link.duplicated),
     ("corrupted", |direction| direction.link.corrupted),
+    ("marked (ECN)", |direction| direction.link.marked),
     ("over the limit", |direction| direction.link.dropped.limit),
     ("socket full", |direction| direction.blocked),
     ("socket error", |direction| direction.failed),
@@ -84,7 +85,7 @@ impl NetemReport {
         match late.degraded() {
             true => write!(
                 f,
-                "\nthis host was too slow for the emulation: do not trust its delays"
+                "\ndegraded: this host was too slow for the emulation, do not trust its delays"
             ),
             false => Ok(()),
         }

@@ -8,13 +8,14 @@ use std::time::Duration;
 use quinn::udp::{EcnCodepoint, Transmit};
 use rustix::event::{PollFd, PollFlags};
 
+use mmt_shared::io::realtime;
 use mmt_shared::time::Time;
 
 use super::clients::Clients;
 use super::port::{Port, Receiver, Sent};
 use super::{DirectionCounters, RelaySnapshot, Shared};
 use crate::counters::Tally;
-use crate::io::alarm::{now, sharpen_deadlines, wait};
+use crate::io::alarm::{now, wait};
 use crate::io::lateness::Lateness;
 use crate::io::lock;
 use crate::io::log::{Dropped, Log};
@@ -78,7 +79,9 @@ impl Lane {
             contents: received.contents.to_owned(),
             backlog,
         };
-        if let Fate::Drop(cause) = self.pipe.push(now, bytes, parcel) {
+        let capable = parcel.ecn.is_some();
+        let fate = self.pipe.push_ecn(now, bytes, capable, parcel);
+        if let Fate::Drop(cause) = fate {
             let packet = Dropped {
                 number,
                 offered_at: now,
@@ -109,8 +112,11 @@ impl Lane {
     }
 }
 
-/// Turns the bit over that the link says.
+/// Turns the bit over that the link says, and marks what met congestion.
 fn harm(packet: &mut Released<Parcel>) {
+    if packet.marked {
+        packet.payload.ecn = Some(EcnCodepoint::Ce);
+    }
     if let Some(bit) = packet.corrupted_bit {
         turn_bit(&mut packet.payload.contents, bit);
     }
@@ -192,7 +198,8 @@ impl Worker {
     }
 
     pub(super) fn run(mut self) -> io::Result<()> {
-        sharpen_deadlines();
+        // what the host does not grant, the lateness shows
+        let _ = realtime::request();
         while !self.shared.stopping.load(Ordering::Acquire) {
             self.release_due();
             self.obey();

@@ -7,13 +7,15 @@ use std::task::{Context, Poll, Waker};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
+use mmt_shared::io::realtime;
 use mmt_shared::time::Time;
+use quinn::udp::EcnCodepoint;
 use quinn::{AsyncUdpSocket, UdpPoller};
 
 use super::meter::{SocketMeter, Unsent};
 use super::{Datagram, SocketExtras, WrapError};
 use crate::config::{ConfigError, LinkConfig};
-use crate::io::alarm::{Alarm, now, sharpen_deadlines};
+use crate::io::alarm::{Alarm, now};
 use crate::io::lock;
 use crate::io::log::{Dropped, Log};
 use crate::link::{Direction, Fate, LinkId, turn_bit};
@@ -71,9 +73,9 @@ impl Shared {
         let number = queue.pipe.counters().offered.packets;
         // read under the lock: times of offers never go back
         let offered_at = now();
-        let fate = queue
-            .pipe
-            .push(offered_at, bytes, Parcel { datagram, backlog });
+        let capable = datagram.ecn.is_some();
+        let parcel = Parcel { datagram, backlog };
+        let fate = queue.pipe.push_ecn(offered_at, bytes, capable, parcel);
         let sooner = queue.pipe.next_due() != next;
         drop(queue);
         if let Fate::Drop(cause) = fate {
@@ -176,7 +178,8 @@ struct Sender {
 
 impl Sender {
     fn run(mut self) {
-        sharpen_deadlines();
+        // what the host does not grant, the lateness shows
+        let _ = realtime::request();
         loop {
             match self.step() {
                 Step::Send(packet) => self.release(packet),
@@ -202,6 +205,9 @@ impl Sender {
         let shared = self.shared.clone();
         if let Some(bit) = packet.corrupted_bit {
             turn_bit(&mut packet.payload.datagram.contents, bit);
+        }
+        if packet.marked {
+            packet.payload.datagram.ecn = Some(EcnCodepoint::Ce);
         }
         let moment = now();
         shared.meter.recorder().record(packet.due, moment);

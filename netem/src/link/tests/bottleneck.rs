@@ -6,6 +6,7 @@ use crate::LinkConfig;
 const PACKET: PacketMeta = PacketMeta {
     bytes: 1000,
     in_flight: 0,
+    ecn_capable: false,
 };
 
 #[test]
@@ -133,6 +134,7 @@ fn a_mahimahi_trace_sends_1500_bytes_at_each_of_its_times_over_and_over() {
         let meta = PacketMeta {
             bytes,
             in_flight: 0,
+            ecn_capable: false,
         };
         let due = link.offer(Time::from_millis(now_ms), meta).due().unwrap();
         due.as_nanos() / 1_000_000

@@ -129,6 +129,7 @@ fn codel_drops_the_packets_that_the_code_of_the_rfc_drops() {
         let meta = PacketMeta {
             bytes: 1000,
             in_flight: 0,
+            ecn_capable: false,
         };
         let mut dropped = 0;
         for (number, (at, expected)) in arrivals.iter().zip(&expected).enumerate() {

@@ -155,6 +155,7 @@ fn copies_and_turned_bits_have_their_shares_and_their_counts() {
         let meta = PacketMeta {
             bytes: if packet % 10 == 0 { 1001 } else { 1000 },
             in_flight: 0,
+            ecn_capable: false,
         };
         let fate = link.offer(Time::from_millis(packet), meta);
         assert_eq!(packet % 10 == 0, fate == Fate::Drop(DropCause::Mtu));

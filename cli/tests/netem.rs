@@ -1,0 +1,182 @@
+//! Emulated networks from the command line, as processes: recorded, met again, changed, marked as degraded.
+#![allow(
+    clippy::disallowed_methods,
+    clippy::indexing_slicing,
+    clippy::unwrap_used,
+    reason = "a test starts the command, writes files for it, and fails by panicking"
+)]
+
+use std::io::Write;
+use std::net::UdpSocket;
+use std::process::{Command, Output, Stdio};
+use std::time::Duration;
+
+use serde_json::Value;
+
+fn mmt(home: &tempfile::TempDir, arguments: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_mmt"));
+    command
+        .args(arguments)
+        .env("XDG_STATE_HOME", home.path())
+        .env_remove("MMT_LOG")
+        .current_dir(home.path())
+        .stdin(Stdio::null())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped());
+    command
+}
+
+fn document(output: &Output) -> Value {
+    let text = String::from_utf8_lossy(&output.stderr);
+    serde_json::from_slice(&output.stdout).expect(&text)
+}
+
+/// p99 above 250 us or anything above 1 ms, by the numbers that stand beside the mark.
+fn is_marked_rightly(p99_us: &Value, max_us: &Value, degraded: &Value) -> bool {
+    let late = p99_us.as_f64().unwrap() > 250.0 || max_us.as_f64().unwrap() > 1000.0;
+    degraded.as_bool() == Some(late)
+}
+
+#[test]
+fn a_demo_records_what_its_packets_met_and_meets_it_again() {
+    let home = tempfile::tempdir().unwrap();
+    let first = [
+        "demo",
+        "--duration",
+        "2s",
+        "--netem-up",
+        "delay 30ms loss every 10",
+        "--netem-down",
+        "delay 5ms",
+        "--netem-record",
+        "run.bin",
+        "--json",
+    ];
+    let first = document(&mmt(&home, &first).output().unwrap());
+    for side in ["up", "down"] {
+        let emulation = &first["emulation"][side];
+        assert!(emulation["released"].as_u64().unwrap() > 0, "{side}");
+        let late = &emulation["late_us"];
+        let mark = &emulation["degraded"];
+        assert!(
+            is_marked_rightly(&late["p99"], &late["max"], mark),
+            "{emulation}"
+        );
+    }
+
+    let report = document(
+        &mmt(&home, &["netem", "report", "run.bin", "--json"])
+            .output()
+            .unwrap(),
+    );
+    let up = &report["up"];
+    assert_eq!(up["words"], "delay 30ms loss every 10");
+    assert_eq!(report["down"]["words"], "delay 5ms");
+    let offered = up["achieved"]["offered"]["packets"].as_u64().unwrap();
+    assert!(offered > 100, "{offered}");
+    assert_eq!(up["achieved"]["dropped"]["loss"], offered / 10);
+    assert!(up["achieved"]["mean_ms"].as_f64().unwrap() >= 30.0);
+
+    let again = [
+        "demo",
+        "--duration",
+        "2s",
+        "--netem-up",
+        "trace run.bin up",
+        "--netem-down",
+        "trace run.bin down",
+        "--json",
+    ];
+    let again = document(&mmt(&home, &again).output().unwrap());
+    let configuration = &again["configuration"];
+    assert_eq!(configuration["master"]["netem"], "trace run.bin up");
+    assert_eq!(configuration["slave"]["netem"], "trace run.bin down");
+    assert!(again["drops"]["master_netem_loss"].as_u64().unwrap() > 0);
+    assert_eq!(again["drops"]["slave_netem_loss"], 0);
+    assert!(again["link"]["rtt_ms"]["p50"].as_f64().unwrap() >= 35.0);
+}
+
+#[test]
+fn a_demo_at_work_takes_new_networks_from_stdin() {
+    let home = tempfile::tempdir().unwrap();
+    let arguments = [
+        "demo",
+        "--duration",
+        "3s",
+        "--netem",
+        "none",
+        "--netem-control",
+        "--json",
+    ];
+    let mut child = mmt(&home, &arguments)
+        .stdin(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut orders = child.stdin.take().unwrap();
+    // it takes them as soon as it runs, whether or not the session has begun
+    writeln!(orders, "sideways\nrebind\nup loss every 4").unwrap();
+    let output = child.wait_with_output().unwrap();
+    let told = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(told.contains("no order \"sideways\""), "{told}");
+    assert!(told.contains("only the relay"), "{told}");
+    assert!(told.contains("loss 25.000 %"), "{told}");
+    let report = document(&output);
+    assert!(
+        report["drops"]["master_netem_loss"].as_u64().unwrap() > 10,
+        "{told}"
+    );
+    assert_eq!(report["drops"]["slave_netem_loss"], 0);
+    drop(orders);
+}
+
+#[test]
+fn a_relay_carries_any_protocol_and_says_whether_it_was_in_time() {
+    let home = tempfile::tempdir().unwrap();
+    let target = UdpSocket::bind("127.0.0.1:0").unwrap();
+    target
+        .set_read_timeout(Some(Duration::from_secs(30)))
+        .unwrap();
+    let to = target.local_addr().unwrap().to_string();
+    // a free port: bound once, so that the relay can be told of it before it listens
+    let listen = UdpSocket::bind("127.0.0.1:0")
+        .unwrap()
+        .local_addr()
+        .unwrap();
+    let at = listen.to_string();
+    let arguments = [
+        "netem",
+        "--listen",
+        &at,
+        "--to",
+        &to,
+        "--up",
+        "delay 3ms ecn loss every 1000",
+        "--duration",
+        "3s",
+        "--json",
+    ];
+    let child = mmt(&home, &arguments).spawn().unwrap();
+    let client = UdpSocket::bind("127.0.0.1:0").unwrap();
+    client
+        .set_read_timeout(Some(Duration::from_millis(50)))
+        .unwrap();
+    let mut buffer = [0; 100];
+    target.set_nonblocking(true).unwrap();
+    // until the relay listens
+    while target.recv(&mut buffer).is_err() {
+        client.send_to(b"no QUIC at all", listen).unwrap();
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    let output = child.wait_with_output().unwrap();
+    let printed = String::from_utf8_lossy(&output.stdout).into_owned();
+    let (address, rest) = printed.split_once('\n').unwrap();
+    assert_eq!(address, at);
+    let report: Value = serde_json::from_str(rest).unwrap();
+    let late = &report["counters"]["lateness"];
+    assert!(late["count"].as_u64().unwrap() > 0);
+    assert!(is_marked_rightly(
+        &late["p99_us"],
+        &late["max_us"],
+        &report["degraded"]
+    ));
+}
