@@ -2,6 +2,7 @@
 #![allow(
     clippy::disallowed_methods,
     clippy::indexing_slicing,
+    clippy::panic,
     clippy::unwrap_used,
     reason = "a test starts the command, writes files for it, and fails by panicking"
 )]
@@ -28,7 +29,7 @@ fn mmt(home: &tempfile::TempDir, arguments: &[&str]) -> Command {
 
 fn document(output: &Output) -> Value {
     let text = String::from_utf8_lossy(&output.stderr);
-    serde_json::from_slice(&output.stdout).expect(&text)
+    serde_json::from_slice(&output.stdout).unwrap_or_else(|_| panic!("{text}"))
 }
 
 /// p99 above 250 us or anything above 1 ms, by the numbers that stand beside the mark.

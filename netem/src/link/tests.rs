@@ -231,7 +231,7 @@ fn binomial_level(n: u64, k: u64, p: f64) -> f64 {
     let log_factorial = |n: u64| libm::lgamma(n as f64 + 1.0);
     let share = |k: u64| {
         let ways = log_factorial(n) - log_factorial(k) - log_factorial(n - k);
-        (ways + k as f64 * p.ln() + (n - k) as f64 * (-p).ln_1p()).exp()
+        libm::exp(ways + k as f64 * libm::log(p) + (n - k) as f64 * libm::log1p(-p))
     };
     let at_most: f64 = (0..=k).map(share).sum();
     let at_least = 1.0 - at_most + share(k);
