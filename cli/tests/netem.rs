@@ -7,7 +7,7 @@
     reason = "a test starts the command, writes files for it, and fails by panicking"
 )]
 
-use std::io::Write;
+use std::io::{BufRead, BufReader, Write};
 use std::net::UdpSocket;
 use std::process::{Command, Output, Stdio};
 use std::time::Duration;
@@ -180,4 +180,52 @@ fn a_relay_carries_any_protocol_and_says_whether_it_was_in_time() {
         &late["max_us"],
         &report["degraded"]
     ));
+}
+
+#[test]
+fn a_master_keeps_the_path_that_it_met_as_a_trace() {
+    let home = tempfile::tempdir().unwrap();
+    let arguments = ["slave", "--listen", "127.0.0.1:0", "--once"];
+    let mut slave = mmt(&home, &arguments)
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap();
+    let mut lines = BufReader::new(slave.stdout.take().unwrap());
+    let mut pairing = String::new();
+    lines.read_line(&mut pairing).unwrap();
+    let arguments = [
+        "master",
+        pairing.trim(),
+        "--duration",
+        "2s",
+        "--netem",
+        "delay 40ms",
+        "--record-path",
+        "path.csv",
+        "--json",
+    ];
+    let master = document(&mmt(&home, &arguments).output().unwrap());
+    assert_eq!(master["ending"], "finished");
+    assert!(slave.wait().unwrap().success());
+
+    let arguments = [
+        "netem",
+        "--listen",
+        "127.0.0.1:0",
+        "--to",
+        "127.0.0.1:9",
+        "--up",
+        "trace path.csv",
+        "--duration",
+        "10ms",
+        "--json",
+    ];
+    let output = mmt(&home, &arguments).output().unwrap();
+    let printed = String::from_utf8_lossy(&output.stdout).into_owned();
+    let (_, rest) = printed.split_once('\n').unwrap();
+    let relay: Value = serde_json::from_str(rest).unwrap();
+    // 40 ms one way: half a round trip is at least 20
+    let effect = &relay["configuration"]["effect_up"];
+    assert!(effect["mean_ms"].as_f64().unwrap() >= 20.0, "{effect}");
+    assert_eq!(relay["configuration"]["up"], "trace path.csv");
 }

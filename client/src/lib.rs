@@ -9,6 +9,7 @@ pub mod limiter;
 pub mod link;
 pub mod master;
 pub mod operator;
+pub mod path;
 
 #[cfg(feature = "io")]
 pub mod io;

@@ -48,6 +48,9 @@ pub struct Effect {
     pub queue_drops: f64,
     /// Share of packets dropped because of the limit, 0 to 1, in the stream sampled.
     pub over_limit: f64,
+    /// Share of packets marked as having met congestion, 0 to 1: where the settings mark (`ecn`) the packets
+    /// sampled understand it.
+    pub marked: f64,
     /// Share of what arrives that arrives after a packet sent later (RFC 4737, section 3), 0 to 1.
     pub reordered: f64,
 }
@@ -75,6 +78,7 @@ pub fn effect(config: &LinkConfig, rate_hz: f64) -> Result<Effect, ConfigError> 
     let only_the_model = config.outages.is_empty()
         && config.mtu.is_none()
         && config.replay.is_none()
+        && !config.ecn
         && config.profile.is_empty();
     let known = config.loss.share().filter(|_| only_the_model);
     let known_burst = config.loss.mean_burst(rate_hz).filter(|_| only_the_model);
@@ -90,6 +94,7 @@ pub fn effect(config: &LinkConfig, rate_hz: f64) -> Result<Effect, ConfigError> 
         burst_packets: known_burst.unwrap_or_else(|| mean_run(&runs(stream.lost.iter().copied()))),
         queue_drops: of_all(drops.queue.plus(drops.codel).packets),
         over_limit: of_all(drops.limit.packets),
+        marked: of_all(stream.marked),
         reordered: stream.reordered as f64 / stream.delays_ms.len().max(1) as f64,
     })
 }
@@ -129,6 +134,7 @@ struct Stream {
     delays_ms: Vec<f64>,
     reordered: u64,
     drops: Drops,
+    marked: u64,
     /// Which packets were lost on the way, in order of sending.
     lost: Vec<bool>,
 }
@@ -140,19 +146,22 @@ impl Stream {
             delays_ms: Vec::with_capacity(PACKETS as usize),
             reordered: 0,
             drops: Drops::default(),
+            marked: 0,
             lost: Vec::with_capacity(PACKETS as usize),
         };
         let mut newest = 0;
+        let capable = config.ecn || config.profile.steps.iter().any(|step| step.settings.ecn);
         for packet in 0..sample_size(config) {
             let now = Time::ZERO + Duration::from_secs_f64(f64::from(packet) / rate_hz);
             stream.collect(&mut pipe, now, &mut newest);
-            let fate = pipe.push(now, BYTES, ());
+            let fate = pipe.push_ecn(now, BYTES, capable, ());
             let on_the_way = [DropCause::Loss, DropCause::Outage, DropCause::Mtu];
             let lost = on_the_way.iter().any(|cause| fate == Fate::Drop(*cause));
             stream.lost.push(lost);
         }
         stream.collect(&mut pipe, Time::MAX, &mut newest);
         stream.drops = pipe.counters().dropped;
+        stream.marked = pipe.counters().marked.packets;
         Ok(stream)
     }
 
@@ -211,6 +220,9 @@ impl fmt::Display for Effect {
                 "; {:.1} % dropped by the queue",
                 100.0 * self.queue_drops
             )?;
+        }
+        if self.marked > 0.0 {
+            write!(f, "; {:.3} % marked (ECN)", 100.0 * self.marked)?;
         }
         if self.over_limit > 0.0 {
             write!(

@@ -156,6 +156,9 @@ pub(crate) struct MasterArguments {
     /// Record and control of the emulated network
     #[command(flatten)]
     pub(crate) emulation: EmulationArguments,
+    /// Keep the path to the slave in this file: half of each round trip, and losses; a trace for --netem
+    #[arg(long, value_name = "FILE")]
+    pub(crate) record_path: Option<PathBuf>,
     /// Seed of operator and network
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub(crate) seed: u64,

@@ -153,6 +153,7 @@ fn master_options(
         netem: up(arguments).clone(),
         netem_seed: arguments.seed,
         netem_extras: emulation.extras(Direction::Up),
+        path: None,
     }
 }
 

@@ -2,14 +2,17 @@
 
 use std::io::BufRead;
 use std::path::Path;
+use std::sync::PoisonError;
 
 use mmt_client::io::{
     MasterHostError, MasterLive, MasterOptions, MasterReport, OperatorChoice, SessionEnd,
+    SharedPath,
 };
 use mmt_client::operator::scripted::ScriptedConfig;
 use mmt_client::operator::trace::Trace;
 use mmt_netem::Direction;
 use mmt_netem::io::socket::SocketExtras;
+use mmt_netem::record::csv::path_text;
 use mmt_shared::geometry::Vec2;
 use mmt_shared::io::connect::ConnectError;
 use mmt_shared::pairing::Pairing;
@@ -50,6 +53,7 @@ pub(crate) fn run(arguments: MasterArguments, messages: &Messages) -> Result<(),
         truth: None,
     };
     let stop = Stop::on_signals()?;
+    let path = options.path.clone();
     let (host, live) = start(options, stop.receiver())?;
     let dashboard = !arguments.json && !emulation.takes_orders();
     let mut viewer = Viewer::new(caption, dashboard, messages, &stop);
@@ -63,6 +67,9 @@ pub(crate) fn run(arguments: MasterArguments, messages: &Messages) -> Result<(),
     drop(viewer);
     let report = host.join()?;
     emulation.finish()?;
+    if let (Some(file), Some(path)) = (&arguments.record_path, &path) {
+        keep_path(file, path)?;
+    }
     match arguments.json {
         true => print_json(&report)?,
         false => print(&report)?,
@@ -114,7 +121,17 @@ fn options(arguments: &MasterArguments) -> Result<MasterOptions, Failure> {
         netem: arguments.netem.clone(),
         netem_seed: arguments.seed,
         netem_extras: SocketExtras::default(),
+        path: arguments.record_path.is_some().then(SharedPath::default),
     })
+}
+
+/// Writes the path that the session met, to be met again as a trace.
+fn keep_path(file: &Path, path: &SharedPath) -> Result<(), Failure> {
+    let shown = file.display();
+    let met = path.lock().unwrap_or_else(PoisonError::into_inner).path();
+    let path = met.map_err(|why| Failure::failed(format!("no path for {shown}: {why}")))?;
+    std::fs::write(file, path_text(&path))
+        .map_err(|error| Failure::failed(format!("cannot write the path {shown}: {error}")))
 }
 
 fn pairing(words: &PairingWords) -> Result<Pairing, Failure> {

@@ -19,6 +19,7 @@ mod session;
 mod tests;
 mod thread;
 
+use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use mmt_netem::LinkConfig;
@@ -33,6 +34,7 @@ use crate::failsafe::LinkState;
 use crate::operator::Operator;
 use crate::operator::scripted::{Scripted, ScriptedConfig, ScriptedError, View};
 use crate::operator::trace::Trace;
+use crate::path::PathRecorder;
 
 pub use end::SessionEnd;
 pub use error::MasterHostError;
@@ -73,6 +75,9 @@ impl OperatorChoice {
     }
 }
 
+/// A record of the path that a session fills and whoever started it reads.
+pub type SharedPath = Arc<Mutex<PathRecorder>>;
+
 /// How a master host runs.
 #[derive(Clone, Debug)]
 pub struct MasterOptions {
@@ -92,6 +97,8 @@ pub struct MasterOptions {
     pub netem_seed: u64,
     /// Record and control of the emulated network.
     pub netem_extras: SocketExtras,
+    /// Where the path of the session is kept, if anybody wants it.
+    pub path: Option<SharedPath>,
 }
 
 /// A look at a running master, for a screen.

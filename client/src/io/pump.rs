@@ -3,6 +3,7 @@
 //! It decides nothing about the model: updates pass the link's own checks, then the latest-wins cell.
 
 use std::pin::Pin;
+use std::sync::PoisonError;
 use std::time::Duration;
 
 use bytes::Bytes;
@@ -15,7 +16,7 @@ use tokio::time::{MissedTickBehavior, interval};
 
 use super::close::FarewellError;
 use super::haptic::HapticPort;
-use super::{MasterLive, SessionEnd};
+use super::{MasterLive, SessionEnd, SharedPath};
 use crate::failsafe::LinkState;
 use crate::link::{FromSlave, MasterLink};
 
@@ -44,6 +45,7 @@ pub(super) struct Pump<'a> {
     pub(super) link: MasterLink,
     pub(super) port: HapticPort,
     live: &'a watch::Sender<MasterLive>,
+    path: Option<SharedPath>,
     pub(super) counts: PumpCounts,
     /// Why the session ends, if this task noticed first.
     pub(super) end: Option<SessionEnd>,
@@ -72,6 +74,7 @@ impl<'a> Pump<'a> {
         link: MasterLink,
         port: HapticPort,
         live: &'a watch::Sender<MasterLive>,
+        path: Option<SharedPath>,
     ) -> Self {
         Self {
             clock,
@@ -79,6 +82,7 @@ impl<'a> Pump<'a> {
             link,
             port,
             live,
+            path,
             counts: PumpCounts::default(),
             end: None,
             connected: true,
@@ -172,10 +176,15 @@ impl<'a> Pump<'a> {
 
     fn take(&mut self, bytes: &[u8]) {
         self.counts.read += 1;
-        match self.link.handle(self.clock.now(), bytes) {
+        let now = self.clock.now();
+        match self.link.handle(now, bytes) {
             Some(FromSlave::Update(update)) => self.port.offer(&update),
             // a scene is for a viewer, and this host has none
             Some(FromSlave::Scene(_)) | None => {}
+        }
+        if let Some(path) = &self.path {
+            let mut path = path.lock().unwrap_or_else(PoisonError::into_inner);
+            path.note(now, self.link.end().peer());
         }
         self.port.heard(self.link.end().last_heard());
     }

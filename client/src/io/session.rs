@@ -100,7 +100,14 @@ async fn operate(
     let thread = start(haptic, clock)?;
     let coupling = options.device.coupling();
     let link = MasterLink::new(began, coupling, options.samples_per_command);
-    let mut pump = Pump::new(clock, &line.connection, link, port, &live);
+    let mut pump = Pump::new(
+        clock,
+        &line.connection,
+        link,
+        port,
+        &live,
+        options.path.clone(),
+    );
     let mut farewell = pin!(read_farewell(&mut receive));
     pump.run(&mut wakeup, &mut stop, farewell.as_mut()).await;
     let haptic = join(thread, &line, patience).await?;

@@ -34,6 +34,7 @@ fn scripted(fake: &Fake) -> MasterOptions {
         netem: LinkConfig::default(),
         netem_seed: 1,
         netem_extras: SocketExtras::default(),
+        path: None,
     }
 }
 

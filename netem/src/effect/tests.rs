@@ -111,3 +111,12 @@ fn what_happens_on_time_is_sampled() {
     assert!((effect.loss - 0.05).abs() < 0.001, "{effect}");
     assert!((effect.burst_packets - 500.0).abs() < 1.0, "{effect}");
 }
+
+#[test]
+fn what_is_marked_is_not_lost() {
+    let effect = at_1_khz("loss 2% ecn");
+    assert_eq!((effect.loss, effect.burst_packets), (0.0, 0.0));
+    assert!((effect.marked - 0.02).abs() < 0.003, "{}", effect.marked);
+    assert!(effect.to_string().contains("% marked (ECN)"), "{effect}");
+    assert!(!at_1_khz("loss 2%").to_string().contains("marked"));
+}

@@ -1,0 +1,121 @@
+//! The path of a session as its master saw it, to be met again as a trace of the emulated network.
+//!
+//! Half of each round trip stands for each way, and what never arrived from the slave is lost: as `ping -D`
+//! would have found it at the same time. It must never measure by itself: it sends nothing.
+
+use std::time::Duration;
+
+use mmt_netem::trace::path::{PathTrace, Sample};
+use mmt_shared::peer::Peer;
+use mmt_shared::time::Time;
+
+/// The most samples kept: ten hours at the 25 a second of an ordinary session. What comes later is left out.
+const SAMPLES_MAX: usize = 1_000_000;
+
+/// What a session met so far.
+#[derive(Clone, Debug, Default)]
+pub struct PathRecorder {
+    samples: Vec<Sample>,
+    /// Round trips and missing packets already among the samples.
+    trips: u64,
+    missing: u32,
+}
+
+impl PathRecorder {
+    /// Looks at what the newest message brought; `now` is its arrival.
+    pub fn note(&mut self, now: Time, peer: &Peer) {
+        self.note_missing(now, peer.incoming().lost());
+        let trips = peer.round_trip().histogram().total();
+        if let Some(trip) = peer.round_trip().latest()
+            && trips > self.trips
+        {
+            self.trips = trips;
+            self.push(now, Some(trip / 2));
+        }
+    }
+
+    fn note_missing(&mut self, now: Time, missing: u32) {
+        while self.missing < missing && self.samples.len() < SAMPLES_MAX {
+            self.missing += 1;
+            self.push(now, None);
+        }
+        while self.missing > missing {
+            // it was late, not lost
+            self.missing -= 1;
+            if let Some(at) = self
+                .samples
+                .iter()
+                .rposition(|sample| sample.delay.is_none())
+            {
+                self.samples.remove(at);
+            }
+        }
+    }
+
+    fn push(&mut self, now: Time, delay: Option<Duration>) {
+        if self.samples.len() < SAMPLES_MAX {
+            let at = now.saturating_since(Time::ZERO);
+            self.samples.push(Sample { at, delay });
+        }
+    }
+
+    /// The path.
+    ///
+    /// # Errors
+    /// In words: no round trip was measured.
+    pub fn path(&self) -> Result<PathTrace, &'static str> {
+        PathTrace::try_new(self.samples.clone())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const DOWN_MS: u64 = 20;
+    const UP_MS: u64 = 30;
+
+    #[test]
+    fn half_of_each_round_trip_and_what_never_came_make_the_path() {
+        let (mut here, mut there) = (Peer::new(), Peer::new());
+        let mut recorder = PathRecorder::default();
+        assert!(recorder.path().is_err());
+        let ms = Time::from_millis;
+        for k in 1..=10 {
+            let question = here.stamp(ms(100 * k)).unwrap();
+            there.handle(ms(100 * k + UP_MS), &question, 50);
+            let answer = there.stamp(ms(100 * k + UP_MS)).unwrap();
+            let now = ms(100 * k + UP_MS + DOWN_MS);
+            // the fourth and the fifth answer never arrive
+            if !(4..=5).contains(&k) {
+                here.handle(now, &answer, 50);
+                recorder.note(now, &here);
+                // looking twice adds nothing
+                recorder.note(now, &here);
+            }
+        }
+        let path = recorder.path().unwrap();
+        let delays: Vec<_> = path.samples().iter().map(|sample| sample.delay).collect();
+        let half = Some(Duration::from_millis((UP_MS + DOWN_MS) / 2));
+        let (before, after) = (vec![half; 3], vec![half; 5]);
+        assert_eq!(delays, [before, vec![None; 2], after].concat());
+    }
+
+    #[test]
+    fn what_comes_late_was_not_lost() {
+        let (mut here, mut there) = (Peer::new(), Peer::new());
+        let mut recorder = PathRecorder::default();
+        let ms = Time::from_millis;
+        let mut answers = Vec::new();
+        for k in 1..=3 {
+            let question = here.stamp(ms(k)).unwrap();
+            there.handle(ms(k), &question, 50);
+            answers.push(there.stamp(ms(k)).unwrap());
+        }
+        for (at, number) in [(10, 0), (11, 2), (12, 1)] {
+            here.handle(ms(at), &answers[number], 50);
+            recorder.note(ms(at), &here);
+        }
+        assert_eq!(recorder.path().unwrap().loss(), 0.0);
+    }
+}
