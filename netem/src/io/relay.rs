@@ -24,6 +24,7 @@ use crate::link::LinkId;
 use crate::pipe::Pipe;
 
 mod clients;
+mod lane;
 mod port;
 #[cfg(test)]
 mod tests;

@@ -5,122 +5,26 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
 
-use quinn::udp::{EcnCodepoint, Transmit};
+use quinn::udp::Transmit;
 use rustix::event::{PollFd, PollFlags};
 
 use mmt_shared::io::realtime;
 use mmt_shared::time::Time;
 
 use super::clients::Clients;
+use super::lane::{Lane, Parcel, harm};
 use super::port::{Port, Receiver, Sent};
-use super::{DirectionCounters, RelaySnapshot, Shared};
+use super::{RelaySnapshot, Shared};
 use crate::counters::Tally;
 use crate::io::alarm::{now, wait};
 use crate::io::lateness::Lateness;
 use crate::io::lock;
-use crate::io::log::{Dropped, Log};
-use crate::link::{Direction, Fate, turn_bit};
+use crate::io::log::Log;
+use crate::link::Direction;
 use crate::pipe::{Pipe, Released};
 
 /// Batches taken from one socket before the times are looked at again.
 const BATCHES: usize = 16;
-
-/// A datagram on a link.
-#[derive(Clone, Debug)]
-pub(super) struct Parcel {
-    client: u64,
-    ecn: Option<EcnCodepoint>,
-    contents: Vec<u8>,
-    /// Packets in flight when it was offered.
-    backlog: u32,
-}
-
-/// One direction: its link and what became of what left it.
-#[derive(Debug)]
-struct Lane {
-    pipe: Pipe<Parcel>,
-    sent: Outcome,
-}
-
-#[derive(Debug, Default)]
-struct Outcome {
-    forwarded: Tally,
-    blocked: Tally,
-    failed: Tally,
-    orphaned: Tally,
-}
-
-impl Outcome {
-    fn count(&mut self, sent: Option<Sent>, bytes: usize) {
-        match sent {
-            Some(Sent::Yes) => self.forwarded.count(bytes),
-            Some(Sent::Blocked) => self.blocked.count(bytes),
-            Some(Sent::Failed) => self.failed.count(bytes),
-            None => self.orphaned.count(bytes),
-        }
-    }
-}
-
-impl Lane {
-    /// Puts a datagram on the link, and a dropped one on record.
-    fn offer(
-        &mut self,
-        log: &Log,
-        direction: Direction,
-        client: u64,
-        received: &super::port::Received<'_>,
-    ) {
-        let (now, bytes) = (now(), received.contents.len());
-        let backlog = u32::try_from(self.pipe.in_flight()).unwrap_or(u32::MAX);
-        let number = self.pipe.counters().offered.packets;
-        let parcel = Parcel {
-            client,
-            ecn: received.ecn,
-            contents: received.contents.to_owned(),
-            backlog,
-        };
-        let capable = parcel.ecn.is_some();
-        let fate = self.pipe.push_ecn(now, bytes, capable, parcel);
-        if let Fate::Drop(cause) = fate {
-            let packet = Dropped {
-                number,
-                offered_at: now,
-                bytes,
-                backlog,
-                cause,
-            };
-            log.dropped(direction, &packet);
-        }
-    }
-
-    fn new(pipe: Pipe<Parcel>) -> Self {
-        Self {
-            pipe,
-            sent: Outcome::default(),
-        }
-    }
-
-    fn counters(&self) -> DirectionCounters {
-        DirectionCounters {
-            link: self.pipe.counters(),
-            in_flight: self.pipe.in_flight() as u64,
-            forwarded: self.sent.forwarded,
-            blocked: self.sent.blocked,
-            failed: self.sent.failed,
-            orphaned: self.sent.orphaned,
-        }
-    }
-}
-
-/// Turns the bit over that the link says, and marks what met congestion.
-fn harm(packet: &mut Released<Parcel>) {
-    if packet.marked {
-        packet.payload.ecn = Some(EcnCodepoint::Ce);
-    }
-    if let Some(bit) = packet.corrupted_bit {
-        turn_bit(&mut packet.payload.contents, bit);
-    }
-}
 
 /// Everything the thread owns.
 pub(super) struct Worker {
