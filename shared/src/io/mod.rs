@@ -18,6 +18,7 @@ pub mod listen;
 pub mod live;
 pub mod quic;
 pub mod realtime;
+pub mod runtime;
 pub mod schedule;
 pub mod secret;
 pub mod socket;

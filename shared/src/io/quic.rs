@@ -10,7 +10,7 @@ use std::time::Duration;
 
 use quinn::{
     AckFrequencyConfig, AsyncUdpSocket, ClientConfig, ConnectionIdGenerator, Endpoint,
-    EndpointConfig, IdleTimeout, ServerConfig, TokioRuntime, TransportConfig, VarInt,
+    EndpointConfig, IdleTimeout, Runtime, ServerConfig, TokioRuntime, TransportConfig, VarInt,
 };
 use quinn_proto::HashedConnectionIdGenerator;
 use ring::hmac;
@@ -67,12 +67,31 @@ pub fn server_endpoint(
     identity: &Identity,
     traffic: Traffic,
 ) -> Result<Endpoint, EndpointError> {
+    server_endpoint_on(Arc::new(TokioRuntime), socket, identity, traffic)
+}
+
+/// The slave's endpoint on any runtime of quinn's, to which the socket must belong.
+///
+/// # Errors
+/// As [`server_endpoint`].
+pub fn server_endpoint_on(
+    runtime: Arc<dyn Runtime>,
+    socket: Arc<dyn AsyncUdpSocket>,
+    identity: &Identity,
+    traffic: Traffic,
+) -> Result<Endpoint, EndpointError> {
     let mut config = ServerConfig::with_crypto(Arc::new(tls::server(identity)?));
     config.transport_config(Arc::new(transport(traffic)));
     config.max_incoming(INCOMING_MAX);
     config.incoming_buffer_size(INCOMING_BYTES);
     config.incoming_buffer_size_total(INCOMING_BYTES * INCOMING_MAX as u64);
-    endpoint(stable_keys(identity), Some(config), socket)
+    let keys = stable_keys(identity);
+    Ok(Endpoint::new_with_abstract_socket(
+        keys,
+        Some(config),
+        socket,
+        runtime,
+    )?)
 }
 
 /// The master's endpoint.
@@ -82,7 +101,21 @@ pub fn server_endpoint(
 /// # Errors
 /// The socket fails.
 pub fn client_endpoint(socket: Arc<dyn AsyncUdpSocket>) -> Result<Endpoint, EndpointError> {
-    endpoint(EndpointConfig::default(), None, socket)
+    client_endpoint_on(Arc::new(TokioRuntime), socket)
+}
+
+/// The master's endpoint on any runtime of quinn's, to which the socket must belong.
+///
+/// # Errors
+/// As [`client_endpoint`].
+pub fn client_endpoint_on(
+    runtime: Arc<dyn Runtime>,
+    socket: Arc<dyn AsyncUdpSocket>,
+) -> Result<Endpoint, EndpointError> {
+    let config = EndpointConfig::default();
+    Ok(Endpoint::new_with_abstract_socket(
+        config, None, socket, runtime,
+    )?)
 }
 
 /// The configuration of one connection attempt.
@@ -153,17 +186,6 @@ fn stable_keys(identity: &Identity) -> EndpointConfig {
         Box::new(HashedConnectionIdGenerator::from_key(id_key))
     });
     config
-}
-
-fn endpoint(
-    config: EndpointConfig,
-    server: Option<ServerConfig>,
-    socket: Arc<dyn AsyncUdpSocket>,
-) -> Result<Endpoint, EndpointError> {
-    let runtime = Arc::new(TokioRuntime);
-    Ok(Endpoint::new_with_abstract_socket(
-        config, server, socket, runtime,
-    )?)
 }
 
 #[cfg(test)]
