@@ -17,6 +17,7 @@ pub mod identity_file;
 pub mod listen;
 pub mod live;
 pub mod quic;
+pub mod raw_udp;
 pub mod realtime;
 pub mod runtime;
 pub mod schedule;
@@ -26,6 +27,7 @@ pub mod spread;
 pub mod stream;
 pub mod ticker;
 pub mod tls;
+pub mod transport;
 pub mod versions;
 pub mod wake;
 
