@@ -53,6 +53,7 @@ fn execute(command: Command) -> Result<(), Failure> {
         Command::Replay(arguments) => commands::replay::run(&arguments),
         Command::Reproduce(arguments) => commands::reproduce::run(&arguments),
         Command::Sweep(arguments) => commands::sweep::run(&arguments),
+        Command::Bench(arguments) => commands::bench::run(&arguments),
     }
 }
 

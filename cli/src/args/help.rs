@@ -118,3 +118,13 @@ A plan:
 
 results.csv is the same, byte for byte, however the rows are cut into shards, threads and runs. Ctrl-C keeps
 what is done; the same command goes on. Exit code 1: rows are missing. docs/sweep.md tells everything.";
+
+/// Examples of `mmt bench`.
+pub(super) const BENCH: &str = "\
+Examples:
+  mmt bench transport
+  mmt bench transport --rate 150 --size 180
+  mmt bench transport --duration 5min --json > transport.json
+
+Bare sockets, raw UDP, QUIC on the single-thread runtime and QUIC on tokio take turns. Real time: repeat it,
+and compare within one run only.";

@@ -1,5 +1,6 @@
 //! The arguments of every command, as clap takes them, with help and examples.
 
+mod bench;
 mod help;
 mod netem;
 mod reproduce;
@@ -20,6 +21,7 @@ use mmt_shared::pairing::{Address, Host};
 use mmt_shared::settings::Mode;
 
 pub(crate) use self::netem::EmulationArguments;
+pub(crate) use bench::{BenchArguments, BenchSubject, TransportBenchArguments};
 pub(crate) use reproduce::{BodyArguments, Experiment, ReproduceArguments};
 pub(crate) use sweep::SweepArguments;
 pub(crate) use values::{OperatorWords, PairingWords, Period};
@@ -57,6 +59,9 @@ pub(crate) enum Command {
     /// Run any grid over configuration in virtual time: in shards, resumable, the same bytes
     #[command(after_help = help::SWEEP)]
     Sweep(SweepArguments),
+    /// Measure what things cost on this machine
+    #[command(after_help = help::BENCH, subcommand_required = true, arg_required_else_help = true)]
+    Bench(BenchArguments),
 }
 
 /// Arguments of `mmt demo`.

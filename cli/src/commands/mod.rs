@@ -1,5 +1,6 @@
 //! The commands, one file each: arguments to configuration to run.
 
+pub(crate) mod bench;
 pub(crate) mod demo;
 mod host;
 pub(crate) mod master;

@@ -9,6 +9,7 @@ mod cost;
 mod folder;
 mod pool;
 mod sheets;
+pub mod transport_bench;
 pub mod virtual_time;
 
 pub use cost::estimator_tick_ms;

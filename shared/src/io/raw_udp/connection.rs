@@ -4,12 +4,10 @@
 //! has no room for is lost and counted.
 
 use std::collections::VecDeque;
-use std::future::{Future, poll_fn};
+use std::future::Future;
 use std::io;
 use std::net::SocketAddr;
-use std::pin::pin;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-use std::task::Poll;
 use std::time::Duration;
 
 use bytes::Bytes;
@@ -22,6 +20,7 @@ use tokio::sync::Notify;
 
 use super::letters::Letters;
 use super::packet::{Body, HEADER, NUMBER, PACKET_MAX, Packet};
+use crate::io::runtime::until;
 use crate::io::stream::{ReadFrameError, WriteFrameError};
 
 /// A letter without a receipt is repeated after this long.
@@ -70,25 +69,13 @@ struct State {
 }
 
 /// Waits for `future`, at most `limit`.
-pub(super) async fn within<T>(
-    runtime: &Arc<dyn Runtime>,
+async fn within<T>(
+    runtime: &dyn Runtime,
     limit: Duration,
     future: impl Future<Output = T>,
 ) -> Option<T> {
-    let mut future = pin!(future);
     // no instant is that late: then there is no limit
-    let deadline = runtime.now().checked_add(limit);
-    let mut timer = deadline.map(|deadline| runtime.new_timer(deadline));
-    poll_fn(|context| {
-        if let Poll::Ready(result) = future.as_mut().poll(context) {
-            return Poll::Ready(Some(result));
-        }
-        match &mut timer {
-            Some(timer) => timer.as_mut().poll(context).map(|()| None),
-            None => Poll::Pending,
-        }
-    })
-    .await
+    until(runtime, runtime.now().checked_add(limit), future).await
 }
 
 impl Ends {
@@ -285,12 +272,12 @@ impl Connection {
                 let come = ends.wait(&ends.receipt, |state| {
                     state.letters.has_come(number).then_some(())
                 });
-                if let Some(come) = within(&ends.runtime, REPEAT, come).await {
+                if let Some(come) = within(&*ends.runtime, REPEAT, come).await {
                     return come;
                 }
             }
         };
-        match within(&ends.runtime, limit, repeated).await {
+        match within(&*ends.runtime, limit, repeated).await {
             Some(Ok(())) => Ok(()),
             Some(Err(why)) => Err(WriteError::ConnectionLost(why).into()),
             None => Err(WriteFrameError::Slow { limit }),
@@ -308,7 +295,7 @@ impl Connection {
     ) -> Result<Vec<u8>, ReadFrameError> {
         let ends = self.ends();
         let come = ends.wait(&ends.letter, |state| state.letters.read());
-        match within(&ends.runtime, limit, come).await {
+        match within(&*ends.runtime, limit, come).await {
             Some(Ok(letter)) if letter.len() > max => Err(ReadFrameError::TooLong {
                 bytes: letter.len(),
                 max,

@@ -1,6 +1,5 @@
 //! The runtime by itself, and quinn on it: order, timers, wakes from outside, sockets that are full.
 
-use std::future::poll_fn;
 use std::sync::atomic::AtomicU32;
 
 use bytes::Bytes;

@@ -1,0 +1,40 @@
+//! The arguments of `mmt bench`.
+
+use std::time::Duration;
+
+use clap::{Args, Subcommand};
+use mmt_lab::io::transport_bench::{BYTES_MAX, BYTES_MIN, RATE_MAX};
+
+use super::values;
+
+/// Arguments of `mmt bench`.
+#[derive(Debug, Args)]
+pub(crate) struct BenchArguments {
+    /// What to measure.
+    #[command(subcommand)]
+    pub(crate) subject: BenchSubject,
+}
+
+/// What can be measured.
+#[derive(Debug, Subcommand)]
+pub(crate) enum BenchSubject {
+    /// Latency, CPU time, packets and bytes of a message over raw UDP and QUIC, on loopback
+    Transport(TransportBenchArguments),
+}
+
+/// Arguments of `mmt bench transport`.
+#[derive(Clone, Copy, Debug, Args)]
+pub(crate) struct TransportBenchArguments {
+    /// Messages a second
+    #[arg(long, value_name = "HZ", default_value_t = 1000, value_parser = clap::value_parser!(u32).range(1..=i64::from(RATE_MAX)))]
+    pub(crate) rate: u32,
+    /// How long, all turns of all carriers together
+    #[arg(long, value_name = "TIME", default_value = "60s", value_parser = values::duration)]
+    pub(crate) duration: Duration,
+    /// Bytes of a message
+    #[arg(long, value_name = "BYTES", default_value_t = 100, value_parser = clap::value_parser!(u16).range(BYTES_MIN as i64..=BYTES_MAX as i64))]
+    pub(crate) size: u16,
+    /// Print one JSON document instead of tables
+    #[arg(long)]
+    pub(crate) json: bool,
+}

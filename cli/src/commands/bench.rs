@@ -1,0 +1,54 @@
+//! `mmt bench`: what things cost on this machine, in real time.
+
+use mmt_lab::io::transport_bench::{self, BenchConfig, BenchReport};
+use serde::Serialize;
+
+use crate::args::{BenchArguments, BenchSubject, TransportBenchArguments};
+use crate::failure::Failure;
+use crate::output::{note, print, print_json};
+use crate::stop::Stop;
+
+/// Runs `mmt bench`.
+///
+/// # Errors
+/// The machine has no sockets or threads to give.
+pub(crate) fn run(arguments: &BenchArguments) -> Result<(), Failure> {
+    match &arguments.subject {
+        BenchSubject::Transport(arguments) => transport(arguments),
+    }
+}
+
+/// The document of `mmt bench transport`.
+#[derive(Serialize)]
+struct Document<'a> {
+    version: &'static str,
+    command: &'static str,
+    duration_s: f64,
+    #[serde(flatten)]
+    report: &'a BenchReport,
+}
+
+fn transport(arguments: &TransportBenchArguments) -> Result<(), Failure> {
+    let config = BenchConfig {
+        rate_hz: arguments.rate,
+        duration: arguments.duration,
+        bytes: usize::from(arguments.size),
+    };
+    let stop = Stop::on_signals()?;
+    note(format_args!(
+        "measuring for {:?}, in turns; Ctrl-C ends it with what there is",
+        arguments.duration
+    ));
+    let report = transport_bench::run(&config, || stop.asked());
+    let report =
+        report.map_err(|error| Failure::failed(format!("mmt bench transport: {error}")))?;
+    match arguments.json {
+        true => print_json(&Document {
+            version: env!("CARGO_PKG_VERSION"),
+            command: "bench transport",
+            duration_s: arguments.duration.as_secs_f64(),
+            report: &report,
+        }),
+        false => print(&report),
+    }
+}
