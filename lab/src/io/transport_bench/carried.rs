@@ -1,9 +1,8 @@
 //! The transports of mmt, each end on its own thread and runtime, with sockets that count.
 
-use std::future::{Future, poll_fn};
+use std::future::Future;
 use std::net::{Ipv4Addr, SocketAddr};
 use std::sync::Arc;
-use std::task::Poll;
 use std::thread;
 use std::time::{Duration, Instant};
 
@@ -275,15 +274,7 @@ impl End {
         self.connection.send_datagram(message)?;
         side.sent += 1;
         // the connection's own task has its turn, so that no two messages share a packet
-        let mut yielded = false;
-        poll_fn(|context| {
-            if std::mem::replace(&mut yielded, true) {
-                return Poll::Ready(());
-            }
-            context.waker().wake_by_ref();
-            Poll::Pending
-        })
-        .await;
+        tokio::task::yield_now().await;
         Ok(())
     }
 }
