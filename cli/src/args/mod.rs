@@ -5,6 +5,7 @@ mod help;
 mod netem;
 mod reproduce;
 mod sweep;
+mod transport;
 mod values;
 
 pub(crate) use values::netem as network;
@@ -24,6 +25,7 @@ pub(crate) use self::netem::EmulationArguments;
 pub(crate) use bench::{BenchArguments, BenchSubject, TransportBenchArguments};
 pub(crate) use reproduce::{BodyArguments, Experiment, ReproduceArguments};
 pub(crate) use sweep::SweepArguments;
+pub(crate) use transport::TransportArguments;
 pub(crate) use values::{OperatorWords, PairingWords, Period};
 
 /// The command line.
@@ -91,6 +93,9 @@ pub(crate) struct DemoArguments {
     /// When updates are sent [default: the mode's]
     #[arg(long, value_name = "WORDS", value_parser = values::scheme)]
     pub(crate) scheme: Option<Scheme>,
+    /// What carries the session.
+    #[command(flatten)]
+    pub(crate) transport: TransportArguments,
     /// Print the report as one JSON document; plain lines instead of the live view
     #[arg(long)]
     pub(crate) json: bool,
@@ -123,6 +128,9 @@ pub(crate) struct SlaveArguments {
     /// Directory that keeps certificate, key and token [default: $XDG_STATE_HOME/mmt]
     #[arg(long, value_name = "DIR")]
     pub(crate) identity: Option<PathBuf>,
+    /// What carries the session.
+    #[command(flatten)]
+    pub(crate) transport: TransportArguments,
     /// End after the first session
     #[arg(long)]
     pub(crate) once: bool,
@@ -170,6 +178,9 @@ pub(crate) struct MasterArguments {
     /// HIP samples (1 a millisecond) in a datagram
     #[arg(long, value_name = "N", default_value_t = 10, value_parser = values::samples_per_command())]
     pub(crate) samples_per_command: u8,
+    /// What carries the session.
+    #[command(flatten)]
+    pub(crate) transport: TransportArguments,
     /// Print the report as one JSON document
     #[arg(long)]
     pub(crate) json: bool,

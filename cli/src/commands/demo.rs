@@ -11,6 +11,7 @@ use mmt_server::io::SlaveOptions;
 use mmt_server::playout::PlayoutConfig;
 use mmt_server::slave::SlaveConfig;
 use mmt_shared::io::identity::Identity;
+use mmt_shared::io::transport::Transport;
 use mmt_shared::pairing::Pairing;
 use mmt_shared::settings::Mode;
 
@@ -41,15 +42,17 @@ pub(crate) fn run(arguments: &DemoArguments, messages: &Messages) -> Result<(), 
     let (up, down) = (up(arguments), down(arguments));
     note(effect(Direction::Up, up)?);
     note(effect(Direction::Down, down)?);
+    arguments.transport.warning().into_iter().for_each(note);
+    let transport = arguments.transport.choose()?;
     let (stop, stop_slave) = (Stop::on_signals()?, Stop::new());
     let seed = arguments.seed;
     let emulation = Emulation::start(&arguments.emulation, seed, Some(up), Some(down))?;
-    let options = slave_options(arguments, &emulation, config)?;
+    let options = slave_options(arguments, transport, &emulation, config)?;
     let (slave, started) = slave::start(options, None, stop_slave.receiver())?;
     let Ok(started) = started.recv() else {
         return slave.join().map(|_| ());
     };
-    let options = master_options(arguments, &emulation, started.pairing);
+    let options = master_options(arguments, transport, &emulation, started.pairing);
     let (master, master_live) = master::start(options, stop.receiver())?;
 
     let dashboard = !arguments.json && !emulation.takes_orders();
@@ -122,10 +125,12 @@ fn caption(arguments: &DemoArguments, config: &SlaveConfig) -> Caption {
 
 fn slave_options(
     arguments: &DemoArguments,
+    transport: Transport,
     emulation: &Emulation,
     config: SlaveConfig,
 ) -> Result<SlaveOptions, Failure> {
     Ok(SlaveOptions {
+        transport,
         listen: SocketAddr::from((Ipv4Addr::LOCALHOST, 0)),
         identity: Identity::ephemeral().map_err(Failure::failed)?,
         config,
@@ -138,10 +143,12 @@ fn slave_options(
 
 fn master_options(
     arguments: &DemoArguments,
+    transport: Transport,
     emulation: &Emulation,
     pairing: Pairing,
 ) -> MasterOptions {
     MasterOptions {
+        transport,
         pairing,
         device: DeviceProfile::default(),
         operator: OperatorChoice::Scripted(ScriptedConfig {

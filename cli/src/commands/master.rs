@@ -52,6 +52,7 @@ pub(crate) fn run(arguments: MasterArguments, messages: &Messages) -> Result<(),
         setting: format!("slave at {}, {}", options.pairing.address, arguments.netem),
         truth: None,
     };
+    arguments.transport.warning().into_iter().for_each(note);
     let stop = Stop::on_signals()?;
     let path = options.path.clone();
     let (host, live) = start(options, stop.receiver())?;
@@ -113,6 +114,7 @@ pub(super) fn judge(end: Option<SessionEnd>) -> Result<(), Failure> {
 fn options(arguments: &MasterArguments) -> Result<MasterOptions, Failure> {
     let device = arguments.device.used_with(arguments.stiffness, None);
     Ok(MasterOptions {
+        transport: arguments.transport.choose()?,
         pairing: pairing(&arguments.pairing)?,
         device: device.map_err(|error| Failure::usage(format!("--stiffness: {error}")))?,
         operator: operator(arguments)?,
@@ -196,7 +198,9 @@ fn trace(path: &Path, push: Option<usize>) -> Result<Trace, Failure> {
 fn host_failure(error: &MasterHostError) -> Failure {
     use MasterHostError as E;
     let exit = match error {
-        E::Operator(_) | E::Limits(_) | E::Lookup { .. } | E::NoAddress { .. } => Exit::Usage,
+        E::Insecure(_) | E::Operator(_) | E::Limits(_) | E::Lookup { .. } | E::NoAddress { .. } => {
+            Exit::Usage
+        }
         E::Connect(ConnectError::NoAnswer { .. }) | E::LookupSlow { .. } | E::NoWelcome { .. } => {
             Exit::NoAnswer
         }

@@ -40,6 +40,7 @@ pub(crate) fn run(arguments: SlaveArguments, messages: &Messages) -> Result<(), 
         note(effect(Direction::Down, &arguments.netem)?);
     }
     let unserved = unserved(&options);
+    arguments.transport.warning().into_iter().for_each(note);
     let stop = Stop::on_signals()?;
     let (host, started) = start(options, arguments.advertise, stop.receiver())?;
     // If it could not start the reason is in the host.
@@ -121,7 +122,11 @@ fn options(arguments: &SlaveArguments) -> Result<SlaveOptions, Failure> {
         Some(directory) => directory.clone(),
         None => default_directory().map_err(Failure::usage)?,
     };
+    let transport = arguments.transport.choose()?;
+    let permitted = transport.permit(arguments.listen);
+    permitted.map_err(Failure::usage)?;
     Ok(SlaveOptions {
+        transport,
         listen: arguments.listen,
         identity: load_or_create(&directory).map_err(Failure::usage)?,
         netem_seed: config.seed,
@@ -136,6 +141,7 @@ fn options(arguments: &SlaveArguments) -> Result<SlaveOptions, Failure> {
 fn unserved(options: &SlaveOptions) -> SlaveReport {
     let configuration = SlaveConfiguration {
         listen: options.listen.to_string(),
+        transport: options.transport.name(),
         slave: options.config.clone(),
         netem: options.netem.to_string(),
     };
@@ -154,6 +160,7 @@ fn host_failure(error: &SlaveHostError) -> Failure {
         SlaveHostError::Slave(_) => {
             Failure::usage(error).remedy("change that number in the configuration")
         }
+        SlaveHostError::Insecure(_) => Failure::usage(error),
         SlaveHostError::Netem(_) => Failure::usage(error).remedy("change --netem"),
         _ => Failure::failed(error),
     }

@@ -2,13 +2,12 @@
 
 use std::time::Duration;
 
-use mmt_shared::io::stream::{ReadFrameError, read_frame, write_frame};
+use mmt_shared::io::stream::ReadFrameError;
+use mmt_shared::io::transport::{ReadError, RecvStream, SendStream};
 use mmt_shared::wire::{
     DecodeError, Farewell, Kind, MasterTotals, STREAM_MESSAGE_MAX, Side, SlaveTotals,
     StreamMessage, decode_stream_message, encode_master_farewell,
 };
-use quinn::{ReadError, RecvStream, SendStream};
-use tokio::time::timeout;
 
 /// Why there is no farewell of the slave.
 #[derive(Debug, thiserror::Error)]
@@ -41,7 +40,9 @@ impl FarewellError {
 pub(super) async fn read_farewell(
     receive: &mut RecvStream,
 ) -> Result<Farewell<SlaveTotals>, FarewellError> {
-    let message = read_frame(receive, STREAM_MESSAGE_MAX, Duration::MAX).await?;
+    let message = receive
+        .read_frame(STREAM_MESSAGE_MAX, Duration::MAX)
+        .await?;
     match decode_stream_message(&message, Side::Slave)? {
         StreamMessage::SlaveFarewell(farewell) => Ok(farewell),
         other => Err(FarewellError::Unexpected { kind: other.kind() }),
@@ -63,16 +64,9 @@ pub(super) async fn send_farewell(
         }
     };
     let message = message.get(..length).unwrap_or_default();
-    if let Err(error) = write_frame(send, message, limit).await {
+    if let Err(error) = send.write_frame(message, limit).await {
         tracing::warn!(%error, "the farewell did not reach the slave");
         return;
     }
-    // an error says that the stream is closed already
-    let _ = send.finish();
-}
-
-/// Waits until the slave has all of the stream, or not.
-pub(super) async fn delivered(send: &SendStream, limit: Duration) {
-    // closing comes next in any case
-    let _ = timeout(limit, send.stopped()).await;
+    send.finish();
 }

@@ -7,6 +7,7 @@ use std::time::Duration;
 use mmt_netem::io::socket::WrapError;
 use mmt_shared::io::connect::ConnectError;
 use mmt_shared::io::quic::EndpointError;
+use mmt_shared::io::raw_udp::Insecure;
 use mmt_shared::io::socket::BindError;
 use mmt_shared::io::stream::{ReadFrameError, WriteFrameError};
 use mmt_shared::wire::{DecodeError, EncodeError, Kind, WelcomeError};
@@ -49,6 +50,9 @@ pub enum MasterHostError {
         /// How long it was waited for.
         limit: Duration,
     },
+    /// Raw UDP to another host, and nobody insists.
+    #[error(transparent)]
+    Insecure(#[from] Insecure),
     /// No socket.
     #[error(transparent)]
     Bind(#[from] BindError),

@@ -25,6 +25,7 @@ use std::time::Duration;
 use mmt_netem::LinkConfig;
 use mmt_netem::io::socket::SocketExtras;
 use mmt_shared::geometry::{BoxFootprint, Pose, Vec2};
+use mmt_shared::io::transport::Transport;
 use mmt_shared::pairing::Pairing;
 use mmt_shared::report::RunReport;
 use serde::Serialize;
@@ -83,6 +84,8 @@ pub type SharedPath = Arc<Mutex<PathRecorder>>;
 pub struct MasterOptions {
     /// Where the slave is, and its secrets.
     pub pairing: Pairing,
+    /// What carries the session; the slave's must be the same.
+    pub transport: Transport,
     /// The device.
     pub device: DeviceProfile,
     /// Who operates.
@@ -143,6 +146,8 @@ pub struct MasterLive {
 pub struct MasterConfiguration {
     /// The slave's address.
     pub slave: String,
+    /// What carried the session: `quic` or `udp`.
+    pub transport: &'static str,
     /// The device.
     pub device: DeviceProfile,
     /// `scripted` or the trace's name.

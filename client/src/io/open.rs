@@ -8,16 +8,15 @@ use mmt_netem::LinkId;
 use mmt_netem::io::socket::{EmulatedSocket, SocketMeter};
 use mmt_shared::geometry::Vec2;
 use mmt_shared::io::congestion::RateCap;
-use mmt_shared::io::connect::{ConnectError, connect};
-use mmt_shared::io::quic::{Traffic, client_endpoint};
+use mmt_shared::io::connect::ConnectError;
+use mmt_shared::io::quic::Traffic;
 use mmt_shared::io::socket;
-use mmt_shared::io::stream::{read_frame, write_frame};
+use mmt_shared::io::transport::{Connection, Endpoint, RecvStream, SendStream, WriteError};
 use mmt_shared::io::versions::CLOSE_FINISHED;
 use mmt_shared::wire::{
     DATAGRAM_MAX, Hello, Label, Refusal, Role, STREAM_MESSAGE_MAX, Side, StreamMessage, Welcome,
     decode_stream_message, encode_hello,
 };
-use quinn::{Connection, Endpoint, RecvStream, SendStream};
 use tokio::time::timeout;
 
 use super::{MasterHostError, MasterOptions};
@@ -138,6 +137,7 @@ async fn open_at(
     hip: Vec2,
     patience: &Patience,
 ) -> Result<Opened, MasterHostError> {
+    options.transport.permit(address)?;
     let local: SocketAddr = match address {
         SocketAddr::V4(_) => (Ipv4Addr::UNSPECIFIED, 0).into(),
         SocketAddr::V6(_) => (Ipv6Addr::UNSPECIFIED, 0).into(),
@@ -147,16 +147,11 @@ async fn open_at(
     let seed = options.netem_seed;
     let wrapped = EmulatedSocket::try_new_with(plain, netem, seed, LinkId::UP, extras)?;
     let meter = wrapped.meter();
-    let endpoint = client_endpoint(Arc::new(wrapped))?;
+    let endpoint = Endpoint::of_master(options.transport, Arc::new(wrapped))?;
     let traffic = traffic(options.samples_per_command);
-    let connection = connect(
-        &endpoint,
-        address,
-        options.pairing.pin,
-        traffic,
-        patience.connect,
-    )
-    .await?;
+    let connection = endpoint
+        .connect(address, options.pairing.pin, traffic, patience.connect)
+        .await?;
     let line = Line {
         endpoint,
         connection,
@@ -201,15 +196,15 @@ async fn greet(
     let address = connection.remote_address();
     let unsent = |source| MasterHostError::HelloUnsent { address, source };
     let opened = connection.open_bi().await;
-    let (mut send, mut receive) =
-        opened.map_err(|error| unsent(quinn::WriteError::from(error).into()))?;
+    let (mut send, mut receive) = opened.map_err(|error| unsent(WriteError::from(error).into()))?;
     let hello = hello(options, hip);
     let mut message = [0; STREAM_MESSAGE_MAX];
     let length = encode_hello(&hello, &mut message)?;
     let message = message.get(..length).unwrap_or_default();
-    let written = write_frame(&mut send, message, limit).await;
+    let written = send.write_frame(message, limit).await;
     written.map_err(unsent)?;
-    let answer = read_frame(&mut receive, STREAM_MESSAGE_MAX, limit)
+    let answer = receive
+        .read_frame(STREAM_MESSAGE_MAX, limit)
         .await
         .map_err(|source| MasterHostError::NoWelcome { address, source })?;
     let welcome = judge(&answer, address, &hello)?;

@@ -8,9 +8,9 @@ use std::time::Duration;
 
 use bytes::Bytes;
 use mmt_shared::io::clock::Clock;
+use mmt_shared::io::transport::{Connection, ConnectionError};
 use mmt_shared::io::wake::Wakeup;
 use mmt_shared::wire::{DATAGRAM_MAX, Farewell, SlaveTotals};
-use quinn::Connection;
 use tokio::sync::watch;
 use tokio::time::{MissedTickBehavior, interval};
 
@@ -152,7 +152,7 @@ impl<'a> Pump<'a> {
         self.port.release();
     }
 
-    fn lose(&mut self, error: &quinn::ConnectionError) {
+    fn lose(&mut self, error: &ConnectionError) {
         self.connected = false;
         if self.told.is_none() {
             tracing::warn!(%error, "the connection to the slave is gone");

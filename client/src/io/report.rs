@@ -8,6 +8,7 @@ use std::time::Duration;
 use mmt_netem::io::lateness::Lateness;
 use mmt_netem::io::socket::SocketCounters;
 use mmt_shared::io::spread::Quantiles as Spread;
+use mmt_shared::io::transport::DatagramCounts;
 use mmt_shared::report::{
     Counts, EstimateReport, ForceReport, LinkReport, LoopReport, MessagesReport, ModelReport,
     Number, PushesReport, QuantilesReport, RttReport, UpDown, UpdatesReport, WireReport,
@@ -17,7 +18,6 @@ use mmt_shared::wire::{
     Cause, Farewell, Identified, LoopTotals, MasterTotals, Quantiles, SlaveTotals, Traffic,
     UpdateDrops,
 };
-use quinn::ConnectionStats;
 
 use super::haptic::HapticOutcome;
 use super::pump::PumpCounts;
@@ -38,7 +38,7 @@ pub(super) struct Ended {
     pub(super) sockets: SocketCounters,
     /// Of the emulated network on what the master sent.
     pub(super) lateness: Lateness,
-    pub(super) quic: ConnectionStats,
+    pub(super) passed: DatagramCounts,
     pub(super) address: SocketAddr,
 }
 
@@ -169,12 +169,12 @@ impl Ended {
             ("datagrams_malformed", u64::from(traffic.malformed)),
             (
                 "datagrams_overtaken_in_queue",
-                queued.saturating_sub(self.quic.frame_tx.datagram),
+                queued.saturating_sub(self.passed.sent),
             ),
             ("datagrams_too_old", u64::from(traffic.too_old)),
             (
                 "datagrams_unread",
-                self.quic.frame_rx.datagram.saturating_sub(self.counts.read),
+                self.passed.received.saturating_sub(self.counts.read),
             ),
             ("datagrams_unsealed", self.counts.unsealed),
             ("datagrams_unsent", self.counts.unsent),
@@ -199,6 +199,7 @@ impl Ended {
 fn configuration(options: &MasterOptions) -> MasterConfiguration {
     MasterConfiguration {
         slave: options.pairing.address.to_string(),
+        transport: options.transport.name(),
         device: options.device,
         operator: options.operator.name().to_owned(),
         scripted: match &options.operator {

@@ -11,7 +11,7 @@ use mmt_shared::wire::{Farewell, SlaveTotals, UpdateDrops};
 use tokio::sync::{oneshot, watch};
 use tokio::time::{error::Elapsed, timeout};
 
-use super::close::{FarewellError, delivered, read_farewell, send_farewell};
+use super::close::{FarewellError, read_farewell, send_farewell};
 use super::haptic::{HapticLoop, HapticOutcome, HapticParts, HapticPort};
 use super::open::{Line, Opened, PATIENCE, Patience, open};
 use super::pump::{Pump, stopped};
@@ -120,7 +120,7 @@ async fn operate(
         told: pump.told,
         sockets: line.meter.snapshot(),
         lateness: line.meter.lateness(),
-        quic: line.connection.stats(),
+        passed: line.connection.datagrams(),
         address: line.address,
     };
     tracing::info!("the session ends: {}", ended.end);
@@ -129,10 +129,10 @@ async fn operate(
         if pump.listening {
             ended.told = answer(timeout(patience.farewell, farewell).await);
         } else {
-            delivered(&send, patience.farewell).await;
+            send.delivered(patience.farewell).await;
         }
     }
-    ended.quic = line.connection.stats();
+    ended.passed = line.connection.datagrams();
     line.close(&ended.end.to_string(), patience.idle).await;
     ended.sockets = line.meter.snapshot();
     ended.lateness = line.meter.lateness();

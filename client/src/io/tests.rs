@@ -6,6 +6,7 @@ use mmt_netem::LinkConfig;
 use mmt_shared::contact::Coupling;
 use mmt_shared::geometry::{Twist, Vec2};
 use mmt_shared::io::connect::ConnectError;
+use mmt_shared::io::transport::Transport;
 use mmt_shared::pairing::{Pin, Token};
 use mmt_shared::params::{ModelParams, ModelState};
 use mmt_shared::time::TICK;
@@ -26,6 +27,7 @@ const FOR_EVER: Duration = Duration::from_secs(60);
 
 fn scripted(fake: &Fake) -> MasterOptions {
     MasterOptions {
+        transport: Transport::Quic,
         pairing: fake.pairing(),
         device: DeviceProfile::default(),
         operator: OperatorChoice::Scripted(ScriptedConfig::default()),
@@ -404,4 +406,17 @@ async fn a_panic_in_the_haptic_thread_is_an_error_and_closes_the_connection() {
     let error = join(thread, &opened.unwrap().line, &PATIENCE).await;
     assert!(matches!(error, Err(MasterHostError::Panicked)));
     timeout(FOR_EVER, slave.connection.closed()).await.unwrap();
+}
+
+#[tokio::test]
+async fn raw_udp_to_another_host_is_refused_before_a_packet_is_sent() {
+    let fake = Fake::new();
+    let mut options = scripted(&fake);
+    options.transport = Transport::RawUdp { insist: false };
+    // TEST-NET-1 (RFC 5737)
+    options.pairing.address = "192.0.2.1:4433".parse().unwrap();
+    let (_stop, stop) = watch::channel(false);
+    let (live, _look) = watch::channel(MasterLive::default());
+    let error = run(options, stop, live).await.unwrap_err();
+    assert!(matches!(error, MasterHostError::Insecure(_)), "{error}");
 }

@@ -8,15 +8,16 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
-use mmt_shared::io::listen::{Handshake, Listener};
-use mmt_shared::io::stream::{ReadFrameError, read_frame, write_frame};
+use mmt_shared::io::stream::ReadFrameError;
+use mmt_shared::io::transport::{
+    Connection, ConnectionError, Handshake, Listener, RecvStream, SendStream,
+};
 use mmt_shared::io::versions::CLOSE_FINISHED;
 use mmt_shared::pairing::Token;
 use mmt_shared::wire::{
     DecodeError, Hello, RawHello, Refusal, STREAM_MESSAGE_MAX, Side, StreamMessage,
     decode_stream_message, encode_refused,
 };
-use quinn::{Connection, ConnectionError, RecvStream, SendStream};
 use tokio::sync::{OwnedSemaphorePermit, Semaphore, mpsc, watch};
 use tokio::task::JoinSet;
 use tokio::time::timeout;
@@ -192,8 +193,9 @@ pub(super) async fn refuse(connection: &Connection, mut send: SendStream, refusa
     let mut out = [0; STREAM_MESSAGE_MAX];
     let length = encode_refused(refusal, &mut out).unwrap_or_default();
     let message = out.get(..length).unwrap_or_default();
-    if write_frame(&mut send, message, REFUSAL_WAIT).await.is_ok() && send.finish().is_ok() {
-        let _ = timeout(REFUSAL_WAIT, send.stopped()).await;
+    if send.write_frame(message, REFUSAL_WAIT).await.is_ok() {
+        send.finish();
+        send.delivered(REFUSAL_WAIT).await;
     }
     connection.close(CLOSE_FINISHED, b"refused");
 }
@@ -202,7 +204,7 @@ async fn hello_of(
     connection: &Connection,
 ) -> Result<(SendStream, RecvStream, RawHello), Unwelcome> {
     let (send, mut receive) = connection.accept_bi().await?;
-    let frame = read_frame(&mut receive, STREAM_MESSAGE_MAX, HELLO_WAIT).await?;
+    let frame = receive.read_frame(STREAM_MESSAGE_MAX, HELLO_WAIT).await?;
     match decode_stream_message(&frame, Side::Master)? {
         StreamMessage::Hello(hello) => Ok((send, receive, hello)),
         _ => Err(Unwelcome::NoHello),

@@ -10,13 +10,13 @@ use mmt_netem::link::LinkId;
 use mmt_shared::contact::Coupling;
 use mmt_shared::io::clock::Clock;
 use mmt_shared::io::congestion::RateCap;
-use mmt_shared::io::listen::Listener;
 use mmt_shared::io::live::LiveCell;
-use mmt_shared::io::quic::{EndpointError, Traffic, server_endpoint};
+use mmt_shared::io::quic::{EndpointError, Traffic};
+use mmt_shared::io::raw_udp::Insecure;
 use mmt_shared::io::socket::{self, BindError};
+use mmt_shared::io::transport::{Endpoint, Listener, Transport};
 use mmt_shared::io::versions::CLOSE_FINISHED;
 use mmt_shared::pairing::{Address, Host, Pairing};
-use quinn::Endpoint;
 use tokio::sync::{mpsc, watch};
 use tokio::time::timeout;
 
@@ -41,6 +41,9 @@ const CLOSING: Duration = Duration::from_secs(1);
 /// Why a slave host could not start or go on.
 #[derive(Debug, thiserror::Error)]
 pub enum SlaveHostError {
+    /// Raw UDP beyond this host, and nobody insists.
+    #[error(transparent)]
+    Insecure(#[from] Insecure),
     /// The port is taken or the address is not this host's.
     #[error("cannot listen: {0}")]
     Bind(#[from] BindError),
@@ -83,6 +86,7 @@ pub(super) struct Shared {
     pub(super) clock: Clock,
     pub(super) config: SlaveConfig,
     pub(super) listen: String,
+    pub(super) transport: Transport,
     pub(super) netem: String,
     pub(super) meter: SocketMeter,
     pub(super) listener: Arc<Listener>,
@@ -93,6 +97,7 @@ impl Shared {
     pub(super) fn configuration(&self, slave: &SlaveConfig) -> SlaveConfiguration {
         SlaveConfiguration {
             listen: self.listen.clone(),
+            transport: self.transport.name(),
             slave: slave.clone(),
             netem: self.netem.clone(),
         }
@@ -105,6 +110,7 @@ impl SlaveHost {
     /// # Errors
     /// The configuration is not accepted, the address cannot be listened on, the identity is unusable.
     pub fn bind(options: SlaveOptions) -> Result<Self, SlaveHostError> {
+        options.transport.permit(options.listen)?;
         Slave::try_new(&options.config, Coupling::for_stiffness(TRIAL_STIFFNESS))?;
         let unusable = |source| SlaveHostError::Socket {
             address: options.listen,
@@ -116,7 +122,8 @@ impl SlaveHost {
         let emulated =
             EmulatedSocket::try_new_with(inner, options.netem, seed, LinkId::DOWN, extras)?;
         let meter = emulated.meter();
-        let endpoint = server_endpoint(Arc::new(emulated), &options.identity, TRAFFIC)?;
+        let socket = Arc::new(emulated);
+        let endpoint = Endpoint::of_slave(options.transport, socket, &options.identity, TRAFFIC)?;
         let address = endpoint.local_addr().map_err(unusable)?;
         let pairing = Pairing {
             address: Address {
@@ -130,6 +137,7 @@ impl SlaveHost {
             clock: Clock::start(),
             config: options.config,
             listen: address.to_string(),
+            transport: options.transport,
             netem,
             meter,
             listener: Arc::new(Listener::new(endpoint.clone())),

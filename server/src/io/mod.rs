@@ -21,6 +21,7 @@ use mmt_netem::LinkConfig;
 use mmt_netem::io::socket::SocketExtras;
 use mmt_shared::geometry::{BoxFootprint, Pose, Vec2};
 use mmt_shared::io::identity::Identity;
+use mmt_shared::io::transport::Transport;
 use mmt_shared::report::RunReport;
 use mmt_shared::wire::Cause;
 use serde::Serialize;
@@ -37,6 +38,8 @@ const PROGRAM: &str = concat!("mmt ", env!("CARGO_PKG_VERSION"));
 pub struct SlaveOptions {
     /// Where to listen.
     pub listen: SocketAddr,
+    /// What carries sessions.
+    pub transport: Transport,
     /// Certificate, key and token.
     pub identity: Identity,
     /// The slave of every session.
@@ -85,6 +88,8 @@ pub struct SlaveLive {
 pub struct SlaveConfiguration {
     /// Where it listened.
     pub listen: String,
+    /// What carries sessions: `quic` or `udp`.
+    pub transport: &'static str,
     /// The slave.
     pub slave: SlaveConfig,
     /// Emulated network on what the slave sends.

@@ -13,14 +13,14 @@ use bytes::Bytes;
 use mmt_netem::io::socket::SocketCounters;
 use mmt_shared::io::clock::Clock;
 use mmt_shared::io::live::LiveCell;
-use mmt_shared::io::stream::{WriteFrameError, write_frame};
+use mmt_shared::io::stream::WriteFrameError;
+use mmt_shared::io::transport::{Connection, RecvStream, SendStream};
 use mmt_shared::io::versions::CLOSE_FINISHED;
 use mmt_shared::metrics::UpdateCounts;
 use mmt_shared::wire::{
     DATAGRAM_MAX, Ending, Farewell, Hello, Label, Refusal, STREAM_MESSAGE_MAX, SlaveTotals,
     Welcome, encode_slave_farewell, encode_welcome,
 };
-use quinn::{Connection, RecvStream, SendStream};
 use tokio::sync::watch;
 use tokio::time::timeout;
 
@@ -173,7 +173,8 @@ async fn welcome(
     let mut out = [0; STREAM_MESSAGE_MAX];
     // A slave that could be made has numbers that can be told.
     let length = encode_welcome(&welcome, &mut out).unwrap_or_default();
-    write_frame(send, out.get(..length).unwrap_or_default(), WRITE_WAIT).await
+    let message = out.get(..length).unwrap_or_default();
+    send.write_frame(message, WRITE_WAIT).await
 }
 
 fn announce(connection: &Connection, hello: &Hello) {
@@ -263,7 +264,7 @@ impl<'a> Session<'a> {
 
     fn outcome(&self, ending: Ending, finished: Option<Finished>) -> Outcome {
         let now = self.shared.clock.now();
-        let frames = self.connection.stats();
+        let passed = self.connection.datagrams();
         Outcome {
             ending,
             duration: now.saturating_since(self.link.end().began()),
@@ -271,8 +272,8 @@ impl<'a> Session<'a> {
             sent: self.sent,
             link: self.link.clone(),
             lost: self.lost,
-            unsent: self.lost.given.saturating_sub(frames.frame_tx.datagram),
-            unread: frames.frame_rx.datagram.saturating_sub(self.lost.read),
+            unsent: self.lost.given.saturating_sub(passed.sent),
+            unread: passed.received.saturating_sub(self.lost.read),
             before: self.socket_before,
             after: self.shared.meter.snapshot(),
             over_ipv4: self
@@ -297,9 +298,8 @@ impl<'a> Session<'a> {
         // Totals come from reports, which hold no number that is not finite.
         let length = encode_slave_farewell(&farewell, &mut out).unwrap_or_default();
         let message = out.get(..length).unwrap_or_default();
-        write_frame(&mut self.send, message, FAREWELL_WAIT).await?;
-        // Finishing fails only on a stream that is finished.
-        let _ = self.send.finish();
+        self.send.write_frame(message, FAREWELL_WAIT).await?;
+        self.send.finish();
         Ok(())
     }
 }

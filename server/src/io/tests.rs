@@ -8,6 +8,7 @@ use std::time::Duration;
 use mmt_netem::LinkConfig;
 use mmt_shared::io::identity::Identity;
 use mmt_shared::io::live::LiveCell;
+use mmt_shared::io::transport::Transport;
 use mmt_shared::pairing::{Pairing, Token};
 use mmt_shared::wire::{Cause, Ending, Refusal};
 use tokio::sync::watch;
@@ -30,6 +31,7 @@ struct Running {
 
 fn options() -> SlaveOptions {
     SlaveOptions {
+        transport: Transport::Quic,
         listen: "127.0.0.1:0".parse().unwrap(),
         identity: Identity::ephemeral().unwrap(),
         config: SlaveConfig::default(),
@@ -320,4 +322,17 @@ async fn the_pairing_names_an_address_that_a_master_can_reach() {
     );
     let named = host.pairing(Some(mmt_shared::pairing::Host::Name("robot".into())));
     assert!(named.to_string().starts_with("mmt://robot:"));
+}
+
+#[tokio::test]
+async fn raw_udp_beyond_this_host_is_refused_unless_somebody_insists() {
+    let bind = |insist| {
+        SlaveHost::bind(SlaveOptions {
+            listen: "0.0.0.0:0".parse().unwrap(),
+            transport: Transport::RawUdp { insist },
+            ..options()
+        })
+    };
+    assert!(matches!(bind(false), Err(SlaveHostError::Insecure(_))));
+    assert!(bind(true).is_ok());
 }

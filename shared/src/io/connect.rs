@@ -27,7 +27,7 @@ pub enum ConnectError {
     /// Nothing there.
     #[error(
         "nothing answered at {address} for {limit:?}: is the slave running there, is the port right, \
-         does a firewall let UDP through?"
+         does a firewall let UDP through, have both sides the same --transport?"
     )]
     NoAnswer {
         /// Where.
@@ -79,6 +79,9 @@ pub enum ConnectError {
         /// Why.
         source: quinn::ConnectError,
     },
+    /// The system gave no random number.
+    #[error("the system has no randomness to give: wait until it has started, and try again")]
+    Randomness,
     /// TLS could not be set up.
     #[error(transparent)]
     Tls(#[from] TlsError),

@@ -3,17 +3,21 @@
 //! Datagrams that may be lost, one stream of framed messages in each direction, an end with a reason. Errors are in
 //! QUIC's words whichever it is. A session must not ask which one carries it.
 
+mod endpoint;
+#[cfg(test)]
+mod tests;
+
 use std::fmt;
-use std::io;
 use std::net::SocketAddr;
-use std::sync::Arc;
 use std::time::Duration;
 
 use bytes::Bytes;
 use tokio::time::timeout;
 
 use super::raw_udp;
+use super::stream::{ReadFrameError, WriteFrameError, read_frame, write_frame};
 
+pub use endpoint::{Endpoint, Handshake, Listener};
 pub use quinn::{ConnectionError, ReadError, SendDatagramError, VarInt, WriteError};
 
 /// Which transport a host uses. Both hosts of a session must use the same.
@@ -54,45 +58,6 @@ impl Transport {
 impl fmt::Display for Transport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(self.name())
-    }
-}
-
-/// An endpoint; clones are the same one.
-#[derive(Clone, Debug)]
-pub enum Endpoint {
-    /// Of QUIC.
-    Quic(quinn::Endpoint),
-    /// Of raw UDP.
-    RawUdp(Arc<raw_udp::Endpoint>),
-}
-
-impl Endpoint {
-    /// Where it is bound.
-    ///
-    /// # Errors
-    /// What the system says.
-    pub fn local_addr(&self) -> io::Result<SocketAddr> {
-        match self {
-            Self::Quic(endpoint) => endpoint.local_addr(),
-            Self::RawUdp(endpoint) => endpoint.local_addr(),
-        }
-    }
-
-    /// Closes all connections and takes no more.
-    pub fn close(&self, code: VarInt, reason: &[u8]) {
-        match self {
-            Self::Quic(endpoint) => endpoint.close(code, reason),
-            Self::RawUdp(endpoint) => endpoint.close(byte(code), reason),
-        }
-    }
-
-    /// Waits until the ends of all connections have gone out.
-    pub async fn wait_idle(&self) {
-        match self {
-            Self::Quic(endpoint) => endpoint.wait_idle().await,
-            // said once, and not waited for
-            Self::RawUdp(_) => {}
-        }
     }
 }
 
@@ -223,6 +188,21 @@ pub enum RecvStream {
 }
 
 impl SendStream {
+    /// Writes one message, within `limit`. Not cancel-safe.
+    ///
+    /// # Errors
+    /// See [`WriteFrameError`]; the stream is of no use afterwards.
+    pub async fn write_frame(
+        &mut self,
+        message: &[u8],
+        limit: Duration,
+    ) -> Result<(), WriteFrameError> {
+        match self {
+            Self::Quic(stream) => write_frame(stream, message, limit).await,
+            Self::RawUdp(connection) => connection.write_letter(message, limit).await,
+        }
+    }
+
     /// Says that no more messages come; does nothing on a stream that has ended.
     pub fn finish(&mut self) {
         match self {
@@ -240,6 +220,23 @@ impl SendStream {
             Self::Quic(stream) => drop(timeout(limit, stream.stopped()).await),
             // written is delivered
             Self::RawUdp(_) => {}
+        }
+    }
+}
+
+impl RecvStream {
+    /// Reads one message of at most `max` bytes, within `limit`. Not cancel-safe.
+    ///
+    /// # Errors
+    /// See [`ReadFrameError`]; after any but [`ReadFrameError::Finished`] the stream is of no use.
+    pub async fn read_frame(
+        &mut self,
+        max: usize,
+        limit: Duration,
+    ) -> Result<Vec<u8>, ReadFrameError> {
+        match self {
+            Self::Quic(stream) => read_frame(stream, max, limit).await,
+            Self::RawUdp(connection) => connection.read_letter(max, limit).await,
         }
     }
 }

@@ -2,13 +2,13 @@
 
 use std::time::Duration;
 
-use mmt_shared::io::stream::{ReadFrameError, read_frame};
+use mmt_shared::io::stream::ReadFrameError;
+use mmt_shared::io::transport::{ConnectionError, RecvStream};
 use mmt_shared::peer::NumbersSpent;
 use mmt_shared::wire::{
     DecodeError, Farewell, MasterTotals, STREAM_MESSAGE_MAX, Side, StreamMessage,
     decode_stream_message,
 };
-use quinn::{ConnectionError, RecvStream};
 
 /// A master that has not been heard for this long has lost its lease (reliability.md, section 1).
 pub(super) const SILENCE_MAX: Duration = Duration::from_secs(10);
@@ -46,7 +46,9 @@ pub(in crate::io) enum StreamError {
 pub(super) async fn farewell_of(
     mut receive: RecvStream,
 ) -> Result<Farewell<MasterTotals>, StreamError> {
-    let frame = read_frame(&mut receive, STREAM_MESSAGE_MAX, Duration::MAX).await?;
+    let frame = receive
+        .read_frame(STREAM_MESSAGE_MAX, Duration::MAX)
+        .await?;
     match decode_stream_message(&frame, Side::Master)? {
         StreamMessage::MasterFarewell(farewell) => Ok(farewell),
         _ => Err(StreamError::NoFarewell),

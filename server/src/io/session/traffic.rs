@@ -7,9 +7,9 @@ use std::time::Duration;
 
 use bytes::Bytes;
 use mmt_shared::io::live::LiveCell;
+use mmt_shared::io::transport::SendDatagramError;
 use mmt_shared::link_end::SealError;
 use mmt_shared::wire::{Farewell, MasterTotals};
-use quinn::SendDatagramError;
 use tokio::sync::watch;
 use tokio::time::{MissedTickBehavior, interval, sleep};
 
