@@ -164,14 +164,14 @@ pub enum BenchError {
 /// What takes turns.
 enum Rig {
     Control(Control),
-    Carried(Carried),
+    Carried(Box<Carried>),
 }
 
 impl Rig {
     fn try_new(carrier: Carrier, config: &BenchConfig, clock: Clock) -> Result<Self, BenchError> {
         Ok(match carrier {
             Carrier::Control => Self::Control(Control::try_new(clock)?),
-            carried => Self::Carried(Carried::try_new(carried, config, clock)?),
+            carried => Self::Carried(Box::new(Carried::try_new(carried, config, clock)?)),
         })
     }
 

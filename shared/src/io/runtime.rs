@@ -43,15 +43,19 @@ pub async fn until<T>(
     future: impl Future<Output = T>,
 ) -> Option<T> {
     let mut future = pin!(future);
-    let mut timer = deadline.map(|deadline| runtime.new_timer(deadline));
+    let mut timer = deadline.map(|deadline| (deadline, runtime.new_timer(deadline)));
     poll_fn(|context| {
         if let Poll::Ready(result) = future.as_mut().poll(context) {
             return Poll::Ready(Some(result));
         }
-        match &mut timer {
-            Some(timer) => timer.as_mut().poll(context).map(|()| None),
-            None => Poll::Pending,
+        let Some((deadline, timer)) = &mut timer else {
+            return Poll::Pending;
+        };
+        // not every timer is ready as soon as its deadline has passed: tokio's waits for its next millisecond
+        if runtime.now() >= *deadline {
+            return Poll::Ready(None);
         }
+        timer.as_mut().poll(context).map(|()| None)
     })
     .await
 }

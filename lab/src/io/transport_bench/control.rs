@@ -50,18 +50,28 @@ impl Control {
         let before = thread_cpu_time();
         for k in 0..slice.messages {
             self.clock.sleep_until(slice.due(k));
-            send(&self.near, &slice.message(self.clock.now()), &mut side)?;
+            let message = slice.message(self.clock.now());
+            send(&self.near, &message, &mut side)?;
             if slice.flow == Flow::RoundTrip {
-                let mut buffer = [0; BYTES_MAX];
-                // a lost one costs a look; the next message is late then
-                if let Some(message) = receive(&self.near, &mut buffer)? {
-                    self.note(slice, message, &mut side);
-                }
+                self.await_answer(slice, &message, &mut side)?;
             }
         }
         self.clock.sleep_until(slice.end());
         side.cpu = thread_cpu_time().saturating_sub(before);
         Ok(side)
+    }
+
+    /// Waits for the answer to `message`, and takes in those that were late before it. A lost one costs a look, and
+    /// the next message is late then.
+    fn await_answer(&self, slice: &Slice, message: &[u8], side: &mut Side) -> io::Result<()> {
+        let mut buffer = [0; BYTES_MAX];
+        while let Some(answer) = receive(&self.near, &mut buffer)? {
+            self.note(slice, answer, side);
+            if answer == message {
+                break;
+            }
+        }
+        Ok(())
     }
 
     fn far(&self, slice: &Slice) -> io::Result<Side> {
