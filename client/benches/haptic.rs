@@ -10,7 +10,7 @@ use std::time::Duration;
 use criterion::{Criterion, criterion_group, criterion_main};
 use mmt_client::device::DeviceProfile;
 use mmt_client::limiter::ForceLimiter;
-use mmt_client::link::MasterLink;
+use mmt_client::link::{CommandConfig, MasterLink};
 use mmt_client::master::Master;
 use mmt_client::operator::Operator;
 use mmt_client::operator::scripted::{Scripted, ScriptedConfig};
@@ -48,7 +48,7 @@ impl Haptic {
         let scripted = Scripted::try_new(ScriptedConfig::default(), master.view()).unwrap();
         Self {
             master,
-            link: MasterLink::new(Time::ZERO, coupling, 10),
+            link: MasterLink::new(Time::ZERO, coupling, CommandConfig::default()),
             operator: Operator::Scripted(Box::new(scripted)),
             hand_force: Vec2::zeros(),
             now: Time::ZERO,

@@ -1,12 +1,53 @@
 //! The master's end of the link: updates in, commands out.
 //!
-//! Pure. An update passes the sequence window and `accept` here or never reaches the model.
+//! Pure. An update passes the sequence window and `accept` here or never reaches the model. A sample is never sent
+//! in another form than it was first.
 
 use mmt_shared::contact::Coupling;
 use mmt_shared::link_end::{LinkEnd, Outgoing, SealError};
 use mmt_shared::peer::{Freshness, SequenceWindow};
+use mmt_shared::rate_control::StretchMax;
 use mmt_shared::time::Time;
-use mmt_shared::wire::{Command, HipSample, Matter, SampleBlock, Scene, Side, Update, UpdateDrops};
+use mmt_shared::wire::{
+    Command, HipSample, Matter, SAMPLES_MAX, SampleBlock, Scene, Side, Update, UpdateDrops,
+};
+use serde::{Deserialize, Serialize};
+
+/// Most ticks from one packed sample to the next: play-out takes its velocity from samples of 5 ms.
+const SPACING_MAX: u32 = 4;
+
+/// How commands are made.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct CommandConfig {
+    /// New samples in a command, 1 to 32; at least one whatever it says.
+    pub samples_per_command: u8,
+    /// How many commands before it each command repeats the samples of, as far as 32 samples hold them.
+    pub repeat_samples: u8,
+    /// By how much congestion may stretch the time between two samples, and so between two commands; 1: not at all.
+    pub stretch_max: StretchMax,
+}
+
+impl Default for CommandConfig {
+    /// Ten samples, none repeated: repeats of samples buy no force error (docs/repeats.md). Congestion may leave
+    /// two of three samples out.
+    fn default() -> Self {
+        Self {
+            samples_per_command: 10,
+            repeat_samples: 0,
+            stretch_max: StretchMax::RECOMMENDED,
+        }
+    }
+}
+
+impl CommandConfig {
+    /// The most samples that a command can have.
+    #[must_use]
+    pub fn samples_at_most(&self) -> usize {
+        let news = usize::from(self.samples_per_command).max(1);
+        (news * (1 + usize::from(self.repeat_samples))).min(SAMPLES_MAX)
+    }
+}
 
 /// What came from the slave.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -24,23 +65,31 @@ pub struct MasterLink {
     coupling: Coupling,
     window: SequenceWindow,
     rejected: u32,
+    config: CommandConfig,
     block: SampleBlock,
-    samples_per_command: usize,
+    /// Samples of the commands before, newest last.
+    told: SampleBlock,
+    /// Samples that congestion leaves out until the next one is packed.
+    to_skip: u32,
     samples_refused: u32,
+    samples_skipped: u32,
 }
 
 impl MasterLink {
-    /// A link that packs `samples_per_command` samples (at least one) in a command.
+    /// A link from `now` on to a slave that knows the device's `coupling`.
     #[must_use]
-    pub fn new(now: Time, coupling: Coupling, samples_per_command: u8) -> Self {
+    pub fn new(now: Time, coupling: Coupling, config: CommandConfig) -> Self {
         Self {
-            end: LinkEnd::new(Side::Master, now),
+            end: LinkEnd::with_rate_control(Side::Master, now, config.stretch_max),
             coupling,
             window: SequenceWindow::new(),
             rejected: 0,
+            config,
             block: SampleBlock::new(),
-            samples_per_command: usize::from(samples_per_command).max(1),
+            told: SampleBlock::new(),
+            to_skip: 0,
             samples_refused: 0,
+            samples_skipped: 0,
         }
     }
 
@@ -65,6 +114,12 @@ impl MasterLink {
     #[must_use]
     pub fn samples_refused(&self) -> u32 {
         self.samples_refused
+    }
+
+    /// Samples that congestion left out on purpose.
+    #[must_use]
+    pub fn samples_skipped(&self) -> u32 {
+        self.samples_skipped
     }
 
     /// Samples that wait for the command to be full.
@@ -93,7 +148,8 @@ impl MasterLink {
         }
     }
 
-    /// Packs a sample; once the command is full it is written to `out` and its length returned.
+    /// Packs a sample; once the command is full it is written to `out` and its length returned. Under congestion
+    /// only every second, third, … sample is packed.
     ///
     /// # Errors
     /// When the command cannot be sealed; its samples are lost then.
@@ -103,20 +159,48 @@ impl MasterLink {
         sample: HipSample,
         out: &mut [u8],
     ) -> Result<Option<usize>, SealError> {
+        if self.to_skip > 0 {
+            self.to_skip -= 1;
+            self.samples_skipped = self.samples_skipped.saturating_add(1);
+            return Ok(None);
+        }
+        self.to_skip = self.spacing() - 1;
         if self.block.push(sample).is_err() {
             self.samples_refused = self.samples_refused.saturating_add(1);
         }
-        if self.block.len() < self.samples_per_command && !self.block.is_full() {
+        if self.block.len() < usize::from(self.config.samples_per_command) && !self.block.is_full() {
             return Ok(None);
         }
         let command = Command {
             newest_update: self.window.newest(),
-            samples: self.block,
+            samples: self.with_repeats(),
         };
         self.block.clear();
         self.end
             .seal(now, Outgoing::Command(&command), out)
             .map(Some)
+    }
+
+    /// Ticks from one packed sample to the next.
+    fn spacing(&self) -> u32 {
+        (libm::ceil(self.end.stretch()) as u32).min(SPACING_MAX)
+    }
+
+    /// The new samples behind those that are repeated, which are kept for the next command; no repeats while the
+    /// path is congested.
+    fn with_repeats(&mut self) -> SampleBlock {
+        if self.config.repeat_samples == 0 {
+            return self.block;
+        }
+        let news = self.block.len();
+        let all = match self.end.stretch() > 1.0 {
+            true => news,
+            false => self.config.samples_at_most(),
+        };
+        let whole = joined(&self.told, &self.block, all);
+        let keep = news * usize::from(self.config.repeat_samples);
+        self.told = joined(&self.told, &self.block, keep.min(SAMPLES_MAX));
+        whole
     }
 
     /// A heartbeat, if nothing has been sent for long enough.
@@ -130,3 +214,18 @@ impl MasterLink {
         self.end.seal(now, Outgoing::Heartbeat, out).map(Some)
     }
 }
+
+/// The newest `most` samples of `older` and then `newer`, all of which are newer. Where the stamps of the two do not
+/// fit together, those of `newer` alone.
+fn joined(older: &SampleBlock, newer: &SampleBlock, most: usize) -> SampleBlock {
+    let skip = (older.len() + newer.len()).saturating_sub(most);
+    let all = older.as_slice().iter().chain(newer.as_slice()).skip(skip);
+    let mut block = SampleBlock::new();
+    match all.copied().try_for_each(|sample| block.push(sample)) {
+        Ok(()) => block,
+        Err(_) => *newer,
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -17,7 +17,7 @@ use mmt_shared::time::TICK_S;
 use mmt_shared::wire::Cause;
 use serde::{Deserialize, Serialize};
 
-use crate::world::{World, WorldConfig, WorldError, WorldTick};
+use crate::world::{Traffic, World, WorldConfig, WorldError, WorldTick};
 use recovery::Watch;
 
 /// The first second of contact is the opening: the model starts wrong there.
@@ -116,6 +116,10 @@ pub struct Measured {
     pub parameter_errors: [f64; 3],
     /// How the change was followed; none if the trial has no change or it never came.
     pub recovery: Option<Recovery>,
+    /// From the sending of each update until the master knew it or a newer one.
+    pub staleness: Vec<Duration>,
+    /// Messages, datagrams and bits that were sent.
+    pub traffic: Traffic,
     /// The forces, tick by tick; empty unless the trial is traced.
     pub trace: Vec<TraceRow>,
     /// SHA-256 of the world's event log.
@@ -237,6 +241,8 @@ impl Run {
                 error(estimate.c, truth.c()),
             ],
             recovery: self.watch.map(Watch::recovery),
+            staleness: outcome.staleness.times().to_vec(),
+            traffic: world.traffic(),
             trace: self.trace,
             digest: world.digest(),
         }

@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use mmt_client::device::{DeviceError, DeviceProfile};
 use mmt_client::limiter::{ForceLimiter, LimitsError};
-use mmt_client::link::{FromSlave, MasterLink};
+use mmt_client::link::{CommandConfig, FromSlave, MasterLink};
 use mmt_client::master::{Master, MasterTick};
 use mmt_client::operator::Operator;
 use mmt_client::operator::scripted::{Picture, Scripted, ScriptedConfig, ScriptedError, View};
@@ -17,13 +17,16 @@ use mmt_netem::counters::Tally;
 use mmt_netem::link::{Direction, LinkId};
 use mmt_netem::pipe::SimPath;
 use mmt_server::environment::Environment;
-use mmt_server::link::SlaveLink;
+use mmt_server::link::{SlaveLink, SlaveLinkConfig};
 use mmt_server::slave::{Slave, SlaveConfig, SlaveError, SlaveTick};
+use mmt_shared::bilateral::message::OVERHEAD_BYTES;
 use mmt_shared::contact::Coupling;
 use mmt_shared::geometry::Vec2;
 use mmt_shared::metrics::{
-    AgeOfInformation, ContactBreaks, ForcePeak, ForceSummary, PoseError, UpdateCounts,
+    AgeOfInformation, ContactBreaks, ForcePeak, ForceSummary, PoseError, Staleness, UpdateCounts,
 };
+use mmt_shared::rate_control::StretchMax;
+use mmt_shared::report::{MessagesReport, UpDown, WireReport};
 use mmt_shared::settings::ModelSettings;
 use mmt_shared::time::{TICK, Time};
 use mmt_shared::wire::{DATAGRAM_MAX, Label, Update, Welcome};
@@ -47,8 +50,12 @@ pub struct WorldConfig {
     pub stiffness_n_per_m: Option<f64>,
     /// The scripted operator.
     pub operator: ScriptedConfig,
-    /// Samples in a command.
+    /// New samples in a command.
     pub samples_per_command: u8,
+    /// How many commands before it each command repeats the samples of.
+    pub repeat_samples: u8,
+    /// By how much congestion may stretch the time between the master's samples; 1: not at all.
+    pub stretch_max: StretchMax,
     /// Network from master to slave.
     pub up: LinkConfig,
     /// Network from slave to master.
@@ -58,13 +65,20 @@ pub struct WorldConfig {
 impl Default for WorldConfig {
     /// The default scenario over a perfect network.
     fn default() -> Self {
+        let CommandConfig {
+            samples_per_command,
+            repeat_samples,
+            stretch_max,
+        } = CommandConfig::default();
         Self {
             seed: 1,
             slave: SlaveConfig::default(),
             settings: None,
             stiffness_n_per_m: None,
             operator: ScriptedConfig::default(),
-            samples_per_command: 10,
+            samples_per_command,
+            repeat_samples,
+            stretch_max,
             up: LinkConfig::default(),
             down: LinkConfig::default(),
         }
@@ -79,6 +93,22 @@ impl WorldConfig {
         self.slave.seed = seed;
         self.operator.seed = seed;
         self
+    }
+
+    fn commands(&self) -> CommandConfig {
+        CommandConfig {
+            samples_per_command: self.samples_per_command,
+            repeat_samples: self.repeat_samples,
+            stretch_max: self.stretch_max,
+        }
+    }
+
+    fn slave_link(&self) -> SlaveLinkConfig {
+        SlaveLinkConfig {
+            repeats: self.slave.repeats_ms,
+            stretch_max: self.slave.stretch_max,
+            samples_per_command: self.samples_per_command,
+        }
     }
 }
 
@@ -111,6 +141,17 @@ pub struct WorldTick {
     pub master: MasterTick,
     /// The slave's tick; none before the first sample is played.
     pub slave: Option<SlaveTick>,
+}
+
+/// The three packet rates of a world, as sent.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Traffic {
+    /// Messages by kind.
+    pub messages: UpDown<MessagesReport>,
+    /// Repeats of updates, by the cause of what they repeat.
+    pub repeated: UpdateCounts,
+    /// Datagrams, and bits per second with headers.
+    pub wire: UpDown<WireReport>,
 }
 
 /// The world.
@@ -163,6 +204,8 @@ pub struct Outcome {
     pub superseded: u32,
     /// Age of the news that the master's model rests on.
     pub age: AgeOfInformation,
+    /// How long updates took to become known at the master.
+    pub staleness: Staleness,
     /// Error of the master's pose against the truth, at the same HIP sample.
     pub pose: PoseError,
     /// Breaks of contact at the master.
@@ -208,13 +251,13 @@ impl World {
         Ok(Self {
             now: Time::ZERO,
             slave,
-            slave_link: SlaveLink::new(Time::ZERO + SLAVE_EPOCH),
+            slave_link: SlaveLink::new(Time::ZERO + SLAVE_EPOCH, config.slave_link()),
             master,
             // a session begins with the slave's welcome, which takes its time as well
             master_link: MasterLink::new(
                 Time::ZERO + down_delay,
                 settings.coupling,
-                config.samples_per_command,
+                config.commands(),
             ),
             operator,
             hand_force: Vec2::zeros(),
@@ -259,6 +302,30 @@ impl World {
     #[must_use]
     pub fn slave_link(&self) -> &SlaveLink {
         &self.slave_link
+    }
+
+    /// What was sent: messages by kind, and datagrams with bits per second. Every message is a datagram of its own
+    /// here; its headers are those of IPv4, UDP and QUIC, whose own packets this world does not have.
+    #[must_use]
+    pub fn traffic(&self) -> Traffic {
+        let duration_s = self.now.as_secs_f64();
+        let repeats = self.slave_link.repeated();
+        let wire = |of: Tally| {
+            WireReport::new(of.packets, of.bytes, OVERHEAD_BYTES as u64, duration_s)
+        };
+        let [up, down] = self.sent();
+        let (master, slave) = (self.master_link.end(), self.slave_link.end());
+        Traffic {
+            messages: UpDown {
+                up: MessagesReport::up(&master.traffic().sent, duration_s),
+                down: MessagesReport::down(&slave.traffic().sent, repeats.total(), duration_s),
+            },
+            repeated: *repeats,
+            wire: UpDown {
+                up: wire(up),
+                down: wire(down),
+            },
+        }
     }
 
     /// Datagrams sent up and down, as long as their payload.
@@ -336,6 +403,7 @@ impl World {
             self.master.apply(&update);
             self.outcome.newest_answer = Some(update.answers);
             self.outcome.newest_update = update.sequence;
+            self.outcome.staleness.known(self.now, update.sequence);
         }
         if let Some(answers) = self.outcome.newest_answer {
             self.outcome.age.push(self.now, answers);
@@ -401,10 +469,10 @@ impl World {
             let bytes = bytes.get(..length).unwrap_or_default();
             let arrived = self.slave_clock.at(packet.due);
             if let Some(command) = self.slave_link.handle(arrived, bytes) {
-                for sample in command.samples.as_slice() {
-                    self.slave
-                        .handle_sample(arrived, sample, command.newest_update);
+                for (sample, newest_update) in self.slave_link.samples(&command) {
+                    self.slave.handle_sample(arrived, &sample, newest_update);
                 }
+                self.slave.stretch(self.slave_link.end().stretch());
             }
         }
     }
@@ -421,10 +489,14 @@ impl World {
             }
             if let Some(update) = &tick.update {
                 self.outcome.updates.sent(update.cause);
+                self.outcome.staleness.sent(self.now, update.sequence);
                 if let Ok(length) = self.slave_link.send_update(now, update, &mut bytes) {
                     self.down.push(self.now, length, Packet { bytes, length });
                 }
             }
+        }
+        if let Ok(Some(length)) = self.slave_link.repeat(now, &mut bytes) {
+            self.down.push(self.now, length, Packet { bytes, length });
         }
         if let Ok(Some(length)) = self.slave_link.heartbeat(now, &mut bytes) {
             self.down.push(self.now, length, Packet { bytes, length });

@@ -1,25 +1,50 @@
-//! The slave's end of the link: commands in, updates out. Pure.
+//! The slave's end of the link: commands in, updates and their repeats out. Pure.
+
+mod repeats;
+
+pub use repeats::{REPEATS_MAX, Repeats, RepeatsError};
 
 use mmt_shared::link_end::{LinkEnd, Outgoing, SealError};
+use mmt_shared::metrics::UpdateCounts;
+use mmt_shared::rate_control::StretchMax;
 use mmt_shared::time::Time;
-use mmt_shared::wire::{Command, Matter, Side, Update};
+use mmt_shared::wire::{Command, HipSample, Matter, Side, Update};
+
+use repeats::Repeating;
+
+/// How the slave's end of a session's link works.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SlaveLinkConfig {
+    /// When an update is said again.
+    pub repeats: Repeats,
+    /// By how much congestion may stretch what is said.
+    pub stretch_max: StretchMax,
+    /// How many samples of a command are news, as the master's hello says; those before them are repeats.
+    pub samples_per_command: u8,
+}
 
 /// The slave's end of the link.
 #[derive(Clone, Debug)]
 pub struct SlaveLink {
     end: LinkEnd,
+    config: SlaveLinkConfig,
     newest_acknowledged: u32,
     samples: u64,
+    repeating: Option<Repeating>,
+    repeated: UpdateCounts,
 }
 
 impl SlaveLink {
     /// A link from `now` on.
     #[must_use]
-    pub fn new(now: Time) -> Self {
+    pub fn new(now: Time, config: SlaveLinkConfig) -> Self {
         Self {
-            end: LinkEnd::new(Side::Slave, now),
+            end: LinkEnd::with_rate_control(Side::Slave, now, config.stretch_max),
+            config,
             newest_acknowledged: 0,
             samples: 0,
+            repeating: None,
+            repeated: UpdateCounts::default(),
         }
     }
 
@@ -35,10 +60,16 @@ impl SlaveLink {
         self.newest_acknowledged
     }
 
-    /// HIP samples received.
+    /// HIP samples received, repeated ones included.
     #[must_use]
     pub fn samples_received(&self) -> u64 {
         self.samples
+    }
+
+    /// Repeats sent, by the cause of what they repeat.
+    #[must_use]
+    pub fn repeated(&self) -> &UpdateCounts {
+        &self.repeated
     }
 
     /// Takes in a datagram that arrived at `now`; its samples are for the play-out buffer.
@@ -51,7 +82,22 @@ impl SlaveLink {
         Some(command)
     }
 
-    /// Writes an update to `out`; it is completed with the newest command seen. Returns its length.
+    /// A command's samples, oldest first, each with the newest update that the master had by then as far as the
+    /// command tells: nothing (0) of a sample that is repeated from an earlier command.
+    pub fn samples(&self, command: &Command) -> impl Iterator<Item = (HipSample, u32)> {
+        let newest_update = command.newest_update;
+        let news = usize::from(self.config.samples_per_command).max(1);
+        let repeated = command.samples.len().saturating_sub(news);
+        // SampleBlock is Copy: the samples outlive the command
+        let samples = command.samples;
+        (0..samples.len()).filter_map(move |n| {
+            let sample = samples.as_slice().get(n)?;
+            Some((*sample, if n < repeated { 0 } else { newest_update }))
+        })
+    }
+
+    /// Writes an update to `out`; it is completed with the newest command seen. Returns its length. Its repeats
+    /// are due from now on, and those of the update before no more.
     ///
     /// # Errors
     /// When it cannot be sealed.
@@ -61,6 +107,40 @@ impl SlaveLink {
         update: &Update,
         out: &mut [u8],
     ) -> Result<usize, SealError> {
+        self.repeating = Some(Repeating::new(now, *update));
+        self.seal(now, update, out)
+    }
+
+    /// When the next repeat is due: never while the path is congested, nor once the master has the update.
+    #[must_use]
+    pub fn repeat_due(&self) -> Option<Time> {
+        let repeating = self.repeating.as_ref()?;
+        let wanted = repeating.update.sequence > self.newest_acknowledged;
+        let due = repeating.due(&self.config.repeats)?;
+        (wanted && self.end.stretch() <= 1.0).then_some(due)
+    }
+
+    /// Writes the newest update to `out` once more, if a repeat is due at `now`. Returns its length.
+    ///
+    /// # Errors
+    /// When it cannot be sealed.
+    pub fn repeat(&mut self, now: Time, out: &mut [u8]) -> Result<Option<usize>, SealError> {
+        if self.repeat_due().is_none_or(|due| due > now) {
+            return Ok(None);
+        }
+        let Some(repeating) = &mut self.repeating else {
+            return Ok(None);
+        };
+        let update = repeating.update;
+        if !repeating.take_due(now, &self.config.repeats) {
+            return Ok(None);
+        }
+        let length = self.seal(now, &update, out)?;
+        self.repeated.sent(update.cause);
+        Ok(Some(length))
+    }
+
+    fn seal(&mut self, now: Time, update: &Update, out: &mut [u8]) -> Result<usize, SealError> {
         let update = Update {
             newest_command: self.end.peer().newest(),
             ..*update
@@ -79,3 +159,6 @@ impl SlaveLink {
         self.end.seal(now, Outgoing::Heartbeat, out).map(Some)
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -183,11 +183,16 @@ impl PlayoutBuffer {
             return;
         }
         self.clock.observe(arrived, sample.stamp);
+        let Err(place) = self.find(sample.stamp) else {
+            // what was there in time asks for no longer delay
+            self.counts.duplicate += 1;
+            return;
+        };
         if let Some(quickest) = self.clock.stamp_at(arrived) {
             self.lateness
                 .observe(arrived, quickest.saturating_since(sample.stamp));
         }
-        self.admit(arrived, sample);
+        self.admit(arrived, sample, place);
     }
 
     /// The HIP to follow at `now` by the slave's clock; to be called every tick.
@@ -263,14 +268,7 @@ impl PlayoutBuffer {
         }
     }
 
-    fn admit(&mut self, arrived: Time, sample: &HipSample) {
-        let place = match self.find(sample.stamp) {
-            Ok(_) => {
-                self.counts.duplicate += 1;
-                return;
-            }
-            Err(place) => place,
-        };
+    fn admit(&mut self, arrived: Time, sample: &HipSample, place: usize) {
         if self.last.is_some_and(|last| sample.stamp <= last.stamp) {
             self.counts.late += 1;
             // while play-out waits for stamps that it has played, samples are in time all the same

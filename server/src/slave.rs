@@ -18,7 +18,7 @@ use crate::playout::PlayoutBuffer;
 use crate::pose_observer::{ObserverConfig, PoseObserver};
 use crate::sensing::Sensing;
 use crate::shadow::{Shadow, TriggerReference};
-use crate::trigger::{ContactDetector, Trigger, TriggerInput};
+use crate::trigger::{ContactDetector, Scheme, Trigger, TriggerInput};
 
 mod config;
 
@@ -201,6 +201,17 @@ impl Slave {
     pub fn handle_sample(&mut self, now: Time, sample: &HipSample, newest_update: u32) {
         self.playout.push(now, sample);
         self.shadow.acknowledge(sample, newest_update);
+    }
+
+    /// From now on the trigger's thresholds and times are `by` as large as configured: the answer to congestion.
+    pub fn stretch(&mut self, by: f64) {
+        self.trigger.stretch(by);
+    }
+
+    /// The update scheme as it is now, stretched or not.
+    #[must_use]
+    pub fn scheme_now(&self) -> Scheme {
+        self.trigger.scheme_now()
     }
 
     /// Where the tool is before the first sample, m.

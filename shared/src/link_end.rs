@@ -6,6 +6,7 @@
 use std::time::Duration;
 
 use crate::peer::{Arrival, NumbersSpent, Peer};
+use crate::rate_control::{RateController, StretchMax};
 use crate::time::Time;
 use crate::wire::{
     Command, EncodeError, KindCounts, Matter, Scene, Side, Traffic, Update, decode_datagram,
@@ -50,12 +51,19 @@ pub struct LinkEnd {
     malformed: u32,
     began: Time,
     last_sent: Time,
+    rate: RateController,
 }
 
 impl LinkEnd {
-    /// The end of `side`, from `now` on.
+    /// The end of `side`, from `now` on, that never says less because of congestion.
     #[must_use]
     pub fn new(side: Side, now: Time) -> Self {
+        Self::with_rate_control(side, now, StretchMax::OFF)
+    }
+
+    /// The end of `side`, from `now` on, that asks for at most this stretch under congestion.
+    #[must_use]
+    pub fn with_rate_control(side: Side, now: Time, stretch_max: StretchMax) -> Self {
         Self {
             side,
             peer: Peer::new(),
@@ -64,6 +72,7 @@ impl LinkEnd {
             malformed: 0,
             began: now,
             last_sent: now,
+            rate: RateController::new(stretch_max),
         }
     }
 
@@ -74,9 +83,13 @@ impl LinkEnd {
             self.malformed = self.malformed.saturating_add(1);
             return None;
         };
+        let measured = self.peer.round_trip().histogram().total();
         match self.peer.handle(now, &datagram.envelope, bytes.len()) {
             Arrival::Newest | Arrival::Reordered => {}
             Arrival::Duplicate | Arrival::TooOld => return None,
+        }
+        if self.peer.round_trip().histogram().total() > measured {
+            self.control_rate(now);
         }
         let count = match datagram.matter {
             Matter::Command(_) => &mut self.received.commands,
@@ -86,6 +99,19 @@ impl LinkEnd {
         };
         *count = count.saturating_add(1);
         Some(datagram.matter)
+    }
+
+    fn control_rate(&mut self, now: Time) {
+        let round_trip = self.peer.round_trip();
+        if let (Some(latest), Some(least)) = (round_trip.latest(), round_trip.least(now)) {
+            self.rate.observe(now, latest, least);
+        }
+    }
+
+    /// By how much to stretch what is said, 1 without congestion ([`RateController`]).
+    #[must_use]
+    pub fn stretch(&self) -> f64 {
+        self.rate.stretch()
     }
 
     /// Writes a datagram to be sent at `now`; returns its length.

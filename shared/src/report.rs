@@ -13,6 +13,7 @@ use serde::{Deserialize, Serialize};
 use crate::metrics::{
     AgeOfInformation, ContactBreaks, ForcePeak, ForceSummary, PoseError, UpdateCounts,
 };
+use crate::wire::KindCounts;
 use crate::wire::message::Ending;
 
 pub use number::Number;
@@ -137,6 +138,10 @@ pub struct UpdatesReport {
     pub contact_rate_hz: Number,
     /// Sent, by cause.
     pub by_cause: Option<Counts>,
+    /// Repeats of them that the slave sent.
+    pub repeated: Option<u64>,
+    /// Repeats, by the cause of what they repeat.
+    pub repeated_by_cause: Option<Counts>,
     /// Updates that the master's model took.
     pub applied: Option<u64>,
     /// Updates that arrived and were not applied, by cause.
@@ -151,9 +156,19 @@ impl UpdatesReport {
         self.sent = Some(counts.total());
         self.rate_hz = counts.rate_hz().into();
         self.contact_rate_hz = counts.contact_rate_hz().into();
-        let named = counts.by_cause().map(|(cause, n)| (cause.name().into(), n));
-        self.by_cause = Some(named.collect());
+        self.by_cause = Some(named_causes(counts));
     }
+
+    /// Takes what the slave repeated.
+    pub fn set_repeated(&mut self, counts: &UpdateCounts) {
+        self.repeated = Some(counts.total());
+        self.repeated_by_cause = Some(named_causes(counts));
+    }
+}
+
+fn named_causes(counts: &UpdateCounts) -> Counts {
+    let named = counts.by_cause().map(|(cause, n)| (cause.name().into(), n));
+    named.collect()
 }
 
 /// Age of information at the master, ms.
@@ -180,12 +195,42 @@ impl From<&AgeOfInformation> for AgeReport {
 pub struct MessagesReport {
     /// Commands: packed HIP samples.
     pub commands: Option<u64>,
-    /// Updates.
+    /// Updates, repeats included.
     pub updates: Option<u64>,
+    /// Repeats among them: where they are received, those that said what was known.
+    pub repeats: Option<u64>,
     /// Scenes.
     pub scenes: Option<u64>,
     /// Heartbeats.
     pub heartbeats: Option<u64>,
+    /// Messages of all kinds per second, 1/s.
+    pub rate_hz: Number,
+}
+
+impl MessagesReport {
+    /// What goes from master to slave in `duration_s` (s).
+    #[must_use]
+    pub fn up(counts: &KindCounts, duration_s: f64) -> Self {
+        Self {
+            commands: Some(counts.commands.into()),
+            heartbeats: Some(counts.heartbeats.into()),
+            rate_hz: Number::rate(counts.total() as f64, duration_s),
+            ..Self::default()
+        }
+    }
+
+    /// What goes from slave to master in `duration_s` (s), with so many repeats among the updates.
+    #[must_use]
+    pub fn down(counts: &KindCounts, repeats: u64, duration_s: f64) -> Self {
+        Self {
+            updates: Some(counts.updates.into()),
+            repeats: Some(repeats),
+            scenes: Some(counts.scenes.into()),
+            heartbeats: Some(counts.heartbeats.into()),
+            rate_hz: Number::rate(counts.total() as f64, duration_s),
+            ..Self::default()
+        }
+    }
 }
 
 /// UDP datagrams in one direction, as this process's socket counted them.

@@ -15,17 +15,18 @@ use std::hint::black_box;
 
 use mmt_client::device::DeviceProfile;
 use mmt_client::limiter::ForceLimiter;
-use mmt_client::link::{FromSlave, MasterLink};
+use mmt_client::link::{CommandConfig, FromSlave, MasterLink};
 use mmt_client::master::Master;
 use mmt_client::operator::Operator;
 use mmt_client::operator::scripted::{Scripted, ScriptedConfig};
 use mmt_server::estimator::{Estimator, EstimatorConfig, Measured, Seen};
-use mmt_server::link::SlaveLink;
+use mmt_server::link::{Repeats, SlaveLink, SlaveLinkConfig};
 use mmt_server::playout::{PlayoutBuffer, PlayoutConfig};
 use mmt_server::shadow::Shadow;
 use mmt_server::slave::{Slave, SlaveConfig, SlaveTick};
 use mmt_server::trigger::{Trigger, TriggerConfig, TriggerInput};
 use mmt_shared::geometry::Vec2;
+use mmt_shared::rate_control::StretchMax;
 use mmt_shared::settings::Mode;
 use mmt_shared::time::{TICK, Time};
 use mmt_shared::wire::{Command, DATAGRAM_MAX, HipSample, Label, Welcome};
@@ -106,6 +107,23 @@ impl Packet {
     }
 }
 
+/// Commands with everything that can be switched on.
+fn commands() -> CommandConfig {
+    CommandConfig {
+        repeat_samples: 1,
+        ..CommandConfig::default()
+    }
+}
+
+/// The slave's end with everything that can be switched on.
+fn slave_link() -> SlaveLinkConfig {
+    SlaveLinkConfig {
+        repeats: Repeats::recommended(),
+        stretch_max: StretchMax::RECOMMENDED,
+        samples_per_command: commands().samples_per_command,
+    }
+}
+
 /// What the haptic thread runs.
 struct Haptic {
     master: Master,
@@ -162,7 +180,7 @@ impl Loop {
         slave.start_at(operator.start());
         let haptic = Haptic {
             master,
-            link: MasterLink::new(Time::ZERO, device.coupling(), 10),
+            link: MasterLink::new(Time::ZERO, device.coupling(), commands()),
             operator,
             hand_force: Vec2::zeros(),
             applied: 0,
@@ -171,7 +189,7 @@ impl Loop {
         Self {
             haptic,
             slave,
-            slave_link: SlaveLink::new(Time::ZERO),
+            slave_link: SlaveLink::new(Time::ZERO, slave_link()),
         }
     }
 
@@ -179,16 +197,17 @@ impl Loop {
     fn slave_tick(&mut self, now: Time, up: Option<&Packet>) -> Slaved {
         let command = up.and_then(|packet| self.slave_link.handle(now, packet.as_slice()));
         if let Some(command) = &command {
-            for sample in command.samples.as_slice() {
-                let newest = command.newest_update;
-                self.slave.handle_sample(now, sample, newest);
+            for (sample, newest) in self.slave_link.samples(command) {
+                self.slave.handle_sample(now, &sample, newest);
             }
+            self.slave.stretch(self.slave_link.end().stretch());
         }
         let tick = self.slave.tick(now);
         let update = tick.and_then(|tick| tick.update);
         let link = &mut self.slave_link;
         let down = update
             .and_then(|update| Packet::of(|out| link.send_update(now, &update, out).ok()))
+            .or_else(|| Packet::of(|out| link.repeat(now, out).unwrap()))
             .or_else(|| Packet::of(|out| link.heartbeat(now, out).unwrap()));
         Slaved {
             command,
@@ -263,7 +282,7 @@ impl Parts {
             trigger: Trigger::new(TriggerConfig::of_mode(Mode::Recommended)),
             shadow: Shadow::new(*slave.settings(), *slave.state()),
             playout: PlayoutBuffer::try_new(PlayoutConfig::default()).unwrap(),
-            link: SlaveLink::new(Time::ZERO),
+            link: SlaveLink::new(Time::ZERO, slave_link()),
             decided: 0,
         }
     }
@@ -297,9 +316,11 @@ impl Parts {
             turn: 0.0,
         };
         self.decided += u64::from(self.trigger.decide(now, &input).is_some());
-        let update = met.update?;
-        self.shadow.send(&update);
         let link = &mut self.link;
+        let Some(update) = met.update else {
+            return Packet::of(|out| link.repeat(now, out).unwrap());
+        };
+        self.shadow.send(&update);
         Packet::of(|out| link.send_update(now, &update, out).ok())
     }
 }

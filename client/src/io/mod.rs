@@ -32,6 +32,7 @@ use serde::Serialize;
 
 use crate::device::DeviceProfile;
 use crate::failsafe::LinkState;
+use crate::link::CommandConfig;
 use crate::operator::Operator;
 use crate::operator::scripted::{Scripted, ScriptedConfig, ScriptedError, View};
 use crate::operator::trace::Trace;
@@ -92,8 +93,8 @@ pub struct MasterOptions {
     pub operator: OperatorChoice,
     /// How long; until the operator has finished or a person ends it if absent.
     pub duration: Option<Duration>,
-    /// Samples in a command.
-    pub samples_per_command: u8,
+    /// How commands are made.
+    pub commands: CommandConfig,
     /// Emulated network on what the master sends.
     pub netem: LinkConfig,
     /// Seed of the emulated network.
@@ -154,8 +155,9 @@ pub struct MasterConfiguration {
     pub operator: String,
     /// The scripted operator's numbers.
     pub scripted: Option<ScriptedConfig>,
-    /// Samples in a command.
-    pub samples_per_command: u8,
+    /// How commands were made.
+    #[serde(flatten)]
+    pub commands: CommandConfig,
     /// Emulated network on what the master sends.
     pub netem: String,
 }

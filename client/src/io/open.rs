@@ -20,6 +20,7 @@ use mmt_shared::wire::{
 use tokio::time::timeout;
 
 use super::{MasterHostError, MasterOptions};
+use crate::link::CommandConfig;
 
 /// How the program names itself to the slave.
 pub(super) const PROGRAM: &str = concat!("mmt ", env!("CARGO_PKG_VERSION"));
@@ -148,7 +149,7 @@ async fn open_at(
     let wrapped = EmulatedSocket::try_new_with(plain, netem, seed, LinkId::UP, extras)?;
     let meter = wrapped.meter();
     let endpoint = Endpoint::of_master(options.transport, Arc::new(wrapped))?;
-    let traffic = traffic(options.samples_per_command);
+    let traffic = traffic(&options.commands);
     let connection = endpoint
         .connect(address, options.pairing.pin, traffic, patience.connect)
         .await?;
@@ -175,10 +176,10 @@ async fn open_at(
 
 /// What a master sends at the most. A command has up to 70 bytes of its own and, at any speed of a hand,
 /// at most 16 a sample; QUIC adds 30. The cap is twice that, with room for handshake and heartbeats.
-fn traffic(samples_per_command: u8) -> Traffic {
-    let samples = usize::from(samples_per_command.max(1));
-    let datagram_max = (70 + 16 * samples).min(DATAGRAM_MAX);
-    let commands_per_s = 1000_u64.div_ceil(samples as u64) + 20;
+fn traffic(commands: &CommandConfig) -> Traffic {
+    let datagram_max = (70 + 16 * commands.samples_at_most()).min(DATAGRAM_MAX);
+    let news = u64::from(commands.samples_per_command.max(1));
+    let commands_per_s = 1000_u64.div_ceil(news) + 20;
     Traffic {
         datagram_max,
         rate_cap: RateCap {
@@ -216,7 +217,7 @@ fn hello(options: &MasterOptions, hip: Vec2) -> Hello {
         token: options.pairing.token,
         role: Role::Operator,
         coupling: options.device.coupling(),
-        samples_per_command: options.samples_per_command,
+        samples_per_command: options.commands.samples_per_command,
         hip,
         program: Label::clipped(PROGRAM),
     }

@@ -84,7 +84,7 @@ impl Ended {
             report.pushes = PushesReport::new(completed, &self.haptic.breaks);
         }
         report.updates = self.updates();
-        report.messages = messages(link);
+        report.messages = messages(link, self.duration.as_secs_f64());
         report.wire = self.wire();
         report.force = self.force();
         if let Some(slave) = self.slave() {
@@ -126,6 +126,8 @@ impl Ended {
             report.sent = Some(sent);
             report.rate_hz = Number::rate(sent as f64, duration_s);
             report.by_cause = Some(named);
+            let all = u64::from(slave.traffic.sent.updates);
+            report.repeated = Some(all.saturating_sub(sent));
         }
         report
     }
@@ -186,6 +188,7 @@ impl Ended {
             ("netem_queue", socket.queue.packets),
             ("samples_off_grid", u64::from(link.samples_refused())),
             ("samples_ring_full", self.haptic.samples_dropped),
+            ("samples_skipped", u64::from(link.samples_skipped())),
             ("samples_unsent", link.pending() as u64),
             ("socket_blocked", socket.blocked.packets),
             ("socket_failed", socket.failed.packets),
@@ -206,7 +209,7 @@ fn configuration(options: &MasterOptions) -> MasterConfiguration {
             OperatorChoice::Scripted(config) => Some(*config),
             OperatorChoice::Trace { .. } => None,
         },
-        samples_per_command: options.samples_per_command,
+        commands: options.commands,
         netem: options.netem.to_string(),
     }
 }
@@ -224,21 +227,13 @@ fn update_counts(drops: &UpdateDrops) -> Counts {
     .collect()
 }
 
-fn messages(link: &MasterLink) -> UpDown<MessagesReport> {
+/// An update that was seen before is a repeat, whether the slave or the network repeated it.
+fn messages(link: &MasterLink, duration_s: f64) -> UpDown<MessagesReport> {
     let traffic = link.end().traffic();
-    let (sent, received) = (traffic.sent, traffic.received);
+    let repeats = u64::from(link.drops().duplicate);
     UpDown {
-        up: MessagesReport {
-            commands: Some(u64::from(sent.commands)),
-            heartbeats: Some(u64::from(sent.heartbeats)),
-            ..MessagesReport::default()
-        },
-        down: MessagesReport {
-            commands: None,
-            updates: Some(u64::from(received.updates)),
-            scenes: Some(u64::from(received.scenes)),
-            heartbeats: Some(u64::from(received.heartbeats)),
-        },
+        up: MessagesReport::up(&traffic.sent, duration_s),
+        down: MessagesReport::down(&traffic.received, repeats, duration_s),
     }
 }
 

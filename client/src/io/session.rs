@@ -74,7 +74,7 @@ pub(super) async fn run_with(
         master,
         operator,
         duration: options.duration,
-        samples_per_wake: options.samples_per_command,
+        samples_per_wake: options.commands.samples_per_command,
     };
     operate(&options, opened, parts, stop, live, &patience).await
 }
@@ -99,7 +99,7 @@ async fn operate(
     let (haptic, port) = HapticLoop::new(parts, began, waker);
     let thread = start(haptic, clock)?;
     let coupling = options.device.coupling();
-    let link = MasterLink::new(began, coupling, options.samples_per_command);
+    let link = MasterLink::new(began, coupling, options.commands);
     let mut pump = Pump::new(
         clock,
         &line.connection,

@@ -32,7 +32,7 @@ fn scripted(fake: &Fake) -> MasterOptions {
         device: DeviceProfile::default(),
         operator: OperatorChoice::Scripted(ScriptedConfig::default()),
         duration: Some(Duration::from_millis(400)),
-        samples_per_command: 10,
+        commands: CommandConfig::default(),
         netem: LinkConfig::default(),
         netem_seed: 1,
         netem_extras: SocketExtras::default(),
@@ -382,7 +382,7 @@ async fn a_trace_ends_the_session_when_it_is_over() {
 async fn the_emulated_link_loses_what_it_is_told_to_and_says_so() {
     let fake = Fake::new();
     let mut options = scripted(&fake);
-    options.samples_per_command = 1;
+    options.commands.samples_per_command = 1;
     options.netem = "loss 20%".parse().unwrap();
     let mut master = start(options, PATIENCE);
     let mut slave = Session::welcomed(&fake).await;

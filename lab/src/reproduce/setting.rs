@@ -109,6 +109,7 @@ pub fn paper_world(mode: Mode, scheme: Scheme) -> WorldConfig {
             ..SlaveConfig::of_mode(mode)
         },
         settings: Some(settings),
+        stretch_max: SlaveConfig::of_mode(mode).stretch_max,
         samples_per_command: 1,
         ..WorldConfig::default()
     }

@@ -9,7 +9,7 @@ use crate::table::{Cell, Table};
 use crate::trial::Measured;
 
 /// The measured columns, in their order.
-pub const MEASURES: [&str; 32] = [
+pub const MEASURES: [&str; 38] = [
     "duration_s",
     "contact_s",
     "pushes",
@@ -41,6 +41,12 @@ pub const MEASURES: [&str; 32] = [
     "recovery_contact_s",
     "recovery_packets",
     "recovery_worst_error",
+    "commands",
+    "repeats",
+    "datagrams_up_hz",
+    "datagrams_down_hz",
+    "bits_up_per_s",
+    "bits_down_per_s",
     "digest",
 ];
 
@@ -59,8 +65,10 @@ fn cells(measured: &Measured) -> Vec<Cell> {
         force,
         updates,
         recovery,
+        traffic,
         ..
     } = measured;
+    let (messages, wire) = (&traffic.messages, &traffic.wire);
     let [m, b, c] = measured.parameter_errors;
     let mut cells: Vec<Cell> = vec![
         measured.duration_s.into(),
@@ -98,6 +106,12 @@ fn cells(measured: &Measured) -> Vec<Cell> {
         recovery.and_then(|recovery| recovery.contact_s).into(),
         recovery.map(|recovery| recovery.updates).into(),
         recovery.map(|recovery| recovery.worst_error).into(),
+        messages.up.commands.into(),
+        messages.down.repeats.into(),
+        wire.up.rate_hz.get().into(),
+        wire.down.rate_hz.get().into(),
+        wire.up.bits_per_s.get().into(),
+        wire.down.bits_per_s.get().into(),
         measured.digest.clone().into(),
     ]);
     cells

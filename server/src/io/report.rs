@@ -101,7 +101,7 @@ pub(super) fn report(
     report.duration_s = outcome.duration.as_secs_f64().into();
     report.ending = Some(ending_name(outcome.ending).to_owned());
     report.updates = updates(outcome, theirs);
-    report.messages = messages(&traffic);
+    report.messages = messages(outcome, &traffic);
     report.wire = wire(outcome, &traffic);
     report.link = link(&outcome.link);
     report.emulation.down = shared.meter.lateness().report();
@@ -121,6 +121,7 @@ fn updates(outcome: &Outcome, theirs: Option<&Farewell<MasterTotals>>) -> Update
     let ticks = outcome.finished.as_ref().map(|finished| finished.ticks);
     let mut updates = UpdatesReport::default();
     updates.set_sent(&outcome.sent.plus(&ticks.unwrap_or_default()));
+    updates.set_repeated(outcome.link.repeated());
     if let Some(Farewell { totals, .. }) = theirs {
         updates.applied = Some(totals.updates_applied.into());
         updates.dropped = Some(dropped(&totals.updates_dropped));
@@ -138,20 +139,12 @@ fn dropped(drops: &UpdateDrops) -> Counts {
     ])
 }
 
-fn messages(traffic: &Traffic) -> UpDown<MessagesReport> {
-    let (received, sent) = (&traffic.received, &traffic.sent);
+fn messages(outcome: &Outcome, traffic: &Traffic) -> UpDown<MessagesReport> {
+    let duration_s = outcome.duration.as_secs_f64();
+    let repeats = outcome.link.repeated().total();
     UpDown {
-        up: MessagesReport {
-            commands: Some(received.commands.into()),
-            heartbeats: Some(received.heartbeats.into()),
-            ..MessagesReport::default()
-        },
-        down: MessagesReport {
-            updates: Some(sent.updates.into()),
-            scenes: Some(sent.scenes.into()),
-            heartbeats: Some(sent.heartbeats.into()),
-            ..MessagesReport::default()
-        },
+        up: MessagesReport::up(&traffic.received, duration_s),
+        down: MessagesReport::down(&traffic.sent, repeats, duration_s),
     }
 }
 

@@ -29,7 +29,7 @@ use super::host::{Shared, SlaveHostError};
 use super::report::{self, Outcome};
 use super::worker::{Finished, Worker};
 use super::{PROGRAM, SlaveLive, SlaveReport};
-use crate::link::SlaveLink;
+use crate::link::{SlaveLink, SlaveLinkConfig};
 use crate::playout::PlayoutConfig;
 use crate::slave::{Slave, SlaveConfig};
 
@@ -129,7 +129,13 @@ pub(super) async fn serve_with(
     }
     announce(&connection, &hello);
     let worker = start(shared.clock, slave)?;
-    let session = Session::new(shared, config, connection, send, worker, socket_before);
+    let link = SlaveLinkConfig {
+        repeats: config.repeats_ms,
+        stretch_max: config.stretch_max,
+        samples_per_command: hello.samples_per_command,
+    };
+    let link = SlaveLink::new(shared.clock.now(), link);
+    let session = Session::new(shared, config, connection, send, worker, link, socket_before);
     session.operate(receive, stop, live).await.map(Some)
 }
 
@@ -189,10 +195,11 @@ impl<'a> Session<'a> {
         connection: Connection,
         send: SendStream,
         worker: Worker,
+        link: SlaveLink,
         socket_before: SocketCounters,
     ) -> Self {
         Self {
-            link: SlaveLink::new(shared.clock.now()),
+            link,
             shared,
             config,
             connection,

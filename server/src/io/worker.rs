@@ -39,8 +39,17 @@ pub(super) struct Finished {
     pub(super) ticker: TickerReport,
 }
 
-/// When a HIP sample arrived, the sample, and the newest update that the master had then.
-pub(super) type Arrived = (Time, HipSample, u32);
+/// A HIP sample on its way to the thread.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Arrived {
+    /// When it arrived.
+    pub(super) at: Time,
+    pub(super) sample: HipSample,
+    /// The newest update that the master had then.
+    pub(super) newest_update: u32,
+    /// By how much congestion stretches what the slave says.
+    pub(super) stretch: f64,
+}
 
 /// Tokio's side of the thread. Dropping it ends the thread.
 pub(super) struct Worker {
@@ -157,8 +166,9 @@ impl Inside {
 
     /// One tick, at its deadline: the stamp is free of wake-up jitter.
     fn turn(&mut self, tick: Tick, slave: &mut Slave) -> Option<SlaveTick> {
-        while let Ok((arrived, sample, newest_update)) = self.samples.pop() {
-            slave.handle_sample(arrived, &sample, newest_update);
+        while let Ok(arrived) = self.samples.pop() {
+            slave.handle_sample(arrived.at, &arrived.sample, arrived.newest_update);
+            slave.stretch(arrived.stretch);
         }
         slave.tick(tick.deadline)
     }

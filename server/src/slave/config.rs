@@ -1,11 +1,13 @@
 //! What a slave is made of, and why it could not be.
 
 use mmt_shared::params::ParamsError;
+use mmt_shared::rate_control::StretchMax;
 use mmt_shared::settings::Mode;
 use serde::{Deserialize, Serialize};
 
 use crate::environment::{EnvironmentConfig, EnvironmentError};
 use crate::estimator::{EstimatorConfig, SettingOutOfRange};
+use crate::link::Repeats;
 use crate::playout::{PlayoutConfig, PlayoutError};
 use crate::sensing::{SensingConfig, SensingError};
 use crate::shadow::TriggerReference;
@@ -59,12 +61,21 @@ pub struct SlaveConfig {
     pub trigger_reference: TriggerReference,
     /// What the local model starts from.
     pub start: StartModel,
+    /// When an update is said again.
+    pub repeats_ms: Repeats,
+    /// By how much congestion may stretch the trigger's thresholds and times; 1: not at all.
+    pub stretch_max: StretchMax,
 }
 
 impl SlaveConfig {
-    /// The default of a mode: the default scenario, with the mode's update scheme.
+    /// The default of a mode: the default scenario, with the mode's update scheme. Only recommended mode says
+    /// updates again and answers congestion.
     #[must_use]
     pub fn of_mode(mode: Mode) -> Self {
+        let (repeats_ms, stretch_max) = match mode {
+            Mode::Paper => (Repeats::NONE, StretchMax::OFF),
+            Mode::Recommended => (Repeats::recommended(), StretchMax::RECOMMENDED),
+        };
         Self {
             seed: 1,
             mode,
@@ -75,6 +86,8 @@ impl SlaveConfig {
             trigger: TriggerConfig::of_mode(mode),
             trigger_reference: TriggerReference::default(),
             start: StartModel::default(),
+            repeats_ms,
+            stretch_max,
         }
     }
 }

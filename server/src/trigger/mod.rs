@@ -131,6 +131,8 @@ struct Mismatch {
 #[derive(Clone, Debug)]
 pub struct Trigger {
     config: TriggerConfig,
+    /// The configured scheme, stretched.
+    scheme: Scheme,
     /// When the last update went out and what it said.
     last: Option<(Time, ModelParams)>,
     began: Option<Time>,
@@ -147,6 +149,7 @@ impl Trigger {
     #[must_use]
     pub fn new(config: TriggerConfig) -> Self {
         Self {
+            scheme: config.scheme,
             config,
             last: None,
             began: None,
@@ -163,6 +166,17 @@ impl Trigger {
         self.repeat = Some(cause);
     }
 
+    /// From now on thresholds and times of the scheme are `by` as large as configured; 1: as configured.
+    pub fn stretch(&mut self, by: f64) {
+        self.scheme = self.config.scheme.stretched(by);
+    }
+
+    /// The scheme as it is now.
+    #[must_use]
+    pub fn scheme_now(&self) -> Scheme {
+        self.scheme
+    }
+
     /// Whether an update is to be sent now, and why. An answer counts as sent.
     pub fn decide(&mut self, now: Time, input: &TriggerInput) -> Option<Cause> {
         self.began.get_or_insert(now);
@@ -171,7 +185,7 @@ impl Trigger {
         }
         let cause = self
             .geometry(now, input)
-            .or_else(|| self.scheme(now, input))
+            .or_else(|| self.due(now, input))
             .or(self.repeat);
         if cause.is_some() {
             self.last = Some((now, input.params));
@@ -216,8 +230,8 @@ impl Trigger {
         }
     }
 
-    fn scheme(&self, now: Time, input: &TriggerInput) -> Option<Cause> {
-        match self.config.scheme {
+    fn due(&self, now: Time, input: &TriggerInput) -> Option<Cause> {
+        match self.scheme {
             Scheme::Deadband { delta } => self.violated(input, delta),
             Scheme::Hybrid { delta, t_update } => {
                 let running = self.config.timer_in_free_space || input.both_in_contact();

@@ -112,6 +112,45 @@ impl Scheme {
             Self::Adaptive { .. } => "adaptive",
         }
     }
+
+    /// The same with thresholds and times `by` as large, as congestion asks for; Delta stays at most 1. A factor of
+    /// 1 or less changes nothing, and nothing changes `every-sample`, which knows neither.
+    #[must_use]
+    pub fn stretched(self, by: f64) -> Self {
+        if by <= 1.0 || !by.is_finite() {
+            return self;
+        }
+        let wider = |delta: f64| (delta * by).min(DELTA.1);
+        let longer = |time: Duration| time.mul_f64(by);
+        match self {
+            Self::Deadband { delta } => Self::Deadband {
+                delta: wider(delta),
+            },
+            Self::Hybrid { delta, t_update } => Self::Hybrid {
+                delta: wider(delta),
+                t_update: longer(t_update),
+            },
+            Self::Timer { t_update } => Self::Timer {
+                t_update: longer(t_update),
+            },
+            Self::EverySample => Self::EverySample,
+            Self::Dis {
+                threshold_n,
+                heartbeat,
+            } => Self::Dis {
+                threshold_n: threshold_n * by,
+                heartbeat: longer(heartbeat),
+            },
+            Self::Useful { delta, t_update } => Self::Useful {
+                delta: wider(delta),
+                t_update: longer(t_update),
+            },
+            Self::Adaptive { delta, horizon } => Self::Adaptive {
+                delta: wider(delta),
+                horizon: longer(horizon),
+            },
+        }
+    }
 }
 
 impl TryFrom<String> for Scheme {
@@ -276,6 +315,27 @@ mod tests {
             assert_eq!(scheme.to_string().parse(), Ok(scheme));
         }
         assert_eq!("dis 0.3N 1s".parse(), "dis 0.3N 1000ms".parse::<Scheme>());
+    }
+
+    #[test]
+    fn stretching_widens_thresholds_and_times_and_one_changes_nothing() {
+        for (text, thrice) in [
+            ("deadband 10%", "deadband 30%"),
+            ("deadband 60%", "deadband 100%"),
+            ("hybrid 10% 150ms", "hybrid 30% 450ms"),
+            ("timer 50ms", "timer 150ms"),
+            ("every-sample", "every-sample"),
+            ("dis 0.5N 1s", "dis 1.5N 3s"),
+            ("useful 10% 150ms", "useful 30% 450ms"),
+            ("adaptive 10% 50ms", "adaptive 30% 150ms"),
+        ] {
+            let scheme: Scheme = text.parse().unwrap();
+            let thrice: Scheme = thrice.parse().unwrap();
+            assert_eq!(scheme.stretched(3.0).to_string(), thrice.to_string());
+            for by in [1.0, 0.5, f64::NAN, f64::INFINITY] {
+                assert_eq!(scheme.stretched(by), scheme, "{text} by {by}");
+            }
+        }
     }
 
     #[test]

@@ -9,6 +9,7 @@ mod contact;
 mod force;
 mod peak;
 mod pose;
+mod staleness;
 mod updates;
 
 pub use age::AgeOfInformation;
@@ -16,6 +17,7 @@ pub use contact::ContactBreaks;
 pub use force::{F_MIN_N, ForceMetrics, ForceSummary, JND_HIGH, JND_LOW};
 pub use peak::ForcePeak;
 pub use pose::PoseError;
+pub use staleness::Staleness;
 pub use updates::UpdateCounts;
 
 /// `sum / n`; absent when n is 0.

@@ -134,6 +134,13 @@ impl<C> RunReport<C> {
             ],
         )?;
         rows.counts("for ", updates.by_cause.as_ref())?;
+        rows.row("repeats", &[count(updates.repeated, "")])?;
+        // only what happened: the causes stand above already
+        let repeated = updates.repeated_by_cause.iter().flatten();
+        for (name, n) in repeated.filter(|(_, n)| **n > 0) {
+            let name = name.replace('_', " ");
+            rows.row(&format!("repeats, {name}"), &[count(Some(*n), "")])?;
+        }
         rows.row("applied", &[count(updates.applied, "")])?;
         rows.counts("dropped, ", updates.dropped.as_ref())?;
         rows.row(
@@ -224,8 +231,9 @@ impl<C> RunReport<C> {
                 after("down", share(link.loss_down)),
             ],
         )?;
-        rows.row("messages up", &message_cells(&messages.up))?;
-        rows.row("messages down", &message_cells(&messages.down))?;
+        for (way, of) in [("up", &messages.up), ("down", &messages.down)] {
+            rows.row(&format!("messages {way}"), &message_cells(of))?;
+        }
         rows.row("datagrams up", &wire_cells(&wire.up))?;
         rows.row("datagrams down", &wire_cells(&wire.down))
     }
@@ -271,12 +279,13 @@ fn estimate_cells(estimate: &EstimateReport, unit: &str) -> [Cell; 3] {
     ]
 }
 
-/// Only the kinds that go this way.
+/// The rate, and only the kinds that go this way; scenes only if there were any.
 fn message_cells(messages: &MessagesReport) -> Vec<Cell> {
     let kinds = [
+        number(messages.rate_hz, 1, " /s"),
         count(messages.commands, " commands"),
         count(messages.updates, " updates"),
-        count(messages.scenes, " scenes"),
+        count(messages.scenes.filter(|n| *n > 0), " scenes"),
         count(messages.heartbeats, " heartbeats"),
     ];
     kinds.into_iter().filter(Option::is_some).collect()

@@ -40,11 +40,22 @@ fn full() -> RunReport<Value> {
     report.updates.applied = Some(30);
     report.updates.dropped = Some(Counts::from([("stale".to_owned(), 1)]));
     report.updates.age_ms = AgeReport::from(&age);
-    report.messages.up.commands = Some(2000);
-    report.messages.up.heartbeats = Some(3);
-    report.messages.down.updates = Some(31);
-    report.messages.down.scenes = Some(600);
-    report.messages.down.heartbeats = Some(390);
+    let mut repeated = UpdateCounts::default();
+    (0..20).for_each(|_| repeated.sent(Cause::Deadband));
+    report.updates.set_repeated(&repeated);
+    let mut kinds = KindCounts {
+        commands: 2000,
+        heartbeats: 3,
+        ..KindCounts::default()
+    };
+    report.messages.up = MessagesReport::up(&kinds, 20.0);
+    kinds = KindCounts {
+        updates: 51,
+        scenes: 600,
+        heartbeats: 390,
+        ..KindCounts::default()
+    };
+    report.messages.down = MessagesReport::down(&kinds, 20, 20.0);
     report.wire.up = WireReport::new(2100, 336_000, 28, 20.0);
     report.wire.down = WireReport::new(1100, 110_000, 28, 20.0);
     report.force = ForceReport::new(&force.summary(), Some(&peak));
@@ -93,6 +104,7 @@ fn quantiles(p50: f64) -> QuantilesReport {
 fn paths(value: &Value, prefix: &str, into: &mut Vec<String>) {
     let open = [
         "updates.by_cause",
+        "updates.repeated_by_cause",
         "updates.dropped",
         "drops",
         "configuration",
@@ -111,9 +123,12 @@ fn paths(value: &Value, prefix: &str, into: &mut Vec<String>) {
 const REQUIRED: &str = "version command seed duration_s ending configuration drops \
     pushes.completed pushes.contact_breaks_per_push \
     updates.sent updates.rate_hz updates.contact_rate_hz updates.by_cause updates.applied \
+    updates.repeated updates.repeated_by_cause \
     updates.dropped updates.age_ms.mean updates.age_ms.max \
-    messages.up.commands messages.up.updates messages.up.scenes messages.up.heartbeats \
-    messages.down.commands messages.down.updates messages.down.scenes messages.down.heartbeats \
+    messages.up.commands messages.up.updates messages.up.repeats messages.up.scenes \
+    messages.up.heartbeats messages.up.rate_hz \
+    messages.down.commands messages.down.updates messages.down.repeats messages.down.scenes \
+    messages.down.heartbeats messages.down.rate_hz \
     wire.up.datagrams wire.up.bytes wire.up.rate_hz wire.up.bits_per_s wire.up.header_bytes \
     wire.down.datagrams wire.down.bytes wire.down.rate_hz wire.down.bits_per_s \
     wire.down.header_bytes \
@@ -163,6 +178,7 @@ fn every_key_is_filled_by_a_run_in_which_it_has_a_meaning() {
     let document = serde_json::to_value(full()).unwrap();
     let other_way = [
         "messages.up.updates",
+        "messages.up.repeats",
         "messages.up.scenes",
         "messages.down.commands",
     ];
@@ -186,6 +202,10 @@ fn values_stand_under_their_keys() {
         })
     );
     assert_eq!(document["updates"]["dropped"], json!({ "stale": 1 }));
+    assert_eq!(document["updates"]["repeated_by_cause"]["deadband"], 20);
+    // 2000 commands and 3 heartbeats in 20 s
+    assert_eq!(document["messages"]["up"]["rate_hz"], 100.15);
+    assert_eq!(document["messages"]["down"]["rate_hz"], 52.05);
     assert_eq!(document["updates"]["age_ms"]["max"], 110.0);
     // 2100 datagrams of 160 bytes in 20 s: 105 a second, 188 bytes each with headers
     assert_eq!(document["wire"]["up"]["rate_hz"], 105.0);
@@ -239,6 +259,8 @@ fn the_table_of_a_full_report_is_aligned_and_stays_within_100_columns() {
     for row in [
         "  rate                      1.55 /s            3.10 /s of contact",
         "  for deadband              30",
+        "  repeats, deadband         20",
+        "  messages up               100.2 /s           2000 commands      3 heartbeats",
         "  mass m                    0.707 kg           truth 0.700 kg     error 1.0 %",
         "  loss                      up 1.0 %           down 1.2 %",
         "  datagrams up              2100               105.0 /s           336000 B           157.9 kbit/s",

@@ -1,4 +1,4 @@
-//! The traffic of a session: datagrams in, updates and heartbeats out, looks for the screen.
+//! The traffic of a session: datagrams in, updates with their repeats and heartbeats out, looks for the screen.
 //!
 //! It never waits for the network to take a datagram: what cannot be sent now is dropped and counted.
 
@@ -17,6 +17,7 @@ use super::Session;
 use super::end::{End, SILENCE_MAX, StreamError};
 use crate::io::SlaveLive;
 use crate::io::host::stopped;
+use crate::io::worker::Arrived;
 
 /// Between two looks for the screen: 40 in a second.
 const LOOK: Duration = Duration::from_millis(25);
@@ -43,7 +44,9 @@ impl Session<'_> {
         looks.set_missed_tick_behavior(MissedTickBehavior::Delay);
         loop {
             let now = self.shared.clock.now();
-            let due = self.link.end().heartbeat_due().saturating_since(now);
+            let due = self.link.end().heartbeat_due();
+            let due = self.link.repeat_due().map_or(due, |repeat| repeat.min(due));
+            let due = due.saturating_since(now);
             // In this order, so that a flood of datagrams holds up nothing else.
             tokio::select! {
                 biased;
@@ -55,7 +58,7 @@ impl Session<'_> {
                     woken.map_err(|_| End::Asked)?;
                     self.send_update()?;
                 }
-                () = sleep(due) => self.send_heartbeat()?,
+                () = sleep(due) => self.send_due()?,
                 _ = looks.tick() => self.look(live)?,
                 datagram = self.connection.read_datagram() => self.take(&datagram?),
             }
@@ -69,11 +72,14 @@ impl Session<'_> {
         let Some(command) = self.link.handle(now, datagram) else {
             return;
         };
-        for sample in command.samples.as_slice() {
-            let taken = self
-                .worker
-                .samples
-                .push((now, *sample, command.newest_update));
+        let stretch = self.link.end().stretch();
+        for (sample, newest_update) in self.link.samples(&command) {
+            let taken = self.worker.samples.push(Arrived {
+                at: now,
+                sample,
+                newest_update,
+                stretch,
+            });
             self.lost.samples += u64::from(taken.is_err());
         }
     }
@@ -90,10 +96,13 @@ impl Session<'_> {
         Ok(())
     }
 
-    fn send_heartbeat(&mut self) -> Result<(), End> {
+    /// Repeats and heartbeats, which nothing but the time asks for.
+    fn send_due(&mut self) -> Result<(), End> {
         let now = self.shared.clock.now();
-        let sealed = self.link.heartbeat(now, &mut self.buffer);
-        self.send(sealed).map(drop)
+        let repeat = self.link.repeat(now, &mut self.buffer);
+        self.send(repeat)?;
+        let heartbeat = self.link.heartbeat(now, &mut self.buffer);
+        self.send(heartbeat).map(drop)
     }
 
     /// Gives what was sealed to the connection; whether it took it.

@@ -1,0 +1,145 @@
+//! What the slave's end says again, and what it takes for news.
+
+use super::*;
+use mmt_shared::contact::Coupling;
+use mmt_shared::geometry::{BoxFootprint, Pose, Twist};
+use mmt_shared::params::{ModelParams, ModelState};
+use mmt_shared::wire::{Cause, DATAGRAM_MAX, SampleBlock};
+
+const AT: fn(u64) -> Time = Time::from_millis;
+
+fn update(sequence: u32, cause: Cause) -> Update {
+    let coupling = Coupling::for_stiffness(1000.0);
+    let params = ModelParams::of_square(0.7, 3.0, 2.06, 0.4, &coupling).unwrap();
+    let footprint = BoxFootprint::square(0.4);
+    let state = ModelState::try_new(params, footprint, Pose::default(), Twist::default());
+    Update {
+        sequence,
+        cause,
+        answers: AT(1),
+        newest_command: 0,
+        slave_in_contact: true,
+        state: state.unwrap(),
+    }
+}
+
+fn link(repeats: &str) -> SlaveLink {
+    let config = SlaveLinkConfig {
+        repeats: repeats.parse().unwrap(),
+        stretch_max: StretchMax::RECOMMENDED,
+        samples_per_command: 10,
+    };
+    SlaveLink::new(Time::ZERO, config)
+}
+
+/// The times (ms, 1 to 100) at which a repeat leaves, and the sequence that a master reads from it.
+fn repeats(link: &mut SlaveLink, mut before: impl FnMut(u64, &mut SlaveLink)) -> Vec<(u64, u32)> {
+    let mut master = LinkEnd::new(Side::Master, Time::ZERO);
+    let mut out = [0; DATAGRAM_MAX];
+    let mut sent = Vec::new();
+    for ms in 1..=100 {
+        before(ms, link);
+        while let Some(length) = link.repeat(AT(ms), &mut out).unwrap() {
+            let Some(Matter::Update(raw)) = master.open(AT(ms), &out[..length]) else {
+                panic!("no update");
+            };
+            sent.push((ms, raw.sequence()));
+        }
+    }
+    sent
+}
+
+/// Sends `update` at its time.
+fn send(link: &mut SlaveLink, now: u64, update: &Update) {
+    link.send_update(AT(now), update, &mut [0; DATAGRAM_MAX])
+        .unwrap();
+}
+
+#[test]
+fn an_update_is_repeated_at_its_times_with_its_sequence_and_counted_by_its_cause() {
+    let mut link = link("10ms 30ms");
+    let sent = repeats(&mut link, |ms, link| {
+        if ms == 5 {
+            send(link, ms, &update(1, Cause::Timer));
+        }
+    });
+    assert_eq!(sent, [(15, 1), (35, 1)]);
+    assert_eq!(link.repeated().of(Cause::Timer), 2);
+    assert_eq!(link.repeated().total(), 2);
+    assert_eq!(link.end().traffic().sent.updates, 3, "repeats included");
+}
+
+#[test]
+fn a_newer_update_takes_the_place_of_the_repeats_of_the_one_before() {
+    let mut link = link("10ms 30ms");
+    let sent = repeats(&mut link, |ms, link| match ms {
+        5 => send(link, ms, &update(1, Cause::Timer)),
+        20 => send(link, ms, &update(2, Cause::Deadband)),
+        _ => {}
+    });
+    assert_eq!(sent, [(15, 1), (30, 2), (50, 2)]);
+}
+
+#[test]
+fn what_the_master_has_is_not_repeated_and_without_times_nothing_is() {
+    let mut with = link("10ms 30ms");
+    let mut master = LinkEnd::new(Side::Master, Time::ZERO);
+    let mut bytes = [0; DATAGRAM_MAX];
+    let mut block = SampleBlock::new();
+    block.push(HipSample::default()).unwrap();
+    let command = Command {
+        newest_update: 1,
+        samples: block,
+    };
+    let length = master.seal(AT(20), Outgoing::Command(&command), &mut bytes);
+    let length = length.unwrap();
+    let sent = repeats(&mut with, |ms, link| match ms {
+        5 => send(link, ms, &update(1, Cause::Timer)),
+        20 => assert!(link.handle(AT(ms), &bytes[..length]).is_some()),
+        _ => {}
+    });
+    assert_eq!(sent, [(15, 1)]);
+
+    let mut without = link("none");
+    let sent = repeats(&mut without, |ms, link| {
+        if ms == 5 {
+            send(link, ms, &update(1, Cause::Timer));
+        }
+    });
+    assert_eq!((sent, without.repeat_due()), (vec![], None));
+}
+
+#[test]
+fn one_that_is_asked_for_late_is_sent_once() {
+    let mut link = link("10ms 30ms");
+    send(&mut link, 0, &update(1, Cause::Timer));
+    let mut out = [0; DATAGRAM_MAX];
+    assert!(link.repeat(AT(70), &mut out).unwrap().is_some());
+    assert_eq!(link.repeat(AT(70), &mut out), Ok(None));
+    assert_eq!(link.repeat_due(), None);
+}
+
+#[test]
+fn only_the_news_of_a_command_acknowledge() {
+    let mut block = SampleBlock::new();
+    for ms in 1..=20 {
+        let stamp = AT(ms);
+        block
+            .push(HipSample {
+                stamp,
+                ..HipSample::default()
+            })
+            .unwrap();
+    }
+    let command = Command {
+        newest_update: 7,
+        samples: block,
+    };
+    let link = link("none");
+    let said: Vec<(u64, u32)> = link
+        .samples(&command)
+        .map(|(sample, newest)| (sample.stamp.as_nanos() / 1_000_000, newest))
+        .collect();
+    let expected: Vec<(u64, u32)> = (1..=20).map(|ms| (ms, if ms <= 10 { 0 } else { 7 })).collect();
+    assert_eq!(said, expected);
+}
