@@ -168,7 +168,8 @@ impl MasterLink {
         if self.block.push(sample).is_err() {
             self.samples_refused = self.samples_refused.saturating_add(1);
         }
-        if self.block.len() < usize::from(self.config.samples_per_command) && !self.block.is_full() {
+        if self.block.len() < usize::from(self.config.samples_per_command) && !self.block.is_full()
+        {
             return Ok(None);
         }
         let command = Command {

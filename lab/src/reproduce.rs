@@ -5,10 +5,12 @@
 
 pub mod ablation;
 pub mod claims;
+pub mod congestion;
 pub mod delay;
 pub mod fig5;
 pub mod netem;
 pub mod physics;
+pub mod repeats;
 pub mod scenarios;
 pub mod schemes;
 mod setting;

@@ -310,9 +310,8 @@ impl World {
     pub fn traffic(&self) -> Traffic {
         let duration_s = self.now.as_secs_f64();
         let repeats = self.slave_link.repeated();
-        let wire = |of: Tally| {
-            WireReport::new(of.packets, of.bytes, OVERHEAD_BYTES as u64, duration_s)
-        };
+        let wire =
+            |of: Tally| WireReport::new(of.packets, of.bytes, OVERHEAD_BYTES as u64, duration_s);
         let [up, down] = self.sent();
         let (master, slave) = (self.master_link.end(), self.slave_link.end());
         Traffic {
@@ -332,6 +331,13 @@ impl World {
     #[must_use]
     pub fn sent(&self) -> [Tally; 2] {
         [self.up.counters().offered, self.down.counters().offered]
+    }
+
+    /// Datagrams that the queues before the bottlenecks of both directions dropped.
+    #[must_use]
+    pub fn dropped_in_queues(&self) -> u64 {
+        let of = |path: &SimPath<Packet>| path.counters().dropped.queue.packets;
+        of(&self.up) + of(&self.down)
     }
 
     /// The operator.

@@ -14,8 +14,8 @@ use crate::time::Time;
 /// A round lasts at least this long.
 const ROUND: Duration = Duration::from_millis(100);
 /// A round has at least this many round trips, so that one of them is quick in spite of jitter: with heartbeats
-/// alone a round lasts 0.4 s.
-const ANSWERS: u32 = 8;
+/// alone a round lasts 0.2 s.
+const ANSWERS: u32 = 5;
 /// A queue longer than this is congestion. More than twice the queue that the transport's own controller aims at
 /// (docs/transport.md), so that the two do not fight.
 const QUEUE_MAX: Duration = Duration::from_millis(30);
@@ -25,10 +25,12 @@ const QUEUE_CLEAR: Duration = Duration::from_millis(10);
 const DRAINING: f64 = 0.8;
 /// Congested rounds in a row before anything is done: one may be a hiccup.
 const ROUNDS: u32 = 2;
-/// Each further congested round multiplies the stretch by this.
-const RISE: f64 = 1.5;
-/// Each round without a queue takes this off the stretch: from 3 to 1 in at least 6.4 s.
-const RETURN: f64 = 0.031_25;
+/// A queue longer than this is no hiccup: one round is enough.
+const QUEUE_SURE: Duration = Duration::from_millis(90);
+/// Each congested round multiplies the stretch by this.
+const RISE: f64 = 2.0;
+/// A second without a queue takes this off the stretch: from 3 to 1 in 8 s.
+const RETURN_PER_S: f64 = 0.25;
 /// Accepted greatest stretch: 1 is off, 8 is 80 % of error at a deadband of 10 %.
 const STRETCH_MAX: (f64, f64) = (1.0, 8.0);
 
@@ -102,7 +104,8 @@ struct Round {
 ///
 /// In rounds of 100 ms the quickest round trip is compared with the least of the last seconds. What jitter does to
 /// the quickest of a few is less than it lies below their mean, so that much is taken off. A queue in two rounds in
-/// a row stretches, multiplicatively, until it falls; without a queue the stretch returns, additively.
+/// a row, or a long one in one, stretches, multiplicatively, until it falls; without a queue the stretch returns,
+/// additively in time.
 #[derive(Clone, Debug)]
 pub struct RateController {
     max: f64,
@@ -150,23 +153,27 @@ impl RateController {
         }
         let jitter = (round.sum / round.answers).saturating_sub(round.quickest);
         let queue = round.quickest.saturating_sub(least).saturating_sub(jitter);
+        let lasted = now.saturating_since(round.began);
         self.round = None;
-        self.judge(queue);
+        self.judge(queue, lasted);
     }
 
-    fn judge(&mut self, queue: Duration) {
+    fn judge(&mut self, queue: Duration, lasted: Duration) {
         let draining = queue < self.queue.mul_f64(DRAINING);
         self.queue = queue;
         if queue > QUEUE_MAX {
             self.congested = self.congested.saturating_add(1);
-            if self.congested >= ROUNDS && !draining {
+            let sure = self.congested >= ROUNDS || queue > QUEUE_SURE;
+            if sure && !draining {
                 self.stretch = (self.stretch * RISE).min(self.max);
             }
             return;
         }
         self.congested = 0;
         if queue < QUEUE_CLEAR {
-            self.stretch = (self.stretch - RETURN).max(1.0);
+            // a round without answers says nothing
+            let seconds = lasted.as_secs_f64().min(1.0);
+            self.stretch = (self.stretch - RETURN_PER_S * seconds).max(1.0);
         }
     }
 }
@@ -202,13 +209,17 @@ mod tests {
     #[test]
     fn a_queue_raises_the_stretch_multiplicatively_to_its_bound() {
         let mut controller = RateController::new(max(3.0));
-        let rising = fed(&mut controller, 0, 1000, |now| 150 + now / 10);
+        let rising = fed(&mut controller, 0, 1000, |now| 150 + now / 100);
         let mut steps = rising.clone();
         steps.dedup();
-        assert_eq!(steps, [1.0, 1.5, 2.25, 3.0]);
+        assert_eq!(steps, [1.0, 2.0, 3.0]);
         // two rounds of 100 ms, which begin 10 ms apart
-        assert!(rising[..20].iter().all(|stretch| *stretch == 1.0));
-        assert_eq!(rising[21], 1.5);
+        assert!(rising[..21].iter().all(|stretch| *stretch == 1.0));
+        assert_eq!(rising[21], 2.0);
+        // a long queue needs one
+        let mut controller = RateController::new(max(3.0));
+        let rising = fed(&mut controller, 0, 120, |_| 250);
+        assert_eq!((rising[9], rising[10]), (1.0, 2.0));
     }
 
     #[test]
@@ -219,27 +230,33 @@ mod tests {
         let mut returning = fed(&mut controller, 1000, 10_000, |_| 101);
         returning.dedup();
         let steps: Vec<f64> = returning.windows(2).map(|pair| pair[0] - pair[1]).collect();
-        assert_eq!(steps, [RETURN; 64]);
+        // rounds of 100 ms; what rounding leaves over goes with the last
+        let (whole, rest) = steps.split_at(80);
+        assert!(
+            whole.iter().all(|step| (step - 0.025).abs() < 1e-9),
+            "{steps:?}"
+        );
+        assert!(rest.iter().sum::<f64>() < 1e-9);
         assert_eq!(controller.stretch(), 1.0);
     }
 
     #[test]
     fn a_queue_that_falls_by_itself_is_left_alone_and_a_small_one_holds() {
         let mut controller = RateController::new(max(8.0));
-        fed(&mut controller, 0, 230, |_| 600);
-        assert_eq!(controller.stretch(), 1.5);
+        fed(&mut controller, 0, 110, |_| 600);
+        assert_eq!(controller.stretch(), 2.0);
         // halves every round
-        let falling = fed(&mut controller, 230, 440, |now| 100 + (500 >> ((now - 120) / 110)));
-        assert!(falling.iter().all(|stretch| *stretch == 1.5), "{falling:?}");
+        let falling = fed(&mut controller, 110, 550, |now| 100 + (500 >> (now / 110)));
+        assert!(falling.iter().all(|stretch| *stretch == 2.0), "{falling:?}");
         let held = fed(&mut controller, 1000, 3000, |_| 120);
-        assert!(held.iter().all(|stretch| *stretch == 1.5));
+        assert!(held.iter().all(|stretch| *stretch == 2.0));
     }
 
     #[test]
     fn one_long_round_is_no_congestion() {
         let mut controller = RateController::new(max(3.0));
         let all = fed(&mut controller, 0, 5000, |now| {
-            if now % 1000 < 110 { 400 } else { 100 }
+            if now % 1000 < 110 { 180 } else { 100 }
         });
         assert!(all.iter().all(|stretch| *stretch == 1.0));
     }

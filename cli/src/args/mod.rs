@@ -16,9 +16,12 @@ use std::time::Duration;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use mmt_client::device::DeviceProfile;
+use mmt_client::link::CommandConfig;
 use mmt_netem::LinkConfig;
+use mmt_server::link::Repeats;
 use mmt_server::trigger::Scheme;
 use mmt_shared::pairing::{Address, Host};
+use mmt_shared::rate_control::StretchMax;
 use mmt_shared::settings::Mode;
 
 pub(crate) use self::netem::EmulationArguments;
@@ -96,6 +99,16 @@ pub(crate) struct DemoArguments {
     /// What carries the session.
     #[command(flatten)]
     pub(crate) transport: TransportArguments,
+    /// When an update is said again, such as "10ms 30ms", or none [default: the mode's]
+    #[arg(long, value_name = "WORDS")]
+    pub(crate) repeats: Option<Repeats>,
+    /// How many commands before it each command repeats the samples of
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = values::repeat_samples())]
+    pub(crate) repeat_samples: u8,
+    /// Greatest factor that congestion may stretch Delta, T_update and the time between samples by; 1: off
+    /// [default: the mode's]
+    #[arg(long, value_name = "FACTOR")]
+    pub(crate) stretch_max: Option<StretchMax>,
     /// Print the report as one JSON document; plain lines instead of the live view
     #[arg(long)]
     pub(crate) json: bool,
@@ -113,6 +126,13 @@ pub(crate) struct SlaveArguments {
     /// When updates are sent, such as "hybrid 10% 150ms" [default: the file's, else the mode's]
     #[arg(long, value_name = "WORDS", value_parser = values::scheme)]
     pub(crate) scheme: Option<Scheme>,
+    /// When an update is said again, such as "10ms 30ms", or none [default: the file's, else the mode's]
+    #[arg(long, value_name = "WORDS")]
+    pub(crate) repeats: Option<Repeats>,
+    /// Greatest factor that congestion may stretch Delta and T_update by; 1: off [default: the file's, else the
+    /// mode's]
+    #[arg(long, value_name = "FACTOR")]
+    pub(crate) stretch_max: Option<StretchMax>,
     /// Configuration of the slave, TOML
     #[arg(long, value_name = "FILE")]
     pub(crate) config: Option<PathBuf>,
@@ -181,6 +201,12 @@ pub(crate) struct MasterArguments {
     /// What carries the session.
     #[command(flatten)]
     pub(crate) transport: TransportArguments,
+    /// How many datagrams before it each datagram repeats the samples of
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = values::repeat_samples())]
+    pub(crate) repeat_samples: u8,
+    /// Greatest factor that congestion may stretch the time between samples by; 1: off
+    #[arg(long, value_name = "FACTOR", default_value_t = CommandConfig::default().stretch_max)]
+    pub(crate) stretch_max: StretchMax,
     /// Print the report as one JSON document
     #[arg(long)]
     pub(crate) json: bool,

@@ -21,7 +21,7 @@ pub(crate) struct ReproduceArguments {
     /// Seeds 1 to N [default: each experiment's own]
     #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=10_000))]
     pub(crate) seeds: Option<u64>,
-    /// Length of a run, in virtual time [default: 30s; delay: 40s, transport: 20s]
+    /// Length of a run, in virtual time [default: 30s; delay, congestion: 40s, transport: 20s]
     #[arg(long, global = true, value_name = "TIME", value_parser = values::duration)]
     pub(crate) duration: Option<Duration>,
     /// Threads [default: as many as the machine has cores]
@@ -63,6 +63,10 @@ pub(crate) enum Experiment {
     },
     /// What the protocol adds to the network's delay: stock quinn against ours, in exact virtual time
     Transport,
+    /// What repeats of updates and samples buy under loss, and cost
+    Repeats,
+    /// The deadband as rate controller at a bottleneck of 64 kbit/s, with and without
+    Congestion,
     /// Every network preset: configured against achieved
     Netem,
     /// What the environment does against closed forms and a fine reference, for any body

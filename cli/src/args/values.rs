@@ -170,3 +170,8 @@ pub(super) fn device(name: &str) -> Result<DeviceProfile, String> {
 pub(super) fn samples_per_command() -> RangedI64ValueParser<u8> {
     RangedI64ValueParser::new().range(1..=SAMPLES_MAX as i64)
 }
+
+/// 0 to as many commands of one sample as a command has room for.
+pub(super) fn repeat_samples() -> RangedI64ValueParser<u8> {
+    RangedI64ValueParser::new().range(0..SAMPLES_MAX as i64)
+}

@@ -5,6 +5,7 @@ use std::time::{Duration, Instant};
 
 use mmt_client::device::DeviceProfile;
 use mmt_client::io::{MasterOptions, OperatorChoice};
+use mmt_client::link::CommandConfig;
 use mmt_client::operator::scripted::ScriptedConfig;
 use mmt_netem::{Direction, LinkConfig};
 use mmt_server::io::SlaveOptions;
@@ -45,6 +46,8 @@ pub(crate) fn run(arguments: &DemoArguments, messages: &Messages) -> Result<(), 
     arguments.transport.warning().into_iter().for_each(note);
     let transport = arguments.transport.choose()?;
     let (stop, stop_slave) = (Stop::on_signals()?, Stop::new());
+    // both sides stretch as far
+    let stretch_max = config.stretch_max;
     let seed = arguments.seed;
     let emulation = Emulation::start(&arguments.emulation, seed, Some(up), Some(down))?;
     let options = slave_options(arguments, transport, &emulation, config)?;
@@ -52,7 +55,8 @@ pub(crate) fn run(arguments: &DemoArguments, messages: &Messages) -> Result<(), 
     let Ok(started) = started.recv() else {
         return slave.join().map(|_| ());
     };
-    let options = master_options(arguments, transport, &emulation, started.pairing);
+    let mut options = master_options(arguments, transport, &emulation, started.pairing);
+    options.commands.stretch_max = stretch_max;
     let (master, master_live) = master::start(options, stop.receiver())?;
 
     let dashboard = !arguments.json && !emulation.takes_orders();
@@ -99,6 +103,8 @@ fn slave_config(arguments: &DemoArguments) -> SlaveConfig {
     if let Some(scheme) = arguments.scheme {
         config.trigger.scheme = scheme;
     }
+    config.repeats_ms = arguments.repeats.unwrap_or(config.repeats_ms);
+    config.stretch_max = arguments.stretch_max.unwrap_or(config.stretch_max);
     config
 }
 
@@ -156,7 +162,11 @@ fn master_options(
             ..ScriptedConfig::default()
         }),
         duration: Some(arguments.duration),
-        samples_per_command: SAMPLES_PER_COMMAND,
+        commands: CommandConfig {
+            samples_per_command: SAMPLES_PER_COMMAND,
+            repeat_samples: arguments.repeat_samples,
+            ..CommandConfig::default()
+        },
         netem: up(arguments).clone(),
         netem_seed: arguments.seed,
         netem_extras: emulation.extras(Direction::Up),

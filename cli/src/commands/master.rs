@@ -8,6 +8,7 @@ use mmt_client::io::{
     MasterHostError, MasterLive, MasterOptions, MasterReport, OperatorChoice, SessionEnd,
     SharedPath,
 };
+use mmt_client::link::CommandConfig;
 use mmt_client::operator::scripted::ScriptedConfig;
 use mmt_client::operator::trace::Trace;
 use mmt_netem::Direction;
@@ -119,7 +120,11 @@ fn options(arguments: &MasterArguments) -> Result<MasterOptions, Failure> {
         device: device.map_err(|error| Failure::usage(format!("--stiffness: {error}")))?,
         operator: operator(arguments)?,
         duration: arguments.duration,
-        samples_per_command: arguments.samples_per_command,
+        commands: CommandConfig {
+            samples_per_command: arguments.samples_per_command,
+            repeat_samples: arguments.repeat_samples,
+            stretch_max: arguments.stretch_max,
+        },
         netem: arguments.netem.clone(),
         netem_seed: arguments.seed,
         netem_extras: SocketExtras::default(),

@@ -8,8 +8,8 @@ use std::time::Duration;
 use mmt_lab::physics::Body;
 use mmt_lab::reproduce::traces::Trace;
 use mmt_lab::reproduce::{
-    Extent, Findings, ReproduceError, ablation, claims, delay, fig5, netem, physics, scenarios,
-    schemes, traces, tupdate,
+    Extent, Findings, ReproduceError, ablation, claims, congestion, delay, fig5, netem, physics,
+    repeats, scenarios, schemes, traces, tupdate,
 };
 use mmt_lab::transport;
 
@@ -22,8 +22,9 @@ use manifest::Manifest;
 
 /// Length of a run: four or five pushes.
 const DURATION: Duration = Duration::from_secs(30);
-/// Length of a run of the delay experiment, whose pushes come later.
-const DELAY_DURATION: Duration = Duration::from_secs(40);
+/// Length of a run of the delay experiment, whose pushes come later, and of the congestion experiment, which
+/// needs time to come back.
+const LONG_DURATION: Duration = Duration::from_secs(40);
 /// Length of a run of the transport experiment: 864 runs, a second of which may be an outage.
 const TRANSPORT_DURATION: Duration = Duration::from_secs(20);
 /// Seeds of fig. 5: the paper's ten repetitions.
@@ -32,6 +33,8 @@ const SEEDS: u64 = 10;
 const TUPDATE_SEEDS: u64 = 5;
 /// Seeds of the delay experiment.
 const DELAY_SEEDS: u64 = 5;
+/// Seeds of the experiment on repeats: one update in a thousand must be seen.
+const REPEAT_SEEDS: u64 = 20;
 /// Seeds of the claims: with fewer, differences between the schemes are noise.
 const CLAIM_SEEDS: u64 = 40;
 
@@ -74,6 +77,8 @@ fn experiments(experiment: &Experiment) -> Vec<Experiment> {
             Experiment::Schemes,
             Experiment::Scenarios,
             Experiment::Tupdate,
+            Experiment::Repeats,
+            Experiment::Congestion,
             Experiment::Netem,
             Experiment::Transport,
             Experiment::Delay { full: false },
@@ -102,6 +107,14 @@ fn reproduce(
         Experiment::Schemes => schemes::reproduce(desk, extent(SEEDS)),
         Experiment::Scenarios => scenarios::reproduce(desk, extent(SEEDS)),
         Experiment::Tupdate => tupdate::reproduce(desk, extent(TUPDATE_SEEDS)),
+        Experiment::Repeats => repeats::reproduce(desk, extent(REPEAT_SEEDS)),
+        Experiment::Congestion => {
+            let extent = Extent {
+                duration: arguments.duration.unwrap_or(LONG_DURATION),
+                ..extent(SEEDS)
+            };
+            congestion::reproduce(desk, extent)
+        }
         Experiment::Netem => netem::reproduce(desk, extent(SEEDS)),
         Experiment::Transport => {
             let extent = Extent {
@@ -112,7 +125,7 @@ fn reproduce(
         }
         Experiment::Delay { full } => {
             let extent = Extent {
-                duration: arguments.duration.unwrap_or(DELAY_DURATION),
+                duration: arguments.duration.unwrap_or(LONG_DURATION),
                 ..extent(DELAY_SEEDS)
             };
             delay::reproduce(desk, extent, *full)

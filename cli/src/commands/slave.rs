@@ -117,6 +117,8 @@ fn options(arguments: &SlaveArguments) -> Result<SlaveOptions, Failure> {
     if let Some(scheme) = arguments.scheme {
         config.trigger.scheme = scheme;
     }
+    config.repeats_ms = arguments.repeats.unwrap_or(config.repeats_ms);
+    config.stretch_max = arguments.stretch_max.unwrap_or(config.stretch_max);
     config.seed = arguments.seed.unwrap_or(config.seed);
     let directory = match &arguments.identity {
         Some(directory) => directory.clone(),
@@ -214,6 +216,23 @@ mod tests {
         let both = options_of(&[&["--config", file.as_str()], &scheme[..]].concat());
         assert_eq!((both.config.seed, both.config.mode), (6, Mode::Recommended));
         assert_eq!(both.config.trigger.scheme.to_string(), "timer 50ms");
+    }
+
+    #[test]
+    fn repeats_and_stretch_are_the_modes_unless_the_file_or_the_command_line_says_otherwise() {
+        let of = |words: &[&str]| {
+            let config = options_of(words).config;
+            (config.repeats_ms.to_string(), config.stretch_max.get())
+        };
+        assert_eq!(of(&[]), ("10ms 30ms".to_owned(), 3.0));
+        assert_eq!(of(&["--mode", "paper"]), ("none".to_owned(), 1.0));
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("slave.toml");
+        std::fs::write(&path, "repeats_ms = [5, 20.5]\nstretch_max = 2\n").unwrap();
+        let file = path.display().to_string();
+        assert_eq!(of(&["--config", &file]), ("5ms 20.5ms".to_owned(), 2.0));
+        let both = ["--config", &file, "--repeats", "none", "--stretch-max", "1"];
+        assert_eq!(of(&both), ("none".to_owned(), 1.0));
     }
 
     #[test]

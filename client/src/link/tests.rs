@@ -5,10 +5,7 @@ use mmt_shared::time::TICK;
 use mmt_shared::wire::{DATAGRAM_MAX, HipCounts};
 
 fn sample(ms: u64) -> HipSample {
-    let hip = HipCounts {
-        x: ms as i32,
-        y: 0,
-    };
+    let hip = HipCounts { x: ms as i32, y: 0 };
     HipSample {
         stamp: Time::from_millis(ms),
         hip,
@@ -41,7 +38,9 @@ fn commands(link: &mut MasterLink, ms: impl IntoIterator<Item = u64>) -> Vec<Vec
         let samples = command.samples.as_slice().iter();
         all.push(
             samples
-                .inspect(|sample| assert_eq!(sample.hip.x as u64 * 1_000_000, sample.stamp.as_nanos()))
+                .inspect(|sample| {
+                    assert_eq!(sample.hip.x as u64 * 1_000_000, sample.stamp.as_nanos())
+                })
                 .map(|sample| sample.stamp.as_nanos() / 1_000_000)
                 .collect(),
         );
@@ -56,7 +55,10 @@ fn a_command_repeats_the_samples_of_as_many_commands_as_it_is_told() {
     let one = commands(&mut link(3, 1), 1..=9);
     assert_eq!(one, [vec![1, 2, 3], (1..=6).collect(), (4..=9).collect()]);
     let two = commands(&mut link(2, 2), 1..=8);
-    assert_eq!(two[1..], [vec![1, 2, 3, 4], (1..=6).collect(), (3..=8).collect()]);
+    assert_eq!(
+        two[1..],
+        [vec![1, 2, 3, 4], (1..=6).collect(), (3..=8).collect()]
+    );
 }
 
 #[test]
@@ -64,7 +66,11 @@ fn a_command_holds_its_news_and_as_many_repeats_as_there_is_room_for() {
     let full = commands(&mut link(32, 1), 1..=64);
     assert_eq!(full[1], (33..=64).collect::<Vec<_>>());
     let most = commands(&mut link(20, 1), 1..=60);
-    assert_eq!(most[2], (29..=60).collect::<Vec<_>>(), "twelve repeats and twenty news");
+    assert_eq!(
+        most[2],
+        (29..=60).collect::<Vec<_>>(),
+        "twelve repeats and twenty news"
+    );
     assert_eq!(link(20, 1).config.samples_at_most(), 32);
     assert_eq!(link(10, 1).config.samples_at_most(), 20);
 }
@@ -85,7 +91,9 @@ fn congestion_spaces_the_samples_leaves_the_repeats_out_and_goes() {
     let mut slave = LinkEnd::new(Side::Slave, Time::ZERO);
     let mut out = [0; DATAGRAM_MAX];
     let mut hear = |link: &mut MasterLink, at: u64, took: u64| {
-        let length = link.end.seal(Time::from_millis(at - took), Outgoing::Heartbeat, &mut out);
+        let length = link
+            .end
+            .seal(Time::from_millis(at - took), Outgoing::Heartbeat, &mut out);
         slave.open(Time::from_millis(at), &out[..length.unwrap()]);
         let length = slave.seal(Time::from_millis(at), Outgoing::Heartbeat, &mut out);
         link.handle(Time::from_millis(at), &out[..length.unwrap()]);

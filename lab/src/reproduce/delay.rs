@@ -31,7 +31,7 @@ const PICTURE_MS: [u64; 4] = [250, 500, 1000, 2000];
 
 /// How packets are lost.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Loss {
+pub(super) enum Loss {
     None,
     FivePercent,
     TwentyPercent,
@@ -40,7 +40,7 @@ enum Loss {
 }
 
 impl Loss {
-    const ALL: [Self; 5] = [
+    pub(super) const ALL: [Self; 5] = [
         Self::None,
         Self::FivePercent,
         Self::TwentyPercent,
@@ -49,7 +49,7 @@ impl Loss {
     ];
 
     /// As `delay.csv` spells it: a share, or the bursts' mean length.
-    fn name(self) -> &'static str {
+    pub(super) fn name(self) -> &'static str {
         match self {
             Self::None => "0",
             Self::FivePercent => "0.05",
@@ -60,7 +60,7 @@ impl Loss {
     }
 
     /// In the words of a link. Bursts take 5 % of the time.
-    fn words(self) -> &'static str {
+    pub(super) fn words(self) -> &'static str {
         match self {
             Self::None => "",
             Self::FivePercent => "loss 5%",

@@ -135,7 +135,15 @@ pub(super) async fn serve_with(
         samples_per_command: hello.samples_per_command,
     };
     let link = SlaveLink::new(shared.clock.now(), link);
-    let session = Session::new(shared, config, connection, send, worker, link, socket_before);
+    let session = Session::new(
+        shared,
+        config,
+        connection,
+        send,
+        worker,
+        link,
+        socket_before,
+    );
     session.operate(receive, stop, live).await.map(Some)
 }
 

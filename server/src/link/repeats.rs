@@ -55,7 +55,10 @@ impl Repeats {
     pub fn recommended() -> Self {
         let mut after = [Duration::ZERO; REPEATS_MAX];
         let times = [Duration::from_millis(10), Duration::from_millis(30)];
-        after.iter_mut().zip(times).for_each(|(slot, time)| *slot = time);
+        after
+            .iter_mut()
+            .zip(times)
+            .for_each(|(slot, time)| *slot = time);
         Self {
             after,
             count: times.len(),
@@ -118,7 +121,9 @@ impl FromStr for Repeats {
             return Ok(Self::NONE);
         }
         let ms = |word: &str| {
-            let digits = word.strip_suffix("ms").and_then(|digits| digits.parse().ok());
+            let digits = word
+                .strip_suffix("ms")
+                .and_then(|digits| digits.parse().ok());
             digits.ok_or_else(|| RepeatsError::Time(word.to_owned()))
         };
         let times: Vec<f64> = text.split_whitespace().map(ms).collect::<Result<_, _>>()?;
@@ -162,7 +167,10 @@ impl Repeating {
 
     /// When the next repeat is due; none after the last.
     pub(super) fn due(&self, repeats: &Repeats) -> Option<Time> {
-        repeats.after().get(self.done).map(|after| self.sent + *after)
+        repeats
+            .after()
+            .get(self.done)
+            .map(|after| self.sent + *after)
     }
 
     /// Whether a repeat is due at `now`. One that is asked for late takes the ones before it along.

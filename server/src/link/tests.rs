@@ -140,6 +140,8 @@ fn only_the_news_of_a_command_acknowledge() {
         .samples(&command)
         .map(|(sample, newest)| (sample.stamp.as_nanos() / 1_000_000, newest))
         .collect();
-    let expected: Vec<(u64, u32)> = (1..=20).map(|ms| (ms, if ms <= 10 { 0 } else { 7 })).collect();
+    let expected: Vec<(u64, u32)> = (1..=20)
+        .map(|ms| (ms, if ms <= 10 { 0 } else { 7 }))
+        .collect();
     assert_eq!(said, expected);
 }

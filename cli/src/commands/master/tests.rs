@@ -40,7 +40,10 @@ fn the_options_say_what_the_arguments_said() {
     let options = options(&arguments(&words)).unwrap();
     assert_eq!(options.pairing.to_string(), pairing);
     assert_eq!(options.device.stiffness_n_per_m(), 2000.0);
-    assert_eq!((options.netem_seed, options.samples_per_command), (7, 10));
+    assert_eq!(
+        (options.netem_seed, options.commands),
+        (7, CommandConfig::default())
+    );
     assert_eq!(options.duration, None);
     let OperatorChoice::Scripted(scripted) = options.operator else {
         panic!("not scripted");
