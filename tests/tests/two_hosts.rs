@@ -26,8 +26,10 @@ const RELAY_TO_MASTER: &str = "10.91.2.1";
 const MASTER: &str = "10.91.2.2";
 /// Packets on a cable that no report counts: ARP, and what QUIC says last when all is counted.
 const BESIDE: f64 = 8.0;
+/// An Ethernet header, bytes.
+const ETHERNET: f64 = 14.0;
 /// Ethernet, IPv4 and UDP headers, bytes.
-const HEADERS: f64 = 14.0 + 20.0 + 8.0;
+const HEADERS: f64 = ETHERNET + 20.0 + 8.0;
 
 /// Runs `ip`; what it says when it fails.
 fn ip(words: &str) -> Result<(), String> {
@@ -91,6 +93,23 @@ impl Hosts {
             received_bytes: read("rx_bytes"),
         }
     }
+
+    /// What the kernel of a host counted of UDP (RFC 4113): datagrams sent and received.
+    fn udp(&self, host: &str) -> Udp {
+        let output = self.on(host, "cat").arg("/proc/net/snmp").output().unwrap();
+        let text = String::from_utf8(output.stdout).unwrap();
+        let mut rows = text.lines().filter(|line| line.starts_with("Udp: "));
+        let (names, counts) = (rows.next().unwrap(), rows.next().unwrap());
+        let of = |name: &str| {
+            let at = names.split(' ').position(|of| of == name).unwrap();
+            counts.split(' ').nth(at).unwrap().parse().unwrap()
+        };
+        Udp {
+            sent: of("OutDatagrams"),
+            received: of("InDatagrams"),
+            refused: of("InErrors"),
+        }
+    }
 }
 
 impl Drop for Hosts {
@@ -130,6 +149,14 @@ struct Cable {
     received_bytes: f64,
 }
 
+/// Counters of a host's UDP.
+#[derive(Clone, Copy, Debug)]
+struct Udp {
+    sent: f64,
+    received: f64,
+    refused: f64,
+}
+
 fn get(report: &Value, path: &str) -> f64 {
     let found = number(report, path);
     found.unwrap_or_else(|| panic!("{path} is {:?}", report.pointer(path)))
@@ -141,6 +168,8 @@ struct Session {
     master: Value,
     slave_cable: Cable,
     master_cable: Cable,
+    slave_udp: Udp,
+    master_udp: Udp,
 }
 
 /// A process that ended well.
@@ -177,6 +206,8 @@ fn session(hosts: &Hosts) -> Session {
         master: master.document(0).unwrap(),
         slave_cable: hosts.counted("slave"),
         master_cable: hosts.counted("master"),
+        slave_udp: hosts.udp("slave"),
+        master_udp: hosts.udp("master"),
     };
     relay.interrupt().unwrap();
     well(relay.end(soon));
@@ -198,6 +229,8 @@ fn two_hosts_report_the_same_session_and_agree_with_their_cables() {
     what_one_side_counted_the_other_reports(&session);
     what_was_sent_was_received_or_lost(&session);
     the_cables_counted_the_same(&session);
+    the_kernels_counted_the_same(&session);
+    the_three_rates_belong_together(&session);
 }
 
 fn the_job_was_done(session: &Session) {
@@ -226,6 +259,7 @@ fn what_one_side_counted_the_other_reports(session: &Session) {
     let both = |path: &str| (get(&session.slave, path), get(&session.master, path));
     for path in [
         "/updates/sent",
+        "/updates/repeated",
         "/updates/by_cause/deadband",
         "/updates/by_cause/timer",
         "/force/pmse",
@@ -320,6 +354,81 @@ fn the_cables_counted_the_same(session: &Session) {
         assert!(
             bytes <= octets && octets <= bytes + BESIDE * 100.0,
             "{end}: the socket counted {bytes} bytes with headers, the cable {octets}"
+        );
+    }
+}
+
+/// No datagram of ours is left out or counted twice: the kernels know of no other.
+fn the_kernels_counted_the_same(session: &Session) {
+    let of = |report, way: &str| get(report, &format!("/wire/{way}/datagrams"));
+    let (slave, master) = (session.slave_udp, session.master_udp);
+    for (end, counted, kernel) in [
+        ("slave, down", of(&session.slave, "down"), slave.sent),
+        ("slave, up", of(&session.slave, "up"), slave.received),
+        ("master, up", of(&session.master, "up"), master.sent),
+        ("master, down", of(&session.master, "down"), master.received),
+    ] {
+        // beside the session there are only the farewell's last words after the count
+        assert!(
+            counted <= kernel && kernel <= counted + BESIDE,
+            "{end}: the socket counted {counted} datagrams, the kernel {kernel}"
+        );
+    }
+    assert_eq!((slave.refused, master.refused), (0.0, 0.0));
+}
+
+/// Messages by kind and cause, UDP datagrams, and bits per second with IP and UDP headers.
+fn the_three_rates_belong_together(session: &Session) {
+    let sum = |report, paths: &[&str]| paths.iter().map(|path| get(report, path)).sum::<f64>();
+    let (slave, master) = (&session.slave, &session.master);
+    let (updates, repeats) = (
+        get(slave, "/messages/down/updates"),
+        get(slave, "/messages/down/repeats"),
+    );
+    assert!(
+        repeats > 0.0,
+        "a round trip of 40 ms leaves time for repeats"
+    );
+    assert_eq!(updates, sum(slave, &["/updates/sent", "/updates/repeated"]));
+    let causes = slave.pointer("/updates/repeated_by_cause");
+    let causes = causes.and_then(Value::as_object).unwrap().values();
+    assert_eq!(repeats, causes.filter_map(Value::as_f64).sum());
+    // the master had most updates at the first saying
+    let seen_again = get(master, "/messages/down/repeats");
+    assert!(
+        seen_again > 0.0 && seen_again <= repeats,
+        "{seen_again} of {repeats}"
+    );
+
+    let up = ["/messages/up/commands", "/messages/up/heartbeats"];
+    let down = [
+        "/messages/down/updates",
+        "/messages/down/scenes",
+        "/messages/down/heartbeats",
+    ];
+    for (way, report, kinds, cable) in [
+        ("up", master, &up[..], session.master_cable),
+        ("down", slave, &down[..], session.slave_cable),
+    ] {
+        let rate = |of: &str| get(report, &format!("/{of}/{way}/rate_hz"));
+        let (messages, datagrams) = (
+            sum(report, kinds),
+            get(report, &format!("/wire/{way}/datagrams")),
+        );
+        // every message is a datagram of its own; QUIC's own come on top
+        assert!(
+            messages <= datagrams,
+            "{way}: {messages} messages, {datagrams} datagrams"
+        );
+        let seconds = messages / rate("messages");
+        assert!((seconds - SECONDS as f64).abs() < 1.0, "{way}: {seconds} s");
+        assert!((datagrams / rate("wire") / seconds - 1.0).abs() < 1e-9);
+        // the cable's bits without Ethernet; a packet beside the session has less than 100 bytes
+        let bits = 8.0 * (cable.sent_bytes - ETHERNET * cable.sent);
+        let reported = get(report, &format!("/wire/{way}/bits_per_s")) * seconds;
+        assert!(
+            reported <= bits && bits <= reported + BESIDE * 8.0 * 100.0,
+            "{way}: {reported} bits reported, {bits} on the cable"
         );
     }
 }

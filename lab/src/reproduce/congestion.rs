@@ -1,4 +1,5 @@
-//! The deadband as a rate controller at a bottleneck of 64 kbit/s: what congestion does with and without it.
+//! The deadband as a rate controller at a bottleneck of 64 kbit/s: what congestion does if nobody, the master or both
+//! answer it.
 //!
 //! The live defaults over 50 ms one way. From 10 to 25 s each direction passes a bottleneck with a second of queue.
 
@@ -24,10 +25,11 @@ const UNTIL_S: f64 = 25.0;
 const NETWORK: &str = "delay 50ms; at 10s delay 50ms rate 64kbit 58 queue 1s; at 25s delay 50ms";
 /// Length of a bin.
 const BIN: Duration = Duration::from_millis(250);
-/// Greatest stretches: without the controller, and with it.
-const VARIANTS: [(&str, StretchMax); 2] = [
-    ("without", StretchMax::OFF),
-    ("with", StretchMax::RECOMMENDED),
+/// Who answers congestion: nobody, the master with its samples alone, both; greatest stretches of master and slave.
+const VARIANTS: [(&str, StretchMax, StretchMax); 3] = [
+    ("nobody", StretchMax::OFF, StretchMax::OFF),
+    ("master", StretchMax::RECOMMENDED, StretchMax::OFF),
+    ("both", StretchMax::RECOMMENDED, StretchMax::RECOMMENDED),
 ];
 /// Beginning of the part after congestion: what had queued is gone, and the stretch.
 const AFTER_S: f64 = 35.0;
@@ -137,7 +139,7 @@ struct Run {
     digest: String,
 }
 
-fn world(stretch_max: StretchMax) -> Result<WorldConfig, ReproduceError> {
+fn world(master: StretchMax, slave: StretchMax) -> Result<WorldConfig, ReproduceError> {
     let link: Result<LinkConfig, _> = NETWORK.parse();
     let link = link.map_err(
         |error: mmt_netem::words::ParseError| ReproduceError::Network {
@@ -148,10 +150,10 @@ fn world(stretch_max: StretchMax) -> Result<WorldConfig, ReproduceError> {
     let mut world = WorldConfig {
         up: link.clone(),
         down: link,
-        stretch_max,
+        stretch_max: master,
         ..WorldConfig::default()
     };
-    world.slave.stretch_max = stretch_max;
+    world.slave.stretch_max = slave;
     Ok(world)
 }
 
@@ -174,15 +176,15 @@ fn run(config: &WorldConfig, duration: Duration) -> Result<Run, ReproduceError> 
     })
 }
 
-/// Runs both variants over the seeds and keeps `congestion.csv` (a row a bin) and `congestion.svg` (seed 1).
+/// Runs every variant over the seeds and keeps `congestion.csv` (a row a bin) and `congestion.svg` (seed 1).
 ///
 /// # Errors
 /// As [`Laboratory::keep`]; when a world is not accepted.
 pub fn reproduce(laboratory: &dyn Laboratory, extent: Extent) -> Result<Findings, ReproduceError> {
     let mut hash = Sha256::new();
     let mut variants = Vec::new();
-    for (name, stretch_max) in VARIANTS {
-        let config = world(stretch_max)?;
+    for (name, master, slave) in VARIANTS {
+        let config = world(master, slave)?;
         let runs =
             (1..=extent.seeds).map(|seed| run(&config.clone().seeded(seed), extent.duration));
         let runs: Vec<Run> = runs.collect::<Result<_, _>>()?;
@@ -218,7 +220,7 @@ fn series_table(variants: &[Variant]) -> Table {
     let mut table = Table::new(
         "Congestion, bin by bin",
         &[
-            ("controller", 0),
+            ("answers", 0),
             ("seed", 0),
             ("t_s", 2),
             ("round_trip_ms", 1),
@@ -263,7 +265,7 @@ fn summary(variants: &[Variant]) -> Table {
     let mut table = Table::new(
         "64 kbit/s each way from 10 to 25 s: round trip, traffic and force error, means over the seeds",
         &[
-            ("controller", 0),
+            ("answers", 0),
             ("phase", 0),
             ("round_trip_p50_ms", 0),
             ("round_trip_max_ms", 0),
@@ -355,6 +357,7 @@ fn figure(variants: &[Variant]) -> Figure {
     ];
     let styles = [
         (Colour::Vermilion, Stroke::Dashed),
+        (Colour::Grey, Stroke::Solid),
         (Colour::Blue, Stroke::Solid),
     ];
     let panels = quantities
@@ -372,11 +375,10 @@ fn figure(variants: &[Variant]) -> Figure {
                     let dots = bins
                         .iter()
                         .filter_map(|bin| Some(Dot::at(bin.t_s, of(bin)?)));
-                    Series::line(&format!("{name} controller"), colour, dots.collect())
-                        .stroked(stroke, 2)
+                    Series::line(name, colour, dots.collect()).stroked(stroke, 2)
                 });
             let edges = [FROM_S, UNTIL_S].map(|t_s| Dot::at(t_s, 0.0)).to_vec();
-            let bottleneck = Series::line("", Colour::Grey, edges).stroked(Stroke::Events, 1);
+            let bottleneck = Series::line("", Colour::Black, edges).stroked(Stroke::Events, 1);
             Panel {
                 title: what.to_owned(),
                 x: Axis::linear("time, s"),

@@ -421,3 +421,23 @@ fn a_delay_whose_greatest_is_its_least_stays() {
     assert_eq!(buffer.delay(), Duration::from_millis(16));
     assert!(buffer.counts().late > 100);
 }
+
+#[test]
+fn when_a_long_queue_is_gone_the_tool_does_not_stand_still() {
+    // 0.9 s of queue for 10 s, which then drains twice as fast as samples come
+    let mut transit = |k: u64| {
+        let drained = 2 * k.saturating_sub(10_000) as i64;
+        Some((950 - drained).max(50) * MS)
+    };
+    let (buffer, played) = play(PlayoutConfig::default(), 10, 15_000, &mut transit);
+    let after = played
+        .iter()
+        .filter(|(now, _)| *now > Time::from_millis(12_000));
+    let late = after
+        .clone()
+        .filter(|(_, p)| p.status != Status::Interpolated);
+    assert_eq!(late.count(), 0, "{:?}", buffer.counts());
+    let lag = |(now, p): &(Time, Played)| now.saturating_since(p.stamp);
+    let longest = after.map(lag).max().unwrap();
+    assert!(longest < Duration::from_millis(400), "{longest:?}");
+}
