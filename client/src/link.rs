@@ -29,7 +29,7 @@ pub struct CommandConfig {
 }
 
 impl Default for CommandConfig {
-    /// Ten samples, none repeated: repeats of samples buy no force error (docs/repeats.md). Congestion may leave
+    /// Ten samples, none repeated: repeats of samples buy no force error (docs/traffic.md). Congestion may leave
     /// two of three samples out.
     fn default() -> Self {
         Self {

@@ -415,7 +415,7 @@ fn the_three_rates_belong_together(session: &Session) {
             sum(report, kinds),
             get(report, &format!("/wire/{way}/datagrams")),
         );
-        // every message is a datagram of its own; QUIC's own come on top
+        // hardly ever do two messages share a datagram, and QUIC's own come on top
         assert!(
             messages <= datagrams,
             "{way}: {messages} messages, {datagrams} datagrams"

@@ -397,3 +397,79 @@ fn figure(variants: &[Variant]) -> Figure {
         panel_size: (460, 240),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const DURATION: Duration = Duration::from_secs(45);
+
+    fn run_of(master: StretchMax, slave: StretchMax) -> Vec<Bin> {
+        let config = world(master, slave).unwrap().seeded(1);
+        run(&config, DURATION).unwrap().bins
+    }
+
+    fn within(bins: &[Bin], from_s: f64, until_s: f64) -> impl Iterator<Item = &Bin> {
+        let of = move |bin: &&Bin| bin.t_s > from_s && bin.t_s <= until_s;
+        bins.iter().filter(of)
+    }
+
+    fn round_trip(bins: &[Bin]) -> f64 {
+        median(within(bins, FROM_S + 3.0, UNTIL_S).filter_map(|bin| bin.round_trip_ms)).unwrap()
+    }
+
+    #[test]
+    fn who_answers_congestion_has_a_short_queue_and_comes_back_to_what_was_configured() {
+        let nobody = run_of(StretchMax::OFF, StretchMax::OFF);
+        let both = run_of(StretchMax::RECOMMENDED, StretchMax::RECOMMENDED);
+        let dropped = |bins: &[Bin]| bins.iter().map(|bin| bin.dropped).sum::<u64>();
+        let (without, with) = (round_trip(&nobody), round_trip(&both));
+        println!(
+            "round trip {without} ms and {with} ms, dropped {} and {}",
+            dropped(&nobody),
+            dropped(&both)
+        );
+        assert!(without > 1000.0 && with < 200.0, "{without} ms, {with} ms");
+        assert!(dropped(&nobody) > 500 && dropped(&both) < 50);
+        assert!(
+            nobody
+                .iter()
+                .all(|bin| (bin.delta, bin.t_update_ms) == (0.10, 150.0))
+        );
+
+        // all three rates give way, to their bounds and no further, and come back
+        let most = |of: fn(&Bin) -> f64| both.iter().map(of).fold(0.0, f64::max);
+        assert!((most(|bin| bin.delta) - 0.30).abs() < 1e-12);
+        assert!((most(|bin| bin.t_update_ms) - 450.0).abs() < 1e-6);
+        let least = within(&both, FROM_S + 3.0, UNTIL_S)
+            .map(|bin| bin.commands)
+            .min();
+        assert_eq!(least, Some(8), "a third of 25 in a quarter of a second");
+        let last = both.last().unwrap();
+        assert_eq!(
+            (last.delta, last.t_update_ms, last.commands),
+            (0.10, 150.0, 25)
+        );
+    }
+
+    #[test]
+    fn without_a_queue_rate_control_changes_nothing() {
+        for words in [
+            "delay 50ms",
+            "delay 50ms 20ms",
+            "delay 50ms loss 20%",
+            "delay 400ms loss burst 5% 100ms",
+        ] {
+            let digest = |stretch_max| {
+                let mut config = world(stretch_max, stretch_max).unwrap();
+                (config.up, config.down) = (words.parse().unwrap(), words.parse().unwrap());
+                run(&config, Duration::from_secs(15)).unwrap().digest
+            };
+            assert_eq!(
+                digest(StretchMax::OFF),
+                digest(StretchMax::RECOMMENDED),
+                "{words}"
+            );
+        }
+    }
+}

@@ -7,6 +7,8 @@
 use std::time::Duration;
 
 use mmt_client::operator::scripted::Picture;
+use mmt_server::link::Repeats;
+use mmt_shared::rate_control::StretchMax;
 use mmt_shared::settings::PoseCorrection;
 
 use super::{Extent, Findings, Laboratory, ReproduceError};
@@ -126,6 +128,10 @@ impl Place {
             ..WorldConfig::default()
         };
         config.operator.view = self.picture;
+        // what the other architectures do not have either
+        config.slave.repeats_ms = Repeats::NONE;
+        config.slave.stretch_max = StretchMax::OFF;
+        config.stretch_max = StretchMax::OFF;
         Ok(Duel {
             architecture: self.architecture,
             config: config.seeded(seed),

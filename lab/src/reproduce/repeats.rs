@@ -298,3 +298,69 @@ fn exceeded(mut times: Vec<Duration>) -> Vec<Dot> {
     }
     dots
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn trial(words: &str, repeats: Repeats, repeat_samples: u8, seed: u64) -> Measured {
+        let link: LinkConfig = words.parse().unwrap();
+        let config = world(Curve::Hybrid(150), &link, repeats, repeat_samples);
+        Trial::new(config.seeded(seed), Duration::from_secs(20))
+            .run()
+            .unwrap()
+    }
+
+    #[test]
+    fn on_a_clean_path_repeats_change_nothing_but_the_traffic() {
+        let plain = trial(DELAY, Repeats::NONE, 0, 1);
+        let repeated = trial(DELAY, Repeats::recommended(), 1, 1);
+        assert_eq!(plain.digest, repeated.digest);
+        assert_eq!(plain.staleness, repeated.staleness);
+        assert_eq!(plain.traffic.repeated.total(), 0);
+        // each update twice, but where a newer one came before
+        let (sent, again) = (repeated.updates.total(), repeated.traffic.repeated.total());
+        assert!(again > sent && again <= 2 * sent, "{again} of {sent}");
+        let bits = |run: &Measured| run.traffic.wire.up.bits_per_s.get().unwrap();
+        assert!(bits(&repeated) > 1.3 * bits(&plain), "samples go up twice");
+        assert!(bits(&repeated) < 1.6 * bits(&plain), "headers do not");
+    }
+
+    #[test]
+    fn under_loss_repeats_of_updates_shorten_the_tail_and_those_of_samples_complete_the_record() {
+        let words = format!("{DELAY} loss 20%");
+        let runs = |repeats, repeat_samples| -> Vec<Measured> {
+            (1..=3)
+                .map(|seed| trial(&words, repeats, repeat_samples, seed))
+                .collect()
+        };
+        let (none, updates) = (runs(Repeats::NONE, 0), runs(Repeats::recommended(), 0));
+        let p95 = |runs: &[Measured]| Staleness::quantile(&mut times(runs), 0.95).unwrap();
+        let (without, with) = (p95(&none), p95(&updates));
+        println!("95 % of updates within {without:?}, with repeats {with:?}");
+        assert!(with < without.mul_f64(0.7));
+        let known = |runs: &[Measured]| runs.iter().map(|run| run.force.samples).sum::<u64>();
+        let both = runs(Repeats::recommended(), 1);
+        let lost = 60_000 - known(&updates).min(60_000);
+        let left = 60_000 - known(&both).min(60_000);
+        println!("{lost} samples without f_m, with repeats {left}");
+        assert!(2 * left < lost, "{left} of {lost}");
+    }
+
+    #[test]
+    fn the_curve_of_the_figure_is_the_share_above_each_time() {
+        let ms = Duration::from_millis;
+        let dots = exceeded(vec![ms(60), ms(50), ms(50), ms(80)]);
+        let expected = [
+            (0.0, 1.0),
+            (50.0, 1.0),
+            (50.0, 0.5),
+            (60.0, 0.5),
+            (60.0, 0.25),
+            (80.0, 0.25),
+            (80.0, 0.0),
+        ];
+        let found: Vec<(f64, f64)> = dots.iter().map(|dot| (dot.x, dot.y)).collect();
+        assert_eq!(found, expected);
+    }
+}

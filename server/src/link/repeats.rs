@@ -50,7 +50,7 @@ impl Repeats {
         count: 0,
     };
 
-    /// 10 and 30 ms after the update: what `mmt reproduce repeats` found worth its packets (docs/repeats.md).
+    /// 10 and 30 ms after the update: what `mmt reproduce repeats` found worth its packets (docs/traffic.md).
     #[must_use]
     pub fn recommended() -> Self {
         let mut after = [Duration::ZERO; REPEATS_MAX];
