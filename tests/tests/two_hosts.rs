@@ -100,7 +100,7 @@ impl Hosts {
         let text = String::from_utf8(output.stdout).unwrap();
         let mut rows = text.lines().filter(|line| line.starts_with("Udp: "));
         let (names, counts) = (rows.next().unwrap(), rows.next().unwrap());
-        let of = |name: &str| {
+        let of = |name: &str| -> f64 {
             let at = names.split(' ').position(|of| of == name).unwrap();
             counts.split(' ').nth(at).unwrap().parse().unwrap()
         };
@@ -392,7 +392,7 @@ fn the_three_rates_belong_together(session: &Session) {
     assert_eq!(updates, sum(slave, &["/updates/sent", "/updates/repeated"]));
     let causes = slave.pointer("/updates/repeated_by_cause");
     let causes = causes.and_then(Value::as_object).unwrap().values();
-    assert_eq!(repeats, causes.filter_map(Value::as_f64).sum());
+    assert_eq!(repeats, causes.filter_map(Value::as_f64).sum::<f64>());
     // the master had most updates at the first saying
     let seen_again = get(master, "/messages/down/repeats");
     assert!(
