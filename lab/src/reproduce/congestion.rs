@@ -48,6 +48,7 @@ struct Bin {
     commands: u64,
     /// Messages of all kinds in both directions.
     messages: u64,
+    /// Repeats included.
     updates: u64,
     /// Bits in each direction with headers.
     bits: [f64; 2],
@@ -377,7 +378,10 @@ fn figure(variants: &[Variant]) -> Figure {
                         .filter_map(|bin| Some(Dot::at(bin.t_s, of(bin)?)));
                     Series::line(name, colour, dots.collect()).stroked(stroke, 2)
                 });
-            let edges = [FROM_S, UNTIL_S].map(|t_s| Dot::at(t_s, 0.0)).to_vec();
+            let all = variants.iter().flat_map(|(_, _, runs)| runs.first());
+            let values = all.flat_map(|run| run.bins.iter().filter_map(of));
+            let most = values.fold(0.0, f64::max);
+            let edges = [FROM_S, UNTIL_S].map(|t_s| Dot::at(t_s, most)).to_vec();
             let bottleneck = Series::line("", Colour::Black, edges).stroked(Stroke::Events, 1);
             Panel {
                 title: what.to_owned(),
