@@ -299,8 +299,7 @@ impl Trigger {
     /// What an update would correct now, as a relative force error: the change of the force beyond the
     /// estimate's own deviation, the turn of its direction, and the error of a face that is held wrongly.
     fn news(&self, input: &TriggerInput) -> f64 {
-        let (Scheme::Adaptive { delta, .. }, Some((_, sent))) = (self.config.scheme, &self.last)
-        else {
+        let (Scheme::Adaptive { delta, .. }, Some((_, sent))) = (self.scheme, &self.last) else {
             return 0.0;
         };
         let change = (force_change(input, sent) - input.force_deviation).max(0.0);
