@@ -212,6 +212,13 @@ impl Apart {
         apart.lost = world.slave.shadow().lost();
         apart
     }
+
+    fn add(&mut self, other: Self) {
+        self.confirmed.extend(other.confirmed);
+        self.between += other.between;
+        self.ahead.extend(other.ahead);
+        self.lost += other.lost;
+    }
 }
 
 fn difference(copy: &LocalModel, own: &LocalModel) -> (f64, f64) {
@@ -246,27 +253,31 @@ fn under_loss_and_reordering_the_shadow_is_the_masters_model_within_its_bound() 
         ("delay 50ms 10ms order free loss 20%", true),
         ("delay 500ms 10ms order free loss 20%", true),
     ] {
-        for (seed, repeat) in [(1, false), (2, false), (2, true)] {
-            let mut config = over(words, seed);
-            config.repeat_samples = u8::from(repeat);
-            if !repeat {
-                config.slave.repeats_ms = Repeats::NONE;
+        for repeat in [false, true] {
+            // no seed is chosen: what holds of three together need not hold of each
+            let mut apart = Apart::default();
+            for seed in 1..=3 {
+                let mut config = over(words, seed);
+                config.repeat_samples = u8::from(repeat);
+                if !repeat {
+                    config.slave.repeats_ms = Repeats::NONE;
+                }
+                apart.add(Apart::of(&config));
             }
-            let apart = Apart::of(&config);
             let [typical, most] = [100, usize::MAX].map(|n| quantile(&apart.confirmed, n));
             let ahead = quantile(&apart.ahead, usize::MAX);
             println!(
-                "{words:38} seed {seed}, repeats {repeat}: confirmed 99 % {typical:.3?}, most {most:.3?} \
+                "{words:38} repeats {repeat}: confirmed 99 % {typical:.3?}, most {most:.3?} \
                  (mm, mrad), ahead {ahead:.3?} in {} ticks, {} ticks between, {} updates lost",
                 apart.ahead.len(),
                 apart.between,
                 apart.lost
             );
-            assert!(repeat || (apart.lost > 5) == lossy);
-            assert!(apart.between < 1000, "{words}: {}", apart.between);
+            assert!(repeat || (apart.lost > 15) == lossy);
+            assert!(apart.between < 3000, "{words}: {}", apart.between);
             assert!(typical.0 < 0.5 && typical.1 < 2.0, "{words}: {typical:?}");
             assert!(most.0 < 10.0 && most.1 < 20.0, "{words}: {most:?}");
-            assert!(apart.ahead.len() > 5000);
+            assert!(apart.ahead.len() > 15_000);
             assert!(ahead.0 < 0.5 && ahead.1 < 0.5, "{words}: {ahead:?}");
         }
     }
