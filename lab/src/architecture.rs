@@ -14,6 +14,7 @@ use std::time::Duration;
 use mmt_client::device::DeviceProfile;
 use mmt_client::operator::Operator;
 use mmt_client::operator::scripted::{Phase, Picture};
+use mmt_server::playout::PlayoutBuffer;
 use mmt_shared::bilateral::Baseline;
 use mmt_shared::bilateral::message::OVERHEAD_BYTES;
 use mmt_shared::settings::{ModelSettings, PoseCorrection};
@@ -82,6 +83,8 @@ pub struct DelayRow {
     pub observer_min_j: f64,
     /// The least of what the hand put in less what the tool put out, J; only where the two are coupled.
     pub network_min_j: Option<f64>,
+    /// Median delay of the slave's play-out, ms.
+    pub playout_delay_ms: Option<f64>,
     /// The mass that the hand felt over the one that the tool felt.
     pub apparent_mass_ratio: Option<f64>,
 }
@@ -140,6 +143,7 @@ fn bilateral_row(world: &Bilateral, duration: Duration) -> DelayRow {
         energy_injected_j: None,
         observer_min_j: outcome.hand_port.least_j(),
         network_min_j: Some(outcome.network_min_j),
+        playout_delay_ms: playout_delay_ms(world.slave().playout()),
         apparent_mass_ratio: outcome.felt.ratio(),
     }
 }
@@ -178,8 +182,14 @@ fn mediated_row(mut world: World, duration: Duration) -> DelayRow {
         energy_injected_j: Some(outcome.energy_injected_j),
         observer_min_j: outcome.observer_min_j,
         network_min_j: None,
+        playout_delay_ms: playout_delay_ms(world.slave().playout()),
         apparent_mass_ratio: felt.ratio(),
     }
+}
+
+fn playout_delay_ms(playout: &PlayoutBuffer) -> Option<f64> {
+    let median = playout.delays().quantile(0.5);
+    median.map(|delay| delay.as_secs_f64() * 1e3)
 }
 
 #[cfg(test)]

@@ -119,6 +119,12 @@ impl BilateralSlave {
         &self.environment
     }
 
+    /// The play-out buffer.
+    #[must_use]
+    pub fn playout(&self) -> &PlayoutBuffer {
+        &self.playout
+    }
+
     /// Force metrics over all samples whose f_m is known.
     #[must_use]
     pub fn force(&self) -> &ForceMetrics {

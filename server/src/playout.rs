@@ -17,6 +17,7 @@ use std::collections::VecDeque;
 use std::time::Duration;
 
 use mmt_shared::geometry::Vec2;
+use mmt_shared::peer::Histogram;
 use mmt_shared::time::{TICK, Time};
 use mmt_shared::wire::message::HipSample;
 use serde::{Deserialize, Serialize};
@@ -128,6 +129,7 @@ pub struct PlayoutBuffer {
     /// Since when only useless samples have come.
     useless_since: Option<Time>,
     counts: PlayoutCounts,
+    delays: Histogram,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -166,6 +168,7 @@ impl PlayoutBuffer {
             start: None,
             useless_since: None,
             counts: PlayoutCounts::default(),
+            delays: Histogram::new(),
         })
     }
 
@@ -214,6 +217,7 @@ impl PlayoutBuffer {
             hip: played.hip,
         });
         self.count(&played);
+        self.delays.note(self.delay());
         self.forget(stamp);
         Some(played)
     }
@@ -243,6 +247,12 @@ impl PlayoutBuffer {
     #[must_use]
     pub fn delay(&self) -> Duration {
         Duration::from_nanos(self.delay_ns.unsigned_abs())
+    }
+
+    /// How often each delay was played with, a count a tick.
+    #[must_use]
+    pub fn delays(&self) -> &Histogram {
+        &self.delays
     }
 
     /// Brings the delay towards what samples need, slowly.

@@ -272,6 +272,7 @@ fn runs(groups: &[Group]) -> Table {
             ("apparent_mass_ratio", 2),
             ("pushes", 0),
             ("wire_bytes_per_s", 0),
+            ("playout_delay_ms", 1),
         ],
     );
     for (place, rows) in groups {
@@ -295,6 +296,7 @@ fn runs(groups: &[Group]) -> Table {
                 row.apparent_mass_ratio.into(),
                 row.pushes.into(),
                 row.wire_bytes_per_s.into(),
+                row.playout_delay_ms.into(),
             ]);
         }
     }
