@@ -39,6 +39,9 @@ const FUTURE: Duration = Duration::from_secs(1);
 const RELEARN_AFTER: Duration = Duration::from_millis(200);
 /// After the clock was learned anew, play-out waits for stamps that it has played, but not longer.
 const WAIT: Duration = Duration::from_secs(1);
+/// The stamp that is told goes ahead of all samples by at most this: where the slave's clock has jumped, no part of the
+/// slave may take the jump for motion. So long an outage has released the hand.
+const AHEAD: Duration = Duration::from_secs(1);
 /// Room above the lateness of 99 of 100 samples, ns: the slave's ticks.
 const ROOM_NS: i64 = 2_000_000;
 /// How often the delay that is wanted is looked up, ticks: the histogram changes slowly.
@@ -67,8 +70,8 @@ pub enum Status {
 /// What the slave's tool follows in one tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Played {
-    /// The point of the master's clock that is played. Never decreases, unless the master's clock had to
-    /// be learned anew and went back by more than a second.
+    /// The point of the master's clock that is played, at most a second after the newest sample. Never decreases, unless
+    /// the master's clock had to be learned anew and went back by more than a second.
     pub stamp: Time,
     /// HIP, world frame, m.
     pub hip: Vec2,
@@ -136,6 +139,8 @@ pub struct PlayoutBuffer {
 struct Last {
     now: Time,
     stamp: Time,
+    /// The stamp that was told.
+    told: Time,
     hip: Vec2,
 }
 
@@ -210,10 +215,12 @@ impl PlayoutBuffer {
         let due = self.clock.stamp_at(now)?.offset_by(-self.delay_ns);
         let stamp = self.no_earlier_than_played(due);
         let aim = self.aim(stamp)?;
-        let played = self.limit(now, elapsed, stamp, &aim);
+        let told = self.told(stamp);
+        let played = self.limit(now, elapsed, told, &aim);
         self.last = Some(Last {
             now,
             stamp,
+            told,
             hip: played.hip,
         });
         self.count(&played);
@@ -311,6 +318,9 @@ impl PlayoutBuffer {
         self.samples.push_back(*sample);
         self.clock = SenderClock::default();
         self.clock.observe(arrived, sample.stamp);
+        if let Some(last) = &mut self.last {
+            last.stamp = last.told;
+        }
         self.lateness = Lateness::new();
         self.wanted_ns = self.delay_range_ns.0;
         true
@@ -330,6 +340,11 @@ impl PlayoutBuffer {
             Some(last) if last.stamp.saturating_since(due) <= WAIT => due.max(last.stamp),
             _ => due,
         }
+    }
+
+    fn told(&self, stamp: Time) -> Time {
+        let newest = self.samples.back();
+        newest.map_or(stamp, |newest| stamp.min(newest.stamp + AHEAD))
     }
 
     fn aim(&self, stamp: Time) -> Option<Aim> {
