@@ -4,9 +4,11 @@
 //! columns mean: `docs/baselines.md`. A run must never depend on anything but its arguments.
 
 mod bilateral;
+mod either;
 mod felt;
 
 pub use bilateral::{Bilateral, BilateralOutcome};
+pub use either::{EitherOutcome, EitherWorld};
 pub use felt::{FeltMass, FeltMasses};
 
 use std::time::Duration;
@@ -29,10 +31,12 @@ pub enum Architecture {
     Bilateral(Baseline),
     /// A model's parameters cross it; how the model's pose is corrected.
     Mediated(PoseCorrection),
+    /// TDPA or MMT with replay, by round trip and by how wrong the model has been of late.
+    Auto,
 }
 
 impl Architecture {
-    /// All of them, in the order of tables.
+    /// All that are compared, in the order of tables.
     pub const ALL: [Self; 8] = [
         Self::Bilateral(Baseline::PositionForce),
         Self::Bilateral(Baseline::DeadbandForce),
@@ -52,6 +56,7 @@ impl Architecture {
             Self::Mediated(PoseCorrection::Snap) => "mmt-snap",
             Self::Mediated(PoseCorrection::MatchedStamps) => "mmt-matched-stamps",
             Self::Mediated(PoseCorrection::Replay) => "mmt-replay",
+            Self::Auto => "auto",
         }
     }
 }
@@ -107,6 +112,13 @@ pub fn run(
             world.run(duration);
             Ok(bilateral_row(&world, duration))
         }
+        Architecture::Auto => {
+            let mut world = EitherWorld::try_new(config, None)?;
+            for _ in 0..duration.as_millis() {
+                world.step();
+            }
+            Ok(either_row(&world, duration))
+        }
         Architecture::Mediated(correction) => {
             let device = DeviceProfile::default().used_with(config.stiffness_n_per_m, None)?;
             let settings = config
@@ -143,6 +155,29 @@ fn bilateral_row(world: &Bilateral, duration: Duration) -> DelayRow {
         energy_injected_j: None,
         observer_min_j: outcome.hand_port.least_j(),
         network_min_j: Some(outcome.network_min_j),
+        playout_delay_ms: playout_delay_ms(world.slave().playout()),
+        apparent_mass_ratio: outcome.felt.ratio(),
+    }
+}
+
+fn either_row(world: &EitherWorld, duration: Duration) -> DelayRow {
+    let (outcome, force) = (world.outcome(), world.force());
+    let pushes = world.operator().pushes_completed().unwrap_or(0);
+    let seconds = duration.as_secs_f64();
+    let [up, down] = world.sent();
+    DelayRow {
+        pushes,
+        packet_rate_hz: outcome.with_news as f64 / seconds,
+        wire_rate_hz: down.packets as f64 / seconds,
+        wire_bytes_per_s: (up.bytes + down.bytes) as f64 / seconds,
+        pmse: force.pmse,
+        relative_error: force.relative_error,
+        pose_rms_mm: outcome.pose.position_rms_m().map(|m| m * 1e3),
+        force_peak_n: outcome.on_hand.largest_n(),
+        breaks_per_push: outcome.breaks.per_push(pushes),
+        energy_injected_j: Some(world.master().model().energy_injected_j()),
+        observer_min_j: world.master().port().least_j(),
+        network_min_j: None,
         playout_delay_ms: playout_delay_ms(world.slave().playout()),
         apparent_mass_ratio: outcome.felt.ratio(),
     }

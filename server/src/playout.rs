@@ -236,6 +236,12 @@ impl PlayoutBuffer {
         self.aim(stamp).map(|aim| aim.hip)
     }
 
+    /// The HIP that was played last, m; none before the first.
+    #[must_use]
+    pub fn played_hip(&self) -> Option<Vec2> {
+        self.last.map(|last| last.hip)
+    }
+
     /// The stamp of the newest sample that is not later than `stamp`.
     #[must_use]
     pub fn sample_before(&self, stamp: Time) -> Option<Time> {

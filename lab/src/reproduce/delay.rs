@@ -496,7 +496,7 @@ fn figure(groups: &[Group]) -> Figure {
             .map(|(k, architecture)| {
                 let (stroke, mark) = match architecture {
                     Architecture::Bilateral(_) => (Stroke::Dashed, Mark::Square),
-                    Architecture::Mediated(_) => (Stroke::Solid, Mark::Circle),
+                    Architecture::Mediated(_) | Architecture::Auto => (Stroke::Solid, Mark::Circle),
                 };
                 let here = groups.iter().filter(|group| {
                     group.0.architecture == architecture && group.0.k_p == 1000 && is_clean(group.0)
