@@ -1,7 +1,7 @@
 //! Which architecture the hand should feel: the tool's force across the network, or the local model.
 //!
 //! Two relative force errors are held against each other: the one that position–force with passivity control (TDPA)
-//! has at the measured round trip, and the one that the model has had of late, as the slave measures it. Pure: a tick
+//! has at the measured round trip and the device's stiffness, and the one that the model has had of late, as the slave measures it. Pure: a tick
 //! at a time. It must never change its mind on one sample: a choice stands until the other has been better by a
 //! margin for a while.
 
@@ -20,9 +20,13 @@ pub const TDPA_ERROR: [(f64, f64); 9] = [
     (100.0, 0.476),
     (200.0, 0.501),
 ];
-/// Beyond this round trip TDPA is not felt whatever the model is like, s: at 20 ms one way a mass is felt as 0.63 of
-/// itself, and from there to 50 ms as a tenth.
-pub const TDPA_ROUND_TRIP_MAX_S: f64 = 0.040;
+/// Stiffness that the errors were measured at, N/m. A contact's period goes with 1/√k_p, so a delay counts √(k_p/1000)
+/// times: at 3000 N/m that foretells 0.076, 0.143 and 0.197 at 2, 5 and 7 ms one way, and 0.080, 0.150 and 0.224 were
+/// measured.
+pub const STIFFNESS_N_PER_M: f64 = 1000.0;
+/// Beyond this round trip, so counted, TDPA is not felt whatever the model is like, s. At 1000 N/m a mass is felt as
+/// 0.77 of itself there; at 3000 N/m contact holds at 7 ms one way and breaks 7 times a push at 10.
+pub const TDPA_ROUND_TRIP_MAX_S: f64 = 0.028;
 /// The other one has to be better by this factor: the errors of two pushes differ by less.
 pub const MARGIN: f64 = 1.25;
 /// For this long without a break, s: longer than a touch, shorter than a push.
@@ -41,8 +45,10 @@ pub enum Chosen {
 }
 
 /// The choice.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Choice {
+    /// How many times a delay counts at the device's stiffness.
+    weight: f64,
     chosen: Chosen,
     /// The newest round trip, s.
     newest_s: Option<f64>,
@@ -52,7 +58,7 @@ pub struct Choice {
     switches: u32,
 }
 
-/// The relative force error to expect of TDPA at a round trip (s); that of the longest measured beyond it.
+/// The relative force error to expect of TDPA at a round trip (s, as counted at 1000 N/m); that of the longest measured beyond it.
 #[must_use]
 pub fn tdpa_error(round_trip_s: f64) -> f64 {
     let ms = round_trip_s * 1e3;
@@ -67,6 +73,19 @@ pub fn tdpa_error(round_trip_s: f64) -> f64 {
 }
 
 impl Choice {
+    /// A choice that has seen nothing, for a device of stiffness k_p, N/m: it begins with the model.
+    #[must_use]
+    pub fn for_stiffness(k_p: f64) -> Self {
+        Self {
+            weight: (k_p / STIFFNESS_N_PER_M).sqrt(),
+            chosen: Chosen::Mediated,
+            newest_s: None,
+            round_trip_s: None,
+            better_s: 0.0,
+            switches: 0,
+        }
+    }
+
     /// What is chosen now.
     #[must_use]
     pub fn chosen(&self) -> Chosen {
@@ -97,7 +116,7 @@ impl Choice {
         // a path is as it was last seen: answers come every tick with TDPA and seldom without
         let known_s = self.round_trip_s.get_or_insert(newest_s);
         *known_s += (newest_s - *known_s) * (TICK_S / ROUND_TRIP_TAU_S);
-        let round_trip_s = *known_s;
+        let round_trip_s = *known_s * self.weight;
         let tdpa = tdpa_error(round_trip_s);
         let better = match self.chosen {
             Chosen::Mediated => {
@@ -145,10 +164,10 @@ mod tests {
 
     #[test]
     fn a_short_path_and_an_unknown_model_choose_the_tools_force_and_a_long_path_the_model() {
-        let mut near = Choice::default();
+        let mut near = Choice::for_stiffness(1000.0);
         assert_eq!(near.tick(None, 0.4), Chosen::Mediated, "nothing is known");
         assert_eq!(after(&mut near, 1000, 0.002, 0.4), Chosen::Tdpa);
-        let mut far = Choice::default();
+        let mut far = Choice::for_stiffness(1000.0);
         assert_eq!(after(&mut far, 5000, 0.5, 0.4), Chosen::Mediated);
         assert_eq!((near.switches(), far.switches()), (1, 0));
     }
@@ -157,7 +176,7 @@ mod tests {
     fn it_crosses_where_the_errors_cross_and_not_on_the_way_back() {
         // the model is 10 % off; TDPA is so at 11 ms: each way the margin lies between
         let at = |choice: &mut Choice, ms: f64| after(choice, 2000, ms * 1e-3, 0.1);
-        let mut choice = Choice::default();
+        let mut choice = Choice::for_stiffness(1000.0);
         let out: Vec<f64> = (0..40).map(f64::from).collect();
         assert_eq!(at(&mut choice, 0.0), Chosen::Tdpa);
         let leaves = out
@@ -175,14 +194,14 @@ mod tests {
 
     #[test]
     fn what_alternates_faster_than_it_insists_changes_nothing() {
-        let mut choice = Choice::default();
+        let mut choice = Choice::for_stiffness(1000.0);
         for _ in 0..100 {
             after(&mut choice, 499, 0.0, 0.4);
             after(&mut choice, 10, 0.0, 0.05);
         }
         assert_eq!(choice.switches(), 0);
         // one late packet in a hundred is no longer path
-        let mut choice = Choice::default();
+        let mut choice = Choice::for_stiffness(1000.0);
         after(&mut choice, 1000, 0.002, 0.2);
         for n in 0..10_000 {
             choice.tick(Some(if n % 100 == 0 { 0.1 } else { 0.002 }), 0.2);
@@ -192,11 +211,18 @@ mod tests {
 
     #[test]
     fn beyond_the_longest_round_trip_no_model_is_too_wrong() {
-        let mut choice = Choice::default();
-        assert_eq!(after(&mut choice, 1000, 0.031, 1.0), Chosen::Tdpa);
-        assert_eq!(after(&mut choice, 1000, 0.039, 1.0), Chosen::Tdpa);
-        assert_eq!(after(&mut choice, 2000, 0.042, 1.0), Chosen::Mediated);
-        assert_eq!(after(&mut choice, 2000, 0.039, 1.0), Chosen::Mediated);
+        let mut choice = Choice::for_stiffness(1000.0);
+        assert_eq!(after(&mut choice, 1000, 0.022, 1.0), Chosen::Tdpa);
+        assert_eq!(after(&mut choice, 1000, 0.0275, 1.0), Chosen::Tdpa);
+        assert_eq!(after(&mut choice, 2000, 0.0285, 1.0), Chosen::Mediated);
+        assert_eq!(after(&mut choice, 2000, 0.0275, 1.0), Chosen::Mediated);
+        let mut stiff = Choice::for_stiffness(4000.0);
+        assert_eq!(
+            after(&mut stiff, 2000, 0.015, 1.0),
+            Chosen::Mediated,
+            "counts twice"
+        );
+        assert_eq!(after(&mut stiff, 2000, 0.011, 1.0), Chosen::Tdpa);
         // one answer is enough: the path is as it was last seen
         choice.tick(Some(0.002), 1.0);
         let last = (0..2000).map(|_| choice.tick(None, 1.0)).last();
@@ -205,7 +231,7 @@ mod tests {
 
     #[test]
     fn a_round_trip_that_is_no_number_is_not_believed() {
-        let mut choice = Choice::default();
+        let mut choice = Choice::for_stiffness(1000.0);
         assert_eq!(choice.tick(Some(f64::NAN), 0.4), Chosen::Mediated);
         assert_eq!(choice.round_trip_s(), None);
     }

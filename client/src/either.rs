@@ -28,7 +28,8 @@ const FRESH_TICKS: u32 = 100;
 pub struct ToolNews {
     /// The slave's time of sending: older news than the newest is of no use.
     pub sent: Time,
-    /// Stamp of the newest sample that the slave had, by the master's clock: from it comes the round trip.
+    /// Stamp of the sample that the tool was at, by the master's clock: from it comes the round trip that the hand would
+    /// feel, play-out included.
     pub echo: Time,
     /// f_s, N on the object; none where the slave does not stream it.
     pub force: Option<ForceCounts>,
@@ -93,7 +94,7 @@ impl EitherMaster {
         Self {
             model: LocalModel::new(welcome.settings, welcome.state),
             limiter,
-            choice: Choice::default(),
+            choice: Choice::for_stiffness(welcome.settings.coupling.stiffness_n_per_m),
             fixed,
             model_share: FADE_TICKS,
             newest: None,

@@ -275,9 +275,6 @@ impl EitherWorld {
     }
 
     fn answer(&mut self, tick: &SlaveTick) {
-        let Some(echo) = self.newest_sample else {
-            return;
-        };
         let quiet = self.now.saturating_since(self.last_sent) < HEARTBEAT;
         if !self.streams && tick.update.is_none() && quiet {
             return;
@@ -288,7 +285,7 @@ impl EitherWorld {
         let payload = Down {
             news: ToolNews {
                 sent: self.now,
-                echo,
+                echo: tick.stamp,
                 force: self.streams.then(|| ForceCounts::nearest(port.held())),
                 in_contact: tick.in_contact,
                 in_j: port.energy().in_j,

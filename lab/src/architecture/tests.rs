@@ -352,5 +352,22 @@ fn the_choice_is_as_good_as_the_better_of_the_two_and_crosses_where_they_cross()
         }
     }
     let (near, far) = (chosen(0), chosen(50));
-    assert!(near.0 > 0.3 && far.0 == 0.0, "{near:?} {far:?}");
+    assert!(near.0 > 0.2 && far.0 == 0.0, "{near:?} {far:?}");
+}
+
+#[test]
+fn with_a_stiff_device_the_choice_leaves_tdpa_before_it_breaks_contact() {
+    for one_way_ms in [0, 2, 5, 7, 10, 14] {
+        let of = |architecture| {
+            let rows = rows(architecture, one_way_ms, 3000.0);
+            print(architecture, one_way_ms, 3000.0, &rows);
+            rows
+        };
+        let tdpa = of(Architecture::Bilateral(Baseline::Tdpa));
+        let auto = of(Architecture::Auto);
+        let breaks = |rows: &[DelayRow]| mean(rows, |row| row.breaks_per_push);
+        assert!((breaks(&tdpa) > 2.0) == (one_way_ms > 7), "{one_way_ms} ms");
+        assert!(breaks(&auto) < 2.5, "{one_way_ms} ms: {}", breaks(&auto));
+        assert!(mean(&auto, |row| row.force_peak_n) < 5.0, "{one_way_ms} ms");
+    }
 }
