@@ -409,6 +409,18 @@ pub struct DelayReport {
     pub p99: Number,
 }
 
+impl DelayReport {
+    /// From all delays that were counted; absent if none was.
+    #[must_use]
+    pub fn of(delays: &Histogram) -> Self {
+        let ms = |q| delays.quantile(q).map(|delay| delay.as_secs_f64() * 1e3);
+        Self {
+            p50: ms(0.5).into(),
+            p99: ms(0.99).into(),
+        }
+    }
+}
+
 /// The emulated network in front of the socket that sends in a direction, in real time; null without one.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct EmulationReport {
@@ -430,18 +442,6 @@ pub struct LateReport {
     pub p99: Number,
     /// Largest.
     pub max: Number,
-}
-
-impl DelayReport {
-    /// From all delays that were counted; absent if none was.
-    #[must_use]
-    pub fn of(delays: &Histogram) -> Self {
-        let ms = |q| delays.quantile(q).map(|delay| delay.as_secs_f64() * 1e3);
-        Self {
-            p50: ms(0.5).into(),
-            p99: ms(0.99).into(),
-        }
-    }
 }
 
 /// A 1 kHz loop.

@@ -6,7 +6,6 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test may panic")]
 
-use std::io::Write;
 use std::time::Duration;
 
 use mmt_lab::statistics::median;
@@ -14,7 +13,7 @@ use mmt_lab::world::{World, WorldConfig};
 use mmt_netem::LinkConfig;
 use mmt_server::playout::PlayoutConfig;
 use mmt_tests::hosts::{Hosts, HostsError};
-use mmt_tests::process::{Running, did_not_run, number};
+use mmt_tests::process::{Running, did_not_run, number, say_loudly};
 use serde_json::Value;
 
 /// Half a second there and back, with jitter and loss.
@@ -120,12 +119,10 @@ fn agree(name: &str, playout: PlayoutConfig, live: impl Fn(u64) -> (Value, Value
     let (skipped, row) = best.unwrap();
     let degraded = skipped > SKIPPED_MAX;
     if degraded {
-        // not eprintln: the harness keeps that to itself when a test passes
-        let _ = writeln!(
-            std::io::stderr(),
-            "\n**** DEGRADED: {name}: this host skipped {:.1} % of the periods; tolerances are doubled ****\n",
+        say_loudly(&format!(
+            "DEGRADED: {name}: this host skipped {:.1} % of the periods; tolerances are doubled",
             100.0 * skipped
-        );
+        ));
     }
     let room = if degraded { 2.0 } else { 1.0 };
     let mut apart = Vec::new();
