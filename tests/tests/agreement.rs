@@ -84,7 +84,8 @@ fn live_row(master: &Value, slave: &Value) -> Row {
     Row {
         updates_hz: number(slave, "/updates/rate_hz"),
         contact_updates_hz: number(slave, "/updates/contact_rate_hz"),
-        relative_error: number(master, "/force/relative_error"),
+        // the master knows it from a farewell that the network may lose
+        relative_error: number(slave, "/force/relative_error"),
         pose_rms_mm: number(master, "/pose/position_rms_m").map(|m| m * 1e3),
         breaks_per_push: number(master, "/pushes/contact_breaks_per_push"),
         force_peak_n: number(master, "/force/largest_n"),
@@ -129,6 +130,11 @@ fn agree(name: &str, playout: PlayoutConfig, live: impl Fn(u64) -> (Value, Value
     for (measure, of, share, absolute) in MEASURES {
         let expected = median(rows.iter().filter_map(of)).unwrap();
         let Some(got) = of(&row) else {
+            // two hosts do not send the truth
+            assert!(
+                name == "hosts" && measure == "pose_rms_mm",
+                "{name}: no {measure}"
+            );
             println!("{name:8} {measure:20} virtual {expected:7.3}  live       -");
             continue;
         };
