@@ -3,7 +3,9 @@
 //! The crate is pure; its QUIC endpoint and its haptic thread live in `io` behind the feature of that name.
 
 pub mod bilateral;
+pub mod choice;
 pub mod device;
+pub mod either;
 pub mod failsafe;
 pub mod limiter;
 pub mod link;

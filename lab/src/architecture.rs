@@ -4,9 +4,11 @@
 //! columns mean: `docs/baselines.md`. A run must never depend on anything but its arguments.
 
 mod bilateral;
+mod either;
 mod felt;
 
 pub use bilateral::{Bilateral, BilateralOutcome};
+pub use either::{EitherOutcome, EitherWorld};
 pub use felt::{FeltMass, FeltMasses};
 
 use std::time::Duration;
@@ -14,6 +16,7 @@ use std::time::Duration;
 use mmt_client::device::DeviceProfile;
 use mmt_client::operator::Operator;
 use mmt_client::operator::scripted::{Phase, Picture};
+use mmt_server::playout::PlayoutBuffer;
 use mmt_shared::bilateral::Baseline;
 use mmt_shared::bilateral::message::OVERHEAD_BYTES;
 use mmt_shared::settings::{ModelSettings, PoseCorrection};
@@ -28,10 +31,12 @@ pub enum Architecture {
     Bilateral(Baseline),
     /// A model's parameters cross it; how the model's pose is corrected.
     Mediated(PoseCorrection),
+    /// TDPA or MMT with replay, by round trip and by how wrong the model has been of late.
+    Auto,
 }
 
 impl Architecture {
-    /// All of them, in the order of tables.
+    /// All that are compared, in the order of tables.
     pub const ALL: [Self; 8] = [
         Self::Bilateral(Baseline::PositionForce),
         Self::Bilateral(Baseline::DeadbandForce),
@@ -51,6 +56,7 @@ impl Architecture {
             Self::Mediated(PoseCorrection::Snap) => "mmt-snap",
             Self::Mediated(PoseCorrection::MatchedStamps) => "mmt-matched-stamps",
             Self::Mediated(PoseCorrection::Replay) => "mmt-replay",
+            Self::Auto => "auto",
         }
     }
 }
@@ -82,6 +88,8 @@ pub struct DelayRow {
     pub observer_min_j: f64,
     /// The least of what the hand put in less what the tool put out, J; only where the two are coupled.
     pub network_min_j: Option<f64>,
+    /// Median delay of the slave's play-out, ms.
+    pub playout_delay_ms: Option<f64>,
     /// The mass that the hand felt over the one that the tool felt.
     pub apparent_mass_ratio: Option<f64>,
 }
@@ -103,6 +111,13 @@ pub fn run(
             let mut world = Bilateral::try_new(config, baseline, Picture::Delayed)?;
             world.run(duration);
             Ok(bilateral_row(&world, duration))
+        }
+        Architecture::Auto => {
+            let mut world = EitherWorld::try_new(config, None)?;
+            for _ in 0..duration.as_millis() {
+                world.step();
+            }
+            Ok(either_row(&world, duration))
         }
         Architecture::Mediated(correction) => {
             let device = DeviceProfile::default().used_with(config.stiffness_n_per_m, None)?;
@@ -140,6 +155,30 @@ fn bilateral_row(world: &Bilateral, duration: Duration) -> DelayRow {
         energy_injected_j: None,
         observer_min_j: outcome.hand_port.least_j(),
         network_min_j: Some(outcome.network_min_j),
+        playout_delay_ms: playout_delay_ms(world.slave().playout()),
+        apparent_mass_ratio: outcome.felt.ratio(),
+    }
+}
+
+fn either_row(world: &EitherWorld, duration: Duration) -> DelayRow {
+    let (outcome, force) = (world.outcome(), world.force());
+    let pushes = world.operator().pushes_completed().unwrap_or(0);
+    let seconds = duration.as_secs_f64();
+    let [up, down] = world.sent();
+    DelayRow {
+        pushes,
+        packet_rate_hz: outcome.with_news as f64 / seconds,
+        wire_rate_hz: down.packets as f64 / seconds,
+        wire_bytes_per_s: (up.bytes + down.bytes) as f64 / seconds,
+        pmse: force.pmse,
+        relative_error: force.relative_error,
+        pose_rms_mm: outcome.pose.position_rms_m().map(|m| m * 1e3),
+        force_peak_n: outcome.on_hand.largest_n(),
+        breaks_per_push: outcome.breaks.per_push(pushes),
+        energy_injected_j: Some(world.master().model().energy_injected_j()),
+        observer_min_j: world.master().port().least_j(),
+        network_min_j: None,
+        playout_delay_ms: playout_delay_ms(world.slave().playout()),
         apparent_mass_ratio: outcome.felt.ratio(),
     }
 }
@@ -178,8 +217,14 @@ fn mediated_row(mut world: World, duration: Duration) -> DelayRow {
         energy_injected_j: Some(outcome.energy_injected_j),
         observer_min_j: outcome.observer_min_j,
         network_min_j: None,
+        playout_delay_ms: playout_delay_ms(world.slave().playout()),
         apparent_mass_ratio: felt.ratio(),
     }
+}
+
+fn playout_delay_ms(playout: &PlayoutBuffer) -> Option<f64> {
+    let median = playout.delays().quantile(0.5);
+    median.map(|delay| delay.as_secs_f64() * 1e3)
 }
 
 #[cfg(test)]

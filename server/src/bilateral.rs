@@ -6,13 +6,15 @@
 //! never look at the truth for anything but reports.
 
 mod arm;
+mod port;
 
 pub use arm::TOOL_MASS_KG;
+pub use port::ToolPort;
 
 use mmt_shared::bilateral::Baseline;
 use mmt_shared::bilateral::deadband::PerceptualDeadband;
 use mmt_shared::bilateral::message::{ToMaster, ToSlave};
-use mmt_shared::bilateral::passivity::{PortEnergy, admittance_controller};
+use mmt_shared::bilateral::passivity::PortEnergy;
 use mmt_shared::bilateral::wave::{WaveReceiver, WaveSender, WaveSum};
 use mmt_shared::contact::Coupling;
 use mmt_shared::geometry::{Pose, Vec2};
@@ -26,10 +28,6 @@ use crate::sensing::Sensing;
 use crate::slave::{SlaveConfig, SlaveError};
 use crate::trigger::ContactDetector;
 use arm::Arm;
-
-/// A force below this many times the sensor's noise per axis is taken for none: three ticks in ten thousand in free
-/// space are not. It is F_min with the default sensor.
-const NOISE_DEVIATIONS: f64 = 4.0;
 
 /// What one tick of the slave gave.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -57,13 +55,8 @@ pub struct BilateralSlave {
     environment: Environment,
     sensing: Sensing,
     contact: ContactDetector,
-    noise_n: f64,
-    speed_max_m_per_s: f64,
     tool: Vec2,
-    /// Force on the object since the last tick as the port knows it, N.
-    held: Vec2,
-    other_in_j: f64,
-    port: PortEnergy,
+    port: ToolPort,
     /// All the work that the tool did, J.
     put_out_j: f64,
     deadband: PerceptualDeadband,
@@ -98,12 +91,8 @@ impl BilateralSlave {
             environment,
             sensing: Sensing::try_new(config.sensing, config.seed)?,
             contact: ContactDetector::new(config.trigger.contact),
-            noise_n: NOISE_DEVIATIONS * config.sensing.force_noise_n,
-            speed_max_m_per_s,
             tool: hip,
-            held: Vec2::zeros(),
-            other_in_j: 0.0,
-            port: PortEnergy::default(),
+            port: ToolPort::new(config.sensing.force_noise_n, speed_max_m_per_s),
             put_out_j: 0.0,
             deadband: PerceptualDeadband::default(),
             arm: Arm::new(coupling.stiffness_n_per_m, speed_max_m_per_s),
@@ -119,6 +108,12 @@ impl BilateralSlave {
         &self.environment
     }
 
+    /// The play-out buffer.
+    #[must_use]
+    pub fn playout(&self) -> &PlayoutBuffer {
+        &self.playout
+    }
+
     /// Force metrics over all samples whose f_m is known.
     #[must_use]
     pub fn force(&self) -> &ForceMetrics {
@@ -128,13 +123,13 @@ impl BilateralSlave {
     /// Energy that passed the tool's port, J.
     #[must_use]
     pub fn port(&self) -> PortEnergy {
-        self.port
+        self.port.energy()
     }
 
     /// Takes in a message that arrived at `now`.
     pub fn receive(&mut self, now: Time, message: &ToSlave) {
         self.playout.push(now, &message.sample);
-        self.other_in_j = self.other_in_j.max(message.in_j);
+        self.port.receive(message.in_j);
         self.waves_in.receive(message.wave);
     }
 
@@ -143,20 +138,14 @@ impl BilateralSlave {
         let played = self.playout.advance(now)?;
         let (way, wave) = self.way(&played);
         self.tool += way;
-        // E(k) = E(k−1) − f(k−1)·(x(k) − x(k−1)), seen from the network
-        let work_j = -self.held.dot(&way);
-        self.put_out_j -= work_j;
-        // the sensor may read low, and a tool that stops by what it reads goes on when it does
-        let doubt_j = self.doubt().dot(&way).abs();
-        self.port.push(work_j - doubt_j, self.other_in_j);
+        self.put_out_j += self.port.moved(way);
         let truth = self.environment.pose();
         let contact = self.environment.step(self.tool, way / TICK_S);
         let sensed = self.sensing.sense(now, self.tool, contact.force, &truth);
         if let Some(f_m) = played.force {
             self.force.push(sensed.force, f_m);
         }
-        let noise = sensed.force.norm() < self.noise_n;
-        self.held = if noise { Vec2::zeros() } else { sensed.force };
+        self.port.measured(sensed.force);
         Some(BilateralSlaveTick {
             stamp: played.stamp,
             tool: self.tool,
@@ -175,43 +164,26 @@ impl BilateralSlave {
                 (played.hip - self.tool, WaveSum::default())
             }
             Baseline::Tdpa | Baseline::TdpaDeadband => {
-                // towards the hand, not along its velocity: where beta held the tool back, it makes up for it as soon
-                // as there is energy (Artigas, Ryu and Preusche, IROS 2010)
-                let wanted = played.hip - self.tool;
-                let most = self.speed_max_m_per_s * TICK_S;
-                let wanted = wanted * (most / wanted.norm().max(most));
-                let margin_j = self.port.margin_j(self.other_in_j);
-                let way = admittance_controller(wanted, self.held + self.doubt(), margin_j);
+                let way = self.port.allowed(played.hip - self.tool);
                 (way, WaveSum::default())
             }
             Baseline::Waves => {
                 let u = self.waves_in.take();
-                let (way, w) = self.arm.step(u, self.held);
-                let given_j = self.put_out_j + self.held.dot(&way);
+                let held = self.port.held();
+                let (way, w) = self.arm.step(u, held);
+                let given_j = self.put_out_j + held.dot(&way);
                 let taken_in_j = self.waves_in.energy_j() - given_j;
                 (way, self.waves_out.send(w, taken_in_j))
             }
         }
     }
 
-    /// By how much more than the measured force the energy is counted, N: a tool that goes W / f at a noisy f goes
-    /// sigma² / f² of it too far on average; twice that for what is taken for none.
-    fn doubt(&self) -> Vec2 {
-        let size2 = self.held.norm_squared();
-        let deviation_n = self.noise_n / NOISE_DEVIATIONS;
-        if size2 > 0.0 {
-            self.held * (2.0 * deviation_n * deviation_n / size2)
-        } else {
-            Vec2::zeros()
-        }
-    }
-
     fn message(&mut self, now: Time, wave: WaveSum) -> Option<ToMaster> {
-        let sends = !self.baseline.has_deadband() || self.deadband.offer(now, self.held);
+        let sends = !self.baseline.has_deadband() || self.deadband.offer(now, self.port.held());
         sends.then(|| ToMaster {
             sent: now,
-            force: ForceCounts::nearest(self.held),
-            in_j: self.port.in_j,
+            force: ForceCounts::nearest(self.port.held()),
+            in_j: self.port.energy().in_j,
             wave,
         })
     }

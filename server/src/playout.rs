@@ -17,6 +17,7 @@ use std::collections::VecDeque;
 use std::time::Duration;
 
 use mmt_shared::geometry::Vec2;
+use mmt_shared::peer::Histogram;
 use mmt_shared::time::{TICK, Time};
 use mmt_shared::wire::message::HipSample;
 use serde::{Deserialize, Serialize};
@@ -38,6 +39,9 @@ const FUTURE: Duration = Duration::from_secs(1);
 const RELEARN_AFTER: Duration = Duration::from_millis(200);
 /// After the clock was learned anew, play-out waits for stamps that it has played, but not longer.
 const WAIT: Duration = Duration::from_secs(1);
+/// The stamp that is told goes ahead of all samples by at most this: where the slave's clock has jumped, no part of the
+/// slave may take the jump for motion. So long an outage has released the hand.
+const AHEAD: Duration = Duration::from_secs(1);
 /// Room above the lateness of 99 of 100 samples, ns: the slave's ticks.
 const ROOM_NS: i64 = 2_000_000;
 /// How often the delay that is wanted is looked up, ticks: the histogram changes slowly.
@@ -66,8 +70,8 @@ pub enum Status {
 /// What the slave's tool follows in one tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Played {
-    /// The point of the master's clock that is played. Never decreases, unless the master's clock had to
-    /// be learned anew and went back by more than a second.
+    /// The point of the master's clock that is played, at most a second after the newest sample. Never decreases, unless
+    /// the master's clock had to be learned anew and went back by more than a second.
     pub stamp: Time,
     /// HIP, world frame, m.
     pub hip: Vec2,
@@ -128,12 +132,15 @@ pub struct PlayoutBuffer {
     /// Since when only useless samples have come.
     useless_since: Option<Time>,
     counts: PlayoutCounts,
+    delays: Histogram,
 }
 
 #[derive(Clone, Copy, Debug)]
 struct Last {
     now: Time,
     stamp: Time,
+    /// The stamp that was told.
+    told: Time,
     hip: Vec2,
 }
 
@@ -166,6 +173,7 @@ impl PlayoutBuffer {
             start: None,
             useless_since: None,
             counts: PlayoutCounts::default(),
+            delays: Histogram::new(),
         })
     }
 
@@ -207,13 +215,16 @@ impl PlayoutBuffer {
         let due = self.clock.stamp_at(now)?.offset_by(-self.delay_ns);
         let stamp = self.no_earlier_than_played(due);
         let aim = self.aim(stamp)?;
-        let played = self.limit(now, elapsed, stamp, &aim);
+        let told = self.told(stamp);
+        let played = self.limit(now, elapsed, told, &aim);
         self.last = Some(Last {
             now,
             stamp,
+            told,
             hip: played.hip,
         });
         self.count(&played);
+        self.delays.note(self.delay());
         self.forget(stamp);
         Some(played)
     }
@@ -223,6 +234,12 @@ impl PlayoutBuffer {
     #[must_use]
     pub fn hip_at(&self, stamp: Time) -> Option<Vec2> {
         self.aim(stamp).map(|aim| aim.hip)
+    }
+
+    /// The HIP that was played last, m; none before the first.
+    #[must_use]
+    pub fn played_hip(&self) -> Option<Vec2> {
+        self.last.map(|last| last.hip)
     }
 
     /// The stamp of the newest sample that is not later than `stamp`.
@@ -243,6 +260,12 @@ impl PlayoutBuffer {
     #[must_use]
     pub fn delay(&self) -> Duration {
         Duration::from_nanos(self.delay_ns.unsigned_abs())
+    }
+
+    /// How often each delay was played with, a count a tick.
+    #[must_use]
+    pub fn delays(&self) -> &Histogram {
+        &self.delays
     }
 
     /// Brings the delay towards what samples need, slowly.
@@ -301,6 +324,9 @@ impl PlayoutBuffer {
         self.samples.push_back(*sample);
         self.clock = SenderClock::default();
         self.clock.observe(arrived, sample.stamp);
+        if let Some(last) = &mut self.last {
+            last.stamp = last.told;
+        }
         self.lateness = Lateness::new();
         self.wanted_ns = self.delay_range_ns.0;
         true
@@ -320,6 +346,11 @@ impl PlayoutBuffer {
             Some(last) if last.stamp.saturating_since(due) <= WAIT => due.max(last.stamp),
             _ => due,
         }
+    }
+
+    fn told(&self, stamp: Time) -> Time {
+        let newest = self.samples.back();
+        newest.map_or(stamp, |newest| stamp.min(newest.stamp + AHEAD))
     }
 
     fn aim(&self, stamp: Time) -> Option<Aim> {

@@ -9,12 +9,14 @@ use mmt_shared::geometry::{BoxFootprint, Pose, Twist, Vec2, wrap_angle};
 use mmt_shared::metrics::ForceMetrics;
 use mmt_shared::params::{ModelParams, ModelState, inertia_of_square};
 use mmt_shared::settings::{Mode, ModelSettings, PoseCorrection};
-use mmt_shared::time::Time;
+use mmt_shared::time::{TICK_S, Time};
 use mmt_shared::wire::{Cause, HipSample, Update};
 
+use crate::bilateral::ToolPort;
 use crate::environment::{Environment, EnvironmentConfig};
 use crate::estimator::{Estimate, Estimator, EstimatorConfig, Measured, Seen};
-use crate::playout::PlayoutBuffer;
+use crate::model_error::ModelError;
+use crate::playout::{Played, PlayoutBuffer};
 use crate::pose_observer::{ObserverConfig, PoseObserver};
 use crate::sensing::Sensing;
 use crate::shadow::{Shadow, TriggerReference};
@@ -23,6 +25,9 @@ use crate::trigger::{ContactDetector, Scheme, Trigger, TriggerInput};
 mod config;
 
 pub use config::{SlaveConfig, SlaveError, StartModel};
+
+/// A tool that is further from the played HIP is behind it, m: 0.1 N at 1000 N/m.
+const BEHIND_M: f64 = 1e-4;
 
 /// What one tick of the slave gave.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -60,6 +65,14 @@ pub struct Slave {
     echo: Vec2,
     /// f_s at the last update, N.
     f_s_told: Vec2,
+    /// The tool where it is not at the played HIP, m.
+    own_tool: Option<Vec2>,
+    /// Whether it goes only as far as the energy allows.
+    passive: bool,
+    /// Whether the tool is behind the HIP.
+    behind: bool,
+    tool_port: ToolPort,
+    model_error: ModelError,
     trigger: Trigger,
     timer_carries_pose: bool,
     /// The last parameters that were accepted.
@@ -128,6 +141,11 @@ impl Slave {
             reference: config.trigger_reference,
             echo: Vec2::zeros(),
             f_s_told: Vec2::zeros(),
+            own_tool: None,
+            passive: false,
+            behind: false,
+            tool_port: ToolPort::new(sensing.force_noise_n, config.playout.speed_max_m_per_s),
+            model_error: ModelError::default(),
             trigger: Trigger::new(config.trigger),
             timer_carries_pose: config.trigger.timer_carries_pose,
             params,
@@ -214,6 +232,29 @@ impl Slave {
         self.trigger.scheme_now()
     }
 
+    /// How wrong the model has been of late.
+    #[must_use]
+    pub fn model_error(&self) -> &ModelError {
+        &self.model_error
+    }
+
+    /// The tool's port, as time-domain passivity control sees it.
+    #[must_use]
+    pub fn tool_port(&self) -> &ToolPort {
+        &self.tool_port
+    }
+
+    /// Takes in E_in of the master's port, J, and whether the tool may go only as far as that pays for: where the
+    /// hand feels the tool's force and not the model's.
+    pub fn pay_tool(&mut self, other_in_j: f64, passive: bool) {
+        self.tool_port.receive(other_in_j);
+        if passive && !self.passive {
+            self.tool_port.begin();
+            self.own_tool = self.own_tool.or(self.playout.played_hip());
+        }
+        self.passive = passive;
+    }
+
     /// Where the tool is before the first sample, m.
     pub fn start_at(&mut self, hip: Vec2) {
         self.playout.start_at(hip);
@@ -222,11 +263,13 @@ impl Slave {
     /// One sample period. None before the first HIP sample is due.
     pub fn tick(&mut self, now: Time) -> Option<SlaveTick> {
         let played = self.playout.advance(now)?;
+        let played = self.lead_tool(played);
         // every pose of a tick is the one that the tool met, before the object moves on
         let truth = self.environment.pose();
         let contact = self.environment.step(played.hip, played.velocity);
         let sensed = self.sensing.sense(now, played.hip, contact.force, &truth);
         let in_contact = self.contact.step(sensed.force.norm());
+        self.tool_port.measured(sensed.force);
         self.observer
             .step(now, sensed.tool, sensed.force, in_contact, &self.params);
         if let Some(vision) = sensed.vision {
@@ -237,6 +280,11 @@ impl Slave {
         self.echo = played.force.unwrap_or(self.echo);
         if let Some(f_m) = played.force {
             self.force.push(sensed.force, f_m);
+        }
+        // where the HIP was guessed, or the tool is not at it, tool and model meet different things
+        if played.force.is_some() && !self.behind {
+            self.model_error
+                .push(sensed.force, self.shadow.rendered().force);
         }
         let mut tick = SlaveTick {
             stamp: played.stamp,
@@ -251,6 +299,28 @@ impl Slave {
         let cause = self.trigger.decide(now, &self.trigger_input(&tick));
         tick.update = cause.map(|cause| self.send(cause, &tick));
         Some(tick)
+    }
+
+    /// The tool follows the played HIP, or goes towards it as far as the energy allows. When it may follow again it
+    /// catches up within the speed limit.
+    fn lead_tool(&mut self, played: Played) -> Played {
+        let Some(tool) = self.own_tool else {
+            return played;
+        };
+        let wanted = played.hip - tool;
+        let way = match self.passive {
+            true => self.tool_port.allowed(wanted),
+            false => self.tool_port.within_speed(wanted),
+        };
+        self.tool_port.moved(way);
+        self.behind = (wanted - way).norm() > BEHIND_M;
+        let there = !self.passive && way == wanted;
+        self.own_tool = Some(tool + way).filter(|_| !there);
+        Played {
+            hip: tool + way,
+            velocity: way / TICK_S,
+            ..played
+        }
     }
 
     fn follow_master(&mut self, stamp: Time) {

@@ -13,6 +13,7 @@ use serde::{Deserialize, Serialize};
 use crate::metrics::{
     AgeOfInformation, ContactBreaks, ForcePeak, ForceSummary, PoseError, UpdateCounts,
 };
+use crate::peer::Histogram;
 use crate::wire::KindCounts;
 use crate::wire::message::Ending;
 
@@ -48,6 +49,8 @@ pub struct RunReport<C> {
     pub model: ModelReport,
     /// How near the model's pose was to the true one.
     pub pose: PoseReport,
+    /// Energy at the hand.
+    pub passivity: PassivityReport,
     /// The path between the two sides.
     pub link: LinkReport,
     /// How well this run's own emulation of the network kept its times.
@@ -78,6 +81,7 @@ impl<C> RunReport<C> {
             force: ForceReport::default(),
             model: ModelReport::default(),
             pose: PoseReport::default(),
+            passivity: PassivityReport::default(),
             link: LinkReport::default(),
             emulation: UpDown::default(),
             haptic_loop: LoopReport::default(),
@@ -374,24 +378,47 @@ impl From<&PoseError> for PoseReport {
     }
 }
 
+/// Energy at the hand; `docs/passivity.md` says what the two mean together.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct PassivityReport {
+    /// Energy that updates added to the master's model beyond what its tank paid, J.
+    pub energy_injected_j: Number,
+    /// The least that the passivity observer at the hand ever showed, J.
+    pub observer_min_j: Number,
+}
+
 /// The path between the two sides, as the application saw it.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct LinkReport {
     /// Round-trip time.
-    pub rtt_ms: RttReport,
+    pub rtt_ms: DelayReport,
     /// Share of the master's datagrams that never arrived, 0 to 1.
     pub loss_up: Number,
     /// Share of the slave's datagrams that never arrived, 0 to 1.
     pub loss_down: Number,
+    /// Delay of the slave's play-out, over its ticks.
+    pub playout_delay_ms: DelayReport,
 }
 
-/// Round-trip time, ms.
+/// Two quantiles of a delay, ms.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct RttReport {
+pub struct DelayReport {
     /// Median.
     pub p50: Number,
     /// 99 % were at most this.
     pub p99: Number,
+}
+
+impl DelayReport {
+    /// From all delays that were counted; absent if none was.
+    #[must_use]
+    pub fn of(delays: &Histogram) -> Self {
+        let ms = |q| delays.quantile(q).map(|delay| delay.as_secs_f64() * 1e3);
+        Self {
+            p50: ms(0.5).into(),
+            p99: ms(0.99).into(),
+        }
+    }
 }
 
 /// The emulated network in front of the socket that sends in a direction, in real time; null without one.

@@ -4,5 +4,6 @@
 //! it may be used by the other crates.
 
 pub mod architecture;
+pub mod hosts;
 pub mod process;
 pub mod tshark;

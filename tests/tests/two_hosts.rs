@@ -4,15 +4,9 @@
 //! is no other way between them. Needs root and `ip`: without, it says so, and with `CI` set it fails.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test may panic")]
-#![allow(
-    clippy::disallowed_methods,
-    reason = "makes hosts and starts processes on them"
-)]
 
-use std::process::{Command, id};
-use std::time::Duration;
-
-use mmt_tests::process::{Ended, Running, did_not_run, number, program};
+use mmt_tests::hosts::{Hosts, HostsError, Session};
+use mmt_tests::process::{did_not_run, number};
 use serde_json::Value;
 
 /// How long the master operates, s.
@@ -20,10 +14,6 @@ const SECONDS: u64 = 8;
 /// What the relay does to each direction.
 const LINK: &str = "delay 20ms 2ms loss 1%";
 const LOSS: f64 = 0.01;
-const SLAVE: &str = "10.91.1.2";
-const RELAY_TO_SLAVE: &str = "10.91.1.1";
-const RELAY_TO_MASTER: &str = "10.91.2.1";
-const MASTER: &str = "10.91.2.2";
 /// Packets on a cable that no report counts: ARP, and what QUIC says last when all is counted.
 const BESIDE: f64 = 8.0;
 /// An Ethernet header, bytes.
@@ -31,200 +21,20 @@ const ETHERNET: f64 = 14.0;
 /// Ethernet, IPv4 and UDP headers, bytes.
 const HEADERS: f64 = ETHERNET + 20.0 + 8.0;
 
-/// Runs `ip`; what it says when it fails.
-fn ip(words: &str) -> Result<(), String> {
-    let output = Command::new("ip").args(words.split(' ')).output();
-    let output = output.map_err(|error| format!("`ip` does not start: {error}"))?;
-    if output.status.success() {
-        return Ok(());
-    }
-    let said = String::from_utf8_lossy(&output.stderr);
-    Err(format!("`ip {words}`: {}", said.trim()))
-}
-
-/// The three hosts; gone when dropped, with the cables between them.
-struct Hosts;
-
-impl Hosts {
-    /// No other test run has a namespace of this name.
-    fn name(host: &str) -> String {
-        format!("mmt-{}-{host}", id())
-    }
-
-    fn try_new() -> Result<Self, String> {
-        let hosts = Self;
-        for host in ["slave", "relay", "master"] {
-            ip(&format!("netns add {}", Self::name(host)))?;
-            ip(&format!("-n {} link set lo up", Self::name(host)))?;
-        }
-        cable("slave", SLAVE, RELAY_TO_SLAVE)?;
-        cable("master", MASTER, RELAY_TO_MASTER)?;
-        Ok(hosts)
-    }
-
-    /// A command that runs on a host.
-    fn on(&self, host: &str, program: &str) -> Command {
-        let mut command = Command::new("ip");
-        command.args(["netns", "exec", &Self::name(host), program]);
-        command
-    }
-
-    /// Starts `mmt` on a host.
-    fn mmt(&self, host: &str, arguments: &[&str]) -> Running {
-        let program = program().unwrap();
-        let mut command = self.on(host, program.to_str().unwrap());
-        command.args(arguments);
-        Running::start(command).unwrap()
-    }
-
-    /// What the cable's end at a host counted itself.
-    fn counted(&self, host: &str) -> Cable {
-        let read = |name: &str| {
-            let mut command = self.on(host, "cat");
-            command.arg(format!("/sys/class/net/cable/statistics/{name}"));
-            let output = command.output().unwrap();
-            let text = String::from_utf8(output.stdout).unwrap();
-            text.trim().parse().unwrap()
-        };
-        Cable {
-            sent: read("tx_packets"),
-            sent_bytes: read("tx_bytes"),
-            received: read("rx_packets"),
-            received_bytes: read("rx_bytes"),
-        }
-    }
-
-    /// What the kernel of a host counted of UDP (RFC 4113): datagrams sent and received.
-    fn udp(&self, host: &str) -> Udp {
-        let output = self.on(host, "cat").arg("/proc/net/snmp").output().unwrap();
-        let text = String::from_utf8(output.stdout).unwrap();
-        let mut rows = text.lines().filter(|line| line.starts_with("Udp: "));
-        let (names, counts) = (rows.next().unwrap(), rows.next().unwrap());
-        let of = |name: &str| -> f64 {
-            let at = names.split(' ').position(|of| of == name).unwrap();
-            counts.split(' ').nth(at).unwrap().parse().unwrap()
-        };
-        Udp {
-            sent: of("OutDatagrams"),
-            received: of("InDatagrams"),
-            refused: of("InErrors"),
-        }
-    }
-}
-
-impl Drop for Hosts {
-    fn drop(&mut self) {
-        for host in ["slave", "relay", "master"] {
-            // one that was never made cannot be removed
-            let _ = ip(&format!("netns del {}", Self::name(host)));
-        }
-    }
-}
-
-/// A cable from a host to the relay, with an address at each end.
-fn cable(host: &str, address: &str, relay_address: &str) -> Result<(), String> {
-    let (near, far, end) = (
-        Hosts::name(host),
-        Hosts::name("relay"),
-        format!("to-{host}"),
-    );
-    ip(&format!(
-        "-n {near} link add cable type veth peer name {end} netns {far}"
-    ))?;
-    for (space, device, address) in [(&near, "cable", address), (&far, &end[..], relay_address)] {
-        // without addresses of IPv6 nothing but ARP and ours is on the cable
-        ip(&format!("-n {space} link set {device} addrgenmode none"))?;
-        ip(&format!("-n {space} address add {address}/24 dev {device}"))?;
-        ip(&format!("-n {space} link set {device} up"))?;
-    }
-    Ok(())
-}
-
-/// Counters of one end of a cable.
-#[derive(Clone, Copy, Debug)]
-struct Cable {
-    sent: f64,
-    sent_bytes: f64,
-    received: f64,
-    received_bytes: f64,
-}
-
-/// Counters of a host's UDP.
-#[derive(Clone, Copy, Debug)]
-struct Udp {
-    sent: f64,
-    received: f64,
-    refused: f64,
-}
-
 fn get(report: &Value, path: &str) -> f64 {
     let found = number(report, path);
     found.unwrap_or_else(|| panic!("{path} is {:?}", report.pointer(path)))
 }
 
-/// One session of both hosts through the relay: their reports and what their cables counted.
-struct Session {
-    slave: Value,
-    master: Value,
-    slave_cable: Cable,
-    master_cable: Cable,
-    slave_udp: Udp,
-    master_udp: Udp,
-}
-
-/// A process that ended well.
-fn well(ended: Result<Ended, mmt_tests::process::ProcessError>) -> Ended {
-    let ended = ended.unwrap_or_else(|error| panic!("{error}"));
-    assert_eq!(ended.status.code(), Some(0), "{}", ended.err);
-    ended
-}
-
-fn session(hosts: &Hosts) -> Session {
-    let soon = Duration::from_secs(10);
-    let listen = format!("{SLAVE}:4433");
-    let mut slave = hosts.mmt("slave", &["slave", "--listen", &listen, "--once", "--json"]);
-    let pairing = slave.wait_for_line(soon, |line| line.starts_with("mmt://"));
-    let pairing = pairing.unwrap_or_else(|error| panic!("{error}"));
-    let near = format!("{RELAY_TO_MASTER}:4434");
-    let relay = hosts.mmt(
-        "relay",
-        &[
-            "netem", "--listen", &near, "--to", &listen, "--up", LINK, "--down", LINK,
-        ],
-    );
-    assert!(pairing.contains(&listen), "{pairing} names {listen}");
-    let through_relay = pairing.replace(&listen, &near);
-    let duration = format!("{SECONDS}s");
-    let master = hosts.mmt(
-        "master",
-        &["master", &through_relay, "--duration", &duration, "--json"],
-    );
-    let master = well(master.end(Duration::from_secs(SECONDS) + soon));
-    let slave = well(slave.end(soon));
-    let session = Session {
-        slave: slave.document(1).unwrap(),
-        master: master.document(0).unwrap(),
-        slave_cable: hosts.counted("slave"),
-        master_cable: hosts.counted("master"),
-        slave_udp: hosts.udp("slave"),
-        master_udp: hosts.udp("master"),
-    };
-    relay.interrupt().unwrap();
-    well(relay.end(soon));
-    session
-}
-
 #[test]
 fn two_hosts_report_the_same_session_and_agree_with_their_cables() {
     let test = "two_hosts";
-    if !rustix::process::geteuid().is_root() {
-        return did_not_run(test, "it needs root to make network namespaces");
-    }
     let hosts = match Hosts::try_new() {
-        Ok(hosts) => hosts,
-        Err(why) => return did_not_run(test, &why),
+        Err(HostsError::Unavailable(why)) => return did_not_run(test, &why),
+        hosts => hosts.unwrap_or_else(|error| panic!("{error}")),
     };
-    let session = session(&hosts);
+    let session = hosts.session(LINK, SECONDS, 1);
+    let session = session.unwrap_or_else(|error| panic!("{error}"));
     the_job_was_done(&session);
     what_one_side_counted_the_other_reports(&session);
     what_was_sent_was_received_or_lost(&session);

@@ -13,6 +13,7 @@ use mmt_server::playout::PlayoutConfig;
 use mmt_server::slave::SlaveConfig;
 use mmt_shared::io::identity::Identity;
 use mmt_shared::io::transport::Transport;
+use mmt_shared::io::truth::{self, TruthReceiver, TruthSender};
 use mmt_shared::pairing::Pairing;
 use mmt_shared::settings::Mode;
 
@@ -50,12 +51,13 @@ pub(crate) fn run(arguments: &DemoArguments, messages: &Messages) -> Result<(), 
     let stretch_max = config.stretch_max;
     let seed = arguments.seed;
     let emulation = Emulation::start(&arguments.emulation, seed, Some(up), Some(down))?;
-    let options = slave_options(arguments, transport, &emulation, config)?;
+    let (truth_from, truth_to) = truth::pair();
+    let options = slave_options(arguments, transport, &emulation, config, truth_from)?;
     let (slave, started) = slave::start(options, None, stop_slave.receiver())?;
     let Ok(started) = started.recv() else {
         return slave.join().map(|_| ());
     };
-    let mut options = master_options(arguments, transport, &emulation, started.pairing);
+    let mut options = master_options(arguments, transport, &emulation, started.pairing, truth_to);
     options.commands.stretch_max = stretch_max;
     let (master, master_live) = master::start(options, stop.receiver())?;
 
@@ -134,6 +136,7 @@ fn slave_options(
     transport: Transport,
     emulation: &Emulation,
     config: SlaveConfig,
+    truth: TruthSender,
 ) -> Result<SlaveOptions, Failure> {
     Ok(SlaveOptions {
         transport,
@@ -144,6 +147,7 @@ fn slave_options(
         netem_seed: arguments.seed,
         netem_extras: emulation.extras(Direction::Down),
         once: true,
+        truth: Some(truth),
     })
 }
 
@@ -152,6 +156,7 @@ fn master_options(
     transport: Transport,
     emulation: &Emulation,
     pairing: Pairing,
+    truth: TruthReceiver,
 ) -> MasterOptions {
     MasterOptions {
         transport,
@@ -171,6 +176,7 @@ fn master_options(
         netem_seed: arguments.seed,
         netem_extras: emulation.extras(Direction::Up),
         path: None,
+        truth: Some(truth),
     }
 }
 

@@ -129,6 +129,7 @@ fn options(arguments: &MasterArguments) -> Result<MasterOptions, Failure> {
         netem_seed: arguments.seed,
         netem_extras: SocketExtras::default(),
         path: arguments.record_path.is_some().then(SharedPath::default),
+        truth: None,
     })
 }
 

@@ -136,6 +136,7 @@ fn options(arguments: &SlaveArguments) -> Result<SlaveOptions, Failure> {
         netem: arguments.netem.clone(),
         netem_extras: SocketExtras::default(),
         once: arguments.once,
+        truth: None,
     })
 }
 

@@ -12,8 +12,9 @@ use std::time::Duration;
 use mmt_shared::geometry::Vec2;
 use mmt_shared::io::schedule::Tick;
 use mmt_shared::io::ticker::TickerReport;
+use mmt_shared::io::truth::TruthReceiver;
 use mmt_shared::io::wake::Waker;
-use mmt_shared::metrics::{AgeOfInformation, ContactBreaks, ForcePeak};
+use mmt_shared::metrics::{AgeOfInformation, ContactBreaks, ForcePeak, PoseError};
 use mmt_shared::time::Time;
 use mmt_shared::wire::HipSample;
 
@@ -28,6 +29,8 @@ pub use port::{HapticPort, RING_SAMPLES};
 
 /// A look for a screen every so many ticks: 50 a second.
 const LOOK_TICKS: u64 = 20;
+/// True poses that a tick judges at most: it must not grow long when the slave catches up.
+const TRUTHS_PER_TICK: usize = 4;
 
 /// What a haptic loop is made of.
 #[derive(Debug)]
@@ -40,6 +43,8 @@ pub struct HapticParts {
     pub duration: Option<Duration>,
     /// The network task is woken once for so many samples.
     pub samples_per_wake: u8,
+    /// The true pose, where the slave lives in this process: for the report.
+    pub truth: Option<TruthReceiver>,
 }
 
 /// What the loop did, once it has ended.
@@ -69,6 +74,12 @@ pub struct HapticOutcome {
     pub on_hand: ForcePeak,
     /// Age of the news that the model rests on.
     pub age: AgeOfInformation,
+    /// Error of the model's pose; empty where the truth is not known.
+    pub pose: PoseError,
+    /// Energy that updates added to the model beyond what its tank paid, J.
+    pub energy_injected_j: f64,
+    /// The least that the passivity observer at the hand showed, J.
+    pub observer_min_j: f64,
 }
 
 /// The haptic loop's own end. It belongs to one thread.
@@ -93,6 +104,8 @@ pub struct HapticLoop {
     breaks: ContactBreaks,
     on_hand: ForcePeak,
     age: AgeOfInformation,
+    truth: Option<TruthReceiver>,
+    pose: PoseError,
 }
 
 impl HapticLoop {
@@ -121,6 +134,8 @@ impl HapticLoop {
             breaks: ContactBreaks::default(),
             on_hand: ForcePeak::default(),
             age: AgeOfInformation::default(),
+            truth: parts.truth,
+            pose: PoseError::default(),
         };
         (haptic, port)
     }
@@ -141,6 +156,7 @@ impl HapticLoop {
         self.hand_force = done.hand_force;
         self.on_hand.push(done.hand_force);
         self.breaks.push(done.rendered.in_contact());
+        self.judge_pose();
         if done.link == LinkState::Released && !self.releasing {
             self.end.get_or_insert(SessionEnd::LinkSilent);
         }
@@ -182,6 +198,9 @@ impl HapticLoop {
             breaks: self.breaks,
             on_hand: self.on_hand,
             age: self.age,
+            pose: self.pose,
+            energy_injected_j: self.master.energy_injected_j(),
+            observer_min_j: self.master.port().least_j(),
         }
     }
 
@@ -199,6 +218,19 @@ impl HapticLoop {
         }
         if let Some(answers) = self.newest_answer {
             self.age.push(now, answers);
+        }
+    }
+
+    /// Holds the model as it was at a HIP sample against the object as the tool met it for the same sample.
+    fn judge_pose(&mut self) {
+        let truths = self
+            .truth
+            .iter_mut()
+            .flat_map(|truth| std::iter::from_fn(|| truth.receive()).take(TRUTHS_PER_TICK));
+        for (stamp, truth) in truths {
+            if let Some(then) = self.master.model().history().at(stamp) {
+                self.pose.push(&then.motion.pose, &truth);
+            }
         }
     }
 

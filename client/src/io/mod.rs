@@ -26,6 +26,7 @@ use mmt_netem::LinkConfig;
 use mmt_netem::io::socket::SocketExtras;
 use mmt_shared::geometry::{BoxFootprint, Pose, Vec2};
 use mmt_shared::io::transport::Transport;
+use mmt_shared::io::truth::TruthReceiver;
 use mmt_shared::pairing::Pairing;
 use mmt_shared::report::RunReport;
 use serde::Serialize;
@@ -81,7 +82,7 @@ impl OperatorChoice {
 pub type SharedPath = Arc<Mutex<PathRecorder>>;
 
 /// How a master host runs.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct MasterOptions {
     /// Where the slave is, and its secrets.
     pub pairing: Pairing,
@@ -103,6 +104,8 @@ pub struct MasterOptions {
     pub netem_extras: SocketExtras,
     /// Where the path of the session is kept, if anybody wants it.
     pub path: Option<SharedPath>,
+    /// The object's true pose, where the slave lives in this process: for the report.
+    pub truth: Option<TruthReceiver>,
 }
 
 /// A look at a running master, for a screen.

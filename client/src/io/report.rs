@@ -10,9 +10,9 @@ use mmt_netem::io::socket::SocketCounters;
 use mmt_shared::io::spread::Quantiles as Spread;
 use mmt_shared::io::transport::DatagramCounts;
 use mmt_shared::report::{
-    Counts, EstimateReport, ForceReport, LinkReport, LoopReport, MessagesReport, ModelReport,
-    Number, PushesReport, QuantilesReport, RttReport, UpDown, UpdatesReport, WireReport,
-    ending_name,
+    Counts, DelayReport, EstimateReport, ForceReport, LinkReport, LoopReport, MessagesReport,
+    ModelReport, Number, PassivityReport, PoseReport, PushesReport, QuantilesReport, UpDown,
+    UpdatesReport, WireReport, ending_name,
 };
 use mmt_shared::wire::{
     Cause, Farewell, Identified, LoopTotals, MasterTotals, Quantiles, SlaveTotals, Traffic,
@@ -94,6 +94,11 @@ impl Ended {
                 friction_n: estimate(&slave.friction_n),
             };
         }
+        report.pose = PoseReport::from(&self.haptic.pose);
+        report.passivity = PassivityReport {
+            energy_injected_j: self.haptic.energy_injected_j.into(),
+            observer_min_j: self.haptic.observer_min_j.into(),
+        };
         report.link = link_report(link);
         report.emulation.up = self.lateness.report();
         report.haptic_loop = LoopReport {
@@ -239,17 +244,11 @@ fn messages(link: &MasterLink, duration_s: f64) -> UpDown<MessagesReport> {
 
 fn link_report(link: &MasterLink) -> LinkReport {
     let peer = link.end().peer();
-    let rtt = |q| {
-        let found = peer.round_trip().histogram().quantile(q);
-        Number::from(found.map(|rtt| rtt.as_secs_f64() * 1e3))
-    };
     LinkReport {
-        rtt_ms: RttReport {
-            p50: rtt(0.5),
-            p99: rtt(0.99),
-        },
+        rtt_ms: DelayReport::of(peer.round_trip().histogram()),
         loss_up: peer.outgoing().share().into(),
         loss_down: peer.incoming().share().into(),
+        ..LinkReport::default()
     }
 }
 

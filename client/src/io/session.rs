@@ -52,7 +52,7 @@ fn first_view() -> View {
 }
 
 pub(super) async fn run_with(
-    options: MasterOptions,
+    mut options: MasterOptions,
     mut stop: watch::Receiver<bool>,
     live: watch::Sender<MasterLive>,
     patience: Patience,
@@ -75,6 +75,7 @@ pub(super) async fn run_with(
         operator,
         duration: options.duration,
         samples_per_wake: options.commands.samples_per_command,
+        truth: options.truth.take(),
     };
     operate(&options, opened, parts, stop, live, &patience).await
 }

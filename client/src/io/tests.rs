@@ -37,6 +37,7 @@ fn scripted(fake: &Fake) -> MasterOptions {
         netem_seed: 1,
         netem_extras: SocketExtras::default(),
         path: None,
+        truth: None,
     }
 }
 
@@ -209,12 +210,13 @@ async fn a_name_is_looked_up_and_one_that_nobody_has_is_named_in_the_error() {
     let port = fake.address.port();
     let mut options = scripted(&fake);
     options.pairing.address = format!("localhost:{port}").parse().unwrap();
-    let mut master = start(options.clone(), PATIENCE);
+    let mut master = start(options, PATIENCE);
     let mut slave = Session::knocked(&fake).await;
     slave.refuse(Refusal::Ending).await;
     let error = master.error().await;
     assert!(matches!(error, MasterHostError::Ending { .. }), "{error}");
 
+    let mut options = scripted(&fake);
     options.pairing.address = "nobody.invalid:1".parse().unwrap();
     let patience = Patience {
         lookup: Duration::from_secs(2),

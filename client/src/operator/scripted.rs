@@ -67,6 +67,8 @@ pub enum Phase {
     Travel,
     /// Slowly towards the face, until it touches.
     Approach,
+    /// Rests at the first touch of a face.
+    Dwell,
     /// Pushes.
     Push,
     /// Rests at the end of a push.
@@ -90,6 +92,8 @@ pub struct Scripted {
     pushes_completed: u64,
     /// Way made along the face's normal in this push, m.
     pushed: f64,
+    /// Faces that were dwelled at, in the order of [`Face::ALL`].
+    dwelled: [bool; 4],
     /// Ticks without contact in a row.
     ticks_in_air: u32,
     /// Where the operator wants the HIP, m, and its velocity, m/s.
@@ -119,6 +123,7 @@ impl Scripted {
             pushes_begun: 0,
             pushes_completed: 0,
             pushed: 0.0,
+            dwelled: [config.dwell_s <= 0.0; 4],
             ticks_in_air: 0,
             wanted: start,
             wanted_velocity: Vec2::zeros(),
@@ -196,7 +201,13 @@ impl Scripted {
             Phase::Travel if self.distance_to(self.stand_off()) < REACHED_M => {
                 self.enter(Phase::Approach);
             }
-            Phase::Approach if self.seen.in_contact => self.enter(Phase::Push),
+            Phase::Approach if self.seen.in_contact => match self.dwells() {
+                true => self.enter(Phase::Dwell),
+                false => self.enter(Phase::Push),
+            },
+            Phase::Dwell if self.seconds_in_phase() >= self.config.dwell_s => {
+                self.enter(Phase::Approach);
+            }
             Phase::Push if self.pushed >= self.config.push_m => {
                 self.pushes_completed += 1;
                 self.enter(Phase::Hold);
@@ -209,6 +220,13 @@ impl Scripted {
             Phase::Retract if self.distance_to(self.retreat()) < REACHED_M => self.next_push(),
             _ => {}
         }
+    }
+
+    /// Whether this is the first touch of the face; it is not the next time.
+    fn dwells(&mut self) -> bool {
+        let place = Face::ALL.iter().position(|face| *face == self.face);
+        let known = place.and_then(|place| self.dwelled.get_mut(place));
+        known.is_some_and(|known| !std::mem::replace(known, true))
     }
 
     fn next_push(&mut self) {
@@ -243,7 +261,7 @@ impl Scripted {
             Phase::Travel => self.travel(),
             Phase::Approach => self.forward(config.approach_m_per_s),
             Phase::Push => self.forward(self.push_speed() * self.ease()),
-            Phase::Hold => Vec2::zeros(),
+            Phase::Dwell | Phase::Hold => Vec2::zeros(),
             Phase::Retract => self.towards(self.retreat()),
         }
     }
@@ -279,7 +297,7 @@ impl Scripted {
 
     /// Does not let the wish run ahead into a box that stands: the press is at most the limit.
     fn give_way(&mut self) {
-        if !matches!(self.phase, Phase::Push | Phase::Hold) {
+        if !matches!(self.phase, Phase::Dwell | Phase::Push | Phase::Hold) {
             return;
         }
         let inward = self.seen.inward(self.face);

@@ -4,6 +4,8 @@
 //! decide there, and jitter, loss and bursts at a few delays; the full grid on request. And what the operator's
 //! picture does beyond 500 ms.
 
+mod crossing;
+
 use std::time::Duration;
 
 use mmt_client::operator::scripted::Picture;
@@ -205,7 +207,7 @@ fn picture_places() -> Vec<Place> {
 /// A place with the rows of its seeds.
 type Group<'a> = (&'a Place, &'a [DelayRow]);
 
-/// Runs the grid and keeps `delay.csv`, `delay-limits.csv`, `delay-view.csv` and `delay.svg`.
+/// Runs the grid and keeps `delay.csv`, `delay-limits.csv`, `delay-view.csv`, `delay-crossing.csv` and `delay.svg`.
 ///
 /// # Errors
 /// As [`Laboratory::duel`] and [`Laboratory::keep`].
@@ -228,12 +230,13 @@ pub fn reproduce(
     let seen: Vec<Group> = pictures.iter().zip(seen.chunks(seeds)).collect();
     let views = views(&seen);
     laboratory.keep("delay-view.csv", &views.to_csv())?;
+    let near = crossing::reproduce(laboratory, extent)?;
     Ok(Findings {
         experiment: "delay",
         extent,
         digest: String::new(),
         configuration: vec![WorldConfig::default()],
-        tables: vec![replayed(&groups), limits, views],
+        tables: [vec![replayed(&groups), limits, views], near.into()].concat(),
     })
 }
 
@@ -272,6 +275,7 @@ fn runs(groups: &[Group]) -> Table {
             ("apparent_mass_ratio", 2),
             ("pushes", 0),
             ("wire_bytes_per_s", 0),
+            ("playout_delay_ms", 1),
         ],
     );
     for (place, rows) in groups {
@@ -295,6 +299,7 @@ fn runs(groups: &[Group]) -> Table {
                 row.apparent_mass_ratio.into(),
                 row.pushes.into(),
                 row.wire_bytes_per_s.into(),
+                row.playout_delay_ms.into(),
             ]);
         }
     }
@@ -494,7 +499,7 @@ fn figure(groups: &[Group]) -> Figure {
             .map(|(k, architecture)| {
                 let (stroke, mark) = match architecture {
                     Architecture::Bilateral(_) => (Stroke::Dashed, Mark::Square),
-                    Architecture::Mediated(_) => (Stroke::Solid, Mark::Circle),
+                    Architecture::Mediated(_) | Architecture::Auto => (Stroke::Solid, Mark::Circle),
                 };
                 let here = groups.iter().filter(|group| {
                     group.0.architecture == architecture && group.0.k_p == 1000 && is_clean(group.0)

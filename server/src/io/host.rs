@@ -2,7 +2,7 @@
 
 use std::io;
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr, UdpSocket};
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 use mmt_netem::io::socket::{EmulatedSocket, SocketMeter, WrapError};
@@ -15,6 +15,7 @@ use mmt_shared::io::quic::{EndpointError, Traffic};
 use mmt_shared::io::raw_udp::Insecure;
 use mmt_shared::io::socket::{self, BindError};
 use mmt_shared::io::transport::{Endpoint, Listener, Transport};
+use mmt_shared::io::truth::TruthSender;
 use mmt_shared::io::versions::CLOSE_FINISHED;
 use mmt_shared::pairing::{Address, Host, Pairing};
 use tokio::sync::{mpsc, watch};
@@ -91,9 +92,17 @@ pub(super) struct Shared {
     pub(super) meter: SocketMeter,
     pub(super) listener: Arc<Listener>,
     pub(super) refusals: Arc<Refusals>,
+    /// Until a session has taken it.
+    pub(super) truth: Mutex<Option<TruthSender>>,
 }
 
 impl Shared {
+    /// The true pose's way to a master of this process; for the first session that asks.
+    pub(super) fn take_truth(&self) -> Option<TruthSender> {
+        let mut truth = self.truth.lock().unwrap_or_else(PoisonError::into_inner);
+        truth.take()
+    }
+
     pub(super) fn configuration(&self, slave: &SlaveConfig) -> SlaveConfiguration {
         SlaveConfiguration {
             listen: self.listen.clone(),
@@ -142,6 +151,7 @@ impl SlaveHost {
             meter,
             listener: Arc::new(Listener::new(endpoint.clone())),
             refusals: Arc::new(Refusals::default()),
+            truth: Mutex::new(options.truth),
         };
         Ok(Self {
             endpoint,

@@ -22,6 +22,7 @@ use mmt_netem::io::socket::SocketExtras;
 use mmt_shared::geometry::{BoxFootprint, Pose, Vec2};
 use mmt_shared::io::identity::Identity;
 use mmt_shared::io::transport::Transport;
+use mmt_shared::io::truth::TruthSender;
 use mmt_shared::report::RunReport;
 use mmt_shared::wire::Cause;
 use serde::Serialize;
@@ -52,6 +53,8 @@ pub struct SlaveOptions {
     pub netem_extras: SocketExtras,
     /// End after the first session.
     pub once: bool,
+    /// Takes the object's true pose to a master of this process, for its report; of the first session only.
+    pub truth: Option<TruthSender>,
 }
 
 /// A look at a running slave, for a screen.

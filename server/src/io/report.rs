@@ -12,8 +12,8 @@ use mmt_netem::io::socket::SocketCounters;
 use mmt_shared::io::spread;
 use mmt_shared::metrics::{ForceSummary, UpdateCounts};
 use mmt_shared::report::{
-    Counts, EstimateReport, ForceReport, LinkReport, LoopReport, MessagesReport, ModelReport,
-    QuantilesReport, RttReport, UpDown, UpdatesReport, WireReport, ending_name,
+    Counts, DelayReport, EstimateReport, ForceReport, LinkReport, LoopReport, MessagesReport,
+    ModelReport, QuantilesReport, UpDown, UpdatesReport, WireReport, ending_name,
 };
 use mmt_shared::wire::{
     Ending, Farewell, ForceTotals, Identified, LoopTotals, MasterTotals, SlaveTotals, Traffic,
@@ -103,7 +103,8 @@ pub(super) fn report(
     report.updates = updates(outcome, theirs);
     report.messages = messages(outcome, &traffic);
     report.wire = wire(outcome, &traffic);
-    report.link = link(&outcome.link);
+    let slave = outcome.finished.as_ref().map(|finished| &finished.slave);
+    report.link = link(&outcome.link, slave);
     report.emulation.down = shared.meter.lateness().report();
     report.drops = Some(drops::drops(shared, outcome, &traffic));
     if let Some(theirs) = theirs {
@@ -162,17 +163,14 @@ fn wire(outcome: &Outcome, traffic: &Traffic) -> UpDown<WireReport> {
     }
 }
 
-fn link(link: &SlaveLink) -> LinkReport {
+fn link(link: &SlaveLink, slave: Option<&Slave>) -> LinkReport {
     let peer = link.end().peer();
-    let quantile = |q| peer.round_trip().histogram().quantile(q);
-    let ms = |rtt: Option<Duration>| rtt.map(|rtt| rtt.as_secs_f64() * 1e3).into();
+    let playout = slave.map(|slave| DelayReport::of(slave.playout().delays()));
     LinkReport {
-        rtt_ms: RttReport {
-            p50: ms(quantile(0.5)),
-            p99: ms(quantile(0.99)),
-        },
+        rtt_ms: DelayReport::of(peer.round_trip().histogram()),
         loss_up: peer.incoming().share().into(),
         loss_down: peer.outgoing().share().into(),
+        playout_delay_ms: playout.unwrap_or_default(),
     }
 }
 

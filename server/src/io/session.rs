@@ -15,6 +15,7 @@ use mmt_shared::io::clock::Clock;
 use mmt_shared::io::live::LiveCell;
 use mmt_shared::io::stream::WriteFrameError;
 use mmt_shared::io::transport::{Connection, RecvStream, SendStream};
+use mmt_shared::io::truth::TruthSender;
 use mmt_shared::io::versions::CLOSE_FINISHED;
 use mmt_shared::metrics::UpdateCounts;
 use mmt_shared::wire::{
@@ -96,7 +97,7 @@ pub(super) async fn serve_with(
     socket_before: SocketCounters,
     stop: &mut watch::Receiver<bool>,
     live: &LiveCell<SlaveLive>,
-    start: impl FnOnce(Clock, Slave) -> io::Result<Worker>,
+    start: impl FnOnce(Clock, Slave, Option<TruthSender>) -> io::Result<Worker>,
 ) -> Result<Option<SlaveReport>, SlaveHostError> {
     let Admitted {
         connection,
@@ -128,7 +129,7 @@ pub(super) async fn serve_with(
         return Ok(None);
     }
     announce(&connection, &hello);
-    let worker = start(shared.clock, slave)?;
+    let worker = start(shared.clock, slave, shared.take_truth())?;
     let link = SlaveLinkConfig {
         repeats: config.repeats_ms,
         stretch_max: config.stretch_max,

@@ -39,6 +39,7 @@ fn options() -> SlaveOptions {
         netem_seed: 1,
         netem_extras: SocketExtras::default(),
         once: false,
+        truth: None,
     }
 }
 
@@ -253,7 +254,7 @@ async fn a_panic_of_the_thread_ends_the_session_as_failed_and_is_an_error() {
         farewell.ending
     });
     let admitted = patiently(masters.recv()).await.unwrap();
-    let start = |_, _| Worker::start_with(|_| panic!("on purpose"));
+    let start = |_, _, _| Worker::start_with(|_| panic!("on purpose"));
     let live = LiveCell::default();
     let served = session::serve_with(
         shared,

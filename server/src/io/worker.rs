@@ -13,6 +13,7 @@ use mmt_shared::io::clock::Clock;
 use mmt_shared::io::realtime::{self, RealTime};
 use mmt_shared::io::schedule::Tick;
 use mmt_shared::io::ticker::{Ticker, TickerReport};
+use mmt_shared::io::truth::TruthSender;
 use mmt_shared::io::wake::{self, Waker, Wakeup};
 use mmt_shared::metrics::UpdateCounts;
 use mmt_shared::time::{TICK, Time};
@@ -72,12 +73,16 @@ pub(super) struct Inside {
 }
 
 impl Worker {
-    /// Starts the thread with a slave.
-    pub(super) fn start(clock: Clock, slave: Slave) -> io::Result<Self> {
+    /// Starts the thread with a slave, and with the way that its true poses take to the report.
+    pub(super) fn start(
+        clock: Clock,
+        slave: Slave,
+        truth: Option<TruthSender>,
+    ) -> io::Result<Self> {
         let ticker = Ticker::new(clock, TICK).map_err(io::Error::other)?;
         Self::start_with(move |inside| {
             tell(&realtime::request());
-            inside.run(ticker, slave)
+            inside.run(ticker, slave, truth)
         })
     }
 
@@ -143,12 +148,20 @@ fn tell(obtained: &RealTime) {
 }
 
 impl Inside {
-    fn run(mut self, mut ticker: Ticker, mut slave: Slave) -> Finished {
+    fn run(
+        mut self,
+        mut ticker: Ticker,
+        mut slave: Slave,
+        mut truth: Option<TruthSender>,
+    ) -> Finished {
         let mut ticks = UpdateCounts::default();
         let mut superseded = 0;
         ticker.run(|tick| {
             if let Some(done) = self.turn(tick, &mut slave) {
                 ticks.tick(done.in_contact);
+                if let Some(truth) = &mut truth {
+                    truth.send(done.stamp, done.truth);
+                }
                 superseded += u64::from(self.hand_over(&slave, &done));
             }
             match self.stop.load(Ordering::Relaxed) {

@@ -28,6 +28,7 @@ pub mod stream;
 pub mod ticker;
 pub mod tls;
 pub mod transport;
+pub mod truth;
 pub mod versions;
 pub mod wake;
 

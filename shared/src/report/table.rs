@@ -74,6 +74,7 @@ impl<C> fmt::Display for RunReport<C> {
         self.updates(f)?;
         self.force(f)?;
         self.model(f)?;
+        self.passivity(f)?;
         self.network(f)?;
         self.emulation(f)?;
         loop_rows(f, "Haptic loop", &self.haptic_loop)?;
@@ -214,6 +215,15 @@ impl<C> RunReport<C> {
         )
     }
 
+    fn passivity(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let mut rows = section(f, "Energy at the hand");
+        let mj = |number: Number| number.times(1e3);
+        let injected = number(mj(self.passivity.energy_injected_j), 3, " mJ");
+        rows.row("injected by updates", &[injected])?;
+        let least = number(mj(self.passivity.observer_min_j), 3, " mJ");
+        rows.row("observer, least", &[least])
+    }
+
     fn network(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (link, wire, messages) = (&self.link, &self.wire, &self.messages);
         let mut rows = section(f, "Network (up: master to slave)");
@@ -229,6 +239,14 @@ impl<C> RunReport<C> {
             &[
                 after("up", share(link.loss_up)),
                 after("down", share(link.loss_down)),
+            ],
+        )?;
+        let playout = &link.playout_delay_ms;
+        rows.row(
+            "play-out delay",
+            &[
+                after("p50", number(playout.p50, 1, " ms")),
+                after("p99", number(playout.p99, 1, " ms")),
             ],
         )?;
         for (way, of) in [("up", &messages.up), ("down", &messages.down)] {

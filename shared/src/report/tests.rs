@@ -63,10 +63,17 @@ fn full() -> RunReport<Value> {
     report.model.damping_ns_per_m = EstimateReport::new(3.03, 3.0);
     report.model.friction_n = EstimateReport::new(2.06, 2.0601);
     report.pose = PoseReport::from(&pose);
-    report.link.rtt_ms = RttReport {
+    report.passivity = PassivityReport {
+        energy_injected_j: 0.0.into(),
+        observer_min_j: (-0.2e-3).into(),
+    };
+    report.link.rtt_ms = DelayReport {
         p50: 100.2.into(),
         p99: 117.9.into(),
     };
+    let mut delays = Histogram::new();
+    delays.note(std::time::Duration::from_millis(16));
+    report.link.playout_delay_ms = DelayReport::of(&delays);
     (report.link.loss_up, report.link.loss_down) = (0.01.into(), 0.012.into());
     report.emulation.up = EmulationReport {
         released: Some(2100),
@@ -139,11 +146,13 @@ const REQUIRED: &str = "version command seed duration_s ending configuration dro
     model.damping_ns_per_m.estimate model.damping_ns_per_m.truth \
     model.friction_n.estimate model.friction_n.truth \
     pose.position_rms_m pose.position_max_m pose.angle_rms_rad pose.angle_max_rad \
+    passivity.energy_injected_j passivity.observer_min_j \
     link.rtt_ms.p50 link.rtt_ms.p99 link.loss_up link.loss_down \
     emulation.up.released emulation.up.late_us.p50 emulation.up.late_us.p99 \
     emulation.up.late_us.max emulation.up.degraded \
     emulation.down.released emulation.down.late_us.p50 emulation.down.late_us.p99 \
     emulation.down.late_us.max emulation.down.degraded \
+    link.playout_delay_ms.p50 link.playout_delay_ms.p99 \
     haptic_loop.ticks haptic_loop.skipped \
     haptic_loop.cpu_us.p50 haptic_loop.cpu_us.p99 haptic_loop.cpu_us.p999 \
     haptic_loop.lateness_us.p50 haptic_loop.lateness_us.p99 haptic_loop.lateness_us.p999 \

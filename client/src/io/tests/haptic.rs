@@ -1,7 +1,10 @@
 //! What the haptic loop promises, ticked by hand.
 
+use mmt_shared::geometry::Pose;
 use mmt_shared::io::schedule::Tick;
+use mmt_shared::io::truth::{self, TruthReceiver};
 use mmt_shared::io::wake::{self, Wakeup};
+use mmt_shared::metrics::PoseError;
 use mmt_shared::time::Time;
 use mmt_shared::wire::Update;
 
@@ -18,13 +21,23 @@ const COUPLING: Coupling = Coupling {
 
 /// A loop whose hand stays 2 mm inside of the box, so that there is a force.
 fn pressing(duration: Option<Duration>) -> (HapticLoop, HapticPort, Wakeup) {
+    along("0,-0.21,0\n0.1,-0.198,0\n1000,-0.198,0\n", duration, None)
+}
+
+/// A loop whose hand follows a path, with the truth at hand or without.
+fn along(
+    path: &str,
+    duration: Option<Duration>,
+    truth: Option<TruthReceiver>,
+) -> (HapticLoop, HapticPort, Wakeup) {
     let limiter = ForceLimiter::try_new(DeviceProfile::default().limits()).unwrap();
-    let path = Trace::from_csv("t_s,x_m,y_m\n0,-0.21,0\n0.1,-0.198,0\n1000,-0.198,0\n").unwrap();
+    let path = Trace::from_csv(&format!("t_s,x_m,y_m\n{path}")).unwrap();
     let parts = HapticParts {
         master: Master::new(&welcome_for(COUPLING), limiter),
         operator: Operator::Trace(path),
         duration,
         samples_per_wake: 10,
+        truth,
     };
     let (waker, wakeup) = wake::pair().unwrap();
     let (haptic, port) = HapticLoop::new(parts, Time::ZERO, waker);
@@ -49,6 +62,38 @@ fn update(sequence: u32) -> Update {
         slave_in_contact: true,
         state: state(&COUPLING),
     }
+}
+
+#[tokio::test]
+async fn the_model_of_a_stamp_is_held_against_the_truth_of_that_stamp_and_without_truth_nothing_is()
+{
+    let (mut blind, _port, _wakeup) = pressing(None);
+    assert!(blind.tick(tick(0)).is_continue());
+    assert_eq!(blind.outcome().pose, PoseError::default());
+    let (mut truth, receiver) = truth::pair();
+    let (mut haptic, _port, _wakeup) =
+        along("0,-0.21,0\n1,-0.10,0\n9,-0.10,0\n", None, Some(receiver));
+    for index in 0..600 {
+        assert!(haptic.tick(tick(index)).is_continue());
+    }
+    let model = haptic.master().model();
+    let then = model
+        .history()
+        .at(Time::from_millis(400))
+        .unwrap()
+        .motion
+        .pose;
+    let now = model.state().pose;
+    assert!(
+        (now.position - then.position).norm() > 1e-3,
+        "it was pushed"
+    );
+    let off = Pose::new(then.position.x + 0.003, then.position.y, then.angle);
+    truth.send(Time::from_millis(400), off);
+    assert!(haptic.tick(tick(600)).is_continue());
+    let outcome = haptic.outcome();
+    assert!((outcome.pose.position_rms_m().unwrap() - 0.003).abs() < 1e-12);
+    assert!(outcome.observer_min_j <= 0.0 && outcome.energy_injected_j == 0.0);
 }
 
 /// Ticks until the loop breaks; the slave is heard all the time. Returns the number of ticks.

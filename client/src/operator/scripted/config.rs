@@ -31,6 +31,9 @@ pub struct ScriptedConfig {
     pub stand_off_m: f64,
     /// Speed of the approach, m/s. Default 0.06.
     pub approach_m_per_s: f64,
+    /// Rest at the first touch of each face, s: a careful operator waits until the answer to its touch can have come.
+    /// Default 0, none.
+    pub dwell_s: f64,
     /// Length of a push from contact, m. Default 0.35.
     pub push_m: f64,
     /// Range of a push's mean speed, m/s; drawn uniformly. Default 0.10 to 0.22.
@@ -67,6 +70,7 @@ impl Default for ScriptedConfig {
             travel_m_per_s: 0.35,
             stand_off_m: 0.05,
             approach_m_per_s: 0.06,
+            dwell_s: 0.0,
             push_m: 0.35,
             push_speed_m_per_s: (0.10, 0.22),
             slow_share: 0.30,
@@ -109,6 +113,7 @@ impl ScriptedConfig {
             ("travel_m_per_s", self.travel_m_per_s, speeds),
             ("stand_off_m", self.stand_off_m, (CLOSE_M, 0.5)),
             ("approach_m_per_s", self.approach_m_per_s, (0.01, 0.1)),
+            ("dwell_s", self.dwell_s, (0.0, 60.0)),
             ("push_m", self.push_m, (0.01, 1.0)),
             ("push_speed_m_per_s.0", slowest, speeds),
             ("push_speed_m_per_s.1", fastest, (slowest, 0.3)),

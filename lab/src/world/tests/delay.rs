@@ -101,6 +101,16 @@ fn beyond_half_a_second_the_unknown_side_decides() {
                 "{words:28} {unknown:.3?}\n{:28} {known:.3?}",
                 "  side known"
             );
+            let dwell = Row::of(&words, 1..=3, |config| {
+                config.operator.dwell_s = one_way_ms as f64 * 2e-3 + 1.0;
+            });
+            println!("{:28} {dwell:.3?}", "  a dwell at each face");
+            // the touches of a dwell are contacts and no pushes: they are not held against it
+            assert!(
+                dwell.pose_rms_mm < unknown.pose_rms_mm,
+                "{words}: {dwell:?}"
+            );
+            assert!(dwell.peak_n <= 4.0 && dwell.observer_min_mj >= -1.0);
             for (row, most_mm) in [(unknown, unknown_mm), (known, known_mm)] {
                 assert!(row.pose_rms_mm <= most_mm, "{words}: {row:?}");
                 assert!(row.peak_n <= 4.0, "{words}: {row:?}");

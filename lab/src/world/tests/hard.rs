@@ -3,6 +3,23 @@
 use super::*;
 use mmt_client::operator::scripted::Phase;
 use mmt_server::environment::Wall;
+use mmt_shared::geometry::Pose;
+
+/// How far the real object turns within a round trip of 2 s, rad: the most of a run.
+#[derive(Default)]
+struct Turned {
+    angles: Vec<f64>,
+    most: f64,
+}
+
+impl Turned {
+    fn look(&mut self, world: &World) {
+        self.angles.push(world.slave.environment().pose().angle);
+        let newest = self.angles[self.angles.len() - 1];
+        let then = self.angles[self.angles.len().saturating_sub(2000)];
+        self.most = self.most.max((newest - then).abs());
+    }
+}
 
 /// What came of a scenario.
 #[derive(Clone, Copy, Debug)]
@@ -177,11 +194,12 @@ fn clocks_that_drift_apart_by_200_ppm_change_nothing() {
 #[test]
 fn a_step_of_the_slaves_clock_is_survived_and_the_tool_stays_below_its_speed() {
     let at = Time::from_millis(10_000);
+    let steps = [(300, true), (300, false), (5000, true), (5000, false)];
     for one_way_ms in [0, 500] {
-        for forward in [true, false] {
-            let name = format!("{one_way_ms} ms, 300 ms forward: {forward}");
+        for (step_ms, forward) in steps {
+            let name = format!("{one_way_ms} ms, {step_ms} ms forward: {forward}");
             let felt = felt(&name, &delayed(one_way_ms), |world| {
-                let by = Duration::from_millis(300);
+                let by = Duration::from_millis(step_ms);
                 let ahead = &mut world.slave_clock.ahead;
                 match (world.now == at, forward) {
                     (true, true) => *ahead += by,
@@ -194,6 +212,8 @@ fn a_step_of_the_slaves_clock_is_survived_and_the_tool_stays_below_its_speed() {
                 "{felt:?}"
             );
             assert!(felt.slave_peak_n <= 15.0, "{felt:?}");
+            let most_mm = if forward { 10.0 } else { 30.0 };
+            assert!(felt.pose_rms_mm <= most_mm, "{felt:?}");
         }
     }
 }
@@ -214,5 +234,25 @@ fn after_an_outage_of_60_ms_the_speed_limit_keeps_the_force_on_the_object_low() 
         let (limited, free) = (peak(one_way_ms, 0.6), peak(one_way_ms, 10.0));
         assert!(free > 30.0, "the effect exists: {free} N");
         assert!(limited <= 15.0, "{limited} N");
+    }
+}
+
+#[test]
+fn a_box_that_is_spun_far_from_the_linear_range_is_felt_where_it_is() {
+    // pushed up to 15 cm beside the middle of a face of 36 cm; from zero, and across the seam of the angle
+    for (one_way_ms, most_mm) in [(0, 1.5), (250, 4.0), (1000, 15.0)] {
+        for (angle, seed) in [(0.0, 1), (0.0, 2), (3.1, 1), (3.1, 3)] {
+            let mut config = delayed(one_way_ms).seeded(seed);
+            config.operator.lateral_max_m = 0.15;
+            config.slave.environment.pose = Pose::new(0.0, 0.0, angle);
+            let mut turned = Turned::default();
+            let name = format!("{one_way_ms} ms, spun from {angle} rad, seed {seed}");
+            let felt = felt(&name, &config, |world| turned.look(world));
+            println!("    turned by up to {:.2} rad within 2 s", turned.most);
+            assert!(turned.most > 1.0, "{} rad", turned.most);
+            assert!(felt.peak_n <= 4.0 && felt.step_n <= 1.6, "{felt:?}");
+            assert!(felt.breaks_per_push <= 1.5, "{felt:?}");
+            assert!(felt.pose_rms_mm <= most_mm, "{felt:?}");
+        }
     }
 }
