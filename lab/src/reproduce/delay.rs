@@ -497,10 +497,7 @@ fn figure(groups: &[Group]) -> Figure {
             .into_iter()
             .enumerate()
             .map(|(k, architecture)| {
-                let (stroke, mark) = match architecture {
-                    Architecture::Bilateral(_) => (Stroke::Dashed, Mark::Square),
-                    Architecture::Mediated(_) | Architecture::Auto => (Stroke::Solid, Mark::Circle),
-                };
+                let (stroke, mark, colour, width) = look(k, architecture);
                 let here = groups.iter().filter(|group| {
                     group.0.architecture == architecture && group.0.k_p == 1000 && is_clean(group.0)
                 });
@@ -508,18 +505,13 @@ fn figure(groups: &[Group]) -> Figure {
                     let y = median(rows.iter().filter_map(of))?;
                     Some(Dot::at((place.one_way_ms as f64).max(0.5), y))
                 });
-                let width = if k + 1 == Architecture::ALL.len() {
-                    3
-                } else {
-                    1
-                };
-                Series::line(architecture.name(), Colour::nth(k), dots.collect())
+                Series::line(architecture.name(), colour, dots.collect())
                     .marked(mark)
                     .stroked(stroke, width)
             });
         Panel {
             title: title.to_owned(),
-            x: Axis::log("one-way delay, ms"),
+            x: Axis::log("one-way delay, ms (none at 0.5)"),
             y,
             series: series.collect(),
             legend: if n == 0 {
@@ -533,5 +525,22 @@ fn figure(groups: &[Group]) -> Figure {
         panels: panels.collect(),
         columns: 2,
         panel_size: (560, 400),
+    }
+}
+
+/// How an architecture is drawn: forces on the wire dashed, models solid, the default thick.
+fn look(k: usize, architecture: Architecture) -> (Stroke, Mark, Colour, u32) {
+    match architecture {
+        Architecture::Bilateral(_) => (Stroke::Dashed, Mark::Square, Colour::nth(k), 1),
+        Architecture::Mediated(PoseCorrection::Snap) => {
+            (Stroke::Solid, Mark::Circle, Colour::Sky, 1)
+        }
+        Architecture::Mediated(PoseCorrection::MatchedStamps) => {
+            (Stroke::Solid, Mark::Circle, Colour::Grey, 1)
+        }
+        Architecture::Mediated(PoseCorrection::Replay) => {
+            (Stroke::Solid, Mark::Circle, Colour::Black, 3)
+        }
+        Architecture::Auto => (Stroke::Solid, Mark::Cross, Colour::Vermilion, 1),
     }
 }
