@@ -6,131 +6,36 @@
 use std::collections::VecDeque;
 use std::time::Duration;
 
-use mmt_client::device::{DeviceError, DeviceProfile};
-use mmt_client::limiter::{ForceLimiter, LimitsError};
-use mmt_client::link::{CommandConfig, FromSlave, MasterLink};
+use mmt_client::device::DeviceProfile;
+use mmt_client::limiter::ForceLimiter;
+use mmt_client::link::{FromSlave, MasterLink};
 use mmt_client::master::{Master, MasterTick};
 use mmt_client::operator::Operator;
-use mmt_client::operator::scripted::{Picture, Scripted, ScriptedConfig, ScriptedError, View};
-use mmt_netem::config::{ConfigError, LinkConfig};
+use mmt_client::operator::scripted::{Picture, Scripted, View};
+use mmt_netem::config::LinkConfig;
 use mmt_netem::counters::Tally;
 use mmt_netem::link::{Direction, LinkId};
 use mmt_netem::pipe::SimPath;
 use mmt_server::environment::Environment;
-use mmt_server::link::{SlaveLink, SlaveLinkConfig};
-use mmt_server::slave::{Slave, SlaveConfig, SlaveError, SlaveTick};
+use mmt_server::link::SlaveLink;
+use mmt_server::slave::{Slave, SlaveTick};
 use mmt_shared::bilateral::message::OVERHEAD_BYTES;
 use mmt_shared::contact::Coupling;
 use mmt_shared::geometry::Vec2;
 use mmt_shared::metrics::{
     AgeOfInformation, ContactBreaks, ForcePeak, ForceSummary, PoseError, Staleness, UpdateCounts,
 };
-use mmt_shared::rate_control::StretchMax;
 use mmt_shared::report::{MessagesReport, UpDown, WireReport};
-use mmt_shared::settings::ModelSettings;
 use mmt_shared::time::{TICK, Time};
 use mmt_shared::wire::{DATAGRAM_MAX, Label, Update, Welcome};
-use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
+
+mod config;
+
+pub use config::{WorldConfig, WorldError};
 
 /// By how much the slave's clock is ahead of the master's at the start: nothing may depend on it.
 const SLAVE_EPOCH: Duration = Duration::from_secs(3600);
-
-/// Everything that a run depends on.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct WorldConfig {
-    /// Seed of the network's draws; the slave's and the operator's seeds are their own.
-    pub seed: u64,
-    /// The slave.
-    pub slave: SlaveConfig,
-    /// How both run the local model; the mode's own if absent.
-    pub settings: Option<ModelSettings>,
-    /// Stiffness k_p of the device, N/m; the default profile's if absent.
-    pub stiffness_n_per_m: Option<f64>,
-    /// The scripted operator.
-    pub operator: ScriptedConfig,
-    /// New samples in a command.
-    pub samples_per_command: u8,
-    /// How many commands before it each command repeats the samples of.
-    pub repeat_samples: u8,
-    /// By how much congestion may stretch the time between the master's samples; 1: not at all.
-    pub stretch_max: StretchMax,
-    /// Network from master to slave.
-    pub up: LinkConfig,
-    /// Network from slave to master.
-    pub down: LinkConfig,
-}
-
-impl Default for WorldConfig {
-    /// The default scenario over a perfect network.
-    fn default() -> Self {
-        let CommandConfig {
-            samples_per_command,
-            repeat_samples,
-            stretch_max,
-        } = CommandConfig::default();
-        Self {
-            seed: 1,
-            slave: SlaveConfig::default(),
-            settings: None,
-            stiffness_n_per_m: None,
-            operator: ScriptedConfig::default(),
-            samples_per_command,
-            repeat_samples,
-            stretch_max,
-            up: LinkConfig::default(),
-            down: LinkConfig::default(),
-        }
-    }
-}
-
-impl WorldConfig {
-    /// This configuration with every seed derived from one.
-    #[must_use]
-    pub fn seeded(mut self, seed: u64) -> Self {
-        self.seed = seed;
-        self.slave.seed = seed;
-        self.operator.seed = seed;
-        self
-    }
-
-    fn commands(&self) -> CommandConfig {
-        CommandConfig {
-            samples_per_command: self.samples_per_command,
-            repeat_samples: self.repeat_samples,
-            stretch_max: self.stretch_max,
-        }
-    }
-
-    fn slave_link(&self) -> SlaveLinkConfig {
-        SlaveLinkConfig {
-            repeats: self.slave.repeats_ms,
-            stretch_max: self.slave.stretch_max,
-            samples_per_command: self.samples_per_command,
-        }
-    }
-}
-
-/// Why a world could not be made.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum WorldError {
-    /// The slave's numbers are wrong.
-    #[error(transparent)]
-    Slave(#[from] SlaveError),
-    /// The device cannot do this.
-    #[error(transparent)]
-    Device(#[from] DeviceError),
-    /// The device's limits are wrong.
-    #[error(transparent)]
-    Limits(#[from] LimitsError),
-    /// The operator's numbers are wrong.
-    #[error(transparent)]
-    Operator(#[from] ScriptedError),
-    /// The network's numbers are wrong.
-    #[error(transparent)]
-    Network(#[from] ConfigError),
-}
 
 /// What one millisecond of the world gave.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -3,6 +3,7 @@
 
 use super::*;
 use mmt_server::playout::PlayoutConfig;
+use mmt_server::slave::SlaveConfig;
 use mmt_shared::settings::Mode;
 
 mod estimation;

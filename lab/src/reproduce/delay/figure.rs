@@ -1,0 +1,88 @@
+//! The delay figure: breaks, force, error and packets of every architecture over the delay.
+//!
+//! Medians over the seeds of the clean runs at k_p 1000; it leaves out no delay.
+
+use super::Group;
+use super::tables::is_clean;
+use crate::architecture::{Architecture, DelayRow};
+use crate::figure::{Axis, Colour, Dot, Figure, Legend, Mark, Panel, Series, Stroke};
+use crate::statistics::median;
+use mmt_shared::settings::PoseCorrection;
+
+/// Four measures over the delay, one curve an architecture; zero delay stands at half a millisecond.
+pub(super) fn figure(groups: &[Group]) -> Figure {
+    type Measure = (&'static str, fn(&DelayRow) -> Option<f64>, Axis);
+    let measures: [Measure; 4] = [
+        (
+            "contact breaks per push",
+            |row| row.breaks_per_push,
+            Axis::log("breaks per push"),
+        ),
+        (
+            "largest force on the hand",
+            |row| row.force_peak_n,
+            Axis::linear("force, N"),
+        ),
+        (
+            "relative force error",
+            |row| row.relative_error,
+            Axis::log("relative error"),
+        ),
+        (
+            "packets from slave to master",
+            |row| Some(row.packet_rate_hz),
+            Axis::log("packets per second"),
+        ),
+    ];
+    let panels = measures.into_iter().enumerate().map(|(n, (title, of, y))| {
+        let series = Architecture::ALL
+            .into_iter()
+            .enumerate()
+            .map(|(k, architecture)| {
+                let (stroke, mark, colour, width) = look(k, architecture);
+                let here = groups.iter().filter(|group| {
+                    group.0.architecture == architecture && group.0.k_p == 1000 && is_clean(group.0)
+                });
+                let dots = here.filter_map(|(place, rows)| {
+                    let y = median(rows.iter().filter_map(of))?;
+                    Some(Dot::at((place.one_way_ms as f64).max(0.5), y))
+                });
+                Series::line(architecture.name(), colour, dots.collect())
+                    .marked(mark)
+                    .stroked(stroke, width)
+            });
+        Panel {
+            title: title.to_owned(),
+            x: Axis::log("one-way delay, ms (none at 0.5)"),
+            y,
+            series: series.collect(),
+            legend: if n == 0 {
+                Legend::UpperLeft
+            } else {
+                Legend::None
+            },
+        }
+    });
+    Figure {
+        panels: panels.collect(),
+        columns: 2,
+        panel_size: (560, 400),
+    }
+}
+
+/// How an architecture is drawn: forces on the wire dashed, models solid, the default thick.
+fn look(k: usize, architecture: Architecture) -> (Stroke, Mark, Colour, u32) {
+    match architecture {
+        Architecture::Bilateral(_) => (Stroke::Dashed, Mark::Square, Colour::nth(k), 1),
+        Architecture::Mediated(PoseCorrection::Snap) => {
+            (Stroke::Solid, Mark::Circle, Colour::Sky, 1)
+        }
+        Architecture::Mediated(PoseCorrection::MatchedStamps) => {
+            (Stroke::Solid, Mark::Circle, Colour::Grey, 1)
+        }
+        Architecture::Mediated(PoseCorrection::Replay) => {
+            (Stroke::Solid, Mark::Circle, Colour::Black, 3)
+        }
+        Architecture::Auto => (Stroke::Solid, Mark::Cross, Colour::Vermilion, 1),
+    }
+}

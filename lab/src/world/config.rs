@@ -1,0 +1,112 @@
+//! What a run depends on, and why a world could not be made of it.
+//!
+//! Numbers only: it builds nothing and runs nothing.
+
+use mmt_client::device::DeviceError;
+use mmt_client::limiter::LimitsError;
+use mmt_client::link::CommandConfig;
+use mmt_client::operator::scripted::{ScriptedConfig, ScriptedError};
+use mmt_netem::config::{ConfigError, LinkConfig};
+use mmt_server::link::SlaveLinkConfig;
+use mmt_server::slave::{SlaveConfig, SlaveError};
+use mmt_shared::rate_control::StretchMax;
+use mmt_shared::settings::ModelSettings;
+use serde::{Deserialize, Serialize};
+
+/// Everything that a run depends on.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct WorldConfig {
+    /// Seed of the network's draws; the slave's and the operator's seeds are their own.
+    pub seed: u64,
+    /// The slave.
+    pub slave: SlaveConfig,
+    /// How both run the local model; the mode's own if absent.
+    pub settings: Option<ModelSettings>,
+    /// Stiffness k_p of the device, N/m; the default profile's if absent.
+    pub stiffness_n_per_m: Option<f64>,
+    /// The scripted operator.
+    pub operator: ScriptedConfig,
+    /// New samples in a command.
+    pub samples_per_command: u8,
+    /// How many commands before it each command repeats the samples of.
+    pub repeat_samples: u8,
+    /// By how much congestion may stretch the time between the master's samples; 1: not at all.
+    pub stretch_max: StretchMax,
+    /// Network from master to slave.
+    pub up: LinkConfig,
+    /// Network from slave to master.
+    pub down: LinkConfig,
+}
+
+impl Default for WorldConfig {
+    /// The default scenario over a perfect network.
+    fn default() -> Self {
+        let CommandConfig {
+            samples_per_command,
+            repeat_samples,
+            stretch_max,
+        } = CommandConfig::default();
+        Self {
+            seed: 1,
+            slave: SlaveConfig::default(),
+            settings: None,
+            stiffness_n_per_m: None,
+            operator: ScriptedConfig::default(),
+            samples_per_command,
+            repeat_samples,
+            stretch_max,
+            up: LinkConfig::default(),
+            down: LinkConfig::default(),
+        }
+    }
+}
+
+impl WorldConfig {
+    /// This configuration with every seed derived from one.
+    #[must_use]
+    pub fn seeded(mut self, seed: u64) -> Self {
+        self.seed = seed;
+        self.slave.seed = seed;
+        self.operator.seed = seed;
+        self
+    }
+
+    /// How the master sends.
+    pub(super) fn commands(&self) -> CommandConfig {
+        CommandConfig {
+            samples_per_command: self.samples_per_command,
+            repeat_samples: self.repeat_samples,
+            stretch_max: self.stretch_max,
+        }
+    }
+
+    /// How the slave sends.
+    pub(super) fn slave_link(&self) -> SlaveLinkConfig {
+        SlaveLinkConfig {
+            repeats: self.slave.repeats_ms,
+            stretch_max: self.slave.stretch_max,
+            samples_per_command: self.samples_per_command,
+        }
+    }
+}
+
+/// Why a world could not be made.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum WorldError {
+    /// The slave's numbers are wrong.
+    #[error(transparent)]
+    Slave(#[from] SlaveError),
+    /// The device cannot do this.
+    #[error(transparent)]
+    Device(#[from] DeviceError),
+    /// The device's limits are wrong.
+    #[error(transparent)]
+    Limits(#[from] LimitsError),
+    /// The operator's numbers are wrong.
+    #[error(transparent)]
+    Operator(#[from] ScriptedError),
+    /// The network's numbers are wrong.
+    #[error(transparent)]
+    Network(#[from] ConfigError),
+}
