@@ -9,6 +9,7 @@ mod figure;
 mod grid;
 mod log;
 mod reproduce;
+mod runs;
 mod tables;
 
 pub use grid::cases;

@@ -1,13 +1,18 @@
 //! Held-out prediction: friction fitted on some of the pushes, the forces of the others predicted.
 
+use mmt_shared::geometry::Vec2;
 use mmt_shared::rng::Substream;
 use serde::Serialize;
 
 use super::ReplayConfig;
 use super::fit::{Observation, fit};
-use super::report::relative_error;
 use super::surface::Law;
 use crate::statistics::median;
+
+/// | |predicted| − |measured| | / |measured|.
+pub(super) fn relative_error(predicted: Vec2, measured: Vec2) -> f64 {
+    (predicted.norm() - measured.norm()).abs() / measured.norm()
+}
 
 /// How well a law predicts pushes that it was not fitted on.
 #[derive(Clone, Debug, PartialEq, Serialize)]

@@ -232,7 +232,7 @@ impl Learner {
         LawOnPush {
             law: self.law,
             predicted_n: predicted,
-            relative_error: measured.map(|force| report::relative_error(predicted, force)),
+            relative_error: measured.map(|force| heldout::relative_error(predicted, force)),
             vector_error: measured.map(|force| (predicted - force).norm() / force.norm()),
             held_error: mean(traffic.error_sum, traffic.samples),
             updates: Rates::of(traffic.packets, push.duration_s(), contact_s),

@@ -12,11 +12,6 @@ use super::surface::{Law, Surface};
 use super::trigger::Packets;
 use crate::statistics::median;
 
-/// | |predicted| − |measured| | / |measured|.
-pub(super) fn relative_error(predicted: Vec2, measured: Vec2) -> f64 {
-    (predicted.norm() - measured.norm()).abs() / measured.norm()
-}
-
 /// Median and mean of an error over pushes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Spread {

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use super::grid::{JITTERS_MS, LOSSES_PERCENT, ROUND_TRIPS_MS};
-use super::reproduce::{Run, largest, of};
+use super::runs::{Run, largest, of};
 use super::tables::{millis, percent};
 use super::{Conditions, Flow, Outcome, Stack};
 use crate::figure::{Axis, Colour, Dot, Figure, Legend, Mark, Panel, Series, Stroke};

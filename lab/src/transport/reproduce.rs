@@ -2,11 +2,9 @@
 
 use sha2::{Digest, Sha256};
 
-use super::{Case, Outcome, Stack, cases, figure, tables};
+use super::runs::Run;
+use super::{Case, Outcome, cases, figure, tables};
 use crate::reproduce::{Extent, Findings, Laboratory, ReproduceError};
-
-/// A case and what it measured.
-pub(super) type Run<'a> = (&'a Case, &'a Outcome);
 
 /// Runs the grid and keeps `transport.csv` and `transport.svg`.
 ///
@@ -42,19 +40,4 @@ fn digest(outcomes: &[Outcome]) -> String {
         .iter()
         .map(|byte| format!("{byte:02x}"))
         .collect()
-}
-
-/// The runs of one stack.
-pub(super) fn of<'a>(runs: &[Run<'a>], stack: Stack) -> Vec<Run<'a>> {
-    let runs = runs.iter().filter(|(case, _)| case.stack == stack);
-    runs.copied().collect()
-}
-
-/// The largest of what some runs measured.
-pub(super) fn largest<'a>(
-    runs: impl IntoIterator<Item = Run<'a>>,
-    of: impl Fn(&Outcome) -> Option<f64>,
-) -> Option<f64> {
-    let values = runs.into_iter().filter_map(|(_, outcome)| of(outcome));
-    values.max_by(f64::total_cmp)
 }

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use mmt_netem::Probability;
 
-use super::reproduce::{Run, largest, of};
+use super::runs::{Run, largest, of};
 use super::{Conditions, Flow, Outcome, Stack};
 use crate::table::{Cell, Table};
 
