@@ -128,6 +128,26 @@ mod tests {
     }
 
     #[test]
+    fn what_a_table_leaves_out_of_the_trigger_and_the_paper_estimator_is_the_default() {
+        let config = parse(
+            "trigger_reference = \"echo\"\n[trigger]\nmetric = \"parameters\"\n\
+             [estimator.paper]\nwindow_s = 0.25\nrows = \"stacked\"\n",
+            None,
+        )
+        .unwrap();
+        let text = serde_json::to_string(&config).unwrap();
+        for part in [
+            r#""trigger_reference":"echo""#,
+            r#""metric":"parameters""#,
+            r#""window_s":0.25"#,
+            r#""rows":"stacked""#,
+            r#""jerk_density":0.3"#,
+        ] {
+            assert!(text.contains(part), "{text}");
+        }
+    }
+
+    #[test]
     fn a_file_that_is_wrong_is_named() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("slave.toml");

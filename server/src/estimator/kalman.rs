@@ -11,6 +11,7 @@ use serde::{Deserialize, Serialize};
 
 /// Settings of [`MotionFilter`].
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
 pub struct KalmanConfig {
     /// Standard deviation of the measured position, m. 10 µm: the default sensor noise.
     pub position_noise_m: f64,

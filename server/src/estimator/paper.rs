@@ -14,6 +14,7 @@ use super::{Estimate, Measured, STICK_SPEED};
 
 /// Settings of [`PaperEstimator`].
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
 pub struct PaperConfig {
     /// The filter of the tool's motion.
     pub kalman: KalmanConfig,
