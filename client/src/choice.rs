@@ -7,8 +7,8 @@
 
 use mmt_shared::time::TICK_S;
 
-/// Relative force error of TDPA by round trip (ms): the medians of `mmt reproduce delay` at k_p 1000, without jitter
-/// and loss, between which it is interpolated. `docs/baselines.md` has the crossing.
+/// Relative force error of TDPA by round trip (ms): the medians at k_p 1000, without jitter and loss,
+/// that `docs/baselines.md` tables with the command that prints them, between which it is interpolated.
 pub const TDPA_ERROR: [(f64, f64); 9] = [
     (0.0, 0.050),
     (2.0, 0.051),
