@@ -1,6 +1,7 @@
 //! Experiments in virtual time: everything that is computed about the system rather than by it.
 
 pub mod architecture;
+mod digest;
 pub mod figure;
 #[cfg(feature = "io")]
 pub mod io;

@@ -23,15 +23,14 @@ use std::time::Duration;
 
 use delay::Duel;
 
-use serde::Serialize;
-use sha2::{Digest, Sha256};
-
 use crate::architecture::DelayRow;
+use crate::digest::of_runs;
 use crate::physics::PhysicsError;
 use crate::table::Table;
 use crate::transport::{Case, Outcome};
 use crate::trial::{Measured, Trial, TrialError};
 use crate::world::WorldConfig;
+use serde::Serialize;
 
 /// Called with each result as soon as it is there, from any thread; may take the trace out of it.
 pub type Each<'a> = &'a (dyn Fn(usize, &mut Measured) -> Result<(), ReproduceError> + Sync);
@@ -144,14 +143,7 @@ pub struct Findings {
 
 /// SHA-256 over the digests of trials, in hexadecimal digits.
 fn digest<'a>(measured: impl IntoIterator<Item = &'a Measured>) -> String {
-    let mut hash = Sha256::new();
-    measured
-        .into_iter()
-        .for_each(|m| hash.update(m.digest.as_bytes()));
-    hash.finalize()
-        .iter()
-        .map(|byte| format!("{byte:02x}"))
-        .collect()
+    of_runs(measured.into_iter().map(|m| m.digest.as_str()))
 }
 
 /// For experiments that need nothing done with a single result.

@@ -30,6 +30,8 @@ use mmt_shared::time::{TICK, Time};
 use mmt_shared::wire::{DATAGRAM_MAX, Label, Update, Welcome};
 use sha2::{Digest, Sha256};
 
+use crate::digest::hex;
+
 mod config;
 
 pub use config::{WorldConfig, WorldError};
@@ -266,8 +268,7 @@ impl World {
     /// SHA-256 of the event log so far, in hexadecimal digits: equal for equal configurations.
     #[must_use]
     pub fn digest(&self) -> String {
-        let hash = self.log.clone().finalize();
-        hash.iter().map(|byte| format!("{byte:02x}")).collect()
+        hex(&self.log.clone().finalize())
     }
 
     /// Runs for a duration and hands every tick to `watch`.

@@ -8,6 +8,8 @@ use std::sync::Mutex;
 
 use sha2::{Digest, Sha256};
 
+use crate::digest::hex;
+
 /// A folder and what was kept in it.
 #[derive(Debug)]
 pub struct Folder {
@@ -47,10 +49,7 @@ impl Folder {
         beside.push(".part");
         fs::write(&beside, bytes)?;
         fs::rename(&beside, &path)?;
-        let digest: String = Sha256::digest(bytes)
-            .iter()
-            .map(|byte| format!("{byte:02x}"))
-            .collect();
+        let digest = hex(&Sha256::digest(bytes));
         if let Ok(mut kept) = self.kept.lock() {
             kept.insert(name.to_owned(), digest);
         }

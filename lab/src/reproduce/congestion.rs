@@ -12,6 +12,7 @@ use mmt_shared::time::Time;
 use sha2::{Digest, Sha256};
 
 use super::{Extent, Findings, Laboratory, ReproduceError};
+use crate::digest::hex;
 use crate::figure::{Axis, Colour, Dot, Figure, Legend, Panel, Series, Stroke};
 use crate::statistics::{Interval, median};
 use crate::table::{Cell, Table};
@@ -197,11 +198,10 @@ pub fn reproduce(laboratory: &dyn Laboratory, extent: Extent) -> Result<Findings
     laboratory.keep("congestion.csv", &all.to_csv())?;
     let figure = figure(&variants);
     laboratory.keep("congestion.svg", figure.draw("congestion.svg")?.as_bytes())?;
-    let digest = hash.finalize();
     Ok(Findings {
         experiment: "congestion",
         extent,
-        digest: digest.iter().map(|byte| format!("{byte:02x}")).collect(),
+        digest: hex(&hash.finalize()),
         configuration: variants.into_iter().map(|(_, config, _)| config).collect(),
         tables: vec![summary],
     })

@@ -10,6 +10,7 @@ use sha2::{Digest, Sha256};
 
 use super::error::PlanError;
 use super::reader::read;
+use crate::digest::hex;
 use crate::trial::{Change, Trial};
 use crate::world::WorldConfig;
 
@@ -85,10 +86,7 @@ impl Row {
         // a configuration is numbers and words: it can always be written
         let text = serde_json::to_string(&parts).unwrap_or_default();
         let hash = Sha256::digest(text);
-        hash.iter()
-            .take(8)
-            .map(|byte| format!("{byte:02x}"))
-            .collect()
+        hex(hash.get(..8).unwrap_or(&hash))
     }
 }
 

@@ -5,6 +5,8 @@ use std::time::Duration;
 use mmt_shared::time::{Time, duration_nanos};
 use sha2::{Digest, Sha256};
 
+use crate::digest::hex;
+
 use super::Case;
 
 /// Packets handed to the path in one direction.
@@ -168,10 +170,7 @@ impl Log {
         for count in [up.packets, up.bytes, down.packets, down.bytes] {
             hash.update(count.to_le_bytes());
         }
-        hash.finalize()
-            .iter()
-            .map(|byte| format!("{byte:02x}"))
-            .collect()
+        hex(&hash.finalize())
     }
 }
 

@@ -1,9 +1,8 @@
 //! The experiment: every case of the grid, the promises of the transport, a table and a figure of them.
 
-use sha2::{Digest, Sha256};
-
 use super::runs::Run;
-use super::{Case, Outcome, cases, figure, tables};
+use super::{Case, cases, figure, tables};
+use crate::digest::of_runs;
 use crate::reproduce::{Extent, Findings, Laboratory, ReproduceError};
 
 /// Runs the grid and keeps `transport.csv` and `transport.svg`.
@@ -21,7 +20,7 @@ pub fn reproduce(laboratory: &dyn Laboratory, extent: Extent) -> Result<Findings
     Ok(Findings {
         experiment: "transport",
         extent,
-        digest: digest(&outcomes),
+        digest: of_runs(outcomes.iter().map(|outcome| outcome.digest.as_str())),
         configuration: Vec::new(),
         tables: vec![
             tables::promises(&runs),
@@ -29,15 +28,4 @@ pub fn reproduce(laboratory: &dyn Laboratory, extent: Extent) -> Result<Findings
             tables::worst(&runs),
         ],
     })
-}
-
-fn digest(outcomes: &[Outcome]) -> String {
-    let mut hash = Sha256::new();
-    for outcome in outcomes {
-        hash.update(outcome.digest.as_bytes());
-    }
-    hash.finalize()
-        .iter()
-        .map(|byte| format!("{byte:02x}"))
-        .collect()
 }
