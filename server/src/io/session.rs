@@ -11,6 +11,7 @@ use std::time::Duration;
 
 use bytes::Bytes;
 use mmt_netem::io::socket::SocketCounters;
+use mmt_shared::contact::Coupling;
 use mmt_shared::io::clock::Clock;
 use mmt_shared::io::live::LiveCell;
 use mmt_shared::io::stream::WriteFrameError;
@@ -194,7 +195,13 @@ async fn welcome(
 
 fn announce(connection: &Connection, hello: &Hello) {
     let (address, program) = (connection.remote_address(), hello.program);
-    tracing::info!("{address} operates ({program}, {:?})", hello.coupling);
+    let Coupling {
+        stiffness_n_per_m,
+        damping_ns_per_m,
+    } = hello.coupling;
+    tracing::info!(
+        "{address} operates ({program}, device of {stiffness_n_per_m} N/m and {damping_ns_per_m} N s/m)"
+    );
 }
 
 impl<'a> Session<'a> {
