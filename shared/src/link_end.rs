@@ -9,8 +9,8 @@ use crate::peer::{Arrival, NumbersSpent, Peer};
 use crate::rate_control::{RateController, StretchMax};
 use crate::time::Time;
 use crate::wire::{
-    Command, EncodeError, KindCounts, Matter, Scene, Side, Traffic, Update, decode_datagram,
-    encode_command, encode_heartbeat, encode_scene, encode_update,
+    Command, EncodeError, KindCounts, Matter, Scene, Side, Tool, Traffic, Update, decode_datagram,
+    encode_command, encode_heartbeat, encode_scene, encode_tool, encode_update,
 };
 
 /// Each side sends at least this often: what is needed to call a link dead within a second and to keep
@@ -26,8 +26,19 @@ pub enum Outgoing<'a> {
     Update(&'a Update),
     /// What a viewer sees.
     Scene(&'a Scene),
+    /// What the tool feels.
+    Tool(&'a Tool),
     /// Nothing but the envelope.
     Heartbeat,
+}
+
+/// What a datagram brought.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Opened {
+    /// What it is about.
+    pub matter: Matter,
+    /// Whether no later datagram had arrived before it.
+    pub is_newest: bool,
 }
 
 /// Why nothing could be sealed.
@@ -78,16 +89,17 @@ impl LinkEnd {
 
     /// Reads a datagram that arrived at `now`. None, and counted, if it does not decode, was seen before
     /// or is too old to tell.
-    pub fn open(&mut self, now: Time, bytes: &[u8]) -> Option<Matter> {
+    pub fn open(&mut self, now: Time, bytes: &[u8]) -> Option<Opened> {
         let Ok(datagram) = decode_datagram(bytes, self.side.other()) else {
             self.malformed = self.malformed.saturating_add(1);
             return None;
         };
         let measured = self.peer.round_trip().histogram().total();
-        match self.peer.handle(now, &datagram.envelope, bytes.len()) {
-            Arrival::Newest | Arrival::Reordered => {}
+        let is_newest = match self.peer.handle(now, &datagram.envelope, bytes.len()) {
+            Arrival::Newest => true,
+            Arrival::Reordered => false,
             Arrival::Duplicate | Arrival::TooOld => return None,
-        }
+        };
         if self.peer.round_trip().histogram().total() > measured {
             self.control_rate(now);
         }
@@ -95,10 +107,14 @@ impl LinkEnd {
             Matter::Command(_) => &mut self.received.commands,
             Matter::Update(_) => &mut self.received.updates,
             Matter::Scene(_) => &mut self.received.scenes,
+            Matter::Tool(_) => &mut self.received.tools,
             Matter::Heartbeat => &mut self.received.heartbeats,
         };
         *count = count.saturating_add(1);
-        Some(datagram.matter)
+        Some(Opened {
+            matter: datagram.matter,
+            is_newest,
+        })
     }
 
     fn control_rate(&mut self, now: Time) {
@@ -135,6 +151,7 @@ impl LinkEnd {
                 &mut self.sent.updates,
             ),
             Outgoing::Scene(scene) => (encode_scene(&envelope, scene, out)?, &mut self.sent.scenes),
+            Outgoing::Tool(tool) => (encode_tool(&envelope, tool, out)?, &mut self.sent.tools),
             Outgoing::Heartbeat => (encode_heartbeat(&envelope, out)?, &mut self.sent.heartbeats),
         };
         *count = count.saturating_add(1);
@@ -200,7 +217,8 @@ mod tests {
         let mut buffer = [0; DATAGRAM_MAX];
         let now = Time::from_millis(5);
         let length = up.seal(now, Outgoing::Heartbeat, &mut buffer).unwrap();
-        assert_eq!(down.open(now, &buffer[..length]), Some(Matter::Heartbeat));
+        let opened = down.open(now, &buffer[..length]).unwrap();
+        assert_eq!((opened.matter, opened.is_newest), (Matter::Heartbeat, true));
         assert_eq!(down.open(now, &buffer[..length]), None, "a duplicate");
         assert_eq!(down.open(now, &buffer[..length - 1]), None, "cut short");
         let traffic = down.traffic();

@@ -1,14 +1,15 @@
-//! Messages in QUIC datagrams: an envelope and a command, update, scene or heartbeat.
+//! Messages in QUIC datagrams: an envelope and a command, update, scene, tool or heartbeat.
 //!
 //! One datagram is exactly one message. Nothing here allocates.
 
 use serde::{Deserialize, Serialize};
 
 use super::body::{Body, read, write};
-use super::error::{DecodeError, EncodeError, FieldError, demand};
+use super::error::{DecodeError, EncodeError, FieldError, demand, finite};
 use super::header::{Channel, DATAGRAM_MAX, Kind, Side, open};
-use super::message::{Command, Envelope, Scene, Update};
+use super::message::{Command, Envelope, HandPort, Scene, Tool, Update};
 use super::raw::{RawScene, RawUpdate};
+use super::samples::SampleBlock;
 
 /// A datagram that was read.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -32,6 +33,8 @@ pub enum Matter {
     Update(RawUpdate),
     /// What a viewer sees.
     Scene(Scene),
+    /// What the tool feels.
+    Tool(Tool),
     /// Nothing but the envelope.
     Heartbeat,
 }
@@ -45,7 +48,19 @@ pub fn encode_command(
     command: &Command,
     out: &mut [u8],
 ) -> Result<usize, EncodeError> {
-    write(&Sealed(*envelope, command), out)
+    let Command {
+        newest_update,
+        samples,
+        port,
+    } = *command;
+    let motion = Motion {
+        newest_update,
+        samples,
+    };
+    match port {
+        None => write(&Sealed(*envelope, motion), out),
+        Some(port) => write(&Sealed(*envelope, CoupledMotion(motion, port)), out),
+    }
 }
 
 /// Writes an update to the front of `out`; returns its length.
@@ -72,6 +87,14 @@ pub fn encode_scene(
     write(&Sealed(*envelope, RawScene::of(scene)), out)
 }
 
+/// Writes what the tool feels to the front of `out`; returns its length.
+///
+/// # Errors
+/// As [`encode_command`].
+pub fn encode_tool(envelope: &Envelope, tool: &Tool, out: &mut [u8]) -> Result<usize, EncodeError> {
+    write(&Sealed(*envelope, *tool), out)
+}
+
 /// Writes a heartbeat to the front of `out`; returns its length.
 ///
 /// # Errors
@@ -92,8 +115,16 @@ pub fn decode_datagram(bytes: &[u8], from: Side) -> Result<Datagram, DecodeError
     let (kind, body) = open(bytes, from, Channel::Datagram)?;
     let (envelope, matter) = match kind {
         Kind::Command => {
-            let Sealed(envelope, command) = read(body)?;
-            (envelope, Matter::Command(command))
+            let Sealed::<Motion>(envelope, motion) = read(body)?;
+            (envelope, Matter::Command(motion.with(None)))
+        }
+        Kind::CoupledCommand => {
+            let Sealed(envelope, CoupledMotion(motion, port)) = read(body)?;
+            (envelope, Matter::Command(motion.with(Some(port))))
+        }
+        Kind::Tool => {
+            let Sealed(envelope, tool) = read(body)?;
+            (envelope, Matter::Tool(tool))
         }
         Kind::Update => {
             let Sealed(envelope, update) = read(body)?;
@@ -120,6 +151,27 @@ pub fn decode_datagram(bytes: &[u8], from: Side) -> Result<Datagram, DecodeError
 #[derive(Serialize, Deserialize)]
 struct Sealed<M>(Envelope, M);
 
+/// The matter of a command.
+#[derive(Serialize, Deserialize)]
+struct Motion {
+    newest_update: u32,
+    samples: SampleBlock,
+}
+
+impl Motion {
+    fn with(&self, port: Option<HandPort>) -> Command {
+        Command {
+            newest_update: self.newest_update,
+            samples: self.samples,
+            port,
+        }
+    }
+}
+
+/// The matter of a command with the hand's port.
+#[derive(Serialize, Deserialize)]
+struct CoupledMotion(Motion, HandPort);
+
 /// The matter of a heartbeat: no bytes.
 #[derive(Serialize, Deserialize)]
 struct Silence;
@@ -142,7 +194,7 @@ impl<M: Sealable> Body for Sealed<M> {
     }
 }
 
-impl Sealable for Command {
+impl Sealable for Motion {
     const KIND: Kind = Kind::Command;
 
     fn check(&self) -> Result<(), FieldError> {
@@ -151,12 +203,31 @@ impl Sealable for Command {
     }
 }
 
-impl Sealable for &Command {
-    const KIND: Kind = Kind::Command;
+impl Sealable for CoupledMotion {
+    const KIND: Kind = Kind::CoupledCommand;
 
     fn check(&self) -> Result<(), FieldError> {
-        (*self).check()
+        let Self(motion, port) = self;
+        motion.check()?;
+        energy(port.in_j)
     }
+}
+
+impl Sealable for Tool {
+    const KIND: Kind = Kind::Tool;
+
+    fn check(&self) -> Result<(), FieldError> {
+        energy(self.in_j)?;
+        let is_share = (0.0..=1.0).contains(&self.model_error);
+        finite("model_error", self.model_error)?;
+        demand(is_share, "model_error", "must be 0 to 1")
+    }
+}
+
+/// What went in at a port.
+fn energy(in_j: f64) -> Result<(), FieldError> {
+    finite("in_j", in_j)?;
+    demand(in_j >= 0.0, "in_j", "must be 0 or more")
 }
 
 impl Sealable for RawUpdate {
@@ -191,6 +262,7 @@ pub(super) fn encode_read(read: &Datagram, out: &mut [u8]) -> Result<usize, Enco
         Matter::Command(command) => encode_command(&envelope, command, out),
         Matter::Update(update) => write(&Sealed(envelope, *update), out),
         Matter::Scene(scene) => encode_scene(&envelope, scene, out),
+        Matter::Tool(tool) => encode_tool(&envelope, tool, out),
         Matter::Heartbeat => encode_heartbeat(&envelope, out),
     }
 }

@@ -89,7 +89,7 @@ pub enum DecodeError {
         number: u8,
     },
     /// Flags are set that this version does not know.
-    #[error("a {} has the unknown flags {flags:#06x}: version 1 has none", kind.name())]
+    #[error("a {} has the unknown flags {flags:#06x}: this version has none", kind.name())]
     Flags {
         /// The message.
         kind: Kind,

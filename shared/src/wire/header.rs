@@ -9,10 +9,10 @@ use super::error::DecodeError;
 pub const MAGIC: [u8; 4] = *b"MMTP";
 
 /// The version of the protocol that this code speaks.
-pub const PROTOCOL_VERSION: u8 = 1;
+pub const PROTOCOL_VERSION: u8 = 2;
 
 /// The protocol's name in the TLS handshake (ALPN, RFC 7301); it carries the version.
-pub const ALPN: &str = "mmt/1";
+pub const ALPN: &str = "mmt/2";
 
 /// Length of the header, bytes.
 pub const HEADER_BYTES: usize = 8;
@@ -73,6 +73,10 @@ pub enum Kind {
     Scene = 3,
     /// A sign of life; both ways.
     Heartbeat = 4,
+    /// What the tool feels, where the hand may feel it too; down.
+    Tool = 5,
+    /// A command with what the hand's port says to the tool's; up.
+    CoupledCommand = 6,
     /// First message on the stream; up.
     Hello = 16,
     /// The slave's yes; down.
@@ -87,11 +91,13 @@ pub enum Kind {
 
 impl Kind {
     /// All types, in the order of their numbers.
-    pub const ALL: [Self; 9] = [
+    pub const ALL: [Self; 11] = [
         Self::Command,
         Self::Update,
         Self::Scene,
         Self::Heartbeat,
+        Self::Tool,
+        Self::CoupledCommand,
         Self::Hello,
         Self::Welcome,
         Self::Refused,
@@ -119,6 +125,8 @@ impl Kind {
             Self::Update => "update",
             Self::Scene => "scene",
             Self::Heartbeat => "heartbeat",
+            Self::Tool => "tool",
+            Self::CoupledCommand => "coupled_command",
             Self::Hello => "hello",
             Self::Welcome => "welcome",
             Self::Refused => "refused",
@@ -131,7 +139,12 @@ impl Kind {
     #[must_use]
     pub const fn channel(self) -> Channel {
         match self {
-            Self::Command | Self::Update | Self::Scene | Self::Heartbeat => Channel::Datagram,
+            Self::Command
+            | Self::Update
+            | Self::Scene
+            | Self::Heartbeat
+            | Self::Tool
+            | Self::CoupledCommand => Channel::Datagram,
             Self::Hello
             | Self::Welcome
             | Self::Refused
@@ -145,15 +158,20 @@ impl Kind {
     pub const fn is_sent_by(self, side: Side) -> bool {
         match self {
             Self::Heartbeat => true,
-            Self::Command | Self::Hello | Self::MasterFarewell => matches!(side, Side::Master),
-            Self::Update | Self::Scene | Self::Welcome | Self::Refused | Self::SlaveFarewell => {
-                matches!(side, Side::Slave)
+            Self::Command | Self::CoupledCommand | Self::Hello | Self::MasterFarewell => {
+                matches!(side, Side::Master)
             }
+            Self::Update
+            | Self::Scene
+            | Self::Tool
+            | Self::Welcome
+            | Self::Refused
+            | Self::SlaveFarewell => matches!(side, Side::Slave),
         }
     }
 }
 
-/// The header of a message of this type. The flags are all zero in version 1.
+/// The header of a message of this type. The flags are all zero in this version.
 pub(super) const fn header(kind: Kind) -> [u8; HEADER_BYTES] {
     let [m, t, u, v] = MAGIC;
     [m, t, u, v, PROTOCOL_VERSION, kind.number(), 0, 0]
@@ -198,7 +216,7 @@ mod tests {
     #[test]
     fn numbers_of_types_are_pinned() {
         let numbers = Kind::ALL.map(Kind::number);
-        assert_eq!(numbers, [1, 2, 3, 4, 16, 17, 18, 19, 20]);
+        assert_eq!(numbers, [1, 2, 3, 4, 5, 6, 16, 17, 18, 19, 20]);
         for number in 0..=u8::MAX {
             let kind = Kind::from_number(number);
             assert_eq!(kind.is_some(), numbers.contains(&number));
@@ -208,7 +226,7 @@ mod tests {
 
     #[test]
     fn header_is_readable_by_eye() {
-        assert_eq!(&header(Kind::Welcome), b"MMTP\x01\x11\x00\x00");
+        assert_eq!(&header(Kind::Welcome), b"MMTP\x02\x11\x00\x00");
         assert!(ALPN.ends_with(&PROTOCOL_VERSION.to_string()));
     }
 
@@ -218,7 +236,7 @@ mod tests {
         assert_eq!(error, DecodeError::OtherVersion { theirs: 7 });
         let text = error.to_string();
         assert!(
-            text.contains("version 7") && text.contains("version 1"),
+            text.contains("version 7") && text.contains("version 2"),
             "{text}"
         );
     }
@@ -241,16 +259,16 @@ mod tests {
     fn flags_short_headers_foreign_magic_and_unknown_types_are_refused() {
         let read = |bytes: &[u8]| open(bytes, Side::Master, Channel::Datagram).unwrap_err();
         let length = 7;
-        assert_eq!(read(b"MMTP\x01\x01\0"), DecodeError::TooShort { length });
-        assert_eq!(read(b"MMTQ\x01\x01\0\0"), DecodeError::NotOurs);
+        assert_eq!(read(b"MMTP\x02\x01\0"), DecodeError::TooShort { length });
+        assert_eq!(read(b"MMTQ\x02\x01\0\0"), DecodeError::NotOurs);
         let number = 99;
         assert_eq!(
-            read(b"MMTP\x01\x63\0\0"),
+            read(b"MMTP\x02\x63\0\0"),
             DecodeError::UnknownType { number }
         );
         let (kind, flags) = (Kind::Command, 0x0100);
         assert_eq!(
-            read(b"MMTP\x01\x01\0\x01"),
+            read(b"MMTP\x02\x01\0\x01"),
             DecodeError::Flags { kind, flags }
         );
     }

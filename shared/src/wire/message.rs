@@ -1,7 +1,7 @@
 //! The messages, as the two sides think of them.
 //!
-//! Datagrams: command (master to slave); update, scene (slave to master); heartbeat (both). Stream: hello,
-//! welcome, refusal, farewell. "Up" is master to slave, "down" is slave to master.
+//! Datagrams: command, with or without the hand's port (master to slave); update, scene, tool (slave to master);
+//! heartbeat (both). Stream: hello, welcome, refusal, farewell. "Up" is master to slave, "down" is slave to master.
 
 use serde::{Deserialize, Serialize};
 
@@ -117,13 +117,43 @@ pub struct HipSample {
 }
 
 /// The master's motion since its last command.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Command {
     /// Number of the newest update that the master has accepted, 0 before the first: the
     /// acknowledgement that the shadow needs.
     pub newest_update: u32,
     /// One sample or more.
     pub samples: SampleBlock,
+    /// The hand's port, where the hand may feel the tool's force.
+    pub port: Option<HandPort>,
+}
+
+/// What the hand's port says to the tool's: time-domain passivity control (TDPA) holds each side to what went in at
+/// the other (`docs/baselines.md`).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct HandPort {
+    /// E_in, the energy that went in at the hand so far, J; it only grows.
+    pub in_j: f64,
+    /// Whether the slave is to say the tool's force every tick.
+    pub wants_force: bool,
+    /// Whether the tool is to go only as far as the hand has paid for.
+    pub passive_tool: bool,
+}
+
+/// What the tool feels, where the hand may feel it too.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Tool {
+    /// Stamp of the HIP sample that the tool was at, by the master's clock: its age is the round trip that the hand
+    /// would feel, play-out included.
+    pub answers: Time,
+    /// f_s, the measured contact force on the object; none where the master has not asked for it.
+    pub force: Option<ForceCounts>,
+    /// Whether the tool touches the object.
+    pub in_contact: bool,
+    /// E_in of the tool's port, J; it only grows.
+    pub in_j: f64,
+    /// Relative force error of the local model over the last half second of contact, 0 to 1.
+    pub model_error: f64,
 }
 
 /// Why an update was sent.
@@ -214,6 +244,40 @@ pub enum Role {
     Operator,
 }
 
+/// Which architecture the master's hand feels.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Architecture {
+    /// Model-mediated teleoperation: the local model's force.
+    #[default]
+    Mmt,
+    /// The tool's force, with time-domain passivity control, as soon as it comes.
+    Tdpa,
+    /// The one of the two that the measured path and the model's error speak for.
+    Auto,
+}
+
+impl Architecture {
+    /// All of them, in the order of their numbers on the wire.
+    pub const ALL: [Self; 3] = [Self::Mmt, Self::Tdpa, Self::Auto];
+
+    /// Name in options and reports.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Mmt => "mmt",
+            Self::Tdpa => "tdpa",
+            Self::Auto => "auto",
+        }
+    }
+
+    /// Whether the hand may feel the tool's force, so that the two ports have to hear of each other.
+    #[must_use]
+    pub const fn feels_tool(self) -> bool {
+        matches!(self, Self::Tdpa | Self::Auto)
+    }
+}
+
 /// First message on the stream, master to slave.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hello {
@@ -223,8 +287,10 @@ pub struct Hello {
     pub role: Role,
     /// k_p and k_d of the master's device profile.
     pub coupling: Coupling,
-    /// Samples that the master puts in a command, 1 to [`SAMPLES_MAX`](super::SAMPLES_MAX).
+    /// Samples that the master puts in a command, 1 to [`SAMPLES_MAX`](super::SAMPLES_MAX); one while it feels the tool.
     pub samples_per_command: u8,
+    /// What the hand feels.
+    pub architecture: Architecture,
     /// Where the HIP is at the start, m.
     pub hip: Vec2,
     /// Name and version of the program, for the other side's log.

@@ -18,7 +18,7 @@ mod tests;
 mod totals;
 
 pub use datagram::{
-    Datagram, Matter, decode_datagram, encode_command, encode_heartbeat, encode_scene,
+    Datagram, Matter, decode_datagram, encode_command, encode_heartbeat, encode_scene, encode_tool,
     encode_update,
 };
 pub use error::{DecodeError, EncodeError, FieldError};
@@ -28,8 +28,8 @@ pub use header::{
 };
 pub use label::{LABEL_MAX, Label};
 pub use message::{
-    Cause, Command, Echo, Ending, Envelope, Farewell, ForceCounts, Hello, HipCounts, HipSample,
-    Refusal, Role, Scene, Update, Welcome,
+    Architecture, Cause, Command, Echo, Ending, Envelope, Farewell, ForceCounts, HandPort, Hello,
+    HipCounts, HipSample, Refusal, Role, Scene, Tool, Update, Welcome,
 };
 pub use raw::{HelloError, RawHello, RawUpdate, RawWelcome, WelcomeError};
 pub use samples::{PushError, SAMPLES_MAX, SampleBlock};

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::error::{FieldError, demand, finite};
 use super::label::Label;
-use super::message::{Cause, Hello, Role, Scene, Update, Welcome};
+use super::message::{Architecture, Cause, Hello, Role, Scene, Update, Welcome};
 use super::samples::SAMPLES_MAX;
 use crate::contact::Coupling;
 use crate::geometry::{BoxFootprint, Pose, Twist, Vec2};
@@ -195,6 +195,7 @@ pub struct RawHello {
     role: Role,
     coupling: [f64; 2],
     samples_per_command: u8,
+    architecture: Architecture,
     hip: [f64; 2],
     program: Label,
 }
@@ -224,6 +225,7 @@ impl RawHello {
             role: hello.role,
             coupling: [stiffness_n_per_m, damping_ns_per_m],
             samples_per_command: hello.samples_per_command,
+            architecture: hello.architecture,
             hip: hello.hip.into(),
             program: hello.program,
         }
@@ -265,6 +267,7 @@ impl RawHello {
             role: self.role,
             coupling,
             samples_per_command: samples,
+            architecture: self.architecture,
             hip: Vec2::new(x, y),
             program: self.program,
         })

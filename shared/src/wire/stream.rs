@@ -102,9 +102,12 @@ pub fn decode_stream_message(message: &[u8], from: Side) -> Result<StreamMessage
         Kind::Refused => read(body).map(StreamMessage::Refused),
         Kind::MasterFarewell => read(body).map(StreamMessage::MasterFarewell),
         Kind::SlaveFarewell => read(body).map(StreamMessage::SlaveFarewell),
-        Kind::Command | Kind::Update | Kind::Scene | Kind::Heartbeat => {
-            Err(DecodeError::WrongChannel { kind })
-        }
+        Kind::Command
+        | Kind::Update
+        | Kind::Scene
+        | Kind::Heartbeat
+        | Kind::Tool
+        | Kind::CoupledCommand => Err(DecodeError::WrongChannel { kind }),
     }
 }
 

@@ -57,6 +57,7 @@ fn hello() -> Hello {
         role: Role::Operator,
         coupling: COUPLING,
         samples_per_command: 10,
+        architecture: Architecture::Auto,
         hip: Vec2::new(-0.3, 0.0),
         program: Label::clipped("mmt test"),
     }
@@ -130,6 +131,29 @@ fn command() -> Command {
     Command {
         newest_update: 250,
         samples: push_samples(10, 1e-4),
+        port: None,
+    }
+}
+
+fn coupled_command() -> Command {
+    Command {
+        samples: push_samples(1, 0.0),
+        port: Some(HandPort {
+            in_j: 0.125,
+            wants_force: true,
+            passive_tool: false,
+        }),
+        ..command()
+    }
+}
+
+fn tool() -> Tool {
+    Tool {
+        answers: Time::from_millis(12),
+        force: Some(ForceCounts { x: 20_000, y: -5 }),
+        in_contact: true,
+        in_j: 0.25,
+        model_error: 0.125,
     }
 }
 
@@ -149,6 +173,14 @@ fn datagrams() -> Vec<(Side, Vec<u8>)> {
             written(|out| encode_scene(&ENVELOPE, &scene(), out)),
         ),
         (Side::Slave, written(|out| encode_heartbeat(&ENVELOPE, out))),
+        (
+            Side::Slave,
+            written(|out| encode_tool(&ENVELOPE, &tool(), out)),
+        ),
+        (
+            Side::Master,
+            written(|out| encode_command(&ENVELOPE, &coupled_command(), out)),
+        ),
     ]
 }
 
@@ -200,6 +232,8 @@ fn every_datagram_reads_back_as_it_was_written() {
     assert_eq!(raw.accept(&COUPLING), Ok(update()));
     assert_eq!(matters[2], Matter::Scene(scene()));
     assert_eq!(matters[3], Matter::Heartbeat);
+    assert_eq!(matters[4], Matter::Tool(tool()));
+    assert_eq!(matters[5], Matter::Command(coupled_command()));
 }
 
 #[test]
@@ -222,7 +256,7 @@ fn every_stream_message_reads_back_as_it_was_written() {
     );
     assert_eq!(messages[4], StreamMessage::SlaveFarewell(slave_farewell()));
     let kinds: Vec<_> = messages.iter().map(StreamMessage::kind).collect();
-    assert_eq!(kinds, Kind::ALL[4..]);
+    assert_eq!(kinds, Kind::ALL[6..]);
 }
 
 #[test]
@@ -277,13 +311,13 @@ fn every_byte_changed_to_every_value_reads_as_itself_or_not_at_all() {
 
 #[test]
 fn an_over_long_varint_is_refused() {
-    let short = b"MMTP\x01\x04\0\0\x01\x00\x00";
+    let short = b"MMTP\x02\x04\0\0\x01\x00\x00";
     assert!(decode_datagram(short, Side::Master).is_ok());
     let kind = Kind::Heartbeat;
     for long in [
-        &b"MMTP\x01\x04\0\0\x81\x00\x00\x00"[..],
-        &b"MMTP\x01\x04\0\0\x01\x80\x00\x00"[..],
-        &b"MMTP\x01\x04\0\0\x81\x80\x80\x80\x00\x00\x00"[..],
+        &b"MMTP\x02\x04\0\0\x81\x00\x00\x00"[..],
+        &b"MMTP\x02\x04\0\0\x01\x80\x00\x00"[..],
+        &b"MMTP\x02\x04\0\0\x81\x80\x80\x80\x00\x00\x00"[..],
     ] {
         let expected = Err(DecodeError::NotCanonical { kind });
         assert_eq!(decode_datagram(long, Side::Master), expected);
@@ -372,6 +406,19 @@ fn what_the_other_side_would_refuse_is_not_written() {
     let mut bad = scene();
     bad.force.y = f64::INFINITY;
     refused(encode_scene(&ENVELOPE, &bad, &mut out));
+    for in_j in [-1e-9, f64::NAN, f64::INFINITY] {
+        refused(encode_tool(&ENVELOPE, &Tool { in_j, ..tool() }, &mut out));
+        let port = coupled_command().port.map(|port| HandPort { in_j, ..port });
+        let bad = Command { port, ..command() };
+        refused(encode_command(&ENVELOPE, &bad, &mut out));
+    }
+    for model_error in [-0.1, 1.1, f64::NAN] {
+        let bad = Tool {
+            model_error,
+            ..tool()
+        };
+        refused(encode_tool(&ENVELOPE, &bad, &mut out));
+    }
     let mut bad = slave_farewell();
     bad.totals.force.pmse = Some(f64::NAN);
     refused(encode_slave_farewell(&bad, &mut out));
@@ -430,11 +477,19 @@ fn the_longest_messages_fit() {
     let command = Command {
         newest_update: u32::MAX,
         samples,
+        port: None,
     };
     let bytes = written(|out| encode_command(&envelope, &command, out));
     // 8 header, 46 envelope, 5 newest update, 1 length, 30 the first sample, 25 each other
     assert_eq!(bytes.len(), 8 + 46 + 5 + 1 + 30 + 31 * 25);
-    assert!(bytes.len() <= DATAGRAM_MAX);
+    let coupled = Command {
+        port: Some(HandPort::default()),
+        ..command
+    };
+    let longest = written(|out| encode_command(&envelope, &coupled, out));
+    // 8 E_in, 1 for each wish
+    assert_eq!(longest.len(), bytes.len() + 10);
+    assert!(longest.len() <= DATAGRAM_MAX);
     assert!(reads_only_what_it_writes(&bytes, Side::Master).is_some());
 }
 
@@ -455,6 +510,7 @@ fn ten_samples_of_a_push_take_115_bytes_in_all_and_125_with_a_strong_tremor() {
         let command = Command {
             newest_update: 250,
             samples: push_samples(10, tremor),
+            port: None,
         };
         written(|out| encode_command(&envelope, &command, out)).len()
     };
@@ -478,6 +534,7 @@ fn pinned<const N: usize>(choices: [impl serde::Serialize + std::fmt::Debug; N])
 fn numbers_of_choices_are_pinned() {
     pinned(Cause::ALL);
     pinned([Role::Operator]);
+    pinned(Architecture::ALL);
     pinned([
         Refusal::Busy,
         Refusal::WrongToken,
@@ -602,6 +659,7 @@ fn any_command() -> impl Strategy<Value = Command> {
         Command {
             newest_update,
             samples,
+            port: None,
         }
     })
 }
@@ -632,9 +690,24 @@ fn any_state() -> impl Strategy<Value = ModelState> {
     })
 }
 
+fn any_port() -> impl Strategy<Value = HandPort> {
+    (0.0..1e9, any::<bool>(), any::<bool>()).prop_map(|(in_j, wants_force, passive_tool)| {
+        HandPort {
+            in_j,
+            wants_force,
+            passive_tool,
+        }
+    })
+}
+
 proptest! {
     #[test]
-    fn any_command_reads_back(envelope in any_envelope(), command in any_command()) {
+    fn any_command_reads_back(
+        envelope in any_envelope(),
+        command in any_command(),
+        port in prop::option::of(any_port()),
+    ) {
+        let command = Command { port, ..command };
         let bytes = written(|out| encode_command(&envelope, &command, out));
         let matter = Matter::Command(command);
         prop_assert!(bytes.len() <= DATAGRAM_MAX);
@@ -681,6 +754,21 @@ proptest! {
     }
 
     #[test]
+    fn any_tool_reads_back(
+        envelope in any_envelope(),
+        (answers, in_j, model_error) in (any::<u64>(), 0.0..1e9, 0.0..=1.0),
+        (force, in_contact) in (prop::option::of(any::<[i32; 2]>()), any::<bool>()),
+    ) {
+        let answers = Time::from_nanos(answers);
+        let force = force.map(|[x, y]| ForceCounts { x, y });
+        let tool = Tool { answers, force, in_contact, in_j, model_error };
+        let bytes = written(|out| encode_tool(&envelope, &tool, out));
+        let matter = Matter::Tool(tool);
+        prop_assert_eq!(decode_datagram(&bytes, Side::Slave), Ok(Datagram { envelope, matter }));
+        prop_assert!(decode_datagram(&bytes, Side::Master).is_err());
+    }
+
+    #[test]
     fn any_hello_and_welcome_read_back(
         token: [u8; 32],
         (k_p, k_d, tau) in (50.0..10_000.0, 0.0..100.0, 0.001..10.0),
@@ -692,6 +780,7 @@ proptest! {
             token: Token::new(token),
             coupling,
             samples_per_command: samples,
+            architecture: Architecture::ALL[usize::from(samples) % 3],
             hip: Vec2::new(x, -x),
             program: Label::clipped(&name),
             ..hello()

@@ -8,7 +8,7 @@ use super::message::Cause;
 /// Messages in datagrams, by type.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct KindCounts {
-    /// Commands.
+    /// Commands, with and without the hand's port.
     pub commands: u32,
     /// Updates, repeats included.
     pub updates: u32,
@@ -16,6 +16,8 @@ pub struct KindCounts {
     pub scenes: u32,
     /// Heartbeats.
     pub heartbeats: u32,
+    /// What the tool feels.
+    pub tools: u32,
 }
 
 impl KindCounts {
@@ -26,6 +28,7 @@ impl KindCounts {
             + u64::from(self.updates)
             + u64::from(self.scenes)
             + u64::from(self.heartbeats)
+            + u64::from(self.tools)
     }
 }
 
