@@ -64,7 +64,9 @@ impl Haptic {
         let tick = self.master.tick(self.now, reading, Duration::ZERO);
         self.hand_force = tick.hand_force;
         self.contact += u64::from(tick.rendered.in_contact());
-        self.link.send(self.now, tick.sample, out).unwrap()
+        self.link
+            .send(self.now, tick.sample, tick.port, out)
+            .unwrap()
     }
 }
 

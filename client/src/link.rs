@@ -9,7 +9,8 @@ use mmt_shared::peer::{Freshness, SequenceWindow};
 use mmt_shared::rate_control::StretchMax;
 use mmt_shared::time::Time;
 use mmt_shared::wire::{
-    Command, HipSample, Matter, SAMPLES_MAX, SampleBlock, Scene, Side, Update, UpdateDrops,
+    Command, HandPort, HipSample, Matter, SAMPLES_MAX, SampleBlock, Scene, Side, Tool, Update,
+    UpdateDrops,
 };
 use serde::{Deserialize, Serialize};
 
@@ -56,6 +57,8 @@ pub enum FromSlave {
     Update(Update),
     /// What the slave sees.
     Scene(Scene),
+    /// What the tool feels, newer than all before.
+    Tool(Tool),
 }
 
 /// The master's end of the link.
@@ -130,7 +133,8 @@ impl MasterLink {
 
     /// Takes in a datagram that arrived at `now`.
     pub fn handle(&mut self, now: Time, bytes: &[u8]) -> Option<FromSlave> {
-        match self.end.open(now, bytes)? {
+        let opened = self.end.open(now, bytes)?;
+        match opened.matter {
             Matter::Update(raw) => {
                 if self.window.offer(raw.sequence()) != Freshness::Fresh {
                     return None;
@@ -144,12 +148,13 @@ impl MasterLink {
                 }
             }
             Matter::Scene(scene) => Some(FromSlave::Scene(scene)),
+            Matter::Tool(tool) => opened.is_newest.then_some(FromSlave::Tool(tool)),
             Matter::Command(_) | Matter::Heartbeat => None,
         }
     }
 
-    /// Packs a sample; once the command is full it is written to `out` and its length returned. Under congestion
-    /// only every second, third, … sample is packed.
+    /// Packs a sample; once the command is full it is written to `out` and its length returned. While the hand's `port`
+    /// wants the tool's force, each sample goes at once. Under congestion only every second, third, … sample is packed.
     ///
     /// # Errors
     /// When the command cannot be sealed; its samples are lost then.
@@ -157,6 +162,7 @@ impl MasterLink {
         &mut self,
         now: Time,
         sample: HipSample,
+        port: Option<HandPort>,
         out: &mut [u8],
     ) -> Result<Option<usize>, SealError> {
         if self.to_skip > 0 {
@@ -168,13 +174,19 @@ impl MasterLink {
         if self.block.push(sample).is_err() {
             self.samples_refused = self.samples_refused.saturating_add(1);
         }
-        if self.block.len() < usize::from(self.config.samples_per_command) && !self.block.is_full()
-        {
+        let at_once = port.is_some_and(|port| port.wants_force);
+        let full = self.block.len() >= usize::from(self.config.samples_per_command);
+        if !at_once && !full && !self.block.is_full() {
             return Ok(None);
         }
         let command = Command {
             newest_update: self.window.newest(),
-            samples: self.with_repeats(),
+            samples: match at_once {
+                // what the next packet says a tick later needs no repeat
+                true => self.block,
+                false => self.with_repeats(),
+            },
+            port,
         };
         self.block.clear();
         self.end

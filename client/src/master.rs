@@ -1,4 +1,4 @@
-//! The master's core: one haptic tick around the local model.
+//! The master's core: one haptic tick around the local model, and around the tool's force where that may be felt.
 //!
 //! HIP in, force out, a sample for the slave. It must never wait, allocate, log or read a clock, and
 //! force leaves it through the limiter only.
@@ -10,8 +10,11 @@ use std::time::Duration;
 use mmt_shared::geometry::Vec2;
 use mmt_shared::local_model::{LocalModel, Rendered};
 use mmt_shared::time::Time;
-use mmt_shared::wire::{ForceCounts, HipCounts, HipSample, Update, Welcome};
+use mmt_shared::wire::{
+    Architecture, ForceCounts, HandPort, HipCounts, HipSample, Tool, Update, Welcome,
+};
 
+use crate::either::Either;
 use crate::failsafe::LinkState;
 use crate::limiter::ForceLimiter;
 use crate::operator::scripted::View;
@@ -20,10 +23,14 @@ pub use port::PortObserver;
 /// What one haptic tick gave.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MasterTick {
-    /// Goes to the slave: the HIP and the force that the model rendered for it.
+    /// Goes to the slave: the HIP and the force that is felt for it.
     pub sample: HipSample,
+    /// Goes to the tool's port, where the hand may feel the tool's force.
+    pub port: Option<HandPort>,
     /// What the model did.
     pub rendered: Rendered,
+    /// Force on the object that is felt, N, before the limiter: f_m, the model's where nothing else may be felt.
+    pub felt: Vec2,
     /// Goes to the device: force on the hand, N, world, limited.
     pub hand_force: Vec2,
     /// The link as this tick saw it.
@@ -34,6 +41,8 @@ pub struct MasterTick {
 #[derive(Clone, Debug)]
 pub struct Master {
     model: LocalModel,
+    /// Where the hand may feel the tool's force.
+    either: Option<Either>,
     limiter: ForceLimiter,
     link: LinkState,
     port: PortObserver,
@@ -46,10 +55,22 @@ pub struct Master {
 impl Master {
     /// A master that renders what the slave's welcome says, its force limited by `limiter`.
     #[must_use]
-    pub fn new(welcome: &Welcome, mut limiter: ForceLimiter) -> Self {
+    pub fn new(welcome: &Welcome, limiter: ForceLimiter) -> Self {
+        Self::with_architecture(welcome, limiter, Architecture::Mmt)
+    }
+
+    /// A master whose hand feels the force of this architecture; the model's, until it has heard of the tool.
+    #[must_use]
+    pub fn with_architecture(
+        welcome: &Welcome,
+        mut limiter: ForceLimiter,
+        architecture: Architecture,
+    ) -> Self {
         limiter.engage();
+        let k_p = welcome.settings.coupling.stiffness_n_per_m;
         Self {
             model: LocalModel::new(welcome.settings, welcome.state),
+            either: Either::new(architecture, k_p),
             limiter,
             link: LinkState::Fresh,
             port: PortObserver::default(),
@@ -60,7 +81,13 @@ impl Master {
         }
     }
 
-    /// The model that is felt.
+    /// Whose force is felt, where there is a choice.
+    #[must_use]
+    pub fn either(&self) -> Option<&Either> {
+        self.either.as_ref()
+    }
+
+    /// The local model, felt or not.
     #[must_use]
     pub fn model(&self) -> &LocalModel {
         &self.model
@@ -102,14 +129,16 @@ impl Master {
         &self.port
     }
 
-    /// What the operator sees: the local model, which is where it is felt.
+    /// What the operator sees: the local model. In contact is what is felt.
     #[must_use]
     pub fn view(&self) -> View {
         let state = self.model.state();
+        let touches_model = self.model.rendered().in_contact();
+        let in_contact = |either: &Either| either.in_contact(touches_model);
         View {
             pose: state.pose,
             footprint: state.footprint,
-            in_contact: self.model.rendered().in_contact(),
+            in_contact: self.either.as_ref().map_or(touches_model, in_contact),
         }
     }
 
@@ -128,6 +157,13 @@ impl Master {
         }
     }
 
+    /// Takes in news of the tool that arrived at `now`, no older than the news before. Without a choice they change nothing.
+    pub fn hear_tool(&mut self, now: Time, tool: &Tool) {
+        if let Some(either) = &mut self.either {
+            either.receive(now, tool);
+        }
+    }
+
     /// One sample period. `stamp` is the tick's time, `reading` the device's HIP (m, world), `silence`
     /// the time since anything was heard of the slave.
     pub fn tick(&mut self, stamp: Time, reading: Vec2, silence: Duration) -> MasterTick {
@@ -141,18 +177,28 @@ impl Master {
         if self.link == LinkState::Released {
             self.limiter.release();
         }
-        let rendered = self.model.step(stamp, self.hip.metres());
-        let force = ForceCounts::nearest(rendered.force);
+        let hip = self.hip.metres();
+        let rendered = self.model.step(stamp, hip);
+        let felt = match &mut self.either {
+            Some(either) => either.blend(hip, &mut self.model, &rendered),
+            None => rendered.force,
+        };
+        let force = ForceCounts::nearest(felt);
         let sample = HipSample {
             stamp,
             hip: self.hip,
             force,
         };
-        let hand_force = self.limiter.limit(-rendered.force);
-        self.port.push(self.hip.metres(), hand_force);
+        let hand_force = self.limiter.limit(-felt);
+        if let Some(either) = &mut self.either {
+            either.displayed(hand_force);
+        }
+        self.port.push(hip, hand_force);
         MasterTick {
             sample,
+            port: self.either.as_ref().map(Either::port),
             rendered,
+            felt,
             hand_force,
             link: self.link,
         }

@@ -1,14 +1,12 @@
 //! Every architecture over one network with one operator: who is usable at which delay.
 //!
-//! Bilateral ones run in [`Bilateral`], model-mediated ones in [`World`]; [`run`] gives the same row for both. What the
+//! Bilateral ones run in [`Bilateral`], the live system's own in [`World`]; [`run`] gives the same row for both. What the
 //! columns mean: `docs/baselines.md`. A run must never depend on anything but its arguments.
 
 mod bilateral;
-mod either;
 mod felt;
 
 pub use bilateral::{Bilateral, BilateralOutcome};
-pub use either::{EitherOutcome, EitherWorld};
 pub use felt::{FeltMass, FeltMasses};
 
 use std::time::Duration;
@@ -20,6 +18,7 @@ use mmt_server::playout::PlayoutBuffer;
 use mmt_shared::bilateral::Baseline;
 use mmt_shared::bilateral::message::OVERHEAD_BYTES;
 use mmt_shared::settings::{ModelSettings, PoseCorrection};
+use mmt_shared::wire;
 use serde::Serialize;
 
 use crate::world::{World, WorldConfig, WorldError};
@@ -113,11 +112,11 @@ pub fn run(
             Ok(bilateral_row(&world, duration))
         }
         Architecture::Auto => {
-            let mut world = EitherWorld::try_new(config, None)?;
-            for _ in 0..duration.as_millis() {
-                world.step();
-            }
-            Ok(either_row(&world, duration))
+            let config = WorldConfig {
+                architecture: wire::Architecture::Auto,
+                ..config.clone()
+            };
+            Ok(world_row(World::try_new(&config)?, duration))
         }
         Architecture::Mediated(correction) => {
             let device = DeviceProfile::default().used_with(config.stiffness_n_per_m, None)?;
@@ -131,7 +130,7 @@ pub fn run(
                 }),
                 ..config.clone()
             };
-            Ok(mediated_row(World::try_new(&config)?, duration))
+            Ok(world_row(World::try_new(&config)?, duration))
         }
     }
 }
@@ -160,30 +159,7 @@ fn bilateral_row(world: &Bilateral, duration: Duration) -> DelayRow {
     }
 }
 
-fn either_row(world: &EitherWorld, duration: Duration) -> DelayRow {
-    let (outcome, force) = (world.outcome(), world.force());
-    let pushes = world.operator().pushes_completed().unwrap_or(0);
-    let seconds = duration.as_secs_f64();
-    let [up, down] = world.sent();
-    DelayRow {
-        pushes,
-        packet_rate_hz: outcome.with_news as f64 / seconds,
-        wire_rate_hz: down.packets as f64 / seconds,
-        wire_bytes_per_s: (up.bytes + down.bytes) as f64 / seconds,
-        pmse: force.pmse,
-        relative_error: force.relative_error,
-        pose_rms_mm: outcome.pose.position_rms_m().map(|m| m * 1e3),
-        force_peak_n: outcome.on_hand.largest_n(),
-        breaks_per_push: outcome.breaks.per_push(pushes),
-        energy_injected_j: Some(world.master().model().energy_injected_j()),
-        observer_min_j: world.master().port().least_j(),
-        network_min_j: None,
-        playout_delay_ms: playout_delay_ms(world.slave().playout()),
-        apparent_mass_ratio: outcome.felt.ratio(),
-    }
-}
-
-fn mediated_row(mut world: World, duration: Duration) -> DelayRow {
+fn world_row(mut world: World, duration: Duration) -> DelayRow {
     let mut felt = FeltMasses::default();
     let ticks = u64::try_from(duration.as_millis()).unwrap_or(u64::MAX);
     for _ in 0..ticks {
@@ -192,7 +168,7 @@ fn mediated_row(mut world: World, duration: Duration) -> DelayRow {
             Operator::Scripted(scripted) => scripted.phase() == Phase::Push,
             Operator::Trace(_) => true,
         };
-        let in_contact = tick.master.rendered.in_contact();
+        let in_contact = world.master().view().in_contact;
         let hip = tick.master.sample.hip.metres();
         felt.push_hand(tick.now, hip, -tick.master.hand_force, pushes && in_contact);
         if let Some(slave) = &tick.slave {
@@ -206,7 +182,7 @@ fn mediated_row(mut world: World, duration: Duration) -> DelayRow {
     let headers = OVERHEAD_BYTES as u64 * (up.packets + down.packets);
     DelayRow {
         pushes,
-        packet_rate_hz: outcome.updates.total() as f64 / seconds,
+        packet_rate_hz: (outcome.updates.total() + outcome.forces) as f64 / seconds,
         wire_rate_hz: down.packets as f64 / seconds,
         wire_bytes_per_s: (up.bytes + down.bytes + headers) as f64 / seconds,
         pmse: force.pmse,

@@ -123,6 +123,8 @@ pub struct Outcome {
     pub energy_injected_j: f64,
     /// The least that the passivity observer at the hand ever showed, J.
     pub observer_min_j: f64,
+    /// Packets with a force of the tool.
+    pub forces: u64,
     newest_answer: Option<Time>,
     /// Number of the newest update that the master has.
     newest_update: u32,
@@ -139,14 +141,15 @@ impl World {
         let settings = config
             .settings
             .unwrap_or_else(|| config.slave.mode.model_settings(coupling));
-        let mut slave = Slave::with_settings(&config.slave, settings)?;
+        let mut slave = Slave::with_settings(&config.slave(), settings)?;
         let welcome = Welcome {
             settings,
             state: *slave.state(),
             scheme: Label::clipped(&config.slave.trigger.scheme.to_string()),
             program: Label::clipped("lab"),
         };
-        let master = Master::new(&welcome, ForceLimiter::try_new(device.limits())?);
+        let limiter = ForceLimiter::try_new(device.limits())?;
+        let master = Master::with_architecture(&welcome, limiter, config.architecture);
         let view: View = master.view();
         let scripted = Scripted::try_new(config.operator, view)?;
         let operator = Operator::Scripted(Box::new(scripted));
@@ -247,6 +250,17 @@ impl World {
         of(&self.up) + of(&self.down)
     }
 
+    /// Another network from now on, both ways; what is on its way is lost, and what was sent is counted anew.
+    ///
+    /// # Errors
+    /// When a number of the network is not accepted.
+    pub fn rewire(&mut self, link: &LinkConfig, seed: u64) -> Result<(), WorldError> {
+        self.up = SimPath::try_new(link.clone(), seed, LinkId::first(Direction::Up))?;
+        self.down = SimPath::try_new(link.clone(), seed, LinkId::first(Direction::Down))?;
+        (self.down_delay, _) = link.delay.parts();
+        Ok(())
+    }
+
     /// The operator.
     #[must_use]
     pub fn operator(&self) -> &Operator {
@@ -306,9 +320,13 @@ impl World {
             }
             let Packet { bytes, length } = packet.payload;
             let bytes = bytes.get(..length).unwrap_or_default();
-            if let Some(FromSlave::Update(update)) = self.master_link.handle(packet.due, bytes) {
-                self.outcome.superseded += u32::from(newest.is_some());
-                newest = Some(update);
+            match self.master_link.handle(packet.due, bytes) {
+                Some(FromSlave::Update(update)) => {
+                    self.outcome.superseded += u32::from(newest.is_some());
+                    newest = Some(update);
+                }
+                Some(FromSlave::Tool(tool)) => self.master.hear_tool(packet.due, &tool),
+                Some(FromSlave::Scene(_)) | None => {}
             }
         }
         if let Some(update) = newest {
@@ -332,10 +350,13 @@ impl World {
         self.outcome.on_hand.push(tick.hand_force);
         self.outcome.energy_injected_j = self.master.energy_injected_j();
         self.outcome.observer_min_j = self.master.port().least_j();
-        self.outcome.breaks.push(tick.rendered.in_contact());
+        self.outcome.breaks.push(self.master.view().in_contact);
         let mut bytes = [0; DATAGRAM_MAX];
         // a message that cannot be sealed is as good as lost; the ends count what they sent
-        if let Ok(Some(length)) = self.master_link.send(self.now, tick.sample, &mut bytes) {
+        let sent = self
+            .master_link
+            .send(self.now, tick.sample, tick.port, &mut bytes);
+        if let Ok(Some(length)) = sent {
             self.up.push(self.now, length, Packet { bytes, length });
         }
         if let Ok(Some(length)) = self.master_link.heartbeat(self.now, &mut bytes) {
@@ -385,6 +406,9 @@ impl World {
                     self.slave.handle_sample(arrived, &sample, newest_update);
                 }
                 self.slave.stretch(self.slave_link.end().stretch());
+                if let Some(port) = &command.port {
+                    self.slave.hear_hand(port);
+                }
             }
         }
     }
@@ -407,6 +431,7 @@ impl World {
                 }
             }
         }
+        self.tell_of_tool(now, tick.as_ref());
         if let Ok(Some(length)) = self.slave_link.repeat(now, &mut bytes) {
             self.down.push(self.now, length, Packet { bytes, length });
         }
@@ -416,15 +441,29 @@ impl World {
         tick
     }
 
+    /// What the tool feels goes out every tick while the hand wants its force, else when it is due.
+    fn tell_of_tool(&mut self, now: Time, tick: Option<&SlaveTick>) {
+        let Some(tool) = tick.map(|tick| self.slave.tool(tick)) else {
+            return;
+        };
+        let due = self.slave_link.tool_due();
+        if tool.force.is_none() && due.is_none_or(|due| due > now) {
+            return;
+        }
+        self.outcome.forces += u64::from(tool.force.is_some());
+        let mut bytes = [0; DATAGRAM_MAX];
+        if let Ok(Some(length)) = self.slave_link.send_tool(now, Some(&tool), &mut bytes) {
+            self.down.push(self.now, length, Packet { bytes, length });
+        }
+    }
+
     /// Every number that either side felt or said goes into the log, bit by bit.
     fn log_tick(&mut self, master: &MasterTick, slave: Option<&SlaveTick>) {
         let mut number = |value: f64| self.log.update(value.to_bits().to_le_bytes());
-        [master.rendered.force, master.hand_force]
-            .iter()
-            .for_each(|f| {
-                number(f.x);
-                number(f.y);
-            });
+        [master.felt, master.hand_force].iter().for_each(|f| {
+            number(f.x);
+            number(f.y);
+        });
         if let Some(slave) = slave {
             [slave.tool, slave.f_s, slave.f_shadow]
                 .iter()

@@ -1,14 +1,14 @@
-//! The slave's end of the link: commands in, updates and their repeats out. Pure.
+//! The slave's end of the link: commands in, updates with their repeats and news of the tool out. Pure.
 
 mod repeats;
 
 pub use repeats::{REPEATS_MAX, Repeats, RepeatsError};
 
-use mmt_shared::link_end::{LinkEnd, Outgoing, SealError};
+use mmt_shared::link_end::{HEARTBEAT, LinkEnd, Outgoing, SealError};
 use mmt_shared::metrics::UpdateCounts;
 use mmt_shared::rate_control::StretchMax;
 use mmt_shared::time::Time;
-use mmt_shared::wire::{Command, HipSample, Matter, Side, Update};
+use mmt_shared::wire::{Architecture, Command, HipSample, Matter, Side, Tool, Update};
 
 use repeats::Repeating;
 
@@ -21,6 +21,8 @@ pub struct SlaveLinkConfig {
     pub stretch_max: StretchMax,
     /// How many samples of a command are news, as the master's hello says; those before them are repeats.
     pub samples_per_command: u8,
+    /// Whose force the master's hand feels, as its hello says.
+    pub architecture: Architecture,
 }
 
 /// The slave's end of the link.
@@ -32,6 +34,7 @@ pub struct SlaveLink {
     samples: u64,
     repeating: Option<Repeating>,
     repeated: UpdateCounts,
+    tool_sent: Time,
 }
 
 impl SlaveLink {
@@ -45,6 +48,7 @@ impl SlaveLink {
             samples: 0,
             repeating: None,
             repeated: UpdateCounts::default(),
+            tool_sent: now,
         }
     }
 
@@ -52,6 +56,12 @@ impl SlaveLink {
     #[must_use]
     pub fn end(&self) -> &LinkEnd {
         &self.end
+    }
+
+    /// Whose force the master's hand feels, as its hello says.
+    #[must_use]
+    pub fn architecture(&self) -> Architecture {
+        self.config.architecture
     }
 
     /// The newest update that the master has said it has.
@@ -72,11 +82,15 @@ impl SlaveLink {
         &self.repeated
     }
 
-    /// Takes in a datagram that arrived at `now`; its samples are for the play-out buffer.
+    /// Takes in a datagram that arrived at `now`; its samples are for the play-out buffer. It keeps its port only where
+    /// the hello has spoken of one and no newer datagram has been there: an older one knows nothing that counts.
     pub fn handle(&mut self, now: Time, bytes: &[u8]) -> Option<Command> {
-        let Matter::Command(command) = self.end.open(now, bytes)? else {
+        let opened = self.end.open(now, bytes)?;
+        let Matter::Command(mut command) = opened.matter else {
             return None;
         };
+        let counts = opened.is_newest && self.config.architecture.feels_tool();
+        command.port = command.port.filter(|_| counts);
         self.newest_acknowledged = self.newest_acknowledged.max(command.newest_update);
         self.samples += command.samples.len() as u64;
         Some(command)
@@ -138,6 +152,28 @@ impl SlaveLink {
         let length = self.seal(now, &update, out)?;
         self.repeated.sent(update.cause);
         Ok(Some(length))
+    }
+
+    /// When news of the tool are due although nobody asked for the force; never where the hand cannot feel it.
+    #[must_use]
+    pub fn tool_due(&self) -> Option<Time> {
+        let feels = self.config.architecture.feels_tool();
+        feels.then(|| self.tool_sent + HEARTBEAT)
+    }
+
+    /// Writes news of the tool to `out`; returns their length. None without news, which are then due a period later.
+    ///
+    /// # Errors
+    /// When they cannot be sealed.
+    pub fn send_tool(
+        &mut self,
+        now: Time,
+        tool: Option<&Tool>,
+        out: &mut [u8],
+    ) -> Result<Option<usize>, SealError> {
+        self.tool_sent = now;
+        tool.map(|tool| self.end.seal(now, Outgoing::Tool(tool), out))
+            .transpose()
     }
 
     fn seal(&mut self, now: Time, update: &Update, out: &mut [u8]) -> Result<usize, SealError> {

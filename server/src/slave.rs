@@ -10,7 +10,7 @@ use mmt_shared::metrics::ForceMetrics;
 use mmt_shared::params::{ModelParams, ModelState, inertia_of_square};
 use mmt_shared::settings::{Mode, ModelSettings, PoseCorrection};
 use mmt_shared::time::{TICK_S, Time};
-use mmt_shared::wire::{Cause, HipSample, Update};
+use mmt_shared::wire::{Cause, ForceCounts, HandPort, HipSample, Tool, Update};
 
 use crate::bilateral::ToolPort;
 use crate::environment::{Environment, EnvironmentConfig};
@@ -69,6 +69,8 @@ pub struct Slave {
     own_tool: Option<Vec2>,
     /// Whether it goes only as far as the energy allows.
     passive: bool,
+    /// Whether the master wants the tool's force.
+    streams: bool,
     /// Whether the tool is behind the HIP.
     behind: bool,
     tool_port: ToolPort,
@@ -143,6 +145,7 @@ impl Slave {
             f_s_told: Vec2::zeros(),
             own_tool: None,
             passive: false,
+            streams: false,
             behind: false,
             tool_port: ToolPort::new(sensing.force_noise_n, config.playout.speed_max_m_per_s),
             model_error: ModelError::default(),
@@ -244,15 +247,30 @@ impl Slave {
         &self.tool_port
     }
 
-    /// Takes in E_in of the master's port, J, and whether the tool may go only as far as that pays for: where the
-    /// hand feels the tool's force and not the model's.
-    pub fn pay_tool(&mut self, other_in_j: f64, passive: bool) {
-        self.tool_port.receive(other_in_j);
+    /// Takes in what the hand's port says, newer than all before.
+    pub fn hear_hand(&mut self, port: &HandPort) {
+        let passive = port.passive_tool;
+        self.streams = port.wants_force;
+        self.tool_port.receive(port.in_j);
         if passive && !self.passive {
             self.tool_port.begin();
             self.own_tool = self.own_tool.or(self.playout.played_hip());
         }
         self.passive = passive;
+    }
+
+    /// What the hand may want to know of the tool after a tick: with its force if the master wants that, which is then to
+    /// go out at once.
+    #[must_use]
+    pub fn tool(&self, tick: &SlaveTick) -> Tool {
+        let port = &self.tool_port;
+        Tool {
+            answers: tick.stamp,
+            force: self.streams.then(|| ForceCounts::nearest(port.held())),
+            in_contact: tick.in_contact,
+            in_j: port.energy().in_j,
+            model_error: self.model_error.relative(),
+        }
     }
 
     /// Where the tool is before the first sample, m.

@@ -15,7 +15,7 @@ use crate::metrics::{
 };
 use crate::peer::Histogram;
 use crate::wire::KindCounts;
-use crate::wire::message::Ending;
+use crate::wire::message::{Architecture, Ending};
 
 pub use number::Number;
 
@@ -35,6 +35,8 @@ pub struct RunReport<C> {
     pub duration_s: Number,
     /// How it ended: `finished`, `interrupted` or `failed`.
     pub ending: Option<String>,
+    /// Whose force the hand felt.
+    pub architecture: ArchitectureReport,
     /// The operator's work.
     pub pushes: PushesReport,
     /// Updates by the slave's trigger.
@@ -74,6 +76,7 @@ impl<C> RunReport<C> {
             seed: None,
             duration_s: Number::ABSENT,
             ending: None,
+            architecture: ArchitectureReport::default(),
             pushes: PushesReport::default(),
             updates: UpdatesReport::default(),
             messages: UpDown::default(),
@@ -109,6 +112,34 @@ pub struct UpDown<T> {
     pub up: T,
     /// Slave to master.
     pub down: T,
+}
+
+/// Whose force the hand felt; all but the name is null where that was the model's alone.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct ArchitectureReport {
+    /// `mmt`, `tdpa` or `auto`.
+    pub name: Option<String>,
+    /// Share of the master's ticks in which the tool's force was felt alone, 0 to 1.
+    pub tool_share: Number,
+    /// How often `auto` changed its choice.
+    pub switches: Option<u64>,
+    /// Largest change of the force on the hand in one tick of a fade, N.
+    pub fade_step_max_n: Number,
+    /// The round trip that the hand would have felt in the end, play-out included, smoothed, ms.
+    pub round_trip_ms: Number,
+    /// Relative error of the model's force in the end, over the last half second of contact.
+    pub model_error: Number,
+}
+
+impl ArchitectureReport {
+    /// Its name, all else absent.
+    #[must_use]
+    pub fn named(architecture: Architecture) -> Self {
+        Self {
+            name: Some(architecture.name().to_owned()),
+            ..Self::default()
+        }
+    }
 }
 
 /// What the operator did.
@@ -205,6 +236,8 @@ pub struct MessagesReport {
     pub repeats: Option<u64>,
     /// Scenes.
     pub scenes: Option<u64>,
+    /// What the tool feels, where the hand may feel it too.
+    pub tools: Option<u64>,
     /// Heartbeats.
     pub heartbeats: Option<u64>,
     /// Messages of all kinds per second, 1/s.
@@ -230,6 +263,7 @@ impl MessagesReport {
             updates: Some(counts.updates.into()),
             repeats: Some(repeats),
             scenes: Some(counts.scenes.into()),
+            tools: Some(counts.tools.into()),
             heartbeats: Some(counts.heartbeats.into()),
             rate_hz: Number::rate(counts.total() as f64, duration_s),
             ..Self::default()

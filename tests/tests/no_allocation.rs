@@ -29,7 +29,7 @@ use mmt_shared::geometry::Vec2;
 use mmt_shared::rate_control::StretchMax;
 use mmt_shared::settings::Mode;
 use mmt_shared::time::{TICK, Time};
-use mmt_shared::wire::{Command, DATAGRAM_MAX, HipSample, Label, Welcome};
+use mmt_shared::wire::{Architecture, Command, DATAGRAM_MAX, HipSample, Label, Welcome};
 
 /// The system's allocator, with a count of every call that takes memory.
 struct Counting;
@@ -121,6 +121,7 @@ fn slave_link() -> SlaveLinkConfig {
         repeats: Repeats::recommended(),
         stretch_max: StretchMax::RECOMMENDED,
         samples_per_command: commands().samples_per_command,
+        architecture: Architecture::Auto,
     }
 }
 
@@ -137,11 +138,13 @@ struct Haptic {
 impl Haptic {
     /// One tick: the update that came, the operator, the tick, the sample and what it fills.
     fn tick(&mut self, now: Time, down: Option<&Packet>) -> Option<Packet> {
-        if let Some(packet) = down
-            && let Some(FromSlave::Update(update)) = self.link.handle(now, packet.as_slice())
-        {
-            self.master.apply(&update);
-            self.applied += 1;
+        match down.and_then(|packet| self.link.handle(now, packet.as_slice())) {
+            Some(FromSlave::Update(update)) => {
+                self.master.apply(&update);
+                self.applied += 1;
+            }
+            Some(FromSlave::Tool(tool)) => self.master.hear_tool(now, &tool),
+            Some(FromSlave::Scene(_)) | None => {}
         }
         let elapsed = now.saturating_since(Time::ZERO);
         let view = self.master.view();
@@ -151,7 +154,7 @@ impl Haptic {
         self.hand_force = tick.hand_force;
         self.contact += u64::from(tick.rendered.in_contact());
         let link = &mut self.link;
-        Packet::of(|out| link.send(now, tick.sample, out).unwrap())
+        Packet::of(|out| link.send(now, tick.sample, tick.port, out).unwrap())
             .or_else(|| Packet::of(|out| link.heartbeat(now, out).unwrap()))
     }
 }
@@ -174,7 +177,7 @@ impl Loop {
             program: Label::clipped("test"),
         };
         let limiter = ForceLimiter::try_new(device.limits()).unwrap();
-        let master = Master::new(&welcome, limiter);
+        let master = Master::with_architecture(&welcome, limiter, Architecture::Auto);
         let scripted = Scripted::try_new(ScriptedConfig::default(), master.view()).unwrap();
         let operator = Operator::Scripted(Box::new(scripted));
         slave.start_at(operator.start());
@@ -201,12 +204,23 @@ impl Loop {
                 self.slave.handle_sample(now, &sample, newest);
             }
             self.slave.stretch(self.slave_link.end().stretch());
+            if let Some(port) = &command.port {
+                self.slave.hear_hand(port);
+            }
         }
         let tick = self.slave.tick(now);
         let update = tick.and_then(|tick| tick.update);
+        let tool = tick.map(|tick| self.slave.tool(&tick));
         let link = &mut self.slave_link;
+        let told =
+            |tool: &Tool| tool.force.is_some() || link.tool_due().is_some_and(|due| due <= now);
+        let tool = tool.filter(told);
         let down = update
             .and_then(|update| Packet::of(|out| link.send_update(now, &update, out).ok()))
+            .or_else(|| {
+                let tool = tool.as_ref();
+                Packet::of(|out| link.send_tool(now, tool, out).unwrap())
+            })
             .or_else(|| Packet::of(|out| link.repeat(now, out).unwrap()))
             .or_else(|| Packet::of(|out| link.heartbeat(now, out).unwrap()));
         Slaved {

@@ -1,15 +1,18 @@
 //! What a fade promises, with a hand and a tool that are made up.
 
+use std::time::Duration;
+
 use super::*;
-use crate::limiter::Limits;
+use crate::limiter::{ForceLimiter, Limits};
+use crate::master::{Master, MasterTick};
 use mmt_shared::contact::Coupling;
 use mmt_shared::geometry::{BoxFootprint, Pose, Twist};
 use mmt_shared::params::{ModelParams, ModelState};
 use mmt_shared::rng::Substream;
 use mmt_shared::settings::Mode;
-use mmt_shared::wire::Label;
+use mmt_shared::wire::{ForceCounts, Label, Welcome};
 
-fn master(fixed: Option<Chosen>) -> EitherMaster {
+fn master(architecture: Architecture) -> Master {
     let coupling = Coupling::for_stiffness(1000.0);
     let params = ModelParams::of_square(0.7, 3.0, 2.06, 0.4, &coupling).unwrap();
     let (footprint, pose) = (BoxFootprint::square(0.4), Pose::default());
@@ -20,14 +23,25 @@ fn master(fixed: Option<Chosen>) -> EitherMaster {
         program: Label::clipped("test"),
     };
     let limiter = ForceLimiter::try_new(Limits::default()).unwrap();
-    EitherMaster::new(&welcome, limiter, fixed)
+    Master::with_architecture(&welcome, limiter, architecture)
+}
+
+fn turn(master: &mut Master, n: u64, hip: Vec2) -> MasterTick {
+    master.tick(Time::from_millis(n), hip, Duration::ZERO)
+}
+
+fn model_share(master: &Master) -> f64 {
+    master.either().unwrap().model_share()
+}
+
+fn choice(master: &Master) -> &Choice {
+    master.either().unwrap().choice()
 }
 
 /// A tool that answers a tick later with a force, and a model that is so wrong.
-fn says(tick: u64, force: Vec2, model_error: f64) -> ToolNews {
-    ToolNews {
-        sent: Time::from_millis(tick),
-        echo: Time::from_millis(tick),
+fn says(tick: u64, force: Vec2, model_error: f64) -> Tool {
+    Tool {
+        answers: Time::from_millis(tick),
         force: Some(ForceCounts::nearest(force)),
         in_contact: force != Vec2::zeros(),
         in_j: 0.0,
@@ -42,36 +56,38 @@ fn pushing(tick: u64) -> Vec2 {
 
 #[test]
 fn without_news_of_the_tool_the_model_is_felt_and_nothing_is_asked_for() {
-    let mut master = master(None);
+    let mut master = master(Architecture::Auto);
     for n in 1..3000 {
-        let tick = master.tick(Time::from_millis(n), pushing(n));
-        assert!(!tick.wants_force && !tick.passive_tool);
+        let tick = turn(&mut master, n, pushing(n));
+        let port = tick.port.unwrap();
+        assert!(!port.wants_force && !port.passive_tool);
         assert!(n < 300 || (tick.hand_force + tick.rendered.force).norm() < 1e-12);
     }
-    assert_eq!(master.model_share(), 1.0);
+    assert_eq!(model_share(&master), 1.0);
 }
 
 #[test]
 fn the_tools_force_is_faded_in_only_while_it_comes_and_the_tool_is_passive_only_when_it_is_felt_alone()
  {
-    let mut master = master(Some(Chosen::Tdpa));
-    let tick = master.tick(Time::from_millis(1), pushing(1));
-    assert!(tick.wants_force && !tick.passive_tool);
+    let mut master = master(Architecture::Tdpa);
+    let tick = turn(&mut master, 1, pushing(1));
+    let port = tick.port.unwrap();
+    assert!(port.wants_force && !port.passive_tool);
     for n in 2..1000 {
-        master.tick(Time::from_millis(n), pushing(n));
+        turn(&mut master, n, pushing(n));
     }
-    assert_eq!(master.model_share(), 1.0, "no force came");
+    assert_eq!(model_share(&master), 1.0, "no force came");
     // the hand has pushed for a while and does not let go
     let begins = 100 + u64::from(PATIENCE_TICKS);
     let ends = begins + u64::from(FADE_TICKS);
     for n in 1000..ends + 50 {
-        master.receive(Time::from_millis(n), &says(n, Vec2::new(5.0, 0.0), 0.4));
-        let tick = master.tick(Time::from_millis(n), pushing(n));
-        assert!(n >= begins - 100 || master.model_share() == 1.0, "tick {n}");
-        assert_eq!(tick.passive_tool, master.model_share() == 0.0);
+        master.hear_tool(Time::from_millis(n), &says(n, Vec2::new(5.0, 0.0), 0.4));
+        let tick = turn(&mut master, n, pushing(n));
+        assert!(n >= begins - 100 || model_share(&master) == 1.0, "tick {n}");
+        assert_eq!(tick.port.unwrap().passive_tool, model_share(&master) == 0.0);
     }
-    let tick = master.tick(Time::from_millis(ends + 50), pushing(ends + 50));
-    assert!(tick.passive_tool);
+    let tick = turn(&mut master, ends + 50, pushing(ends + 50));
+    assert!(tick.port.unwrap().passive_tool);
     assert!(
         (tick.hand_force.x + 5.0).abs() < 0.2,
         "{:?}",
@@ -82,14 +98,14 @@ fn the_tools_force_is_faded_in_only_while_it_comes_and_the_tool_is_passive_only_
 #[test]
 fn a_fade_changes_the_force_by_no_more_than_its_share_of_the_difference() {
     // a hand at rest in the model by 2 mm, which holds it at 2 N; the tool says 5 N the other way
-    let mut master = master(None);
+    let mut master = master(Architecture::Auto);
     let mut last = None;
     let mut seen = (0.0_f64, 0.0_f64);
     for n in 1..50_000 {
         let x = (-0.21 + 1e-4 * n as f64).min(-0.1985);
         let wrong = if n / 12_000 % 2 == 0 { 0.4 } else { 0.01 };
-        master.receive(Time::from_millis(n), &says(n, Vec2::new(-5.0, 0.0), wrong));
-        let tick = master.tick(Time::from_millis(n), Vec2::new(x, 0.0));
+        master.hear_tool(Time::from_millis(n), &says(n, Vec2::new(-5.0, 0.0), wrong));
+        let tick = turn(&mut master, n, Vec2::new(x, 0.0));
         let force = tick.hand_force.x;
         seen = (seen.0.min(force), seen.1.max(force));
         if let Some(last) = last.filter(|_| n > 400) {
@@ -101,7 +117,7 @@ fn a_fade_changes_the_force_by_no_more_than_its_share_of_the_difference() {
         }
         last = Some(force);
     }
-    assert!(master.choice().switches() >= 3);
+    assert!(choice(&master).switches() >= 3);
     assert!(seen.0 < -1.0 && seen.1 > 4.9, "both were felt: {seen:?}");
 }
 
@@ -109,7 +125,7 @@ fn a_fade_changes_the_force_by_no_more_than_its_share_of_the_difference() {
 fn no_tool_and_no_switching_gives_the_hand_energy() {
     for seed in 1..=20 {
         let mut draw = Substream::new(seed, "test/either", 0);
-        let mut master = master(None);
+        let mut master = master(Architecture::Auto);
         let (mut hip, mut velocity) = (Vec2::new(-0.25, 0.0), Vec2::zeros());
         let mut wrong = 0.4;
         for n in 1..15_000 {
@@ -123,10 +139,10 @@ fn no_tool_and_no_switching_gives_the_hand_energy() {
             hip += velocity * TICK_S;
             // a tool that pushes the hand wherever it goes, and says that it took in nothing for it
             let force = -velocity * draw.uniform_in(0.0, 40.0);
-            master.receive(Time::from_millis(n), &says(n, force, wrong));
-            master.tick(Time::from_millis(n), hip);
+            master.hear_tool(Time::from_millis(n), &says(n, force, wrong));
+            turn(&mut master, n, hip);
         }
-        assert!(master.choice().switches() > 3);
+        assert!(choice(&master).switches() > 3);
         // what TDPA's prediction of the velocity is wrong by when the hand turns at once: twice its reserve
         let least_j = master.port().least_j();
         assert!(least_j >= -2.0 * RESERVE_J, "seed {seed}: {least_j} J");
@@ -137,14 +153,14 @@ fn no_tool_and_no_switching_gives_the_hand_energy() {
 fn a_model_that_has_taken_nothing_is_not_faded_into_a_hand_that_presses_it_and_is_into_one_that_lets_go()
  {
     // 1 N does not move a box that 2.06 N hold: the model's tank stays empty
-    let mut master = master(None);
+    let mut master = master(Architecture::Auto);
     let mut run = |ticks: std::ops::Range<u64>, x: f64, wrong: f64| {
         for n in ticks {
             let near = Vec2::new(x.min(-0.21 + 1e-4 * n as f64), 0.0);
-            master.receive(Time::from_millis(n), &says(n, Vec2::zeros(), wrong));
-            master.tick(Time::from_millis(n), near);
+            master.hear_tool(Time::from_millis(n), &says(n, Vec2::zeros(), wrong));
+            turn(&mut master, n, near);
         }
-        (master.choice().chosen(), master.model_share())
+        (choice(&master).chosen(), model_share(&master))
     };
     assert_eq!(run(1..8000, -0.199, 0.4), (Chosen::Tdpa, 0.0));
     assert_eq!(run(8000..20_000, -0.199, 0.01), (Chosen::Mediated, 0.0));

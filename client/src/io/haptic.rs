@@ -16,16 +16,16 @@ use mmt_shared::io::truth::TruthReceiver;
 use mmt_shared::io::wake::Waker;
 use mmt_shared::metrics::{AgeOfInformation, ContactBreaks, ForcePeak, PoseError};
 use mmt_shared::time::Time;
-use mmt_shared::wire::HipSample;
 
 use super::{MasterLive, SessionEnd};
+use crate::either::{ChoiceOutcome, Either};
 use crate::failsafe::LinkState;
 use crate::master::{Master, MasterTick};
 use crate::operator::Operator;
 
 pub(super) use port::Gone;
 use port::LoopEnd;
-pub use port::{HapticPort, RING_SAMPLES};
+pub use port::{HapticPort, RING_SAMPLES, Said};
 
 /// A look for a screen every so many ticks: 50 a second.
 const LOOK_TICKS: u64 = 20;
@@ -41,7 +41,7 @@ pub struct HapticParts {
     pub operator: Operator,
     /// How long; for ever if absent.
     pub duration: Option<Duration>,
-    /// The network task is woken once for so many samples.
+    /// The network task is woken once for so many samples, and for each while the tool's force is wanted.
     pub samples_per_wake: u8,
     /// The true pose, where the slave lives in this process: for the report.
     pub truth: Option<TruthReceiver>,
@@ -76,10 +76,36 @@ pub struct HapticOutcome {
     pub age: AgeOfInformation,
     /// Error of the model's pose; empty where the truth is not known.
     pub pose: PoseError,
+    /// Whose force was felt, where there was a choice.
+    pub felt: Option<FeltOutcome>,
     /// Energy that updates added to the model beyond what its tank paid, J.
     pub energy_injected_j: f64,
     /// The least that the passivity observer at the hand showed, J.
     pub observer_min_j: f64,
+}
+
+/// Whose force was felt, and what that rested on in the end.
+#[derive(Clone, Copy, Debug)]
+pub struct FeltOutcome {
+    /// What became of the choice.
+    pub choice: ChoiceOutcome,
+    /// How often it changed.
+    pub switches: u32,
+    /// The smoothed round trip, s; none if the slave said nothing.
+    pub round_trip_s: Option<f64>,
+    /// The model's relative error.
+    pub model_error: f64,
+}
+
+impl From<&Either> for FeltOutcome {
+    fn from(either: &Either) -> Self {
+        Self {
+            choice: *either.outcome(),
+            switches: either.choice().switches(),
+            round_trip_s: either.choice().round_trip_s(),
+            model_error: either.model_error(),
+        }
+    }
 }
 
 /// The haptic loop's own end. It belongs to one thread.
@@ -149,18 +175,24 @@ impl HapticLoop {
         self.ticks = self.ticks.saturating_add(1);
         self.skipped = self.skipped.saturating_add(tick.skipped);
         self.take_update(stamp);
+        if let Some((at, tool)) = self.port.newest_tool() {
+            self.master.hear_tool(*at, tool);
+        }
         self.consider_end();
         let view = self.master.view();
         let hip = self.operator.step(self.elapsed, &view, self.hand_force);
         let done = self.master.tick(stamp, hip, self.port.silence(stamp));
         self.hand_force = done.hand_force;
         self.on_hand.push(done.hand_force);
-        self.breaks.push(done.rendered.in_contact());
+        self.breaks.push(self.master.view().in_contact);
         self.judge_pose();
         if done.link == LinkState::Released && !self.releasing {
             self.end.get_or_insert(SessionEnd::LinkSilent);
         }
-        self.give(done.sample);
+        self.give(Said {
+            sample: done.sample,
+            port: done.port,
+        });
         let at_rest = self.master.limiter().at_rest();
         if at_rest || self.ticks.is_multiple_of(LOOK_TICKS) {
             self.show(&done);
@@ -199,6 +231,7 @@ impl HapticLoop {
             on_hand: self.on_hand,
             age: self.age,
             pose: self.pose,
+            felt: self.master.either().map(FeltOutcome::from),
             energy_injected_j: self.master.energy_injected_j(),
             observer_min_j: self.master.port().least_j(),
         }
@@ -251,12 +284,13 @@ impl HapticLoop {
         }
     }
 
-    fn give(&mut self, sample: HipSample) {
-        if !self.port.give(sample) {
+    fn give(&mut self, said: Said) {
+        let at_once = said.port.is_some_and(|port| port.wants_force);
+        if !self.port.give(said) {
             self.samples_dropped = self.samples_dropped.saturating_add(1);
         }
         self.unwoken = self.unwoken.saturating_add(1);
-        if self.unwoken >= self.samples_per_wake {
+        if at_once || self.unwoken >= self.samples_per_wake {
             self.unwoken = 0;
             self.port.wake();
         }
@@ -268,12 +302,13 @@ impl HapticLoop {
         self.port.show(MasterLive {
             elapsed_s: self.elapsed.as_secs_f64(),
             hip: done.sample.hip.metres(),
-            f_m: done.rendered.force,
+            f_m: done.felt,
             hand_force: done.hand_force,
             model: state.pose,
             footprint: Some(state.footprint),
             params: [params.m(), params.b(), params.c()],
-            in_contact: done.rendered.in_contact(),
+            in_contact: self.master.view().in_contact,
+            model_share: self.master.either().map(Either::model_share),
             updates_applied: u64::from(self.master.applied()),
             pushes: self.operator.pushes_completed(),
             link: done.link,

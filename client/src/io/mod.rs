@@ -29,6 +29,7 @@ use mmt_shared::io::transport::Transport;
 use mmt_shared::io::truth::TruthReceiver;
 use mmt_shared::pairing::Pairing;
 use mmt_shared::report::RunReport;
+use mmt_shared::wire::Architecture;
 use serde::Serialize;
 
 use crate::device::DeviceProfile;
@@ -94,6 +95,8 @@ pub struct MasterOptions {
     pub operator: OperatorChoice,
     /// How long; until the operator has finished or a person ends it if absent.
     pub duration: Option<Duration>,
+    /// Whose force the hand feels.
+    pub architecture: Architecture,
     /// How commands are made.
     pub commands: CommandConfig,
     /// Emulated network on what the master sends.
@@ -127,6 +130,8 @@ pub struct MasterLive {
     pub params: [f64; 3],
     /// Whether the HIP touches the model.
     pub in_contact: bool,
+    /// The model's share of what is felt, 0 to 1, where the tool's force may be felt too.
+    pub model_share: Option<f64>,
     /// Updates applied.
     pub updates_applied: u64,
     /// Pushes completed.
@@ -158,6 +163,8 @@ pub struct MasterConfiguration {
     pub operator: String,
     /// The scripted operator's numbers.
     pub scripted: Option<ScriptedConfig>,
+    /// Whose force the hand felt: `mmt`, `tdpa` or `auto`.
+    pub architecture: Architecture,
     /// How commands were made.
     #[serde(flatten)]
     pub commands: CommandConfig,

@@ -14,8 +14,8 @@ use mmt_shared::io::socket;
 use mmt_shared::io::transport::{Connection, Endpoint, RecvStream, SendStream, WriteError};
 use mmt_shared::io::versions::CLOSE_FINISHED;
 use mmt_shared::wire::{
-    DATAGRAM_MAX, Hello, Label, Refusal, Role, STREAM_MESSAGE_MAX, Side, StreamMessage, Welcome,
-    decode_stream_message, encode_hello,
+    Architecture, DATAGRAM_MAX, Hello, Label, Refusal, Role, STREAM_MESSAGE_MAX, Side,
+    StreamMessage, Welcome, decode_stream_message, encode_hello,
 };
 use tokio::time::timeout;
 
@@ -149,7 +149,7 @@ async fn open_at(
     let wrapped = EmulatedSocket::try_new_with(plain, netem, seed, LinkId::UP, extras)?;
     let meter = wrapped.meter();
     let endpoint = Endpoint::of_master(options.transport, Arc::new(wrapped))?;
-    let traffic = traffic(&options.commands);
+    let traffic = traffic(&options.commands, options.architecture);
     let connection = endpoint
         .connect(address, options.pairing.pin, traffic, patience.connect)
         .await?;
@@ -174,16 +174,26 @@ async fn open_at(
     }
 }
 
-/// What a master sends at the most. A command has up to 70 bytes of its own and, at any speed of a hand,
-/// at most 16 a sample; QUIC adds 30. The cap is twice that, with room for handshake and heartbeats.
-fn traffic(commands: &CommandConfig) -> Traffic {
-    let datagram_max = (70 + 16 * commands.samples_at_most()).min(DATAGRAM_MAX);
+/// What a master sends at the most. A command has up to 70 bytes of its own, 10 for the hand's port and, at any speed
+/// of a hand, at most 16 a sample; QUIC adds 30. While the tool is felt every sample goes at once and alone. The cap
+/// is twice that, with room for handshake and heartbeats.
+fn traffic(commands: &CommandConfig, architecture: Architecture) -> Traffic {
+    let bytes = |own: usize, samples: usize| (own + 16 * samples).min(DATAGRAM_MAX);
+    let packed = bytes(70, commands.samples_at_most());
     let news = u64::from(commands.samples_per_command.max(1));
-    let commands_per_s = 1000_u64.div_ceil(news) + 20;
+    let load = |per_s: u64, bytes: usize| (per_s + 20) * (bytes as u64 + 30);
+    let (datagram_max, busiest) = match architecture.feels_tool() {
+        false => (packed, load(1000_u64.div_ceil(news), packed)),
+        true => {
+            let packed = bytes(80, commands.samples_at_most());
+            let apart = load(1000, bytes(80, 1));
+            (packed, apart.max(load(1000_u64.div_ceil(news), packed)))
+        }
+    };
     Traffic {
         datagram_max,
         rate_cap: RateCap {
-            bytes_per_s: 2 * commands_per_s * (datagram_max as u64 + 30),
+            bytes_per_s: 2 * busiest,
         },
     }
 }
@@ -218,6 +228,7 @@ fn hello(options: &MasterOptions, hip: Vec2) -> Hello {
         role: Role::Operator,
         coupling: options.device.coupling(),
         samples_per_command: options.commands.samples_per_command,
+        architecture: options.architecture,
         hip,
         program: Label::clipped(PROGRAM),
     }

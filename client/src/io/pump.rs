@@ -15,7 +15,7 @@ use tokio::sync::watch;
 use tokio::time::{MissedTickBehavior, interval};
 
 use super::close::FarewellError;
-use super::haptic::HapticPort;
+use super::haptic::{HapticPort, Said};
 use super::{MasterLive, SessionEnd, SharedPath};
 use crate::failsafe::LinkState;
 use crate::link::{FromSlave, MasterLink};
@@ -179,6 +179,7 @@ impl<'a> Pump<'a> {
         let now = self.clock.now();
         match self.link.handle(now, bytes) {
             Some(FromSlave::Update(update)) => self.port.offer(&update),
+            Some(FromSlave::Tool(tool)) => self.port.offer_tool(now, &tool),
             // a scene is for a viewer, and this host has none
             Some(FromSlave::Scene(_)) | None => {}
         }
@@ -191,8 +192,9 @@ impl<'a> Pump<'a> {
 
     fn send_samples(&mut self) {
         let mut buffer = [0; DATAGRAM_MAX];
-        while let Some(sample) = self.port.pop() {
-            match self.link.send(self.clock.now(), sample, &mut buffer) {
+        while let Some(Said { sample, port }) = self.port.pop() {
+            let now = self.clock.now();
+            match self.link.send(now, sample, port, &mut buffer) {
                 Ok(length) => self.give(length.and_then(|length| buffer.get(..length))),
                 Err(_) => self.counts.unsealed += 1,
             }

@@ -10,13 +10,13 @@ use mmt_netem::io::socket::SocketCounters;
 use mmt_shared::io::spread::Quantiles as Spread;
 use mmt_shared::io::transport::DatagramCounts;
 use mmt_shared::report::{
-    Counts, DelayReport, EstimateReport, ForceReport, LinkReport, LoopReport, MessagesReport,
-    ModelReport, Number, PassivityReport, PoseReport, PushesReport, QuantilesReport, UpDown,
-    UpdatesReport, WireReport, ending_name,
+    ArchitectureReport, Counts, DelayReport, EstimateReport, ForceReport, LinkReport, LoopReport,
+    MessagesReport, ModelReport, Number, PassivityReport, PoseReport, PushesReport,
+    QuantilesReport, UpDown, UpdatesReport, WireReport, ending_name,
 };
 use mmt_shared::wire::{
-    Cause, Farewell, Identified, LoopTotals, MasterTotals, Quantiles, SlaveTotals, Traffic,
-    UpdateDrops,
+    Architecture, Cause, Farewell, Identified, LoopTotals, MasterTotals, Quantiles, SlaveTotals,
+    Traffic, UpdateDrops,
 };
 
 use super::haptic::HapticOutcome;
@@ -80,6 +80,7 @@ impl Ended {
         report.seed = Some(options.netem_seed);
         report.duration_s = self.haptic.duration.as_secs_f64().into();
         report.ending = Some(ending_name(self.end.ending()).to_owned());
+        report.architecture = self.architecture(options.architecture);
         if let Some(completed) = self.haptic.pushes {
             report.pushes = PushesReport::new(completed, &self.haptic.breaks);
         }
@@ -109,6 +110,22 @@ impl Ended {
         };
         report.drops = Some(self.drops(link));
         report
+    }
+
+    fn architecture(&self, architecture: Architecture) -> ArchitectureReport {
+        let report = ArchitectureReport::named(architecture);
+        let Some(felt) = self.haptic.felt else {
+            return report;
+        };
+        let choice = &felt.choice;
+        ArchitectureReport {
+            tool_share: Number::rate(choice.tool_ticks as f64, choice.ticks as f64),
+            switches: (architecture == Architecture::Auto).then(|| felt.switches.into()),
+            fade_step_max_n: choice.fade_step_n.into(),
+            round_trip_ms: felt.round_trip_s.map(|s| s * 1e3).into(),
+            model_error: felt.model_error.into(),
+            ..report
+        }
     }
 
     fn slave(&self) -> Option<&SlaveTotals> {
@@ -214,6 +231,7 @@ fn configuration(options: &MasterOptions) -> MasterConfiguration {
             OperatorChoice::Scripted(config) => Some(*config),
             OperatorChoice::Trace { .. } => None,
         },
+        architecture: options.architecture,
         commands: options.commands,
         netem: options.netem.to_string(),
     }

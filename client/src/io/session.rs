@@ -68,7 +68,7 @@ pub(super) async fn run_with(
         slave = %opened.line.address, program = %welcome.program, scheme = %welcome.scheme,
         "the session begins"
     );
-    let master = Master::new(welcome, limiter);
+    let master = Master::with_architecture(welcome, limiter, options.architecture);
     let operator = options.operator.begin(master.view())?;
     let parts = HapticParts {
         master,

@@ -10,7 +10,9 @@ use mmt_shared::io::transport::Transport;
 use mmt_shared::pairing::{Pin, Token};
 use mmt_shared::params::{ModelParams, ModelState};
 use mmt_shared::time::TICK;
-use mmt_shared::wire::{Cause, Ending, ForceTotals, Identified, Refusal, SlaveTotals};
+use mmt_shared::wire::{
+    Architecture, Cause, Ending, ForceTotals, Identified, Refusal, SlaveTotals,
+};
 use tokio::sync::watch;
 use tokio::time::{Instant, sleep, timeout};
 
@@ -27,6 +29,7 @@ const FOR_EVER: Duration = Duration::from_secs(60);
 
 fn scripted(fake: &Fake) -> MasterOptions {
     MasterOptions {
+        architecture: Architecture::Mmt,
         transport: Transport::Quic,
         pairing: fake.pairing(),
         device: DeviceProfile::default(),

@@ -24,17 +24,28 @@ fn link(samples_per_command: u8, repeat_samples: u8) -> MasterLink {
 
 /// The stamps (ms) of each command that the samples of `ms` make, as the slave reads them.
 fn commands(link: &mut MasterLink, ms: impl IntoIterator<Item = u64>) -> Vec<Vec<u64>> {
+    coupled_commands(link, ms, None)
+}
+
+/// The same, of a master whose port says this.
+fn coupled_commands(
+    link: &mut MasterLink,
+    ms: impl IntoIterator<Item = u64>,
+    port: Option<HandPort>,
+) -> Vec<Vec<u64>> {
     let mut slave = LinkEnd::new(Side::Slave, Time::ZERO);
     let mut out = [0; DATAGRAM_MAX];
     let mut all = Vec::new();
     for ms in ms {
         let now = Time::from_millis(ms);
-        let Some(length) = link.send(now, sample(ms), &mut out).unwrap() else {
+        let Some(length) = link.send(now, sample(ms), port, &mut out).unwrap() else {
             continue;
         };
-        let Some(Matter::Command(command)) = slave.open(now, &out[..length]) else {
+        let opened = slave.open(now, &out[..length]).unwrap();
+        let Matter::Command(command) = opened.matter else {
             panic!("no command");
         };
+        assert_eq!(command.port, port);
         let samples = command.samples.as_slice().iter();
         all.push(
             samples
@@ -59,6 +70,26 @@ fn a_command_repeats_the_samples_of_as_many_commands_as_it_is_told() {
         two[1..],
         [vec![1, 2, 3, 4], (1..=6).collect(), (3..=8).collect()]
     );
+}
+
+#[test]
+fn while_the_tools_force_is_wanted_each_sample_goes_at_once_and_alone() {
+    let port = |wants_force| {
+        Some(HandPort {
+            in_j: 0.5,
+            wants_force,
+            passive_tool: false,
+        })
+    };
+    let mut link = link(3, 1);
+    let packed = coupled_commands(&mut link, 1..=4, port(false));
+    assert_eq!(packed, [[1, 2, 3]]);
+    // the one that waited goes with the first
+    let at_once = coupled_commands(&mut link, 5..=7, port(true));
+    assert_eq!(at_once, [vec![4, 5], vec![6], vec![7]]);
+    let packed = coupled_commands(&mut link, 8..=13, port(false));
+    assert_eq!(packed[0][packed[0].len() - 3..], [8, 9, 10]);
+    assert_eq!(packed[1], (8..=13).collect::<Vec<_>>());
 }
 
 #[test]

@@ -1,6 +1,7 @@
 //! What is known of each architecture from the literature must hold here. Print the tables with `--nocapture`.
 
 use super::*;
+use mmt_client::either::ChoiceOutcome;
 use mmt_client::operator::hand::{Hand, HandConfig};
 use mmt_netem::config::LinkConfig;
 use mmt_server::model_error::UNKNOWN;
@@ -267,7 +268,7 @@ fn the_first_push_of_an_unknown_object_is_as_wrong_as_is_said_before_it() {
 fn a_path_that_becomes_longer_and_shorter_again_is_followed_without_a_jolt() {
     for seed in 1..=3 {
         let config = over("delay 2ms", 1000.0, seed);
-        let mut world = EitherWorld::try_new(&config, None).unwrap();
+        let mut world = World::try_new(&auto(config)).unwrap();
         let mut felt = Vec::new();
         for (words, seconds) in [
             ("delay 2ms", 10),
@@ -276,20 +277,21 @@ fn a_path_that_becomes_longer_and_shorter_again_is_followed_without_a_jolt() {
         ] {
             let link: LinkConfig = words.parse().unwrap();
             world.rewire(&link, seed).unwrap();
-            let tdpa_before = world.outcome().tdpa_ticks;
+            let tdpa_before = choice(&world).tool_ticks;
             for _ in 0..seconds * 1000 {
                 world.step();
             }
-            felt.push(
-                (world.outcome().tdpa_ticks - tdpa_before) as f64 / f64::from(seconds * 1000),
-            );
+            felt.push((choice(&world).tool_ticks - tdpa_before) as f64 / f64::from(seconds * 1000));
         }
         let (outcome, pushes) = (
             world.outcome(),
             world.operator().pushes_completed().unwrap(),
         );
         let breaks = outcome.breaks.per_push(pushes).unwrap();
-        let (peak_n, step_n) = (outcome.on_hand.largest_n().unwrap(), outcome.fade_step_n);
+        let (peak_n, step_n) = (
+            outcome.on_hand.largest_n().unwrap(),
+            choice(&world).fade_step_n,
+        );
         let least_mj = world.master().port().least_j() * 1e3;
         println!(
             "seed {seed}: TDPA {felt:.2?} of the time, {pushes} pushes, {breaks:.2} breaks a push, peak {peak_n:.2} N, \
@@ -302,18 +304,29 @@ fn a_path_that_becomes_longer_and_shorter_again_is_followed_without_a_jolt() {
     }
 }
 
+fn auto(config: WorldConfig) -> WorldConfig {
+    WorldConfig {
+        architecture: wire::Architecture::Auto,
+        ..config
+    }
+}
+
+fn choice(world: &World) -> ChoiceOutcome {
+    *world.master().either().unwrap().outcome()
+}
+
 /// What the choice did over three seeds of one delay: share of the time with TDPA, switches, largest step in a fade.
 fn chosen(one_way_ms: u64) -> (f64, u32, f64) {
     let (mut share, mut switches, mut step_n) = (0.0, 0, 0.0_f64);
     for seed in 1..=3 {
         let config = over(&format!("delay {one_way_ms}ms"), 1000.0, seed);
-        let mut world = EitherWorld::try_new(&config, None).unwrap();
+        let mut world = World::try_new(&auto(config)).unwrap();
         (0..20_000).for_each(|_| {
             world.step();
         });
-        let outcome = world.outcome();
-        share += outcome.tdpa_ticks as f64 / outcome.ticks as f64 / 3.0;
-        switches += world.master().choice().switches();
+        let outcome = choice(&world);
+        share += outcome.tool_ticks as f64 / outcome.ticks as f64 / 3.0;
+        switches += world.master().either().unwrap().choice().switches();
         step_n = step_n.max(outcome.fade_step_n);
     }
     (share, switches, step_n)

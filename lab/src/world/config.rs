@@ -11,6 +11,7 @@ use mmt_server::link::SlaveLinkConfig;
 use mmt_server::slave::{SlaveConfig, SlaveError};
 use mmt_shared::rate_control::StretchMax;
 use mmt_shared::settings::ModelSettings;
+use mmt_shared::wire::Architecture;
 use serde::{Deserialize, Serialize};
 
 /// Everything that a run depends on.
@@ -27,6 +28,8 @@ pub struct WorldConfig {
     pub stiffness_n_per_m: Option<f64>,
     /// The scripted operator.
     pub operator: ScriptedConfig,
+    /// Whose force the hand feels.
+    pub architecture: Architecture,
     /// New samples in a command.
     pub samples_per_command: u8,
     /// How many commands before it each command repeats the samples of.
@@ -53,6 +56,7 @@ impl Default for WorldConfig {
             settings: None,
             stiffness_n_per_m: None,
             operator: ScriptedConfig::default(),
+            architecture: Architecture::default(),
             samples_per_command,
             repeat_samples,
             stretch_max,
@@ -72,6 +76,15 @@ impl WorldConfig {
         self
     }
 
+    /// The slave; where the tool may be felt, its play-out waits for no longer than it has to, as in a session.
+    pub(super) fn slave(&self) -> SlaveConfig {
+        let mut slave = self.slave.clone();
+        if self.architecture.feels_tool() {
+            slave.playout.delay_ms = 0.0;
+        }
+        slave
+    }
+
     /// How the master sends.
     pub(super) fn commands(&self) -> CommandConfig {
         CommandConfig {
@@ -87,6 +100,7 @@ impl WorldConfig {
             repeats: self.slave.repeats_ms,
             stretch_max: self.slave.stretch_max,
             samples_per_command: self.samples_per_command,
+            architecture: self.architecture,
         }
     }
 }

@@ -12,8 +12,8 @@ use mmt_netem::io::socket::SocketCounters;
 use mmt_shared::io::spread;
 use mmt_shared::metrics::{ForceSummary, UpdateCounts};
 use mmt_shared::report::{
-    Counts, DelayReport, EstimateReport, ForceReport, LinkReport, LoopReport, MessagesReport,
-    ModelReport, QuantilesReport, UpDown, UpdatesReport, WireReport, ending_name,
+    ArchitectureReport, Counts, DelayReport, EstimateReport, ForceReport, LinkReport, LoopReport,
+    MessagesReport, ModelReport, QuantilesReport, UpDown, UpdatesReport, WireReport, ending_name,
 };
 use mmt_shared::wire::{
     Ending, Farewell, ForceTotals, Identified, LoopTotals, MasterTotals, SlaveTotals, Traffic,
@@ -100,6 +100,7 @@ pub(super) fn report(
     report.seed = Some(config.seed);
     report.duration_s = outcome.duration.as_secs_f64().into();
     report.ending = Some(ending_name(outcome.ending).to_owned());
+    report.architecture = ArchitectureReport::named(outcome.link.architecture());
     report.updates = updates(outcome, theirs);
     report.messages = messages(outcome, &traffic);
     report.wire = wire(outcome, &traffic);

@@ -20,8 +20,8 @@ use mmt_shared::io::truth::TruthSender;
 use mmt_shared::io::versions::CLOSE_FINISHED;
 use mmt_shared::metrics::UpdateCounts;
 use mmt_shared::wire::{
-    DATAGRAM_MAX, Ending, Farewell, Hello, Label, Refusal, STREAM_MESSAGE_MAX, SlaveTotals,
-    Welcome, encode_slave_farewell, encode_welcome,
+    Architecture, DATAGRAM_MAX, Ending, Farewell, Hello, Label, Refusal, STREAM_MESSAGE_MAX,
+    SlaveTotals, Welcome, encode_slave_farewell, encode_welcome,
 };
 use tokio::sync::watch;
 use tokio::time::timeout;
@@ -108,7 +108,11 @@ pub(super) async fn serve_with(
         lease: _lease,
     } = admitted;
     let config = SlaveConfig {
-        playout: playout_for(shared.config.playout, hello.samples_per_command),
+        playout: playout_for(
+            shared.config.playout,
+            hello.samples_per_command,
+            hello.architecture,
+        ),
         ..shared.config.clone()
     };
     let mut slave = match Slave::try_new(&config, hello.coupling) {
@@ -135,6 +139,7 @@ pub(super) async fn serve_with(
         repeats: config.repeats_ms,
         stretch_max: config.stretch_max,
         samples_per_command: hello.samples_per_command,
+        architecture: hello.architecture,
     };
     let link = SlaveLink::new(shared.clock.now(), link);
     let session = Session::new(
@@ -150,11 +155,22 @@ pub(super) async fn serve_with(
 }
 
 /// The configured play-out; if its delay is the default, with the delay that the master's packing needs
-/// instead of the default's ten samples. The jitter that it has room for stays.
-fn playout_for(configured: PlayoutConfig, samples_per_command: u8) -> PlayoutConfig {
+/// instead of the default's ten samples. The jitter that it has room for stays. Where the tool may be felt the delay
+/// grows from none as packing and jitter ask for: it is part of what the hand feels.
+fn playout_for(
+    configured: PlayoutConfig,
+    samples_per_command: u8,
+    architecture: Architecture,
+) -> PlayoutConfig {
     let default = PlayoutConfig::default();
     if configured.delay_ms != default.delay_ms {
         return configured;
+    }
+    if architecture.feels_tool() {
+        return PlayoutConfig {
+            delay_ms: 0.0,
+            ..configured
+        };
     }
     let delay = |samples| PlayoutConfig::for_packing_and_jitter(samples, Duration::ZERO).delay_ms;
     // the default is made for ten samples
@@ -195,12 +211,13 @@ async fn welcome(
 
 fn announce(connection: &Connection, hello: &Hello) {
     let (address, program) = (connection.remote_address(), hello.program);
+    let architecture = hello.architecture.name();
     let Coupling {
         stiffness_n_per_m,
         damping_ns_per_m,
     } = hello.coupling;
     tracing::info!(
-        "{address} operates ({program}, device of {stiffness_n_per_m} N/m and {damping_ns_per_m} N s/m)"
+        "{address} operates ({program}, {architecture}, device of {stiffness_n_per_m} N/m and {damping_ns_per_m} N s/m)"
     );
 }
 
@@ -334,6 +351,9 @@ mod tests {
     #[test]
     fn play_out_waits_for_the_masters_packing_unless_its_delay_was_configured() {
         let default = PlayoutConfig::default();
+        let playout_for = |configured, samples_per_command| {
+            super::playout_for(configured, samples_per_command, Architecture::Mmt)
+        };
         assert_eq!(playout_for(default, 10), default);
         let one = playout_for(default, 1);
         assert!((default.delay_ms - one.delay_ms - 9.0).abs() < 1e-9);
@@ -347,5 +367,11 @@ mod tests {
             ..default
         };
         assert_eq!(playout_for(configured, 1), configured);
+        for architecture in [Architecture::Tdpa, Architecture::Auto] {
+            let from_none = super::playout_for(default, 10, architecture);
+            assert_eq!(from_none.delay_ms, 0.0, "the hand feels it");
+            let kept = super::playout_for(configured, 10, architecture);
+            assert_eq!(kept, configured);
+        }
     }
 }

@@ -17,7 +17,7 @@ use mmt_shared::io::truth::TruthSender;
 use mmt_shared::io::wake::{self, Waker, Wakeup};
 use mmt_shared::metrics::UpdateCounts;
 use mmt_shared::time::{TICK, Time};
-use mmt_shared::wire::{HipSample, Update};
+use mmt_shared::wire::{HandPort, HipSample, Tool, Update};
 use rtrb::{Consumer, Producer, RingBuffer};
 use tokio::sync::oneshot;
 use triple_buffer::{Input, Output, triple_buffer};
@@ -50,12 +50,15 @@ pub(super) struct Arrived {
     pub(super) newest_update: u32,
     /// By how much congestion stretches what the slave says.
     pub(super) stretch: f64,
+    /// What the hand's port says, with the last sample of a command.
+    pub(super) port: Option<HandPort>,
 }
 
 /// Tokio's side of the thread. Dropping it ends the thread.
 pub(super) struct Worker {
     pub(super) samples: Producer<Arrived>,
     pub(super) updates: Output<Option<Update>>,
+    pub(super) tools: Output<Option<Tool>>,
     pub(super) looks: Output<SlaveLive>,
     pub(super) wakeup: Wakeup,
     /// Closed without a word if the thread panicked.
@@ -67,6 +70,7 @@ pub(super) struct Worker {
 pub(super) struct Inside {
     samples: Consumer<Arrived>,
     updates: Input<Option<Update>>,
+    tools: Input<Option<Tool>>,
     looks: Input<SlaveLive>,
     waker: Waker,
     stop: Arc<AtomicBool>,
@@ -92,6 +96,7 @@ impl Worker {
     ) -> io::Result<Self> {
         let (samples_in, samples) = RingBuffer::new(SAMPLES_WAITING);
         let (updates, updates_out) = triple_buffer(&None);
+        let (tools, tools_out) = triple_buffer(&None);
         let (looks, looks_out) = triple_buffer(&SlaveLive::default());
         let (waker, wakeup) = wake::pair()?;
         let stop = Arc::new(AtomicBool::new(false));
@@ -99,6 +104,7 @@ impl Worker {
         let inside = Inside {
             samples,
             updates,
+            tools,
             looks,
             waker,
             stop: Arc::clone(&stop),
@@ -113,6 +119,7 @@ impl Worker {
         Ok(Self {
             samples: samples_in,
             updates: updates_out,
+            tools: tools_out,
             looks: looks_out,
             wakeup,
             finished,
@@ -129,6 +136,13 @@ impl Worker {
     pub(super) fn fresh_update(&mut self) -> Option<Update> {
         let fresh = self.updates.update();
         self.updates.output_buffer().filter(|_| fresh)
+    }
+
+    /// The newest news of the tool, if their force is wanted and they have not been fetched yet.
+    pub(super) fn fresh_force(&mut self) -> Option<Tool> {
+        let fresh = self.tools.update();
+        let tool = self.tools.output_buffer().filter(|_| fresh);
+        tool.filter(|tool| tool.force.is_some())
     }
 }
 
@@ -182,20 +196,28 @@ impl Inside {
         while let Ok(arrived) = self.samples.pop() {
             slave.handle_sample(arrived.at, &arrived.sample, arrived.newest_update);
             slave.stretch(arrived.stretch);
+            if let Some(port) = &arrived.port {
+                slave.hear_hand(port);
+            }
         }
         slave.tick(tick.deadline)
     }
 
-    /// Leaves the look and the update; whether an update was overtaken.
+    /// Leaves the look, the news of the tool and the update; whether an update was overtaken.
     fn hand_over(&mut self, slave: &Slave, tick: &SlaveTick) -> bool {
         *self.looks.input_buffer_mut() = look(slave, tick);
         self.looks.publish();
-        if tick.update.is_none() {
-            return false;
+        let tool = slave.tool(tick);
+        *self.tools.input_buffer_mut() = Some(tool);
+        self.tools.publish();
+        let mut overtook = false;
+        if tick.update.is_some() {
+            *self.updates.input_buffer_mut() = tick.update;
+            overtook = self.updates.publish();
         }
-        *self.updates.input_buffer_mut() = tick.update;
-        let overtook = self.updates.publish();
-        self.waker.wake();
+        if tick.update.is_some() || tool.force.is_some() {
+            self.waker.wake();
+        }
         overtook
     }
 }

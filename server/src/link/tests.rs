@@ -4,7 +4,7 @@ use super::*;
 use mmt_shared::contact::Coupling;
 use mmt_shared::geometry::{BoxFootprint, Pose, Twist};
 use mmt_shared::params::{ModelParams, ModelState};
-use mmt_shared::wire::{Cause, DATAGRAM_MAX, SampleBlock};
+use mmt_shared::wire::{Cause, DATAGRAM_MAX, HandPort, SampleBlock};
 
 const AT: fn(u64) -> Time = Time::from_millis;
 
@@ -24,10 +24,15 @@ fn update(sequence: u32, cause: Cause) -> Update {
 }
 
 fn link(repeats: &str) -> SlaveLink {
+    link_of(repeats, Architecture::Mmt)
+}
+
+fn link_of(repeats: &str, architecture: Architecture) -> SlaveLink {
     let config = SlaveLinkConfig {
         repeats: repeats.parse().unwrap(),
         stretch_max: StretchMax::RECOMMENDED,
         samples_per_command: 10,
+        architecture,
     };
     SlaveLink::new(Time::ZERO, config)
 }
@@ -40,7 +45,7 @@ fn repeats(link: &mut SlaveLink, mut before: impl FnMut(u64, &mut SlaveLink)) ->
     for ms in 1..=100 {
         before(ms, link);
         while let Some(length) = link.repeat(AT(ms), &mut out).unwrap() {
-            let Some(Matter::Update(raw)) = master.open(AT(ms), &out[..length]) else {
+            let Matter::Update(raw) = master.open(AT(ms), &out[..length]).unwrap().matter else {
                 panic!("no update");
             };
             sent.push((ms, raw.sequence()));
@@ -90,6 +95,7 @@ fn what_the_master_has_is_not_repeated_and_without_times_nothing_is() {
     let command = Command {
         newest_update: 1,
         samples: block,
+        port: None,
     };
     let length = master.seal(AT(20), Outgoing::Command(&command), &mut bytes);
     let length = length.unwrap();
@@ -134,6 +140,7 @@ fn only_the_news_of_a_command_acknowledge() {
     let command = Command {
         newest_update: 7,
         samples: block,
+        port: None,
     };
     let link = link("none");
     let said: Vec<(u64, u32)> = link
@@ -144,4 +151,78 @@ fn only_the_news_of_a_command_acknowledge() {
         .map(|ms| (ms, if ms <= 10 { 0 } else { 7 }))
         .collect();
     assert_eq!(said, expected);
+}
+
+#[test]
+fn a_port_counts_in_the_newest_command_only_and_where_the_hello_has_spoken_of_one() {
+    let port = |in_j| {
+        Some(HandPort {
+            in_j,
+            wants_force: true,
+            passive_tool: true,
+        })
+    };
+    let mut master = LinkEnd::new(Side::Master, Time::ZERO);
+    let mut command = |ms, port| {
+        let mut samples = SampleBlock::new();
+        let stamp = AT(ms);
+        let sample = HipSample {
+            stamp,
+            ..HipSample::default()
+        };
+        samples.push(sample).unwrap();
+        let command = Command {
+            newest_update: 0,
+            samples,
+            port,
+        };
+        let mut bytes = [0; DATAGRAM_MAX];
+        let length = master.seal(AT(ms), Outgoing::Command(&command), &mut bytes);
+        bytes[..length.unwrap()].to_vec()
+    };
+    let (first, second) = (command(1, port(0.1)), command(2, port(0.2)));
+    let mut feels = link_of("none", Architecture::Auto);
+    let taken = feels.handle(AT(3), &second).unwrap();
+    assert_eq!(taken.port, port(0.2));
+    let late = feels.handle(AT(4), &first).unwrap();
+    assert_eq!(
+        (late.port, late.samples.len()),
+        (None, 1),
+        "its sample counts"
+    );
+    let mut never = link("none");
+    assert_eq!(never.handle(AT(3), &second).unwrap().port, None);
+}
+
+#[test]
+fn news_of_the_tool_are_due_every_fifty_milliseconds_and_stand_for_the_heartbeat() {
+    let tool = Tool {
+        answers: AT(7),
+        force: None,
+        in_contact: false,
+        in_j: 0.25,
+        model_error: 0.125,
+    };
+    let mut link = link_of("none", Architecture::Tdpa);
+    let mut master = LinkEnd::new(Side::Master, Time::ZERO);
+    let mut out = [0; DATAGRAM_MAX];
+    assert_eq!(link.tool_due(), Some(AT(50)));
+    let length = link
+        .send_tool(AT(50), Some(&tool), &mut out)
+        .unwrap()
+        .unwrap();
+    let opened = master.open(AT(50), &out[..length]).unwrap();
+    assert_eq!(opened.matter, Matter::Tool(tool));
+    assert_eq!(
+        (link.tool_due(), link.end().heartbeat_due()),
+        (Some(AT(100)), AT(100))
+    );
+    assert_eq!(link.end().traffic().sent.tools, 1);
+    assert_eq!(
+        link.send_tool(AT(100), None, &mut out),
+        Ok(None),
+        "nothing to say"
+    );
+    assert_eq!(link.tool_due(), Some(AT(150)));
+    assert_eq!(self::link("none").tool_due(), None);
 }

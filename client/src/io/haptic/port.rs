@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use mmt_shared::io::wake::Waker;
 use mmt_shared::time::Time;
-use mmt_shared::wire::{HipSample, Update};
+use mmt_shared::wire::{HandPort, HipSample, Tool, Update};
 use triple_buffer::{Input, Output, triple_buffer};
 
 use crate::io::MasterLive;
@@ -14,6 +14,15 @@ use crate::io::MasterLive;
 /// Samples that may wait for the network task: a quarter of a second. Older ones the slave would not
 /// play any more; when the ring is full the new one is dropped and counted.
 pub const RING_SAMPLES: usize = 256;
+
+/// What a tick says to the slave.
+#[derive(Clone, Copy, Debug)]
+pub struct Said {
+    /// The HIP and the force that is felt.
+    pub sample: HipSample,
+    /// What goes to the tool's port, where the hand may feel the tool.
+    pub port: Option<HandPort>,
+}
 
 /// What both ends look at.
 #[derive(Debug)]
@@ -27,7 +36,8 @@ struct Signals {
 #[derive(Debug)]
 pub(super) struct LoopEnd {
     updates: Output<Option<Update>>,
-    samples: rtrb::Producer<HipSample>,
+    tools: Output<Option<(Time, Tool)>>,
+    samples: rtrb::Producer<Said>,
     look: Input<MasterLive>,
     signals: Arc<Signals>,
     waker: Waker,
@@ -37,7 +47,8 @@ pub(super) struct LoopEnd {
 #[derive(Debug)]
 pub struct HapticPort {
     updates: Input<Option<Update>>,
-    samples: rtrb::Consumer<HipSample>,
+    tools: Input<Option<(Time, Tool)>>,
+    samples: rtrb::Consumer<Said>,
     look: Output<MasterLive>,
     signals: Arc<Signals>,
     superseded: u32,
@@ -51,10 +62,12 @@ pub(super) fn ends(began: Time, waker: Waker) -> (LoopEnd, HapticPort) {
         ended: AtomicBool::new(false),
     });
     let (updates_in, updates_out) = triple_buffer(&None);
+    let (tools_in, tools_out) = triple_buffer(&None);
     let (samples_in, samples_out) = rtrb::RingBuffer::new(RING_SAMPLES);
     let (look_in, look_out) = triple_buffer(&MasterLive::default());
     let loop_end = LoopEnd {
         updates: updates_out,
+        tools: tools_out,
         samples: samples_in,
         look: look_in,
         signals: Arc::clone(&signals),
@@ -62,6 +75,7 @@ pub(super) fn ends(began: Time, waker: Waker) -> (LoopEnd, HapticPort) {
     };
     let port = HapticPort {
         updates: updates_in,
+        tools: tools_in,
         samples: samples_out,
         look: look_out,
         signals,
@@ -93,6 +107,14 @@ impl LoopEnd {
         }
     }
 
+    /// The newest news of the tool and when they arrived, if no tick has taken them before.
+    pub(super) fn newest_tool(&mut self) -> Option<&(Time, Tool)> {
+        match self.tools.update() {
+            true => self.tools.output_buffer().as_ref(),
+            false => None,
+        }
+    }
+
     /// How long nothing was heard of the slave.
     pub(super) fn silence(&self, now: Time) -> Duration {
         let heard = Time::from_nanos(self.signals.last_heard_ns.load(Ordering::Acquire));
@@ -105,8 +127,8 @@ impl LoopEnd {
     }
 
     /// Leaves a sample; false if the ring is full and it was dropped.
-    pub(super) fn give(&mut self, sample: HipSample) -> bool {
-        self.samples.push(sample).is_ok()
+    pub(super) fn give(&mut self, said: Said) -> bool {
+        self.samples.push(said).is_ok()
     }
 
     /// Wakes the network task.
@@ -137,6 +159,12 @@ impl HapticPort {
         self.superseded = self.superseded.saturating_add(u32::from(overtook));
     }
 
+    /// Puts news of the tool that arrived at `now` into the cell: the newest is all that counts.
+    pub fn offer_tool(&mut self, now: Time, tool: &Tool) {
+        *self.tools.input_buffer_mut() = Some((now, *tool));
+        self.tools.publish();
+    }
+
     /// Says when the slave was last heard.
     pub fn heard(&self, at: Time) {
         self.signals
@@ -156,7 +184,7 @@ impl HapticPort {
     }
 
     /// The oldest sample that waits.
-    pub fn pop(&mut self) -> Option<HipSample> {
+    pub fn pop(&mut self) -> Option<Said> {
         self.samples.pop().ok()
     }
 

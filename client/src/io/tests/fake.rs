@@ -180,7 +180,8 @@ impl Session {
         while let Ok(Ok(bytes)) =
             tokio::time::timeout_at(end, self.connection.read_datagram()).await
         {
-            if let Some(Matter::Command(command)) = self.link.open(self.clock.now(), &bytes) {
+            let opened = self.link.open(self.clock.now(), &bytes);
+            if let Some(Matter::Command(command)) = opened.map(|opened| opened.matter) {
                 let stamps = command.samples.as_slice().iter();
                 self.stamps
                     .extend(stamps.map(|sample| sample.stamp.as_nanos()));

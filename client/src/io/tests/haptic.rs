@@ -171,7 +171,7 @@ async fn a_full_ring_drops_the_new_sample_and_counts_it() {
     }
     assert_eq!(haptic.outcome().samples_dropped, 7);
     let first = port.pop().unwrap();
-    assert_eq!(first.stamp, Time::from_millis(1));
+    assert_eq!(first.sample.stamp, Time::from_millis(1));
     assert_eq!((0..).map_while(|_| port.pop()).count(), RING_SAMPLES - 1);
 }
 

@@ -9,6 +9,7 @@ use bytes::Bytes;
 use mmt_shared::io::live::LiveCell;
 use mmt_shared::io::transport::SendDatagramError;
 use mmt_shared::link_end::SealError;
+use mmt_shared::time::Time;
 use mmt_shared::wire::{Farewell, MasterTotals};
 use tokio::sync::watch;
 use tokio::time::{MissedTickBehavior, interval, sleep};
@@ -45,7 +46,8 @@ impl Session<'_> {
         loop {
             let now = self.shared.clock.now();
             let due = self.link.end().heartbeat_due();
-            let due = self.link.repeat_due().map_or(due, |repeat| repeat.min(due));
+            let others = [self.link.repeat_due(), self.link.tool_due()];
+            let due = others.into_iter().flatten().fold(due, Time::min);
             let due = due.saturating_since(now);
             // In this order, so that a flood of datagrams holds up nothing else.
             tokio::select! {
@@ -57,6 +59,7 @@ impl Session<'_> {
                     // Only a runtime that shuts down fails here.
                     woken.map_err(|_| End::Asked)?;
                     self.send_update()?;
+                    self.send_force()?;
                 }
                 () = sleep(due) => self.send_due()?,
                 _ = looks.tick() => self.look(live)?,
@@ -73,12 +76,14 @@ impl Session<'_> {
             return;
         };
         let stretch = self.link.end().stretch();
+        let last = command.samples.last().map(|sample| sample.stamp);
         for (sample, newest_update) in self.link.samples(&command) {
             let taken = self.worker.samples.push(Arrived {
                 at: now,
                 sample,
                 newest_update,
                 stretch,
+                port: command.port.filter(|_| Some(sample.stamp) == last),
             });
             self.lost.samples += u64::from(taken.is_err());
         }
@@ -96,9 +101,24 @@ impl Session<'_> {
         Ok(())
     }
 
-    /// Repeats and heartbeats, which nothing but the time asks for.
+    /// The tool's force, as long as it is wanted.
+    fn send_force(&mut self) -> Result<(), End> {
+        let Some(tool) = self.worker.fresh_force() else {
+            return Ok(());
+        };
+        let now = self.shared.clock.now();
+        let sealed = self.link.send_tool(now, Some(&tool), &mut self.buffer);
+        self.send(sealed).map(drop)
+    }
+
+    /// News of the tool, repeats and heartbeats, which nothing but the time asks for.
     fn send_due(&mut self) -> Result<(), End> {
         let now = self.shared.clock.now();
+        if self.link.tool_due().is_some_and(|due| due <= now) {
+            let tool = self.worker.tools.read().as_ref();
+            let sealed = self.link.send_tool(now, tool, &mut self.buffer);
+            self.send(sealed)?;
+        }
         let repeat = self.link.repeat(now, &mut self.buffer);
         self.send(repeat)?;
         let heartbeat = self.link.heartbeat(now, &mut self.buffer);

@@ -15,9 +15,9 @@ use mmt_shared::link_end::{LinkEnd, Outgoing};
 use mmt_shared::pairing::{Pairing, Token};
 use mmt_shared::time::{TICK, Time};
 use mmt_shared::wire::{
-    Command, DATAGRAM_MAX, Ending, Farewell, Hello, HipCounts, HipSample, Label, MasterTotals,
-    Matter, RawUpdate, RawWelcome, Refusal, Role, STREAM_MESSAGE_MAX, SampleBlock, Side,
-    SlaveTotals, StreamMessage, decode_stream_message, encode_hello, encode_master_farewell,
+    Architecture, Command, DATAGRAM_MAX, Ending, Farewell, Hello, HipCounts, HipSample, Label,
+    MasterTotals, Matter, RawUpdate, RawWelcome, Refusal, Role, STREAM_MESSAGE_MAX, SampleBlock,
+    Side, SlaveTotals, StreamMessage, decode_stream_message, encode_hello, encode_master_farewell,
 };
 use quinn::{Connection, Endpoint, RecvStream, SendStream};
 use tokio::time::{interval, timeout};
@@ -84,6 +84,7 @@ impl Master {
             role: Role::Operator,
             coupling: Coupling::for_stiffness(k_p),
             samples_per_command: PACKED,
+            architecture: Architecture::Mmt,
             hip: self.hip,
             program: Label::clipped("test"),
         };
@@ -133,7 +134,8 @@ impl Master {
     }
 
     fn take(&mut self, datagram: &Bytes) {
-        if let Some(Matter::Update(update)) = self.link.open(self.clock.now(), datagram) {
+        let opened = self.link.open(self.clock.now(), datagram);
+        if let Some(Matter::Update(update)) = opened.map(|opened| opened.matter) {
             self.updates.push(update);
         }
     }
@@ -156,6 +158,7 @@ impl Master {
         let command = Command {
             newest_update,
             samples,
+            port: None,
         };
         let mut out = [0; DATAGRAM_MAX];
         let now = self.clock.now();
