@@ -23,6 +23,7 @@ use mmt_server::trigger::Scheme;
 use mmt_shared::pairing::{Address, Host};
 use mmt_shared::rate_control::StretchMax;
 use mmt_shared::settings::Mode;
+use mmt_shared::wire::Architecture;
 
 pub(crate) use self::netem::EmulationArguments;
 pub(crate) use bench::{BenchArguments, BenchSubject, TransportBenchArguments};
@@ -93,6 +94,9 @@ pub(crate) struct DemoArguments {
     /// The bundle of choices
     #[arg(long, value_enum, default_value_t = ModeName::Recommended)]
     pub(crate) mode: ModeName,
+    /// Whose force the hand feels
+    #[arg(long, value_enum, default_value_t = ArchitectureName::Mmt)]
+    pub(crate) architecture: ArchitectureName,
     /// When updates are sent [default: the mode's]
     #[arg(long, value_name = "WORDS", value_parser = values::scheme)]
     pub(crate) scheme: Option<Scheme>,
@@ -183,6 +187,9 @@ pub(crate) struct MasterArguments {
     /// Virtual stiffness k_p, N/m [default: the device's]
     #[arg(long, value_name = "N_PER_M")]
     pub(crate) stiffness: Option<f64>,
+    /// Whose force the hand feels
+    #[arg(long, value_enum, default_value_t = ArchitectureName::Mmt)]
+    pub(crate) architecture: ArchitectureName,
     /// Emulated network on what the master sends
     #[arg(long, value_name = "WORDS", default_value = "none", value_parser = values::netem)]
     pub(crate) netem: LinkConfig,
@@ -298,6 +305,27 @@ pub(crate) enum ModeName {
     Paper,
     /// What the design study found better
     Recommended,
+}
+
+/// Whose force the hand feels, as written on the command line.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum ArchitectureName {
+    /// The local model's: model-mediated teleoperation
+    Mmt,
+    /// The tool's, across the network, with time-domain passivity control
+    Tdpa,
+    /// The one of the two that the measured path and the model's error speak for
+    Auto,
+}
+
+impl From<ArchitectureName> for Architecture {
+    fn from(name: ArchitectureName) -> Self {
+        match name {
+            ArchitectureName::Mmt => Self::Mmt,
+            ArchitectureName::Tdpa => Self::Tdpa,
+            ArchitectureName::Auto => Self::Auto,
+        }
+    }
 }
 
 impl From<ModeName> for Mode {

@@ -16,6 +16,7 @@ use mmt_shared::io::transport::Transport;
 use mmt_shared::io::truth::{self, TruthReceiver, TruthSender};
 use mmt_shared::pairing::Pairing;
 use mmt_shared::settings::Mode;
+use mmt_shared::wire::Architecture;
 
 use super::netem::wrap::{Emulation, effect};
 use super::viewer::Viewer;
@@ -97,11 +98,18 @@ fn down(arguments: &DemoArguments) -> &LinkConfig {
     arguments.netem_down.as_ref().unwrap_or(&arguments.netem)
 }
 
+fn architecture(arguments: &DemoArguments) -> Architecture {
+    arguments.architecture.into()
+}
+
 fn slave_config(arguments: &DemoArguments) -> SlaveConfig {
     let mut config = SlaveConfig::of_mode(arguments.mode.into());
     config.seed = arguments.seed;
-    config.playout =
-        PlayoutConfig::for_packing_and_jitter(SAMPLES_PER_COMMAND, up(arguments).jitter_span());
+    // where the tool may be felt the play-out finds out by itself how long it has to wait
+    if !architecture(arguments).feels_tool() {
+        let jitter = up(arguments).jitter_span();
+        config.playout = PlayoutConfig::for_packing_and_jitter(SAMPLES_PER_COMMAND, jitter);
+    }
     if let Some(scheme) = arguments.scheme {
         config.trigger.scheme = scheme;
     }
@@ -122,6 +130,10 @@ fn caption(arguments: &DemoArguments, config: &SlaveConfig) -> Caption {
     let network = match (up(arguments), down(arguments)) {
         (up, down) if up == down => format!("network each way: {up}"),
         (up, down) => format!("network up: {up}, down: {down}"),
+    };
+    let mode = match architecture(arguments) {
+        Architecture::Mmt => mode.to_owned(),
+        other => format!("{mode}, {}", other.name()),
     };
     Caption {
         command: "demo",
@@ -167,6 +179,7 @@ fn master_options(
             ..ScriptedConfig::default()
         }),
         duration: Some(arguments.duration),
+        architecture: architecture(arguments),
         commands: CommandConfig {
             samples_per_command: SAMPLES_PER_COMMAND,
             repeat_samples: arguments.repeat_samples,

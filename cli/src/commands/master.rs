@@ -120,6 +120,7 @@ fn options(arguments: &MasterArguments) -> Result<MasterOptions, Failure> {
         device: device.map_err(|error| Failure::usage(format!("--stiffness: {error}")))?,
         operator: operator(arguments)?,
         duration: arguments.duration,
+        architecture: arguments.architecture.into(),
         commands: CommandConfig {
             samples_per_command: arguments.samples_per_command,
             repeat_samples: arguments.repeat_samples,

@@ -69,14 +69,16 @@ pub(super) fn link_panel(now: &Snapshot) -> Paragraph<'static> {
     let (up, down) = now.loss();
     let percent = |share: Option<f64>| shown(share.map(|share| share * 100.0), 1, " %");
     let state = now.master.map_or("-", |master| master.link.name());
-    panel(
-        format!("link: {state}"),
-        vec![
-            format!("round trip {}", shown(now.rtt_ms(), 1, " ms")),
-            format!("loss up {}", percent(up)),
-            format!("loss down {}", percent(down)),
-        ],
-    )
+    let mut lines = vec![
+        format!("round trip {}", shown(now.rtt_ms(), 1, " ms")),
+        format!("loss up {}", percent(up)),
+        format!("loss down {}", percent(down)),
+    ];
+    // only where there is a choice
+    if let Some(share) = now.model_share() {
+        lines.push(format!("felt: model {:.0} %", share * 100.0));
+    }
+    panel(format!("link: {state}"), lines)
 }
 
 /// The haptic loop.

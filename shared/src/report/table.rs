@@ -71,6 +71,7 @@ impl<C> fmt::Display for RunReport<C> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         self.head(f)?;
         self.work(f)?;
+        self.architecture(f)?;
         self.updates(f)?;
         self.force(f)?;
         self.model(f)?;
@@ -121,6 +122,23 @@ impl<C> RunReport<C> {
             "contact breaks per push",
             &[number(self.pushes.contact_breaks_per_push, 2, "")],
         )
+    }
+
+    /// Only where there was a choice.
+    fn architecture(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let of = &self.architecture;
+        let (Some(name), Some(_)) = (&of.name, of.tool_share.get()) else {
+            return Ok(());
+        };
+        let mut rows = section(f, "Felt");
+        rows.row("architecture", &[Some(name.clone())])?;
+        rows.row("tool felt alone", &[share(of.tool_share)])?;
+        rows.row("switches", &[count(of.switches, "")])?;
+        let step = number(of.fade_step_max_n, 3, " N in a tick");
+        rows.row("largest step of a fade", &[step])?;
+        let round_trip = number(of.round_trip_ms, 1, " ms");
+        rows.row("round trip as felt", &[round_trip])?;
+        rows.row("error of the model", &[number(of.model_error, 3, "")])
     }
 
     fn updates(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -304,6 +322,7 @@ fn message_cells(messages: &MessagesReport) -> Vec<Cell> {
         count(messages.commands, " commands"),
         count(messages.updates, " updates"),
         count(messages.scenes.filter(|n| *n > 0), " scenes"),
+        count(messages.tools.filter(|n| *n > 0), " of the tool"),
         count(messages.heartbeats, " heartbeats"),
     ];
     kinds.into_iter().filter(Option::is_some).collect()
