@@ -132,6 +132,49 @@ fn the_demonstration_runs_end_to_end_and_its_report_is_sane() {
     }
 }
 
+/// A path that is 0.2 ms long for eight seconds and 60 ms from then on. The hand feels the tool, then the model; it
+/// is in no push when it changes, and the force takes no step.
+#[test]
+fn auto_feels_the_tool_while_the_path_is_short_and_the_model_when_it_has_become_long() {
+    let _turn = alone();
+    let path = std::env::temp_dir().join(format!("mmt-live-{}.csv", std::process::id()));
+    let probes =
+        "# mmt netem path 1\nat_ns,delay_ns\n0,200000\n8000000000,60000000\n60000000000,60000000\n";
+    std::fs::write(&path, probes).unwrap();
+    let netem = format!("trace {}", path.display());
+    let auto = ["demo", "--architecture", "auto", "--duration", "16s"];
+    let arguments = [&auto[..], &["--netem", &netem, "--json"]].concat();
+    let ended = ok(ok(Running::mmt(&arguments)).end(Duration::from_secs(40)));
+    std::fs::remove_file(&path).unwrap();
+    ended_with(0, &ended);
+    let report = ok(ended.document(0));
+    nothing_is_nan(&report, "");
+    let name = report.pointer("/architecture/name").and_then(Value::as_str);
+    assert_eq!(name, Some("auto"));
+    for (path, least, most) in [
+        ("/architecture/switches", 2.0, 4.0),
+        ("/architecture/tool_share", 0.1, 0.7),
+        // the limiter lets 2 N through, a fade 40 mN of what differs
+        ("/architecture/fade_step_max_n", 0.0, 0.5),
+        // both ways and the play-out
+        ("/architecture/round_trip_ms", 120.0, 300.0),
+        ("/architecture/model_error", 0.0, 1.0),
+        // every tick of the tool, and 20 a second
+        ("/messages/down/tools", 1000.0, 14_000.0),
+        ("/passivity/observer_min_j", -1e-3, 0.0),
+        ("/passivity/energy_injected_j", 0.0, 1e-9),
+        ("/pushes/completed", 1.0, 4.0),
+        ("/pushes/contact_breaks_per_push", 0.0, 3.0),
+    ] {
+        let value = number(&report, path);
+        let value = value.unwrap_or_else(|| panic!("{path} is {:?}", report.pointer(path)));
+        assert!(
+            (least..=most).contains(&value),
+            "{path} is {value}, not {least} to {most}"
+        );
+    }
+}
+
 #[test]
 fn the_master_that_is_interrupted_ends_both_sides_with_their_reports() {
     let _turn = alone();

@@ -29,7 +29,7 @@ use mmt_shared::geometry::Vec2;
 use mmt_shared::rate_control::StretchMax;
 use mmt_shared::settings::Mode;
 use mmt_shared::time::{TICK, Time};
-use mmt_shared::wire::{Architecture, Command, DATAGRAM_MAX, HipSample, Label, Welcome};
+use mmt_shared::wire::{Architecture, Command, DATAGRAM_MAX, HipSample, Label, Tool, Welcome};
 
 /// The system's allocator, with a count of every call that takes memory.
 struct Counting;
@@ -121,7 +121,7 @@ fn slave_link() -> SlaveLinkConfig {
         repeats: Repeats::recommended(),
         stretch_max: StretchMax::RECOMMENDED,
         samples_per_command: commands().samples_per_command,
-        architecture: Architecture::Auto,
+        architecture: Architecture::Tdpa,
     }
 }
 
@@ -177,7 +177,7 @@ impl Loop {
             program: Label::clipped("test"),
         };
         let limiter = ForceLimiter::try_new(device.limits()).unwrap();
-        let master = Master::with_architecture(&welcome, limiter, Architecture::Auto);
+        let master = Master::with_architecture(&welcome, limiter, Architecture::Tdpa);
         let scripted = Scripted::try_new(ScriptedConfig::default(), master.view()).unwrap();
         let operator = Operator::Scripted(Box::new(scripted));
         slave.start_at(operator.start());
@@ -274,6 +274,12 @@ fn the_haptic_tick_never_allocates() {
         assert!(contact > TICKS / 5, "{mode:?}: {contact} ticks of contact");
         assert!(applied > 20, "{mode:?}: {applied} updates applied");
         assert!(haptic.operator.pushes_completed() >= Some(1), "{mode:?}");
+        let felt = haptic.master.either().unwrap().outcome();
+        let tool = felt.tool_ticks;
+        assert!(
+            0 < tool && tool < TICKS,
+            "{mode:?}: {tool} ticks of the tool"
+        );
     }
 }
 
@@ -376,7 +382,7 @@ fn the_slaves_own_parts_never_allocate() {
         }
         down = slaved.down;
     }
-    assert_eq!(samples, TICKS / 10, "every command was read");
+    assert_eq!(samples, TICKS, "every command was read, each with a sample");
     assert!(updates > 20, "{updates} updates written");
     assert!(parts.decided > 20, "{} decisions to send", parts.decided);
     for estimator in &parts.estimators {
