@@ -384,3 +384,27 @@ fn with_a_stiff_device_the_choice_leaves_tdpa_before_it_breaks_contact() {
         assert!(mean(&auto, |row| row.force_peak_n) < 5.0, "{one_way_ms} ms");
     }
 }
+
+#[test]
+fn a_path_too_narrow_for_the_tools_force_is_noticed_and_left_to_the_model() {
+    // the stream takes 1.1 Mbit/s up; the queue it makes is a round trip that the hand would feel
+    for rate in ["256kbit", "600kbit"] {
+        for seed in 1..=2 {
+            let words = format!("delay 2ms rate {rate} 28 queue 200ms");
+            let mut world = World::try_new(&auto(over(&words, 1000.0, seed))).unwrap();
+            let ticks = 60_000;
+            (0..ticks).for_each(|_| drop(world.step()));
+            let (outcome, chosen) = (world.outcome(), choice(&world));
+            let switches = world.master().either().unwrap().choice().switches();
+            let share = chosen.tool_ticks as f64 / f64::from(ticks);
+            let pushes = world.operator().pushes_completed().unwrap();
+            let breaks = outcome.breaks.per_push(pushes).unwrap();
+            let peak_n = outcome.on_hand.largest_n().unwrap();
+            println!(
+                "{rate}, seed {seed}: TDPA {share:.3} of the time, {switches} switches, {breaks:.2} breaks a push, peak {peak_n:.2} N"
+            );
+            assert!(switches <= 4 && share < 0.05, "{switches} {share}");
+            assert!(breaks < 2.0 && peak_n < 5.0 && outcome.observer_min_j > -1e-3);
+        }
+    }
+}
