@@ -61,6 +61,11 @@ pub(super) fn model_panel(caption: &Caption, now: &Snapshot) -> Paragraph<'stati
         "pushes            {:>8}",
         shown(pushes.map(|n| n as f64), 0, "")
     ));
+    // only where there is a choice
+    if let Some(share) = now.model_share() {
+        let percent = shown(Some(share * 100.0), 0, " %");
+        lines.push(format!("felt of the model {percent:>8}"));
+    }
     panel("model", lines)
 }
 
@@ -69,16 +74,14 @@ pub(super) fn link_panel(now: &Snapshot) -> Paragraph<'static> {
     let (up, down) = now.loss();
     let percent = |share: Option<f64>| shown(share.map(|share| share * 100.0), 1, " %");
     let state = now.master.map_or("-", |master| master.link.name());
-    let mut lines = vec![
-        format!("round trip {}", shown(now.rtt_ms(), 1, " ms")),
-        format!("loss up {}", percent(up)),
-        format!("loss down {}", percent(down)),
-    ];
-    // only where there is a choice
-    if let Some(share) = now.model_share() {
-        lines.push(format!("felt: model {:.0} %", share * 100.0));
-    }
-    panel(format!("link: {state}"), lines)
+    panel(
+        format!("link: {state}"),
+        vec![
+            format!("round trip {}", shown(now.rtt_ms(), 1, " ms")),
+            format!("loss up {}", percent(up)),
+            format!("loss down {}", percent(down)),
+        ],
+    )
 }
 
 /// The haptic loop.

@@ -94,7 +94,7 @@ fn the_dashboard_shows_every_label_and_number_on_a_small_terminal() {
         "c N",
         "pushes",
         "link: late",
-        "felt: model 25 %",
+        "felt of the model     25 %",
         "101.5 ms",
         "loss up 1.1 %",
         "loss down 0.9 %",

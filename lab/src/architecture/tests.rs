@@ -387,7 +387,7 @@ fn with_a_stiff_device_the_choice_leaves_tdpa_before_it_breaks_contact() {
 
 #[test]
 fn a_path_too_narrow_for_the_tools_force_is_noticed_and_left_to_the_model() {
-    // the stream takes 1.1 Mbit/s up; the queue it makes is a round trip that the hand would feel
+    // the stream takes 1 Mbit/s each way; the queue it makes is a round trip that the hand would feel
     for rate in ["256kbit", "600kbit"] {
         for seed in 1..=2 {
             let words = format!("delay 2ms rate {rate} 28 queue 200ms");
