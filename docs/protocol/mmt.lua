@@ -1,4 +1,4 @@
--- Dissects mmt's messages in Wireshark and tshark, by what docs/protocol.md says (version 1 of the protocol).
+-- Dissects mmt's messages in Wireshark and tshark, by what docs/protocol.md says (version 2 of the protocol).
 --
 --   tshark -X lua_script:mmt.lua -o tls.keylog_file:KEYS -r SESSION.pcap -Y mmt
 --
@@ -18,7 +18,7 @@ local malformed = ProtoExpert.new("mmt.malformed.expert", "Not a message",
 mmt.experts = { malformed }
 
 local HEADER_BYTES, DATAGRAM_MAX, STREAM_MAX = 8, 1024, 4096
-local VERSION, TEXT_MAX, SAMPLES_MAX, TICK_NS = 1, 64, 32, 1000000
+local VERSION, TEXT_MAX, SAMPLES_MAX, TICK_NS = 2, 64, 32, 1000000
 local I32_MIN, I32_MAX = -2147483648, 2147483647
 local POSITION_COUNT_M, FORCE_COUNT_N = 1e-7, 1e-4
 
@@ -40,16 +40,16 @@ declare("uint8", "version samples_per_command")
 declare("uint16", "flags", base.HEX)
 declare("uint32", "length number echo.number echo.received newest_update samples.ticks sequence newest_command")
 declare("uint64", "sent echo.sent echo.held_ns samples.stamp answers")
-declare("int32", "samples.x samples.y samples.force_x samples.force_y")
-declare("bool", "slave_in_contact")
-declare("string", "cause role program friction smoothing correction scheme refusal ending")
+declare("int32", "samples.x samples.y samples.force_x samples.force_y force.x force.y")
+declare("bool", "slave_in_contact in_contact wants_force passive_tool")
+declare("string", "cause role architecture program friction smoothing correction scheme refusal ending")
 declare("bytes", "token")
-declare("double", "object tool force hip stiffness_n_per_m damping_ns_per_m lambda tau_s")
+declare("double", "object tool force in_j model_error hip stiffness_n_per_m damping_ns_per_m lambda tau_s")
 
 local STATE = "m b c inertia e east north west south x y angle v_x v_y omega"
 for name in STATE:gmatch("%S+") do declare("double", "state." .. name) end
 
-local KINDS = "commands updates scenes heartbeats"
+local KINDS = "commands updates scenes heartbeats tools"
 for _, way in ipairs { "sent", "received" } do
     for name in KINDS:gmatch("%S+") do declare("uint32", "totals.traffic." .. way .. "." .. name) end
 end
@@ -158,6 +158,11 @@ function Reader:f64(name)
     local value = range:le_float()
     self.tree:add_le(fields[name], range)
     demand(value == value and math.abs(value) ~= math.huge, name .. " is not a finite number")
+    return value
+end
+
+function Reader:energy(name)
+    demand(self:f64(name) >= 0, name .. " is below 0")
 end
 
 function Reader:floats(prefix, names)
@@ -169,6 +174,11 @@ function Reader:truth(what)
     local value = range:uint()
     demand(value <= 1, what .. " is neither 0 nor 1")
     return value == 1, range
+end
+
+function Reader:bool(name)
+    local value, range = self:truth(name)
+    self.tree:add(fields[name], range, value)
 end
 
 function Reader:option(name, read)
@@ -236,6 +246,12 @@ local function envelope(r)
     return " #" .. number
 end
 
+-- A number of counts, and how much that is.
+local function counted(r, name, range, value, count, unit)
+    local item = r.tree:add(fields[name], range, value)
+    item:append_text(string.format(" (%.7g %s)", value * count, unit))
+end
+
 local COUNTED = { { "x", POSITION_COUNT_M, "m" }, { "y", POSITION_COUNT_M, "m" },
     { "force_x", FORCE_COUNT_N, "N" }, { "force_y", FORCE_COUNT_N, "N" } }
 
@@ -258,8 +274,7 @@ local function sample(r, first, before)
         local value = (first and 0 or before[name]) + step
         demand(value >= I32_MIN and value <= I32_MAX, name .. " leaves 32 bits")
         before[name] = value
-        local item = r.tree:add(fields["samples." .. name], range, value)
-        item:append_text(string.format(" (%.7g %s)", value * count, unit))
+        counted(r, "samples." .. name, range, value, count, unit)
     end
 end
 
@@ -276,6 +291,32 @@ local function command(r)
     return info .. ", " .. count .. " samples"
 end
 
+local function coupled_command(r)
+    local info = command(r)
+    r:energy("in_j")
+    r:bool("wants_force")
+    r:bool("passive_tool")
+    return info
+end
+
+local function tool(r)
+    local info = envelope(r)
+    r:u64("answers")
+    r:option("force", function()
+        r:group("force", function()
+            for _, name in ipairs { "force.x", "force.y" } do
+                local value, range = r:zigzag(32)
+                counted(r, name, range, value, FORCE_COUNT_N, "N")
+            end
+        end)
+    end)
+    r:bool("in_contact")
+    r:energy("in_j")
+    local share = r:f64("model_error")
+    demand(share >= 0 and share <= 1, "model_error is not 0 to 1")
+    return info
+end
+
 local function state(r)
     r:group("state", function() r:floats("state.", STATE) end)
 end
@@ -288,8 +329,7 @@ local function update(r)
     local cause = r:choice("cause", CAUSES)
     r:u64("answers")
     r:u32("newest_command")
-    local contact, range = r:truth("slave_in_contact")
-    r.tree:add(fields.slave_in_contact, range, contact)
+    r:bool("slave_in_contact")
     state(r)
     return info .. ", update " .. sequence .. " " .. cause
 end
@@ -306,6 +346,7 @@ local function hello(r)
     r:choice("role", { "operator" })
     r:floats("", "stiffness_n_per_m damping_ns_per_m")
     r.tree:add(fields.samples_per_command, r:take(1))
+    r:choice("architecture", { "mmt", "tdpa", "auto" })
     r:floats("", "hip hip")
     r:text("program")
 end
@@ -372,6 +413,8 @@ local TYPES = {
     [2] = { "update", "slave", "datagram", update },
     [3] = { "scene", "slave", "datagram", scene },
     [4] = { "heartbeat", nil, "datagram", envelope },
+    [5] = { "tool", "slave", "datagram", tool },
+    [6] = { "coupled_command", "master", "datagram", coupled_command },
     [16] = { "hello", "master", "stream", hello },
     [17] = { "welcome", "slave", "stream", welcome },
     [18] = { "refused", "slave", "stream", refused },
@@ -396,7 +439,7 @@ local function message(r, road, from)
     demand(magic:string() == "MMTP", "another magic")
     r.tree:add(fields.magic, magic)
     r.tree:add(fields.version, version)
-    demand(version:uint() == VERSION, "version " .. version:uint() .. " of the protocol, not 1")
+    demand(version:uint() == VERSION, "version " .. version:uint() .. " of the protocol, not " .. VERSION)
     local kind = TYPES[number:uint()]
     demand(kind, "unknown type " .. number:uint())
     r.tree:add(fields.type, number, kind[1])
@@ -474,7 +517,7 @@ function mmt_quic.dissector(_, pinfo, tree)
 end
 
 register_postdissector(mmt_quic)
-DissectorTable.get("quic.proto"):add("mmt/1", mmt_stream)
+DissectorTable.get("quic.proto"):add("mmt/" .. VERSION, mmt_stream)
 DissectorTable.get("udp.port"):add_for_decode_as(mmt)
 DissectorTable.get("udp.port"):add_for_decode_as(mmt_stream)
 mmt:register_heuristic("udp", function(buffer, pinfo, tree)

@@ -13,12 +13,14 @@ import struct
 import sys
 import unicodedata
 
-KINDS = {1: "command", 2: "update", 3: "scene", 4: "heartbeat", 16: "hello", 17: "welcome",
-         18: "refused", 19: "master_farewell", 20: "slave_farewell"}
+KINDS = {1: "command", 2: "update", 3: "scene", 4: "heartbeat", 5: "tool", 6: "coupled_command",
+         16: "hello", 17: "welcome", 18: "refused", 19: "master_farewell", 20: "slave_farewell"}
 SENDERS = {"command": ["master"], "update": ["slave"], "scene": ["slave"],
-           "heartbeat": ["master", "slave"], "hello": ["master"], "welcome": ["slave"],
-           "refused": ["slave"], "master_farewell": ["master"], "slave_farewell": ["slave"]}
-DATAGRAM_TYPES = ["command", "update", "scene", "heartbeat"]
+           "heartbeat": ["master", "slave"], "tool": ["slave"], "coupled_command": ["master"],
+           "hello": ["master"], "welcome": ["slave"], "refused": ["slave"],
+           "master_farewell": ["master"], "slave_farewell": ["slave"]}
+DATAGRAM_TYPES = ["command", "update", "scene", "heartbeat", "tool", "coupled_command"]
+VERSION = 2
 STATE = ["m", "b", "c", "inertia", "e", "east", "north", "west", "south",
          "x", "y", "angle", "v_x", "v_y", "omega"]
 
@@ -74,6 +76,11 @@ class Reader:
     def f64(self):
         value = struct.unpack("<d", self.take(8))[0]
         demand(math.isfinite(value), "float not finite")
+        return value
+
+    def energy(self):
+        value = self.f64()
+        demand(value >= 0, "energy below 0")
         return value
 
     def floats(self, count):
@@ -145,6 +152,19 @@ def command(r):
     return {**envelope(r), "newest_update": r.u32(), "samples": samples(r)}
 
 
+def coupled_command(r):
+    return {**command(r), "in_j": r.energy(), "wants_force": r.boolean(),
+            "passive_tool": r.boolean()}
+
+
+def tool(r):
+    fields = {**envelope(r), "answers": r.u64(),
+              "force": r.option(lambda: {"x": r.i32(), "y": r.i32()}),
+              "in_contact": r.boolean(), "in_j": r.energy(), "model_error": r.f64()}
+    demand(0 <= fields["model_error"] <= 1, "model_error beyond 0 to 1")
+    return fields
+
+
 def update(r):
     causes = ["deadband", "timer", "master_only_contact", "slave_only_contact", "contact_lost",
               "every_sample"]
@@ -161,7 +181,8 @@ def scene(r):
 def hello(r):
     return {"token": r.take(32).hex(), "role": r.choice(["operator"]),
             "stiffness_n_per_m": r.f64(), "damping_ns_per_m": r.f64(),
-            "samples_per_command": r.u8(), "hip": r.floats(2), "program": r.text()}
+            "samples_per_command": r.u8(), "architecture": r.choice(["mmt", "tdpa", "auto"]),
+            "hip": r.floats(2), "program": r.text()}
 
 
 def welcome(r):
@@ -182,7 +203,7 @@ def counters(r, names, read):
 
 
 def traffic(r):
-    kinds = "commands updates scenes heartbeats"
+    kinds = "commands updates scenes heartbeats tools"
     udp = "udp_datagrams_sent udp_bytes_sent udp_datagrams_received udp_bytes_received"
     return {"sent": counters(r, kinds, r.u32), "received": counters(r, kinds, r.u32),
             **counters(r, "duplicates too_old malformed", r.u32), **counters(r, udp, r.u64)}
@@ -217,7 +238,7 @@ def slave_farewell(r):
 
 
 BODIES = {"command": command, "update": update, "scene": scene, "heartbeat": envelope,
-          "hello": hello, "welcome": welcome, "refused": refused,
+          "tool": tool, "coupled_command": coupled_command, "hello": hello, "welcome": welcome, "refused": refused,
           "master_farewell": master_farewell, "slave_farewell": slave_farewell}
 
 
@@ -233,7 +254,8 @@ def decode(data, channel, sender):
     demand(len(data) >= 8, "shorter than a header")
     magic, version, number, flags = struct.unpack("<4sBBH", data[:8])
     demand(magic == b"MMTP", "other magic")
-    demand(version == 1, f"the other side speaks version {version}, this side version 1")
+    demand(version == VERSION,
+           f"the other side speaks version {version}, this side version {VERSION}")
     demand(number in KINDS, "unknown type")
     demand(flags == 0, "unknown flags")
     kind = KINDS[number]

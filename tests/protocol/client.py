@@ -36,7 +36,7 @@ from capture import Capture  # noqa: E402
 from decode import Refused, decode  # noqa: E402
 from push import COUPLING, START, Push  # noqa: E402
 
-ALPN = "mmt/1"
+ALPN = "mmt/2"
 VERSION_PROTOCOL = "mmt/version"
 OTHER_VERSION = 1  # code of the close
 NO_APPLICATION_PROTOCOL = 0x178  # TLS alert 120 as an error of QUIC (RFC 9001, section 4.8)
@@ -45,7 +45,8 @@ SAMPLES_PER_COMMAND, SAMPLES_MAX = 10, 32
 HEARTBEAT_NS = 50_000_000
 REST_TICKS = 400  # at the end, without commands
 WAIT_S = 10.0  # for each answer; generous, the host may be busy
-KINDS = {"command": "commands", "update": "updates", "scene": "scenes", "heartbeat": "heartbeats"}
+KINDS = {"command": "commands", "update": "updates", "scene": "scenes", "heartbeat": "heartbeats",
+         "tool": "tools"}
 # what an update may say: name -> least, most
 RANGES = {"m": (0.05, 50), "b": (0, 200), "c": (0, 200), "inertia": (3e-6, 34), "e": (0, 200),
           "east": (0.01, 1), "north": (0.01, 1), "west": (0.01, 1), "south": (0.01, 1),

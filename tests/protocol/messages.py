@@ -6,7 +6,7 @@ Must never write what that decoder would refuse. Python 3.10 or later, standard 
 
 import struct
 
-VERSION = 1
+VERSION = 2
 COMMAND, HEARTBEAT, HELLO, MASTER_FAREWELL = 1, 4, 16, 19
 TICK_NS = 1_000_000
 
@@ -85,16 +85,16 @@ def command(fields, newest_update, samples):
 
 
 def hello(token, coupling, samples_per_command, hip, program):
-    operator = u32(0)
+    operator, mmt = u32(0), u32(0)
     return (header(HELLO) + token + operator + f64(*coupling) + bytes([samples_per_command])
-            + f64(*hip) + text(program))
+            + mmt + f64(*hip) + text(program))
 
 
 def master_farewell(duration_ns, traffic, applied, dropped, ticks):
     """A finished session. `traffic`: dict with the names of the document; nothing of a haptic loop."""
     finished, skipped, absent = u32(0), u64(0), b"\0"
     udp = "udp_datagrams_sent udp_bytes_sent udp_datagrams_received udp_bytes_received"
-    kinds = "commands updates scenes heartbeats"
+    kinds = "commands updates scenes heartbeats tools"
     drops = "duplicate stale rejected superseded frozen"
     out = header(MASTER_FAREWELL) + finished + u64(duration_ns)
     for counts in (traffic["sent"], traffic["received"]):
