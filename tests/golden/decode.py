@@ -238,7 +238,8 @@ def slave_farewell(r):
 
 
 BODIES = {"command": command, "update": update, "scene": scene, "heartbeat": envelope,
-          "tool": tool, "coupled_command": coupled_command, "hello": hello, "welcome": welcome, "refused": refused,
+          "tool": tool, "coupled_command": coupled_command, "hello": hello, "welcome": welcome,
+          "refused": refused,
           "master_farewell": master_farewell, "slave_farewell": slave_farewell}
 
 
