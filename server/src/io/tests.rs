@@ -167,7 +167,7 @@ async fn garbage_is_counted_and_harmless() {
         b"".as_slice(),
         b"MMTP",
         &[0xff; 300],
-        b"MMTP\x01\x01\x00\x00\x01",
+        b"MMTP\x02\x01\x00\x00\x01",
     ] {
         master.send_raw(garbage);
         patiently(master.listen(1)).await;
