@@ -43,6 +43,7 @@ fn command() -> Command {
     Command {
         newest_update: 250,
         samples,
+        port: None,
     }
 }
 

@@ -392,11 +392,10 @@ fn a_path_too_narrow_for_the_tools_force_is_noticed_and_left_to_the_model() {
         for seed in 1..=2 {
             let words = format!("delay 2ms rate {rate} 28 queue 200ms");
             let mut world = World::try_new(&auto(over(&words, 1000.0, seed))).unwrap();
-            let ticks = 60_000;
-            (0..ticks).for_each(|_| drop(world.step()));
+            world.run(Duration::from_secs(60), |_| ());
             let (outcome, chosen) = (world.outcome(), choice(&world));
             let switches = world.master().either().unwrap().choice().switches();
-            let share = chosen.tool_ticks as f64 / f64::from(ticks);
+            let share = chosen.tool_ticks as f64 / chosen.ticks as f64;
             let pushes = world.operator().pushes_completed().unwrap();
             let breaks = outcome.breaks.per_push(pushes).unwrap();
             let peak_n = outcome.on_hand.largest_n().unwrap();
