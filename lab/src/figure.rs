@@ -20,6 +20,27 @@ pub struct Figure {
     pub panel_size: (u32, u32),
 }
 
+impl Figure {
+    /// Panels whose curves look alike, so that one legend, in the first, serves them all.
+    #[must_use]
+    pub fn of_alike(
+        panels: impl IntoIterator<Item = Panel>,
+        legend: Legend,
+        columns: usize,
+        panel_size: (u32, u32),
+    ) -> Self {
+        let mut panels: Vec<Panel> = panels.into_iter().collect();
+        if let Some(first) = panels.first_mut() {
+            first.legend = legend;
+        }
+        Self {
+            panels,
+            columns,
+            panel_size,
+        }
+    }
+}
+
 /// How numbers are laid out along an axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Scale {
@@ -98,6 +119,25 @@ pub struct Panel {
     pub series: Vec<Series>,
     /// Where the legend stands.
     pub legend: Legend,
+}
+
+impl Panel {
+    /// A panel without a legend.
+    #[must_use]
+    pub fn new(
+        title: impl Into<String>,
+        x: Axis,
+        y: Axis,
+        series: impl IntoIterator<Item = Series>,
+    ) -> Self {
+        Self {
+            title: title.into(),
+            x,
+            y,
+            series: series.into_iter().collect(),
+            legend: Legend::None,
+        }
+    }
 }
 
 /// How a curve's line is drawn.

@@ -25,6 +25,7 @@ use delay::Duel;
 
 use crate::architecture::DelayRow;
 use crate::digest::of_runs;
+use crate::figure::Figure;
 use crate::physics::PhysicsError;
 use crate::table::Table;
 use crate::transport::{Case, Outcome};
@@ -65,6 +66,14 @@ pub trait Laboratory: Sync {
     /// # Errors
     /// When the file cannot be written.
     fn keep(&self, name: &str, bytes: &[u8]) -> Result<(), ReproduceError>;
+
+    /// Draws a figure and keeps it.
+    ///
+    /// # Errors
+    /// As [`Figure::draw`] and [`Self::keep`].
+    fn keep_figure(&self, name: &str, figure: &Figure) -> Result<(), ReproduceError> {
+        self.keep(name, figure.draw(name)?.as_bytes())
+    }
 
     /// CPU time of one tick of the paper's estimator in contact, ms; none where there is no clock. The one number
     /// that depends on the machine.

@@ -54,3 +54,13 @@ fn what_cannot_be_drawn_is_left_out_and_breaks_nothing() {
     };
     assert!(empty.draw("a").unwrap().contains("</svg>"));
 }
+
+#[test]
+fn panels_that_look_alike_share_the_legend_of_the_first() {
+    let panel = || Panel::new("Title", Axis::linear("x"), Axis::linear("y"), []);
+    let figure = Figure::of_alike([panel(), panel()], Legend::LowerLeft, 2, (100, 100));
+    let legends: Vec<Legend> = figure.panels.iter().map(|panel| panel.legend).collect();
+    assert_eq!(legends, [Legend::LowerLeft, Legend::None]);
+    let none = Figure::of_alike([], Legend::LowerLeft, 2, (100, 100));
+    assert!(none.panels.is_empty());
+}

@@ -196,8 +196,7 @@ pub fn reproduce(laboratory: &dyn Laboratory, extent: Extent) -> Result<Findings
     }
     let (all, summary) = (series_table(&variants), summary(&variants));
     laboratory.keep("congestion.csv", &all.to_csv())?;
-    let figure = figure(&variants);
-    laboratory.keep("congestion.svg", figure.draw("congestion.svg")?.as_bytes())?;
+    laboratory.keep_figure("congestion.svg", &figure(&variants))?;
     Ok(Findings {
         experiment: "congestion",
         extent,
@@ -361,45 +360,33 @@ fn figure(variants: &[Variant]) -> Figure {
         (Colour::Grey, Stroke::Solid),
         (Colour::Blue, Stroke::Solid),
     ];
-    let panels = quantities
-        .into_iter()
-        .enumerate()
-        .map(|(n, (what, unit, of))| {
-            let series = variants
-                .iter()
-                .zip(styles)
-                .map(|((name, _, runs), (colour, stroke))| {
-                    let bins = runs
-                        .first()
-                        .map(|run| run.bins.as_slice())
-                        .unwrap_or_default();
-                    let dots = bins
-                        .iter()
-                        .filter_map(|bin| Some(Dot::at(bin.t_s, of(bin)?)));
-                    Series::line(name, colour, dots.collect()).stroked(stroke, 2)
-                });
-            let all = variants.iter().flat_map(|(_, _, runs)| runs.first());
-            let values = all.flat_map(|run| run.bins.iter().filter_map(of));
-            let most = values.fold(0.0, f64::max);
-            let edges = [FROM_S, UNTIL_S].map(|t_s| Dot::at(t_s, most)).to_vec();
-            let bottleneck = Series::line("", Colour::Black, edges).stroked(Stroke::Events, 1);
-            Panel {
-                title: what.to_owned(),
-                x: Axis::linear("time, s"),
-                y: Axis::linear(&format!("{what}, {unit}")),
-                series: std::iter::once(bottleneck).chain(series).collect(),
-                legend: if n == 0 {
-                    Legend::UpperRight
-                } else {
-                    Legend::None
-                },
-            }
-        });
-    Figure {
-        panels: panels.collect(),
-        columns: 2,
-        panel_size: (460, 240),
-    }
+    let panels = quantities.into_iter().map(|(what, unit, of)| {
+        let series = variants
+            .iter()
+            .zip(styles)
+            .map(|((name, _, runs), (colour, stroke))| {
+                let bins = runs
+                    .first()
+                    .map(|run| run.bins.as_slice())
+                    .unwrap_or_default();
+                let dots = bins
+                    .iter()
+                    .filter_map(|bin| Some(Dot::at(bin.t_s, of(bin)?)));
+                Series::line(name, colour, dots.collect()).stroked(stroke, 2)
+            });
+        let all = variants.iter().flat_map(|(_, _, runs)| runs.first());
+        let values = all.flat_map(|run| run.bins.iter().filter_map(of));
+        let most = values.fold(0.0, f64::max);
+        let edges = [FROM_S, UNTIL_S].map(|t_s| Dot::at(t_s, most)).to_vec();
+        let bottleneck = Series::line("", Colour::Black, edges).stroked(Stroke::Events, 1);
+        Panel::new(
+            what,
+            Axis::linear("time, s"),
+            Axis::linear(&format!("{what}, {unit}")),
+            std::iter::once(bottleneck).chain(series),
+        )
+    });
+    Figure::of_alike(panels, Legend::UpperRight, 2, (460, 240))
 }
 
 #[cfg(test)]

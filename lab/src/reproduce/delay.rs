@@ -50,7 +50,7 @@ pub fn reproduce(
     laboratory.keep("delay.csv", &runs(&groups).to_csv())?;
     let limits = limits(&groups);
     laboratory.keep("delay-limits.csv", &limits.to_csv())?;
-    laboratory.keep("delay.svg", figure(&groups).draw("delay.svg")?.as_bytes())?;
+    laboratory.keep_figure("delay.svg", &figure(&groups))?;
 
     let pictures = picture_places();
     let seen = run(laboratory, "delay-view", &pictures, extent)?;

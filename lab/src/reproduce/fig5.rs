@@ -103,7 +103,7 @@ pub fn reproduce(
     let runs = runs(&points, &measured);
     laboratory.keep("fig5.csv", &runs.to_csv())?;
     let curves = curves(&points, &measured);
-    laboratory.keep("fig5.svg", figure(&curves).draw("fig5.svg")?.as_bytes())?;
+    laboratory.keep_figure("fig5.svg", &figure(&curves))?;
     Ok(Findings {
         experiment: "fig5",
         extent,

@@ -65,12 +65,8 @@ pub fn reproduce(laboratory: &dyn Laboratory, extent: Extent) -> Result<Findings
         panels.push(panel(preset, &config, &configured, &achieved, &delays));
     }
     laboratory.keep("netem.csv", &table.to_csv())?;
-    let figure = Figure {
-        panels,
-        columns: 4,
-        panel_size: (330, 260),
-    };
-    laboratory.keep("netem.svg", figure.draw("netem.svg")?.as_bytes())?;
+    let figure = Figure::of_alike(panels, Legend::UpperLeft, 4, (330, 260));
+    laboratory.keep_figure("netem.svg", &figure)?;
     Ok(Findings {
         experiment: "netem",
         extent,
@@ -182,25 +178,19 @@ fn panel(
     let said: Vec<Dot> = shares.map(|share| Dot::at(said(share), share)).collect();
     let met: Vec<Dot> = met.collect();
     let loss = Interval::of(achieved.iter().map(|summary| summary.loss)).map_or(0.0, |i| i.mean);
-    Panel {
-        title: format!(
-            "{}: loss {:.2} %, configured {:.2} %",
-            preset.name,
-            100.0 * loss,
-            100.0 * configured.loss
-        ),
-        x: Axis::linear("delay, ms").over(range(said.iter().chain(&met))),
-        y: Axis::linear("share of packets").over(0.0..1.0),
-        series: vec![
-            Series::line("achieved", Colour::Sky, met).stroked(Stroke::Solid, 3),
-            Series::line("configured", Colour::Black, said).stroked(Stroke::Dashed, 1),
-        ],
-        legend: if preset.name == "lan" {
-            Legend::UpperLeft
-        } else {
-            Legend::None
-        },
-    }
+    let title = format!(
+        "{}: loss {:.2} %, configured {:.2} %",
+        preset.name,
+        100.0 * loss,
+        100.0 * configured.loss
+    );
+    let x = Axis::linear("delay, ms").over(range(said.iter().chain(&met)));
+    let y = Axis::linear("share of packets").over(0.0..1.0);
+    let series = [
+        Series::line("achieved", Colour::Sky, met).stroked(Stroke::Solid, 3),
+        Series::line("configured", Colour::Black, said).stroked(Stroke::Dashed, 1),
+    ];
+    Panel::new(title, x, y, series)
 }
 
 /// A little more than what the dots take, and never nothing.

@@ -16,10 +16,7 @@ pub fn reproduce(
 ) -> Result<Findings, ReproduceError> {
     let (cases, traces) = (cases(body)?, traces(body)?);
     laboratory.keep("physics.csv", &rows(&cases).to_csv())?;
-    laboratory.keep(
-        "physics.svg",
-        figure(&traces).draw("physics.svg")?.as_bytes(),
-    )?;
+    laboratory.keep_figure("physics.svg", &figure(&traces))?;
     Ok(Findings {
         experiment: "physics",
         extent,
@@ -77,7 +74,7 @@ fn shown(body: &Body, cases: &[PhysicsCase]) -> Table {
 }
 
 fn figure(traces: &[PhysicsTrace]) -> Figure {
-    let panels = traces.iter().enumerate().map(|(n, trace)| {
+    let panels = traces.iter().map(|trace| {
         let curve = |of: &dyn Fn(&TracePoint) -> f64| {
             trace
                 .points
@@ -85,28 +82,15 @@ fn figure(traces: &[PhysicsTrace]) -> Figure {
                 .map(|point| Dot::at(point.t_s, of(point)))
                 .collect()
         };
-        Panel {
-            title: trace.case.to_owned(),
-            x: Axis::linear("time, s"),
-            y: vertical(trace),
-            series: vec![
-                Series::line("measured", Colour::Sky, curve(&|point| point.measured))
-                    .stroked(Stroke::Solid, 4),
-                Series::line("reference", Colour::Black, curve(&|point| point.reference))
-                    .stroked(Stroke::Dashed, 1),
-            ],
-            legend: if n == 0 {
-                Legend::UpperLeft
-            } else {
-                Legend::None
-            },
-        }
+        let series = [
+            Series::line("measured", Colour::Sky, curve(&|point| point.measured))
+                .stroked(Stroke::Solid, 4),
+            Series::line("reference", Colour::Black, curve(&|point| point.reference))
+                .stroked(Stroke::Dashed, 1),
+        ];
+        Panel::new(trace.case, Axis::linear("time, s"), vertical(trace), series)
     });
-    Figure {
-        panels: panels.collect(),
-        columns: 5,
-        panel_size: (300, 260),
-    }
+    Figure::of_alike(panels, Legend::UpperLeft, 5, (300, 260))
 }
 
 /// A body that is held moves by less than can be drawn: within a millimetre or a milliradian, as errors are given.

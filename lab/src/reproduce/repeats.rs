@@ -12,7 +12,7 @@ use mmt_shared::rate_control::StretchMax;
 
 use super::delay::Loss;
 use super::{Curve, Extent, Findings, Laboratory, ReproduceError, digest, nothing};
-use crate::figure::{Axis, Colour, Dot, Figure, Legend, Mark, Panel, Series, Stroke};
+use crate::figure::{Axis, Colour, Dot, Figure, Legend, Panel, Series, Stroke};
 use crate::statistics::Interval;
 use crate::table::{Cell, Table};
 use crate::trial::{Measured, Trial};
@@ -107,8 +107,7 @@ pub fn reproduce(laboratory: &dyn Laboratory, extent: Extent) -> Result<Findings
         &runs,
         |case| case.repeats == Repeats::recommended(),
     );
-    let figure = figure(&cases, &runs);
-    laboratory.keep("repeats.svg", figure.draw("repeats.svg")?.as_bytes())?;
+    laboratory.keep_figure("repeats.svg", &figure(&cases, &runs))?;
     Ok(Findings {
         experiment: "repeats",
         extent,
@@ -263,25 +262,15 @@ fn figure(cases: &[Case], runs: &[&[Measured]]) -> Figure {
         let series = of.zip(styles).map(|((case, runs), (colour, stroke))| {
             Series::line(&case.repeats.to_string(), colour, exceeded(times(runs)))
                 .stroked(stroke, 2)
-                .marked(Mark::None)
         });
-        Panel {
-            title: format!("loss {}", loss.name()),
-            x: Axis::linear("time from sent to known, ms").over(0.0..400.0),
-            y: Axis::log("share of updates that took longer").over(5e-4..1.0),
-            series: series.collect(),
-            legend: if loss == Loss::None {
-                Legend::UpperRight
-            } else {
-                Legend::None
-            },
-        }
+        Panel::new(
+            format!("loss {}", loss.name()),
+            Axis::linear("time from sent to known, ms").over(0.0..400.0),
+            Axis::log("share of updates that took longer").over(5e-4..1.0),
+            series,
+        )
     });
-    Figure {
-        panels: panels.collect(),
-        columns: 3,
-        panel_size: (360, 300),
-    }
+    Figure::of_alike(panels, Legend::UpperRight, 3, (360, 300))
 }
 
 /// The share of times above each time, as steps.

@@ -1,9 +1,11 @@
 //! Figs. 6 and 7: the forces and the packets of one run, over time.
 
+use std::ops::RangeInclusive;
+
 use mmt_shared::settings::Mode;
 
 use super::{Curve, Extent, Findings, Laboratory, ReproduceError, digest, nothing, paper_world};
-use crate::figure::{Axis, Colour, Dot, Figure, Legend, Mark, Panel, Series, Stroke};
+use crate::figure::{Axis, Colour, Dot, Figure, Legend, Panel, Series, Stroke};
 use crate::table::{Cell, Table};
 use crate::trial::{Measured, TraceRow, Trial};
 
@@ -66,8 +68,7 @@ pub fn reproduce(
     let mut tables = Vec::new();
     if let Some(run) = measured.first() {
         laboratory.keep(&format!("{name}.csv"), &forces(&run.trace).to_csv())?;
-        let (svg, figure) = (format!("{name}.svg"), figure(trace, &run.trace));
-        laboratory.keep(&svg, figure.draw(&svg)?.as_bytes())?;
+        laboratory.keep_figure(&format!("{name}.svg"), &figure(trace, &run.trace))?;
         tables.push(summary(trace, run));
     }
     Ok(Findings {
@@ -130,27 +131,15 @@ fn figure(trace: Trace, rows: &[TraceRow]) -> Figure {
     let end = rows.last().map_or(1.0, |row| row.t_s);
     let contact = rows.iter().find(|row| row.f_s.norm() > 0.1);
     let begin = contact.map_or(0.0, |row| (row.t_s - 0.5).max(0.0));
-    Figure {
-        panels: vec![
-            panel(&trace.title(), rows, 0.0, end, Legend::UpperRight),
-            panel(
-                "the first push",
-                rows,
-                begin,
-                begin + OPENING_S,
-                Legend::None,
-            ),
-        ],
-        columns: 1,
-        panel_size: (1060, 330),
-    }
+    let panels = [
+        panel(&trace.title(), rows, 0.0..=end),
+        panel("the first push", rows, begin..=begin + OPENING_S),
+    ];
+    Figure::of_alike(panels, Legend::UpperRight, 1, (1060, 330))
 }
 
-fn panel(title: &str, rows: &[TraceRow], from: f64, to: f64, legend: Legend) -> Panel {
-    let shown: Vec<&TraceRow> = rows
-        .iter()
-        .filter(|row| (from..=to).contains(&row.t_s))
-        .collect();
+fn panel(title: &str, rows: &[TraceRow], when: RangeInclusive<f64>) -> Panel {
+    let shown: Vec<&TraceRow> = rows.iter().filter(|row| when.contains(&row.t_s)).collect();
     let largest = shown
         .iter()
         .map(|row| row.f_s.norm().max(row.f_m.map_or(0.0, |f| f.norm())));
@@ -162,22 +151,17 @@ fn panel(title: &str, rows: &[TraceRow], from: f64, to: f64, legend: Legend) -> 
     let sent = shown.iter().filter(|row| row.update.is_some());
     // a strip of its own below the forces
     let events = sent.map(|row| Dot::at(row.t_s, -0.03 * top)).collect();
-    Panel {
-        title: title.to_owned(),
-        x: Axis::linear("time, s").over(from..to),
-        y: Axis::linear("force, N").over(-0.1 * top..top),
-        series: vec![
-            Series::line("packet", Colour::Sky, events)
-                .stroked(Stroke::Events, 1)
-                .marked(Mark::None),
-            curve("|f_s|", Colour::Vermilion, 2, &|row| Some(row.f_s.norm())),
-            curve("|f_m|", Colour::Blue, 1, &|row| row.f_m.map(|f| f.norm())),
-            curve("|f_s − f_m|", Colour::Grey, 1, &|row| {
-                row.f_m.map(|f| (row.f_s - f).norm())
-            }),
-        ],
-        legend,
-    }
+    let series = [
+        Series::line("packet", Colour::Sky, events).stroked(Stroke::Events, 1),
+        curve("|f_s|", Colour::Vermilion, 2, &|row| Some(row.f_s.norm())),
+        curve("|f_m|", Colour::Blue, 1, &|row| row.f_m.map(|f| f.norm())),
+        curve("|f_s − f_m|", Colour::Grey, 1, &|row| {
+            row.f_m.map(|f| (row.f_s - f).norm())
+        }),
+    ];
+    let x = Axis::linear("time, s").over(*when.start()..*when.end());
+    let y = Axis::linear("force, N").over(-0.1 * top..top);
+    Panel::new(title, x, y, series)
 }
 
 /// The least and the largest value of each part of the rows, in the order in which they came.

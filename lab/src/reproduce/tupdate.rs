@@ -153,10 +153,7 @@ pub fn reproduce(laboratory: &dyn Laboratory, extent: Extent) -> Result<Findings
     let (all, verdict) = (table(&knots), verdicts(&knots));
     laboratory.keep("tupdate.csv", &all.to_csv())?;
     laboratory.keep("tupdate-adaptive.csv", &verdict.to_csv())?;
-    laboratory.keep(
-        "tupdate.svg",
-        figure(&knots).draw("tupdate.svg")?.as_bytes(),
-    )?;
+    laboratory.keep_figure("tupdate.svg", &figure(&knots))?;
     Ok(Findings {
         experiment: "tupdate",
         extent,
@@ -279,7 +276,7 @@ fn verdicts(knots: &[Knot]) -> Table {
 }
 
 fn figure(knots: &[Knot]) -> Figure {
-    let panels = places().enumerate().map(|(n, place)| {
+    let panels = places().map(|place| {
         let styles = [
             (
                 Family::Hybrid,
@@ -310,21 +307,9 @@ fn figure(knots: &[Knot]) -> Figure {
                 .marked(mark)
                 .stroked(stroke, 2)
         });
-        Panel {
-            title: format!("{} pushes, {} ground", place.0, place.1),
-            x: Axis::log("packet rate, 1/s"),
-            y: Axis::log("PMSE"),
-            series: series.to_vec(),
-            legend: if n == 0 {
-                Legend::UpperRight
-            } else {
-                Legend::None
-            },
-        }
+        let title = format!("{} pushes, {} ground", place.0, place.1);
+        let (x, y) = (Axis::log("packet rate, 1/s"), Axis::log("PMSE"));
+        Panel::new(title, x, y, series)
     });
-    Figure {
-        panels: panels.collect(),
-        columns: GROUNDS.len(),
-        panel_size: (420, 340),
-    }
+    Figure::of_alike(panels, Legend::UpperRight, GROUNDS.len(), (420, 340))
 }

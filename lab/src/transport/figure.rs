@@ -60,13 +60,12 @@ pub(super) fn figure(runs: &[Run]) -> Figure {
                     && (row.shows)(&case.conditions)
             });
             let shown: Vec<Run> = shown.copied().collect();
-            panels.push(Panel {
-                title: format!("{}, round trip {round_trip_ms} ms", row.name),
-                x: Axis::log("loss, % (none at 0.01)").over(0.008..8.0),
-                y: Axis::log(row.what).over(row.foot..20_000.0),
-                series: curves(&shown, row.value),
-                legend: Legend::None,
-            });
+            panels.push(Panel::new(
+                format!("{}, round trip {round_trip_ms} ms", row.name),
+                Axis::log("loss, % (none at 0.01)").over(0.008..8.0),
+                Axis::log(row.what).over(row.foot..20_000.0),
+                curves(&shown, row.value),
+            ));
         }
     }
     if let Some(last) = panels.last_mut() {

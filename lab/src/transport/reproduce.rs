@@ -15,8 +15,7 @@ pub fn reproduce(laboratory: &dyn Laboratory, extent: Extent) -> Result<Findings
     let outcomes = laboratory.transfer("transport", &cases)?;
     let runs: Vec<Run> = cases.iter().zip(&outcomes).collect();
     laboratory.keep("transport.csv", &tables::all(&runs).to_csv())?;
-    let figure = figure::figure(&runs).draw("transport.svg")?;
-    laboratory.keep("transport.svg", figure.as_bytes())?;
+    laboratory.keep_figure("transport.svg", &figure::figure(&runs))?;
     Ok(Findings {
         experiment: "transport",
         extent,

@@ -34,7 +34,7 @@ pub(super) fn figure(groups: &[Group]) -> Figure {
             Axis::log("packets per second"),
         ),
     ];
-    let panels = measures.into_iter().enumerate().map(|(n, (title, of, y))| {
+    let panels = measures.into_iter().map(|(title, of, y)| {
         let series = Architecture::ALL
             .into_iter()
             .enumerate()
@@ -51,23 +51,10 @@ pub(super) fn figure(groups: &[Group]) -> Figure {
                     .marked(mark)
                     .stroked(stroke, width)
             });
-        Panel {
-            title: title.to_owned(),
-            x: Axis::log("one-way delay, ms (none at 0.5)"),
-            y,
-            series: series.collect(),
-            legend: if n == 0 {
-                Legend::UpperLeft
-            } else {
-                Legend::None
-            },
-        }
+        let x = Axis::log("one-way delay, ms (none at 0.5)");
+        Panel::new(title, x, y, series)
     });
-    Figure {
-        panels: panels.collect(),
-        columns: 2,
-        panel_size: (560, 400),
-    }
+    Figure::of_alike(panels, Legend::UpperLeft, 2, (560, 400))
 }
 
 /// How an architecture is drawn: forces on the wire dashed, models solid, the default thick.
