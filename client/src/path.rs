@@ -5,7 +5,8 @@
 
 use std::time::Duration;
 
-use mmt_netem::trace::path::{PathTrace, Sample};
+use mmt_netem::trace::Sample;
+use mmt_netem::trace::path::PathTrace;
 use mmt_shared::peer::Peer;
 use mmt_shared::time::Time;
 

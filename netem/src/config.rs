@@ -18,16 +18,16 @@ mod tests;
 
 pub use delay::{Correlation, Delay, Order, Reorder, TAU_MIN};
 pub use loss::{BURST_MIN, FourState, GilbertElliott, Loss, Outage, PacketList, TimedBursts};
-pub use probability::Probability;
-pub use profile::{Profile, STEPS_MAX, Step};
+pub use probability::{Chance, Probability};
 pub use queue::{Codel, Framing, Queue, RATE_MAX_BIT_S, Rate, Service};
 pub use range::ConfigError;
 pub use slot::{Slot, SlotGap};
 
+pub use crate::distribution::DELAY_MAX;
 use crate::trace::path::Replay;
 
-/// The longest delay or jitter, 1 h: beyond any path on Earth, and far from overflow in nanoseconds.
-pub const DELAY_MAX: Duration = Duration::from_secs(3600);
+/// The most steps of a profile, and the most outages of a link.
+pub const STEPS_MAX: usize = 1000;
 /// The default limit, packets in flight: 10 s at 1 kHz, 15 MB of full-sized packets. `tc` has 1000,
 /// which is 1 s at 1 kHz and drops silently beyond it.
 pub const LIMIT_DEFAULT: u32 = 10_000;
@@ -78,13 +78,25 @@ pub struct LinkConfig {
     pub profile: Profile,
 }
 
-/// An event that befalls packets with a probability, perhaps in runs.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Chance {
-    /// The share of all packets.
-    pub probability: Probability,
-    /// Correlation of the Gaussian numbers behind neighbouring packets: runs, at the same share.
-    pub correlation: Probability,
+/// What changes as time goes by, counted from the start of the link.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Profile {
+    /// The changes in ascending order of time, at most [`STEPS_MAX`].
+    pub steps: Vec<Step>,
+    /// After how long it begins again; none: the last step stays.
+    pub repeat: Option<Duration>,
+}
+
+/// From a time on the link has these settings, all of them: what a step does not say is not there.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Step {
+    /// When.
+    pub at: Duration,
+    /// How long the way there takes from `at` on: delay, jitter, independent loss and constant rate go
+    /// evenly, in 32 parts; everything else changes at its end. Zero: at once.
+    pub ramp: Duration,
+    /// The settings, without a profile of their own.
+    pub settings: LinkConfig,
 }
 
 impl Default for LinkConfig {

@@ -4,7 +4,7 @@
 
 use serde::Serialize;
 
-use crate::link::DropCause;
+use crate::fate::DropCause;
 
 /// A number of packets and the bytes in them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]

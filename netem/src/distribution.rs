@@ -2,6 +2,8 @@
 //!
 //! Tables come as text; reading a file is for whoever has one.
 
+use std::time::Duration;
+
 use crate::quantile::standard_normal;
 use crate::trace::{TraceError, meaningful_lines};
 
@@ -9,6 +11,8 @@ mod gamma;
 
 pub(crate) use gamma::gamma;
 
+/// The longest delay or jitter, 1 h: beyond any path on Earth, and far from overflow in nanoseconds.
+pub const DELAY_MAX: Duration = Duration::from_secs(3600);
 /// Where iproute2's tables end: 32767 / 8192.
 const TABLE_END: f64 = 32_767.0 / TABLE_UNIT;
 /// The table entry that stands for one J (the kernel's `NETEM_DIST_SCALE`).
@@ -114,7 +118,7 @@ impl Cdf {
         if !pairs().all(|(a, b)| a.0 <= b.0 && a.1 <= b.1) {
             return Err("delays and shares of a distribution must not fall");
         }
-        if points.len() > POINTS_MAX || last.0 > crate::config::DELAY_MAX.as_nanos() as u64 {
+        if points.len() > POINTS_MAX || last.0 > DELAY_MAX.as_nanos() as u64 {
             return Err("a distribution has a million points and delays of 1 h at most");
         }
         let points = points.iter().map(|(delay, p)| (*p, *delay as f64));

@@ -11,7 +11,8 @@ use serde::Serialize;
 
 use crate::config::{ConfigError, Correlation, LinkConfig, Loss, Order};
 use crate::counters::Drops;
-use crate::link::{DropCause, Fate, LinkId};
+use crate::direction::LinkId;
+use crate::fate::{DropCause, Fate};
 use crate::pipe::Pipe;
 use crate::record::summary::{mean_run, nearest_rank, runs};
 

@@ -7,8 +7,10 @@
 
 pub mod config;
 pub mod counters;
+mod direction;
 pub mod distribution;
 pub mod effect;
+pub mod fate;
 #[cfg(feature = "io")]
 pub mod io;
 pub mod link;
@@ -21,5 +23,6 @@ pub mod words;
 
 pub use config::{Delay, LinkConfig, Loss, Order, Probability};
 pub use effect::{Effect, effect};
-pub use link::{Direction, DropCause, Fate, Link, LinkId, PacketMeta};
+pub use fate::{DropCause, Fate};
+pub use link::{Direction, Link, LinkId, PacketMeta};
 pub use pipe::{Pipe, SimPath};

@@ -7,73 +7,27 @@
 //!
 //! It must never sleep, read a clock, touch a socket or allocate.
 
-use std::time::Duration;
-
 use mmt_shared::time::Time;
-use serde::{Deserialize, Serialize};
 
 use crate::config::{ConfigError, LinkConfig};
 use crate::counters::LinkCounters;
+use crate::fate::{Deliveries, Delivery, DropCause, Fate};
 
 mod bottleneck;
 mod catch_up;
 mod codel;
 mod correlated;
-mod fate;
 mod losing;
 mod slots;
 mod stages;
 mod streams;
 mod timeline;
 
-pub use fate::{DELIVERIES_MAX, Deliveries, Delivery, DropCause, Fate, turn_bit};
+pub use crate::direction::{Direction, LinkId};
 
-use stages::{Passing, Stages};
+use stages::{Departure, Passing, Stages};
 use streams::Streams;
 use timeline::Timeline;
-
-/// Which way packets go.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Direction {
-    /// From master to slave.
-    Up,
-    /// From slave to master.
-    Down,
-}
-
-impl Direction {
-    /// The direction as the words spell it.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Up => "up",
-            Self::Down => "down",
-        }
-    }
-}
-
-/// Which link this is among those of one seed: two links of one seed draw different numbers.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub struct LinkId {
-    /// The number of the path.
-    pub path: u64,
-    /// The direction on it.
-    pub direction: Direction,
-}
-
-impl LinkId {
-    /// Master to slave on path 0.
-    pub const UP: Self = Self::first(Direction::Up);
-    /// Slave to master on path 0.
-    pub const DOWN: Self = Self::first(Direction::Down);
-
-    /// A direction of path 0.
-    #[must_use]
-    pub const fn first(direction: Direction) -> Self {
-        Self { path: 0, direction }
-    }
-}
 
 /// What a link must know about a packet.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -228,14 +182,6 @@ impl Link {
     pub fn counters(&self) -> LinkCounters {
         self.counters
     }
-}
-
-/// When a packet leaves, counted from the origin.
-#[derive(Clone, Copy, Debug)]
-struct Departure {
-    after: Duration,
-    corrupted_bit: Option<u64>,
-    marked: bool,
 }
 
 #[cfg(test)]

@@ -11,7 +11,9 @@ use mmt_shared::time::Time;
 
 use crate::config::{ConfigError, LinkConfig};
 use crate::counters::{LinkCounters, Tally};
-use crate::link::{Delivery, Fate, Link, LinkId, PacketMeta};
+use crate::direction::LinkId;
+use crate::fate::{Delivery, Fate};
+use crate::link::{Link, PacketMeta};
 
 /// One direction of a path in virtual time, as the lab drives it.
 pub type SimPath<T> = Pipe<T>;
@@ -42,7 +44,7 @@ pub struct Released<T> {
     /// Whether it is a copy.
     pub copy: bool,
     /// The bit that was turned over on the way: whoever knows the bytes of the payload turns it
-    /// ([`crate::link::turn_bit`]), or treats the packet as its checksum would.
+    /// ([`crate::fate::turn_bit`]), or treats the packet as its checksum would.
     pub corrupted_bit: Option<u64>,
     /// Whether it met congestion on the way and is to be marked so, instead of having been lost.
     pub marked: bool,

@@ -4,10 +4,12 @@
 //! line. It reads no file: it is handed text.
 
 use std::fmt;
+use std::time::Duration;
 
 pub mod irtt;
 pub mod lens;
 pub mod mahimahi;
+pub mod mmt;
 pub mod path;
 pub mod ping;
 #[cfg(test)]
@@ -29,6 +31,15 @@ impl TraceError {
         let reason = reason.to_string();
         Self { line, reason }
     }
+}
+
+/// One probe that went over a path.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Sample {
+    /// When it was sent, counted from the first.
+    pub at: Duration,
+    /// How long it took one way; `None`: it was lost.
+    pub delay: Option<Duration>,
 }
 
 /// The lines that say something, with their numbers from 1: not empty, no comment.

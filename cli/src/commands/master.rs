@@ -13,7 +13,7 @@ use mmt_client::operator::scripted::ScriptedConfig;
 use mmt_client::operator::trace::Trace;
 use mmt_netem::Direction;
 use mmt_netem::io::socket::SocketExtras;
-use mmt_netem::record::csv::path_text;
+use mmt_netem::trace::mmt::path_text;
 use mmt_shared::geometry::Vec2;
 use mmt_shared::io::connect::ConnectError;
 use mmt_shared::pairing::Pairing;
@@ -139,7 +139,7 @@ fn keep_path(file: &Path, path: &SharedPath) -> Result<(), Failure> {
     let shown = file.display();
     let met = path.lock().unwrap_or_else(PoisonError::into_inner).path();
     let path = met.map_err(|why| Failure::failed(format!("no path for {shown}: {why}")))?;
-    std::fs::write(file, path_text(&path))
+    std::fs::write(file, path_text(path.samples()))
         .map_err(|error| Failure::failed(format!("cannot write the path {shown}: {error}")))
 }
 

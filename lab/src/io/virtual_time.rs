@@ -5,11 +5,13 @@
 //! what the protocol adds. A run must never read the host's clock or wait for anything.
 
 mod ends;
+mod error;
 mod executor;
 mod path;
 mod run;
 
-pub use run::{VirtualTimeError, run};
+pub use error::VirtualTimeError;
+pub use run::run;
 
 #[cfg(test)]
 mod tests;

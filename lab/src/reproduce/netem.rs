@@ -4,7 +4,8 @@ use std::time::Duration;
 
 use mmt_netem::config::LinkConfig;
 use mmt_netem::effect::Effect;
-use mmt_netem::link::{Direction, Fate, LinkId};
+use mmt_netem::fate::Fate;
+use mmt_netem::link::{Direction, LinkId};
 use mmt_netem::pipe::Pipe;
 use mmt_netem::presets::{PRESETS, Preset};
 use mmt_netem::record::summary::Summary;

@@ -8,8 +8,6 @@ use std::time::Duration;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
-use super::error::PlanError;
-use super::reader::read;
 use crate::digest::hex;
 use crate::trial::{Change, Trial};
 use crate::world::WorldConfig;
@@ -91,14 +89,6 @@ impl Row {
 }
 
 impl Plan {
-    /// The plan of a text in TOML (`docs/sweep.md` tells its keys).
-    ///
-    /// # Errors
-    /// What is wrong with which key or value, with its line: nothing of the plan has run by then.
-    pub fn parse(text: &str) -> Result<Self, PlanError> {
-        read(text)
-    }
-
     /// Number of rows.
     #[must_use]
     pub fn rows(&self) -> u64 {

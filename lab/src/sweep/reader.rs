@@ -21,22 +21,27 @@ const DURATION_S: (f64, f64) = (0.001, 604_800.0);
 /// What the seeds of a plan set.
 const SEED_KEYS: [&str; 3] = ["seed", "slave.seed", "operator.seed"];
 
-/// The plan of a text.
-pub(super) fn read(text: &str) -> Result<Plan, PlanError> {
-    let root = DeTable::parse(text).map_err(|error| PlanError::of(text, &error))?;
-    let head = Head::deserialize(Deserializer::from(root.clone()))
-        .map_err(|error| PlanError::of(text, &error))?;
-    let duration = head.duration(text)?;
-    let reader = Reader::new(text, &root, &head)?;
-    reader.check_size(head.seeds.get_ref(), &head.seeds.span())?;
-    let change = head.change(text)?;
-    Ok(Plan {
-        duration,
-        seeds: *head.seeds.get_ref(),
-        change,
-        points: reader.points(change)?,
-        axes: reader.axes.iter().map(|axis| axis.plain(text)).collect(),
-    })
+impl Plan {
+    /// The plan of a text in TOML (`docs/sweep.md` tells its keys).
+    ///
+    /// # Errors
+    /// What is wrong with which key or value, with its line: nothing of the plan has run by then.
+    pub fn parse(text: &str) -> Result<Self, PlanError> {
+        let root = DeTable::parse(text).map_err(|error| PlanError::of(text, &error))?;
+        let head = Head::deserialize(Deserializer::from(root.clone()))
+            .map_err(|error| PlanError::of(text, &error))?;
+        let duration = head.duration(text)?;
+        let reader = Reader::new(text, &root, &head)?;
+        reader.check_size(head.seeds.get_ref(), &head.seeds.span())?;
+        let change = head.change(text)?;
+        Ok(Self {
+            duration,
+            seeds: *head.seeds.get_ref(),
+            change,
+            points: reader.points(change)?,
+            axes: reader.axes.iter().map(|axis| axis.plain(text)).collect(),
+        })
+    }
 }
 
 /// What a plan holds beside the values, which keep their places.

@@ -1,4 +1,4 @@
-//! A probability that prints as it was written.
+//! A probability that prints as it was written, and what happens with one.
 
 /// A probability between 0 and 1, held in parts per billion so that it prints as it was written.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
@@ -41,4 +41,13 @@ impl Probability {
     pub fn get(self) -> f64 {
         f64::from(self.0) / 1e9
     }
+}
+
+/// An event that befalls packets with a probability, perhaps in runs.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Chance {
+    /// The share of all packets.
+    pub probability: Probability,
+    /// Correlation of the Gaussian numbers behind neighbouring packets: runs, at the same share.
+    pub correlation: Probability,
 }

@@ -1,35 +1,12 @@
-//! Settings that change as time goes by.
+//! How settings change as time goes by: the walk from one set to the next.
 
 use std::time::Duration;
 
 use super::delay::between;
-use super::{Delay, LinkConfig, Loss, Probability, Service};
+use super::{Delay, LinkConfig, Loss, Probability, Profile, Service};
 
-/// The most steps of a profile, and the most outages of a link.
-pub const STEPS_MAX: usize = 1000;
 /// The equal parts in which a ramp is walked.
 const RAMP_PARTS: u32 = 32;
-
-/// What changes as time goes by, counted from the start of the link.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Profile {
-    /// The changes in ascending order of time, at most [`STEPS_MAX`].
-    pub steps: Vec<Step>,
-    /// After how long it begins again; none: the last step stays.
-    pub repeat: Option<Duration>,
-}
-
-/// From a time on the link has these settings, all of them: what a step does not say is not there.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Step {
-    /// When.
-    pub at: Duration,
-    /// How long the way there takes from `at` on: delay, jitter, independent loss and constant rate go
-    /// evenly, in 32 parts; everything else changes at its end. Zero: at once.
-    pub ramp: Duration,
-    /// The settings, without a profile of their own.
-    pub settings: LinkConfig,
-}
 
 impl Profile {
     /// Whether nothing ever changes.

@@ -3,7 +3,8 @@
 use mmt_shared::time::Time;
 
 use super::record_file::RecordWriter;
-use crate::link::{Direction, DropCause};
+use crate::direction::Direction;
+use crate::fate::DropCause;
 use crate::pipe::Released;
 use crate::record::{End, Entry};
 

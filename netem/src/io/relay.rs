@@ -20,7 +20,7 @@ use super::log::Log;
 use super::record_file::RecordWriter;
 use crate::config::{ConfigError, LinkConfig};
 use crate::counters::{LinkCounters, Tally};
-use crate::link::LinkId;
+use crate::direction::LinkId;
 use crate::pipe::Pipe;
 
 mod clients;

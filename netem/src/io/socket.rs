@@ -16,8 +16,8 @@ use quinn::udp::{EcnCodepoint, RecvMeta, Transmit};
 use quinn::{AsyncUdpSocket, UdpPoller};
 
 use crate::config::{ConfigError, LinkConfig};
+use crate::direction::LinkId;
 use crate::io::record_file::RecordWriter;
-use crate::link::LinkId;
 
 mod control;
 mod meter;

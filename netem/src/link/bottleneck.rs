@@ -7,8 +7,8 @@ use std::collections::VecDeque;
 use std::time::Duration;
 
 use super::codel::CodelState;
-use super::fate::DropCause;
 use crate::config::{LinkConfig, Queue, Rate, Service};
+use crate::fate::DropCause;
 use crate::trace::mahimahi::OPPORTUNITY_BYTES;
 
 /// A packet that is heavier than this does not make `CoDel` wait longer: the usual MTU.

@@ -6,12 +6,12 @@ use mmt_shared::time::duration_nanos;
 
 use super::bottleneck::Bottleneck;
 use super::correlated::{ByPacket, InTime};
-use super::fate::DropCause;
 use super::losing::{Losing, Verdict};
 use super::slots::Slots;
 use super::streams::{Draws, substream};
-use super::{Departure, LinkId};
 use crate::config::{Correlation, LinkConfig, Order, Reorder};
+use crate::direction::LinkId;
+use crate::fate::DropCause;
 
 /// What the stages know about the packet. Times are counted from the origin of the link.
 #[derive(Clone, Copy, Debug)]
@@ -37,6 +37,14 @@ pub(super) struct Stages {
     slots: Slots,
     /// The latest departure promised so far.
     latest: Duration,
+}
+
+/// When a packet leaves, counted from the origin.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Departure {
+    pub(super) after: Duration,
+    pub(super) corrupted_bit: Option<u64>,
+    pub(super) marked: bool,
 }
 
 type Outcome = Result<Departure, DropCause>;

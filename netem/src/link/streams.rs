@@ -2,7 +2,7 @@
 
 use mmt_shared::rng::Substream;
 
-use super::{Direction, LinkId};
+use crate::direction::{Direction, LinkId};
 
 /// The random substreams of a link.
 ///

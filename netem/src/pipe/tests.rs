@@ -5,7 +5,7 @@ use std::time::Duration;
 use proptest::prelude::*;
 
 use super::*;
-use crate::link::DropCause;
+use crate::fate::DropCause;
 
 fn pipe(words: &str) -> SimPath<u64> {
     Pipe::try_new(words.parse().unwrap(), 1, LinkId::UP).unwrap()

@@ -4,8 +4,9 @@
 
 use mmt_shared::time::Time;
 
-use super::{End, Entry, Heading};
-use crate::link::{Direction, DropCause};
+use super::entry::{End, Entry, Heading};
+use crate::direction::Direction;
+use crate::fate::DropCause;
 use crate::trace::TraceError;
 
 /// How a record in binary begins.

@@ -1,21 +1,15 @@
 //! The record as CSV: comment lines with the heading, names of columns, a line for each packet.
 
 use std::fmt::Write;
-use std::time::Duration;
 
 use mmt_shared::time::Time;
 
-use super::{End, Entry, Heading};
-use crate::link::Direction;
+use super::entry::{End, Entry, Heading};
+use crate::direction::Direction;
 use crate::trace::TraceError;
-use crate::trace::path::{PathTrace, Sample};
 
-/// How every record and every recorded path in text begins.
-pub const OPENING: &str = "# mmt netem ";
 const RECORD: &str = "# mmt netem record 1";
-const PATH: &str = "# mmt netem path 1";
 const COLUMNS: &str = "direction,number,offered_ns,due_ns,sent_ns,bytes,backlog,fate,reason";
-const PATH_COLUMNS: &str = "at_ns,delay_ns";
 
 /// The lines before the first packet.
 #[must_use]
@@ -111,57 +105,4 @@ fn entry(line: &str) -> Result<Entry, &'static str> {
         backlog: backlog.parse().map_err(|_| "backlog is no number")?,
         end: end.ok_or("fate, reason and times do not go together")?,
     })
-}
-
-/// The path that a record or a recorded path holds, one direction of it: what every packet met.
-pub(crate) fn path(text: &str, direction: Direction) -> Result<Vec<Sample>, TraceError> {
-    if text.lines().next() == Some(PATH) {
-        return recorded_path(text);
-    }
-    let (_, entries) = read(text)?;
-    let mine = entries.iter().filter(|entry| entry.direction == direction);
-    let originals = mine.filter(|entry| !matches!(entry.end, End::Sent { copy: true, .. }));
-    let sample = |entry: &Entry| Sample {
-        at: entry.offered.saturating_since(Time::ZERO),
-        delay: match entry.end {
-            End::Sent { sent, .. } => Some(sent.saturating_since(entry.offered)),
-            End::Dropped(_) | End::Unsent => None,
-        },
-    };
-    Ok(originals.map(sample).collect())
-}
-
-/// A path as text, for whoever measured one: reads back as a trace.
-#[must_use]
-pub fn path_text(path: &PathTrace) -> String {
-    let mut text = format!("{PATH}\n{PATH_COLUMNS}\n");
-    for sample in path.samples() {
-        let delay = sample.delay.map(|delay| delay.as_nanos().to_string());
-        // writing to a string does not fail
-        let _ = writeln!(
-            text,
-            "{},{}",
-            sample.at.as_nanos(),
-            delay.unwrap_or_default()
-        );
-    }
-    text
-}
-
-fn recorded_path(text: &str) -> Result<Vec<Sample>, TraceError> {
-    let mut samples = Vec::new();
-    for (line, content) in crate::trace::meaningful_lines(text) {
-        if content == PATH_COLUMNS {
-            continue;
-        }
-        let wrong = || TraceError::at(line, "expected at_ns,delay_ns, or at_ns, for a loss");
-        let (at, delay) = content.split_once(',').ok_or_else(wrong)?;
-        let delay = match delay {
-            "" => None,
-            delay => Some(Duration::from_nanos(delay.parse().map_err(|_| wrong())?)),
-        };
-        let at = Duration::from_nanos(at.parse().map_err(|_| wrong())?);
-        samples.push(Sample { at, delay });
-    }
-    Ok(samples)
 }

@@ -4,9 +4,10 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use super::{End, Entry};
+use super::entry::{End, Entry};
 use crate::counters::Tally;
-use crate::link::{Direction, DropCause};
+use crate::direction::Direction;
+use crate::fate::DropCause;
 
 /// Beyond this p99 of release lateness the emulation is degraded.
 pub const P99_DEGRADED_US: f64 = 250.0;

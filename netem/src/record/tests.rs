@@ -4,8 +4,11 @@ use proptest::prelude::*;
 
 use super::summary::Summary;
 use super::*;
+use crate::direction::Direction;
+use crate::fate::DropCause;
 use crate::pipe::Pipe;
 use crate::{Fate, LinkId, effect};
+use mmt_shared::time::Time;
 
 fn heading() -> Heading {
     Heading {

@@ -4,9 +4,8 @@ use std::time::Duration;
 
 use serde::Deserialize;
 
-use super::TraceError;
-use super::path::Sample;
-use crate::link::Direction;
+use super::{Sample, TraceError};
+use crate::direction::Direction;
 
 #[derive(Deserialize)]
 struct Document {

@@ -3,9 +3,8 @@
 
 use std::time::Duration;
 
-use super::TraceError;
-use super::path::Sample;
-use crate::link::Direction;
+use super::{Sample, TraceError};
+use crate::direction::Direction;
 
 /// Reads it: stamps in whole nanoseconds (irtt) or decimal seconds (ping), delays in ms, -1 for the way
 /// on which a probe was lost. Without a direction, or without one-way columns, half of the round trip is

@@ -5,22 +5,12 @@ use std::time::Duration;
 
 use mmt_shared::time::duration_nanos;
 
-use super::{TraceError, irtt, lens, ping};
-use crate::config::DELAY_MAX;
-use crate::link::Direction;
-use crate::record;
+use super::{Sample, TraceError, irtt, lens, mmt, ping};
+use crate::direction::Direction;
+use crate::distribution::DELAY_MAX;
 
 /// The most samples of a path.
 const SAMPLES_MAX: usize = 10_000_000;
-
-/// One probe that went over the path.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Sample {
-    /// When it was sent, counted from the first.
-    pub at: Duration,
-    /// How long it took one way; `None`: it was lost.
-    pub delay: Option<Duration>,
-}
 
 /// What befell probes on a path, one direction. A packet meets what the last probe before it met; after
 /// the last probe it begins again.
@@ -84,8 +74,8 @@ impl PathTrace {
             line if line.starts_with('{') => irtt::parse(text, direction),
             line if line.starts_with("timestamp,rtt") => lens::parse(text, direction),
             line if line.starts_with("PING") || line.starts_with('[') => ping::parse(text),
-            line if line.starts_with(record::csv::OPENING) => {
-                record::csv::path(text, direction.unwrap_or(Direction::Up))
+            line if line.starts_with(mmt::OPENING) => {
+                mmt::parse(text, direction.unwrap_or(Direction::Up))
             }
             _ => Err(TraceError::at(
                 1,

@@ -2,8 +2,7 @@
 
 use std::time::Duration;
 
-use super::TraceError;
-use super::path::Sample;
+use super::{Sample, TraceError};
 
 /// Reads it. Half of each round trip is taken for one way: ping cannot tell more. A sequence number that
 /// is missing was lost, at the time at which it would have been sent.

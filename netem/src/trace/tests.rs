@@ -3,9 +3,9 @@
 use std::time::Duration;
 
 use super::mahimahi::Opportunities;
-use super::path::{PathTrace, Sample};
+use super::path::PathTrace;
 use super::*;
-use crate::link::Direction;
+use crate::direction::Direction;
 
 const UP: Option<Direction> = Some(Direction::Up);
 const DOWN: Option<Direction> = Some(Direction::Down);
@@ -127,7 +127,7 @@ fn irtt_json_gives_each_way_up_to_the_offset_of_the_clocks() {
 #[test]
 fn a_path_written_down_reads_back() {
     let original = path(PING, None);
-    let text = crate::record::csv::path_text(&original);
+    let text = mmt::path_text(original.samples());
     assert_eq!(path(&text, None), original);
 }
 

@@ -11,8 +11,8 @@ use crate::config::{
     Chance, Codel, Correlation, Framing, LIMIT_MAX, Order, Probability, Queue, Rate, STEPS_MAX,
     Service, Slot, SlotGap, TAU_MIN,
 };
+use crate::direction::Direction;
 use crate::distribution::{Cdf, Table};
-use crate::link::Direction;
 use crate::presets;
 use crate::trace::mahimahi::Opportunities;
 use crate::trace::path::{PathTrace, Replay};

@@ -22,9 +22,9 @@ use quinn::{
     UdpPoller,
 };
 
+use super::error::VirtualTimeError;
 use super::executor::{Executor, lock};
 use super::path::{Packet, Way};
-use super::run::VirtualTimeError;
 use crate::transport::{Case, Stack};
 
 /// What QUIC adds to a message, bytes (short header, 8-byte connection id, frame, tag).

@@ -12,16 +12,13 @@ use std::time::Duration;
 
 use bytes::Bytes;
 use mmt_netem::LinkId;
-use mmt_netem::config::ConfigError;
-use mmt_shared::io::identity::GenerateError;
-use mmt_shared::io::tls::TlsError;
 use mmt_shared::time::{Time, duration_nanos};
 use quinn::{Connection, ConnectionError, Endpoint};
 
 use super::ends::{Ends, MemorySocket, ends};
+use super::error::VirtualTimeError;
 use super::executor::{Executor, lock};
 use super::path::{Arrived, Way};
-use crate::reproduce::ReproduceError;
 use crate::transport::{Case, HEARTBEAT, HEARTBEAT_BYTES, Log, Outcome, Sent};
 
 /// Told of each packet that came: when, and what the path itself took for it.
@@ -33,42 +30,6 @@ const SERVER_NAME: &str = "mmt";
 const HANDSHAKE_MAX: Time = Time::from_millis(30_000);
 /// Messages begin at the first multiple of this after the handshake.
 const START_GRID: Duration = Duration::from_secs(1);
-
-/// Why a run came to nothing.
-#[derive(Debug, thiserror::Error)]
-pub enum VirtualTimeError {
-    /// A setting of the link.
-    #[error(transparent)]
-    Link(#[from] ConfigError),
-    /// No identity.
-    #[error(transparent)]
-    Identity(#[from] GenerateError),
-    /// TLS could not be set up.
-    #[error(transparent)]
-    Tls(#[from] TlsError),
-    /// quinn would not make an endpoint.
-    #[error("no endpoint: {0}")]
-    Endpoint(#[from] std::io::Error),
-    /// quinn would not connect.
-    #[error("cannot connect: {0}")]
-    Connect(#[from] quinn::ConnectError),
-    /// The connection failed.
-    #[error("the connection failed: {0}")]
-    Connection(#[from] ConnectionError),
-    /// The handshake was never over.
-    #[error("the handshake was not over after {HANDSHAKE_MAX:?} of virtual time")]
-    Handshake,
-    /// quinn would not take a message.
-    #[error("a message could not be sent: {0}")]
-    Send(#[from] quinn::SendDatagramError),
-}
-
-impl From<VirtualTimeError> for ReproduceError {
-    fn from(error: VirtualTimeError) -> Self {
-        let why = error.to_string();
-        Self::Transport { why }
-    }
-}
 
 /// Runs `case` in virtual time.
 ///
@@ -145,7 +106,10 @@ impl Setup {
                 return Ok(Pair { master, slave });
             }
             let next = self.next_event().filter(|at| *at < HANDSHAKE_MAX);
-            self.pass(next.ok_or(VirtualTimeError::Handshake)?, &mut |_, _| Ok(()))?;
+            let next = next.ok_or(VirtualTimeError::Handshake {
+                after: HANDSHAKE_MAX,
+            })?;
+            self.pass(next, &mut |_, _| Ok(()))?;
         }
     }
 

@@ -5,9 +5,10 @@ use quinn::udp::EcnCodepoint;
 use super::DirectionCounters;
 use super::port::{Received, Sent};
 use crate::counters::Tally;
+use crate::direction::Direction;
+use crate::fate::{Fate, turn_bit};
 use crate::io::alarm::now;
 use crate::io::log::{Dropped, Log};
-use crate::link::{Direction, Fate, turn_bit};
 use crate::pipe::{Pipe, Released};
 
 /// A datagram on a link.

@@ -16,11 +16,11 @@ use super::lane::{Lane, Parcel, harm};
 use super::port::{Port, Receiver, Sent};
 use super::{RelaySnapshot, Shared};
 use crate::counters::Tally;
+use crate::direction::Direction;
 use crate::io::alarm::{now, wait};
 use crate::io::lateness::Lateness;
 use crate::io::lock;
 use crate::io::log::Log;
-use crate::link::Direction;
 use crate::pipe::{Pipe, Released};
 
 /// Batches taken from one socket before the times are looked at again.

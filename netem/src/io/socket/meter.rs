@@ -9,8 +9,8 @@ use serde::Serialize;
 
 use super::{WrapError, segments};
 use crate::counters::Tally;
+use crate::fate::DropCause;
 use crate::io::lateness::{Lateness, Recorder};
-use crate::link::DropCause;
 
 /// A snapshot of the counters of a socket. Bytes are UDP payload, without UDP and IP headers.
 ///

@@ -15,10 +15,11 @@ use quinn::{AsyncUdpSocket, UdpPoller};
 use super::meter::{SocketMeter, Unsent};
 use super::{Datagram, SocketExtras, WrapError};
 use crate::config::{ConfigError, LinkConfig};
+use crate::direction::{Direction, LinkId};
+use crate::fate::{Fate, turn_bit};
 use crate::io::alarm::{Alarm, now};
 use crate::io::lock;
 use crate::io::log::{Dropped, Log};
-use crate::link::{Direction, Fate, LinkId, turn_bit};
 use crate::pipe::{Pipe, Released};
 
 /// How long the thread waits for a full socket before it drops the datagram: long against the time in

@@ -11,9 +11,9 @@ use quinn::{ClientConfig, Endpoint, EndpointConfig, Runtime, ServerConfig, Tokio
 
 use super::*;
 use crate::counters::Tally;
+use crate::direction::Direction;
 use crate::io::alarm;
 use crate::io::record_file::RecordFile;
-use crate::link::Direction;
 
 const PATIENCE: Duration = Duration::from_secs(30);
 const PEER: SocketAddr = SocketAddr::new(IpAddr::V4(Ipv4Addr::LOCALHOST), 9);

@@ -2,6 +2,7 @@
 //! (one false alarm in 16 000) unless another level is named; seeds are fixed.
 
 use super::*;
+use crate::fate::turn_bit;
 use crate::record::summary::{mean_run, runs};
 
 fn lost(words: &str, seed: u64) -> Vec<bool> {
