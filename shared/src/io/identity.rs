@@ -5,10 +5,12 @@
 
 use ring::hmac;
 use rustls::pki_types::pem::PemObject;
-use rustls::pki_types::{CertificateDer, PrivateKeyDer, PrivatePkcs8KeyDer};
+use rustls::pki_types::{
+    CertificateDer, PrivateKeyDer, PrivatePkcs8KeyDer, SubjectPublicKeyInfoDer,
+};
+use rustls::server::ParsedCertificate;
 
 use super::secret::NoRandomness;
-use super::tls::public_key_of;
 use crate::pairing::{HexError, Pin, Token};
 
 /// Name that the certificate carries; nobody checks it, the pin is what counts.
@@ -148,6 +150,16 @@ impl Identity {
         }
         derived
     }
+}
+
+/// The public key in a certificate, as `SubjectPublicKeyInfo` in DER.
+///
+/// # Errors
+/// The certificate is malformed.
+pub fn public_key_of(
+    certificate: &CertificateDer<'_>,
+) -> Result<SubjectPublicKeyInfoDer<'static>, rustls::Error> {
+    ParsedCertificate::try_from(certificate).map(|parsed| parsed.subject_public_key_info())
 }
 
 #[cfg(test)]

@@ -7,6 +7,7 @@
 mod connection;
 mod driver;
 mod endpoint;
+mod hub;
 mod letters;
 pub mod packet;
 #[cfg(test)]

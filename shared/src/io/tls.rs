@@ -8,13 +8,13 @@ use quinn::crypto::rustls::{NoInitialCipherSuite, QuicClientConfig, QuicServerCo
 use rustls::client::Resumption;
 use rustls::client::danger::{HandshakeSignatureValid, ServerCertVerified, ServerCertVerifier};
 use rustls::crypto::{CryptoProvider, WebPkiSupportedAlgorithms, ring, verify_tls13_signature};
-use rustls::pki_types::{CertificateDer, ServerName, SubjectPublicKeyInfoDer, UnixTime};
-use rustls::server::{NoServerSessionStorage, ParsedCertificate};
+use rustls::pki_types::{CertificateDer, ServerName, UnixTime};
+use rustls::server::NoServerSessionStorage;
 use rustls::{
     CertificateError, DigitallySignedStruct, Error, PeerIncompatible, SignatureScheme, version,
 };
 
-use super::identity::Identity;
+use super::identity::{Identity, public_key_of};
 use crate::pairing::Pin;
 use crate::wire::ALPN;
 
@@ -31,16 +31,6 @@ pub enum TlsError {
     /// The provider lacks the suite that QUIC needs.
     #[error("the cryptography provider lacks TLS13_AES_128_GCM_SHA256, which QUIC version 1 needs")]
     NoInitialSuite(#[from] NoInitialCipherSuite),
-}
-
-/// The public key in a certificate, as `SubjectPublicKeyInfo` in DER.
-///
-/// # Errors
-/// The certificate is malformed.
-pub fn public_key_of(
-    certificate: &CertificateDer<'_>,
-) -> Result<SubjectPublicKeyInfoDer<'static>, Error> {
-    ParsedCertificate::try_from(certificate).map(|parsed| parsed.subject_public_key_info())
 }
 
 /// The slave's side: proves `identity`, asks no certificate of the master.

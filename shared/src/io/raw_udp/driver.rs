@@ -7,7 +7,7 @@ use std::task::{Context, Poll};
 
 use quinn::udp::RecvMeta;
 
-use super::endpoint::Hub;
+use super::hub::Hub;
 
 /// Messages read in one call; each may hold several datagrams of one sender (GRO).
 const BATCH: usize = 8;
