@@ -84,9 +84,28 @@ pub fn median(values: impl IntoIterator<Item = f64>) -> Option<f64> {
     Some(f64::midpoint(lower, upper))
 }
 
+/// The least of rising values that a share (0 to 1) of all lies below; of all of them the largest. None without values.
+#[must_use]
+pub fn quantile(sorted: &[f64], share: f64) -> Option<f64> {
+    let place = (share * sorted.len() as f64) as usize;
+    sorted.get(place.min(sorted.len().checked_sub(1)?)).copied()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_quantile_is_one_of_the_values_with_that_share_below_it() {
+        let hundred: Vec<f64> = (0..100).map(f64::from).collect();
+        let of = |share| quantile(&hundred, share);
+        assert_eq!(
+            (of(0.0), of(0.05), of(0.95), of(1.0)),
+            (Some(0.0), Some(5.0), Some(95.0), Some(99.0))
+        );
+        assert_eq!(quantile(&[7.0], 0.99), Some(7.0));
+        assert_eq!(quantile(&[], 0.5), None);
+    }
 
     #[test]
     fn the_interval_of_a_hand_computed_case() {

@@ -86,6 +86,7 @@ pub(super) const REPLAY: &str = "\
 Examples:
   mmt replay black-patch.txt
   mmt replay --deadband 5% --t-update none *.txt
+  mmt replay --splits 100 wood-patch.txt
   mmt replay --json wood-patch.txt > report.json";
 
 /// Examples of `mmt reproduce`.

@@ -17,6 +17,7 @@ use std::time::Duration;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use mmt_client::device::DeviceProfile;
 use mmt_client::link::CommandConfig;
+use mmt_lab::replay::ReplayConfig;
 use mmt_netem::LinkConfig;
 use mmt_server::link::Repeats;
 use mmt_server::trigger::Scheme;
@@ -290,7 +291,10 @@ pub(crate) struct ReplayArguments {
     /// Longest time without an update in contact; none for the pure deadband
     #[arg(long, value_name = "TIME", default_value = "150ms", value_parser = values::period)]
     pub(crate) t_update: Period,
-    /// Seed of the splits into fitted and held-out pushes
+    /// Random splits into fitted and held-out pushes
+    #[arg(long, value_name = "N", default_value_t = ReplayConfig::default().repeats, value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    pub(crate) splits: u32,
+    /// Seed of the splits
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub(crate) seed: u64,
     /// Print one JSON document instead of tables

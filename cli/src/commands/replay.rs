@@ -23,6 +23,7 @@ pub(crate) fn run(arguments: &ReplayArguments) -> Result<(), Failure> {
     let config = ReplayConfig {
         deadband: arguments.deadband,
         t_update_s: arguments.t_update.0.map(|period| period.as_secs_f64()),
+        repeats: arguments.splits,
         seed: arguments.seed,
         ..ReplayConfig::default()
     };

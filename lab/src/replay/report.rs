@@ -10,7 +10,7 @@ use super::ReplayConfig;
 use super::heldout::HeldOut;
 use super::surface::{Law, Surface};
 use super::trigger::Packets;
-use crate::statistics::median;
+use crate::statistics::{median, quantile};
 
 /// Median and mean of an error over pushes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
@@ -196,6 +196,28 @@ impl fmt::Display for Fixed {
     }
 }
 
+/// The most repeats of which every one is shown.
+const SHOWN_MAX: usize = 10;
+
+/// The errors of single repeats: each, or the 5th to the 95th percentile of many.
+struct Repeats<'a>(&'a [f64]);
+
+impl fmt::Display for Repeats<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if self.0.len() > SHOWN_MAX {
+            let mut sorted = self.0.to_vec();
+            sorted.sort_by(f64::total_cmp);
+            let [low, high] = [0.05, 0.95].map(|share| Percent(quantile(&sorted, share)));
+            return write!(f, "5th to 95th percentile: {low} to {high}");
+        }
+        for (repeat, error) in self.0.iter().enumerate() {
+            let comma = if repeat == 0 { "" } else { ", " };
+            write!(f, "{comma}{}", Percent(Some(*error)))?;
+        }
+        Ok(())
+    }
+}
+
 impl fmt::Display for ReplayReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         self.write_pushes(f)?;
@@ -283,17 +305,12 @@ impl ReplayReport {
             self.configuration.seed
         )?;
         for law in &self.held_out {
-            write!(
+            let (name, error) = (law.law.name(), Percent(law.median_error));
+            writeln!(
                 f,
-                "{:<20} {:>8}  (",
-                law.law.name(),
-                Percent(law.median_error)
+                "{name:<20} {error:>8}  ({})",
+                Repeats(&law.median_errors)
             )?;
-            for (repeat, error) in law.median_errors.iter().enumerate() {
-                let comma = if repeat == 0 { "" } else { ", " };
-                write!(f, "{comma}{}", Percent(Some(*error)))?;
-            }
-            writeln!(f, ")")?;
         }
         Ok(())
     }

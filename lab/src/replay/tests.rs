@@ -142,6 +142,27 @@ fn progress_rises_to_the_whole() {
 }
 
 #[test]
+fn of_many_splits_the_percentiles_are_shown_and_of_few_each() {
+    let recording = recording(Law::LimitSurface, 8);
+    let shown = |repeats| {
+        let config = ReplayConfig {
+            repeats,
+            ..ReplayConfig::default()
+        };
+        replay(&recording, &config, &mut |_, _| {})
+    };
+    let (few, many) = (shown(3), shown(100));
+    assert_eq!(few.held_out[0].median_errors.len(), 3);
+    assert_eq!(many.held_out[0].median_errors.len(), 100);
+    assert_eq!(
+        few.held_out[0].median_errors,
+        many.held_out[0].median_errors[..3]
+    );
+    let text = "percentile:";
+    assert!(many.to_string().contains(text) && !few.to_string().contains(text));
+}
+
+#[test]
 fn two_replays_of_one_recording_are_equal_to_the_bit() {
     let recording = recording(Law::ThreePoint, 10);
     assert_eq!(run(&recording), run(&recording));

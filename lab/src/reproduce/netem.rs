@@ -14,7 +14,7 @@ use mmt_shared::time::{TICK, Time};
 
 use super::{Extent, Findings, Laboratory, ReproduceError};
 use crate::figure::{Axis, Colour, Dot, Figure, Legend, Panel, Series, Stroke};
-use crate::statistics::Interval;
+use crate::statistics::{Interval, quantile};
 use crate::table::{Cell, Table};
 
 /// Packets per second that are offered: a haptic stream that sends every sample.
@@ -128,11 +128,6 @@ fn delays_ms(runs: &[Vec<Entry>]) -> Vec<f64> {
     let mut delays: Vec<f64> = delays.collect();
     delays.sort_by(f64::total_cmp);
     delays
-}
-
-fn quantile(sorted: &[f64], share: f64) -> Option<f64> {
-    let place = (share * sorted.len() as f64) as usize;
-    sorted.get(place.min(sorted.len().checked_sub(1)?)).copied()
 }
 
 fn row(preset: &Preset, configured: &Effect, achieved: &[Summary], delays: &[f64]) -> Vec<Cell> {
