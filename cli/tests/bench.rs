@@ -6,15 +6,16 @@
     reason = "a test starts the command, and fails by panicking"
 )]
 
-use std::process::{Command, Output, Stdio};
+use std::process::Output;
 
 use serde_json::Value;
 
+mod command;
+
 fn bench(arguments: &[&str]) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_mmt"));
-    command.args(["bench"]).args(arguments);
-    command.env_remove("MMT_LOG").stdin(Stdio::null());
-    command.output().unwrap()
+    let home = tempfile::tempdir().unwrap();
+    let mut command = command::mmt(&home, &["bench"]);
+    command.args(arguments).output().unwrap()
 }
 
 #[test]

@@ -2,35 +2,22 @@
 #![allow(
     clippy::disallowed_methods,
     clippy::indexing_slicing,
-    clippy::panic,
     clippy::unwrap_used,
     reason = "a test starts the command, writes files for it, and fails by panicking"
 )]
 
-use std::io::{BufRead, BufReader, Write};
-use std::net::UdpSocket;
-use std::process::{Command, Output, Stdio};
+use std::io::Write;
+use std::net::{SocketAddr, UdpSocket};
+use std::process::Stdio;
 use std::time::Duration;
 
 use serde_json::Value;
 
-fn mmt(home: &tempfile::TempDir, arguments: &[&str]) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_mmt"));
-    command
-        .args(arguments)
-        .env("XDG_STATE_HOME", home.path())
-        .env_remove("MMT_LOG")
-        .current_dir(home.path())
-        .stdin(Stdio::null())
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped());
-    command
-}
+mod command;
+mod running;
 
-fn document(output: &Output) -> Value {
-    let text = String::from_utf8_lossy(&output.stderr);
-    serde_json::from_slice(&output.stdout).unwrap_or_else(|_| panic!("{text}"))
-}
+use command::mmt;
+use running::{Running, document};
 
 /// p99 above 250 us or anything above 1 ms, by the numbers that stand beside the mark.
 fn is_marked_rightly(p99_us: &Value, max_us: &Value, degraded: &Value) -> bool {
@@ -186,16 +173,10 @@ fn a_relay_carries_any_protocol_and_says_whether_it_was_in_time() {
 fn a_master_keeps_the_path_that_it_met_as_a_trace() {
     let home = tempfile::tempdir().unwrap();
     let arguments = ["slave", "--listen", "127.0.0.1:0", "--once"];
-    let mut slave = mmt(&home, &arguments)
-        .stderr(Stdio::null())
-        .spawn()
-        .unwrap();
-    let mut lines = BufReader::new(slave.stdout.take().unwrap());
-    let mut pairing = String::new();
-    lines.read_line(&mut pairing).unwrap();
+    let slave = Running::start(mmt(&home, &arguments));
     let arguments = [
         "master",
-        pairing.trim(),
+        &slave.first_line,
         "--duration",
         "2s",
         "--netem",
@@ -206,7 +187,8 @@ fn a_master_keeps_the_path_that_it_met_as_a_trace() {
     ];
     let master = document(&mmt(&home, &arguments).output().unwrap());
     assert_eq!(master["ending"], "finished");
-    assert!(slave.wait().unwrap().success());
+    let (_, code) = slave.finish();
+    assert_eq!(code, Some(0));
 
     let arguments = [
         "netem",
@@ -228,4 +210,88 @@ fn a_master_keeps_the_path_that_it_met_as_a_trace() {
     let effect = &relay["configuration"]["effect_up"];
     assert!(effect["mean_ms"].as_f64().unwrap() >= 20.0, "{effect}");
     assert_eq!(relay["configuration"]["up"], "trace path.csv");
+}
+
+#[test]
+fn a_relay_prints_its_address_first_and_its_counters_when_interrupted() {
+    let home = tempfile::tempdir().unwrap();
+    let target = UdpSocket::bind("127.0.0.1:0").unwrap();
+    let to = target.local_addr().unwrap().to_string();
+    let arguments = [
+        "netem",
+        "--listen",
+        "127.0.0.1:0",
+        "--to",
+        &to,
+        "--up",
+        "loss 100%",
+        "--json",
+    ];
+    let relay = Running::start(mmt(&home, &arguments));
+    let address: SocketAddr = relay.first_line.parse().unwrap();
+    let source = UdpSocket::bind("127.0.0.1:0").unwrap();
+    source.send_to(b"lost", address).unwrap();
+    relay.interrupt();
+    let (rest, code) = relay.finish();
+    assert_eq!(code, Some(0));
+    let document: Value = serde_json::from_str(&rest).unwrap();
+    assert_eq!(document["ending"], "interrupted");
+    let up = &document["counters"]["up"];
+    assert_eq!(up["link"]["offered"], up["link"]["dropped"]["loss"]);
+    assert_eq!(up["forwarded"]["packets"], 0);
+}
+
+#[test]
+fn a_record_is_compared_with_the_settings_it_was_made_with() {
+    let home = tempfile::tempdir().unwrap();
+    let target = UdpSocket::bind("127.0.0.1:0").unwrap();
+    let to = target.local_addr().unwrap().to_string();
+    let file = home.path().join("run.csv");
+    let file = file.to_str().unwrap();
+    let arguments = [
+        "netem",
+        "--listen",
+        "127.0.0.1:0",
+        "--to",
+        &to,
+        "--up",
+        "delay 20ms loss list 3",
+        "--record",
+        file,
+    ];
+    let relay = Running::start(mmt(&home, &arguments));
+    let address: SocketAddr = relay.first_line.parse().unwrap();
+    let source = UdpSocket::bind("127.0.0.1:0").unwrap();
+    let patience = Some(Duration::from_secs(30));
+    target.set_read_timeout(patience).unwrap();
+    for number in 0..10_u8 {
+        source.send_to(&[number], address).unwrap();
+        if number != 3 {
+            let mut buffer = [0; 10];
+            assert_eq!(target.recv(&mut buffer).unwrap(), 1);
+            assert_eq!(buffer[0], number);
+        }
+    }
+    relay.interrupt();
+    let (_, code) = relay.finish();
+    assert_eq!(code, Some(0));
+
+    let output = mmt(&home, &["netem", "report", file, "--json"])
+        .output()
+        .unwrap();
+    assert!(output.status.success(), "{output:?}");
+    let up = &document(&output)["up"];
+    assert_eq!(up["words"], "delay 20ms loss list 3");
+    assert_eq!(up["achieved"]["offered"]["packets"], 10);
+    assert_eq!(up["achieved"]["sent"]["packets"], 9);
+    assert_eq!(up["achieved"]["dropped"]["loss"], 1);
+    assert!(up["achieved"]["mean_ms"].as_f64().unwrap() >= 20.0);
+    assert!((up["configured"]["mean_ms"].as_f64().unwrap() - 20.0).abs() < 1e-6);
+
+    let output = mmt(&home, &["netem", "report", file]).output().unwrap();
+    let text = String::from_utf8(output.stdout).unwrap();
+    assert!(
+        text.contains("configured") && text.contains("lost in a row"),
+        "{text}"
+    );
 }

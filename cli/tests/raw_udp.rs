@@ -6,19 +6,15 @@
     reason = "a test starts the command, and fails by panicking"
 )]
 
-use std::process::{Command, Output, Stdio};
+use std::process::Output;
 
 use serde_json::Value;
 
+mod command;
+
 fn mmt(arguments: &[&str]) -> Output {
     let home = tempfile::tempdir().unwrap();
-    let mut command = Command::new(env!("CARGO_BIN_EXE_mmt"));
-    command
-        .args(arguments)
-        .env("XDG_STATE_HOME", home.path())
-        .env_remove("MMT_LOG")
-        .stdin(Stdio::null());
-    command.output().unwrap()
+    command::mmt(&home, arguments).output().unwrap()
 }
 
 fn errors(output: &Output) -> String {

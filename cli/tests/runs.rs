@@ -6,66 +6,14 @@
     reason = "a test starts the command, writes files for it, and fails by panicking"
 )]
 
-use std::fmt::Write;
-use std::io::{BufRead, BufReader, Read};
-use std::process::{Child, ChildStdout, Command, Stdio};
-
 use serde_json::Value;
+use std::fmt::Write;
 
-fn mmt(home: &tempfile::TempDir, arguments: &[&str]) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_mmt"));
-    command
-        .args(arguments)
-        .env("XDG_STATE_HOME", home.path())
-        .env_remove("MMT_LOG")
-        .current_dir(home.path())
-        .stdin(Stdio::null())
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped());
-    command
-}
+mod command;
+mod running;
 
-/// A process whose first line on stdout has been read. Killed if the test fails.
-struct Running {
-    child: Child,
-    stdout: BufReader<ChildStdout>,
-    first_line: String,
-}
-
-impl Running {
-    fn start(mut command: Command) -> Self {
-        let mut child = command.stderr(Stdio::null()).spawn().unwrap();
-        let mut stdout = BufReader::new(child.stdout.take().unwrap());
-        let mut first_line = String::new();
-        stdout.read_line(&mut first_line).unwrap();
-        Self {
-            child,
-            stdout,
-            first_line: first_line.trim_end().to_owned(),
-        }
-    }
-
-    fn interrupt(&self) {
-        let number = self.child.id().to_string();
-        let killed = Command::new("kill").args(["-INT", &number]).status();
-        assert!(killed.unwrap().success());
-    }
-
-    /// What else it printed, and its exit code.
-    fn finish(mut self) -> (String, Option<i32>) {
-        let mut rest = String::new();
-        self.stdout.read_to_string(&mut rest).unwrap();
-        let status = self.child.wait().unwrap();
-        (rest, status.code())
-    }
-}
-
-impl Drop for Running {
-    fn drop(&mut self) {
-        let _ = self.child.kill();
-        let _ = self.child.wait();
-    }
-}
+use command::mmt;
+use running::{Running, document};
 
 /// A recording of pushes along +x of a block that takes 2 N, each 1 cm long.
 fn recording(pushes: u32) -> String {
@@ -144,91 +92,6 @@ fn a_replay_as_json_is_one_document_with_the_keys_of_every_report() {
 }
 
 #[test]
-fn a_relay_prints_its_address_first_and_its_counters_when_interrupted() {
-    let home = tempfile::tempdir().unwrap();
-    let target = std::net::UdpSocket::bind("127.0.0.1:0").unwrap();
-    let to = target.local_addr().unwrap().to_string();
-    let arguments = [
-        "netem",
-        "--listen",
-        "127.0.0.1:0",
-        "--to",
-        &to,
-        "--up",
-        "loss 100%",
-        "--json",
-    ];
-    let relay = Running::start(mmt(&home, &arguments));
-    let address: std::net::SocketAddr = relay.first_line.parse().unwrap();
-    let source = std::net::UdpSocket::bind("127.0.0.1:0").unwrap();
-    source.send_to(b"lost", address).unwrap();
-    relay.interrupt();
-    let (rest, code) = relay.finish();
-    assert_eq!(code, Some(0));
-    let document: Value = serde_json::from_str(&rest).unwrap();
-    assert_eq!(document["ending"], "interrupted");
-    let up = &document["counters"]["up"];
-    assert_eq!(up["link"]["offered"], up["link"]["dropped"]["loss"]);
-    assert_eq!(up["forwarded"]["packets"], 0);
-}
-
-#[test]
-fn a_record_is_compared_with_the_settings_it_was_made_with() {
-    let home = tempfile::tempdir().unwrap();
-    let target = std::net::UdpSocket::bind("127.0.0.1:0").unwrap();
-    let to = target.local_addr().unwrap().to_string();
-    let file = home.path().join("run.csv");
-    let file = file.to_str().unwrap();
-    let arguments = [
-        "netem",
-        "--listen",
-        "127.0.0.1:0",
-        "--to",
-        &to,
-        "--up",
-        "delay 20ms loss list 3",
-        "--record",
-        file,
-    ];
-    let relay = Running::start(mmt(&home, &arguments));
-    let address: std::net::SocketAddr = relay.first_line.parse().unwrap();
-    let source = std::net::UdpSocket::bind("127.0.0.1:0").unwrap();
-    let patience = Some(std::time::Duration::from_secs(30));
-    target.set_read_timeout(patience).unwrap();
-    for number in 0..10_u8 {
-        source.send_to(&[number], address).unwrap();
-        if number != 3 {
-            let mut buffer = [0; 10];
-            assert_eq!(target.recv(&mut buffer).unwrap(), 1);
-            assert_eq!(buffer[0], number);
-        }
-    }
-    relay.interrupt();
-    let (_, code) = relay.finish();
-    assert_eq!(code, Some(0));
-
-    let output = mmt(&home, &["netem", "report", file, "--json"])
-        .output()
-        .unwrap();
-    assert!(output.status.success(), "{output:?}");
-    let document: Value = serde_json::from_slice(&output.stdout).unwrap();
-    let up = &document["up"];
-    assert_eq!(up["words"], "delay 20ms loss list 3");
-    assert_eq!(up["achieved"]["offered"]["packets"], 10);
-    assert_eq!(up["achieved"]["sent"]["packets"], 9);
-    assert_eq!(up["achieved"]["dropped"]["loss"], 1);
-    assert!(up["achieved"]["mean_ms"].as_f64().unwrap() >= 20.0);
-    assert!((up["configured"]["mean_ms"].as_f64().unwrap() - 20.0).abs() < 1e-6);
-
-    let output = mmt(&home, &["netem", "report", file]).output().unwrap();
-    let text = String::from_utf8(output.stdout).unwrap();
-    assert!(
-        text.contains("configured") && text.contains("lost in a row"),
-        "{text}"
-    );
-}
-
-#[test]
 fn a_slave_that_nobody_comes_to_prints_its_pairing_string_and_an_empty_report() {
     let home = tempfile::tempdir().unwrap();
     let arguments = [
@@ -281,7 +144,7 @@ fn a_slave_and_a_master_as_processes_both_end_with_a_report() {
     let arguments = ["master", &pairing, "--duration", "2s", "--json"];
     let output = mmt(&home, &arguments).output().unwrap();
     let text = String::from_utf8_lossy(&output.stderr);
-    let master: Value = serde_json::from_slice(&output.stdout).expect(&text);
+    let master = document(&output);
     let (rest, code) = slave.finish();
     assert_eq!(code, Some(0));
     let slave: Value = serde_json::from_str(&rest).unwrap();

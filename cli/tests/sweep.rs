@@ -8,11 +8,13 @@
 
 use std::fs;
 use std::path::Path;
-use std::process::{Command, Output, Stdio};
+use std::process::{Command, Output};
 use std::thread;
 use std::time::Duration;
 
 use serde_json::Value;
+
+mod command;
 
 /// Two axes of two values, two seeds: eight rows, each long enough for contact.
 const PLAN: &str = r#"
@@ -44,13 +46,8 @@ impl Bench {
     }
 
     fn command(&self, arguments: &[&str]) -> Command {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_mmt"));
-        command
-            .args(["sweep", "plan.toml"])
-            .args(arguments)
-            .env_remove("MMT_LOG")
-            .current_dir(self.path())
-            .stdin(Stdio::null());
+        let mut command = command::mmt(&self.0, &["sweep", "plan.toml"]);
+        command.args(arguments);
         command
     }
 
@@ -166,7 +163,6 @@ fn an_interrupted_sweep_keeps_what_is_done_and_says_how_to_go_on() {
     let rows =
         || fs::read_to_string(&part).map_or(0, |text| text.lines().count().saturating_sub(1));
     let mut command = bench.command(&["--jobs", "1", "--json"]);
-    let command = command.stdout(Stdio::piped()).stderr(Stdio::piped());
     let mut running = command.spawn().unwrap();
     while rows() == 0 && running.try_wait().unwrap().is_none() {
         thread::sleep(Duration::from_millis(10));

@@ -5,23 +5,15 @@
     reason = "a test starts the command, writes files for it, and fails by panicking"
 )]
 
-use std::process::{Command, Output, Stdio};
+use std::process::Output;
+
+mod command;
 
 /// Runs `mmt` with these arguments, with a directory of its own for everything that it keeps.
 fn mmt(arguments: &[&str]) -> (Output, tempfile::TempDir) {
     let home = tempfile::tempdir().unwrap();
-    let output = command(&home).args(arguments).output().unwrap();
+    let output = command::mmt(&home, arguments).output().unwrap();
     (output, home)
-}
-
-fn command(home: &tempfile::TempDir) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_mmt"));
-    command
-        .env("XDG_STATE_HOME", home.path())
-        .env_remove("MMT_LOG")
-        .current_dir(home.path())
-        .stdin(Stdio::null());
-    command
 }
 
 /// Checks that the command refuses these arguments with a message that has these parts.
@@ -89,7 +81,7 @@ fn a_wrong_trace_or_record_is_refused_with_its_line() {
         ),
         (&["netem"], &["--listen"]),
     ] {
-        complains(&command(&home).args(arguments).output().unwrap(), 2, parts);
+        complains(&command::mmt(&home, arguments).output().unwrap(), 2, parts);
     }
 }
 
@@ -129,7 +121,7 @@ fn a_wrong_configuration_is_refused_with_line_and_caret() {
     ] {
         std::fs::write(&file, text).unwrap();
         let arguments = ["slave", "--listen", "127.0.0.1:0", "--config", "slave.toml"];
-        complains(&command(&home).args(arguments).output().unwrap(), 2, parts);
+        complains(&command::mmt(&home, &arguments).output().unwrap(), 2, parts);
     }
     refuses(
         &["slave", "--listen", "127.0.0.1:0", "--config", "none.toml"],
@@ -154,7 +146,7 @@ fn a_wrong_trace_is_refused_with_file_and_line() {
         std::fs::write(home.path().join(name), text).unwrap();
         let operator = format!("trace:{name}");
         let arguments = ["master", &pairing, "--operator", &operator];
-        complains(&command(&home).args(arguments).output().unwrap(), 2, parts);
+        complains(&command::mmt(&home, &arguments).output().unwrap(), 2, parts);
     }
 }
 
@@ -162,8 +154,7 @@ fn a_wrong_trace_is_refused_with_file_and_line() {
 fn a_wrong_recording_is_refused_before_any_is_replayed() {
     let home = tempfile::tempdir().unwrap();
     std::fs::write(home.path().join("binary.txt"), [0xff, 0xfe]).unwrap();
-    let output = command(&home)
-        .args(["replay", "binary.txt"])
+    let output = command::mmt(&home, &["replay", "binary.txt"])
         .output()
         .unwrap();
     complains(&output, 2, &["binary.txt", "UTF-8"]);
@@ -187,10 +178,8 @@ fn an_address_in_use_has_an_exit_code_of_its_own() {
 #[test]
 fn a_wrong_log_filter_is_refused_by_the_name_of_its_variable() {
     let home = tempfile::tempdir().unwrap();
-    let mut command = command(&home);
-    let output = command
+    let output = command::mmt(&home, &["replay", "x"])
         .env("MMT_LOG", "mmt=loud")
-        .args(["replay", "x"])
         .output();
     complains(&output.unwrap(), 2, &["MMT_LOG", "debug"]);
 }
@@ -210,12 +199,7 @@ fn nobody_reading_stdout_is_no_panic() {
             "1ms",
         ],
     ] {
-        let mut child = command(&home)
-            .args(arguments)
-            .stdout(Stdio::piped())
-            .stderr(Stdio::piped())
-            .spawn()
-            .unwrap();
+        let mut child = command::mmt(&home, arguments).spawn().unwrap();
         drop(child.stdout.take());
         let output = child.wait_with_output().unwrap();
         let text = String::from_utf8_lossy(&output.stderr);
