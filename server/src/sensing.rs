@@ -8,6 +8,7 @@
 use std::collections::VecDeque;
 
 use mmt_shared::geometry::{Pose, Vec2};
+use mmt_shared::range::{OutOfRange, in_range};
 use mmt_shared::rng::Substream;
 use mmt_shared::time::Time;
 use serde::{Deserialize, Serialize};
@@ -76,19 +77,8 @@ impl Default for VisionConfig {
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum SensingError {
     /// A number lies outside its accepted range or is not a number.
-    #[error("sensing: {name} {value} is outside the accepted range {min} to {max} {unit}")]
-    OutOfRange {
-        /// Which number.
-        name: &'static str,
-        /// What it was.
-        value: f64,
-        /// Least accepted value.
-        min: f64,
-        /// Greatest accepted value.
-        max: f64,
-        /// Unit of all three.
-        unit: &'static str,
-    },
+    #[error("sensing: {0}")]
+    OutOfRange(#[from] OutOfRange),
     /// More images would be on their way than are kept.
     #[error(
         "sensing: {rate_hz} images/s with a latency of {latency_ms} ms keep more than {max} images on their way; lower one of them"
@@ -243,39 +233,27 @@ impl SensingConfig {
 
     fn check(&self) -> Result<(), SensingError> {
         let v = &self.vision;
-        for (name, unit, value, (min, max)) in [
-            (
-                "position noise",
-                "m",
-                self.position_noise_m,
-                POSITION_NOISE_M,
-            ),
-            ("force noise", "N", self.force_noise_n, FORCE_NOISE_N),
-            ("vision rate", "Hz", v.rate_hz, RATE_HZ),
-            (
-                "vision position noise",
-                "m",
-                v.position_noise_m,
-                POSITION_NOISE_M,
-            ),
-            (
-                "vision angle noise",
-                "rad",
-                v.angle_noise_rad,
-                ANGLE_NOISE_RAD,
-            ),
-            ("vision latency", "ms", v.latency_ms, LATENCY_MS),
-        ] {
-            if !(min..=max).contains(&value) {
-                return Err(SensingError::OutOfRange {
-                    name,
-                    value,
-                    min,
-                    max,
-                    unit,
-                });
-            }
-        }
+        in_range(
+            "position noise",
+            "m",
+            self.position_noise_m,
+            POSITION_NOISE_M,
+        )?;
+        in_range("force noise", "N", self.force_noise_n, FORCE_NOISE_N)?;
+        in_range("vision rate", "Hz", v.rate_hz, RATE_HZ)?;
+        in_range(
+            "vision position noise",
+            "m",
+            v.position_noise_m,
+            POSITION_NOISE_M,
+        )?;
+        in_range(
+            "vision angle noise",
+            "rad",
+            v.angle_noise_rad,
+            ANGLE_NOISE_RAD,
+        )?;
+        in_range("vision latency", "ms", v.latency_ms, LATENCY_MS)?;
         if v.rate_hz * v.latency_ms / 1e3 + 2.0 > IMAGES_MAX as f64 {
             return Err(SensingError::TooManyImages {
                 rate_hz: v.rate_hz,

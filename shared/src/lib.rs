@@ -18,6 +18,7 @@ pub mod metrics;
 pub mod pairing;
 pub mod params;
 pub mod peer;
+pub mod range;
 pub mod rate_control;
 pub mod recording;
 pub mod report;

@@ -7,6 +7,7 @@ use serde::Serialize;
 
 use crate::contact::Coupling;
 use crate::geometry::{BoxFootprint, Face, Pose, Twist};
+use crate::range::{self, OutOfRange};
 use crate::time::TICK_S;
 
 /// Acceleration of gravity g, m/s².
@@ -48,19 +49,8 @@ pub enum ParamsError {
         name: &'static str,
     },
     /// A number lies outside its accepted range.
-    #[error("{name} {value} is outside the accepted range {min} to {max} {unit}")]
-    OutOfRange {
-        /// Which number.
-        name: &'static str,
-        /// What it was.
-        value: f64,
-        /// Least accepted value.
-        min: f64,
-        /// Greatest accepted value.
-        max: f64,
-        /// Unit of all three.
-        unit: &'static str,
-    },
+    #[error(transparent)]
+    OutOfRange(#[from] OutOfRange),
     /// The discrete local model would be near its stability bound.
     #[error(
         "mass {mass} kg is below {least} kg, the least that is stable with margin at this stiffness and damping"
@@ -73,26 +63,17 @@ pub enum ParamsError {
     },
 }
 
-/// Checks that `value` is finite and within `min..=max`; names it if not.
+/// Checks that `value` is finite and within `range`; names it if not.
 pub(crate) fn in_range(
     name: &'static str,
     unit: &'static str,
     value: f64,
-    (min, max): (f64, f64),
+    range: (f64, f64),
 ) -> Result<(), ParamsError> {
     if !value.is_finite() {
         return Err(ParamsError::NotFinite { name });
     }
-    if value < min || value > max {
-        return Err(ParamsError::OutOfRange {
-            name,
-            value,
-            min,
-            max,
-            unit,
-        });
-    }
-    Ok(())
+    Ok(range::in_range(name, unit, value, range)?)
 }
 
 /// The impedance of the box on the plane: what the estimator finds and the local model is made of.

@@ -3,6 +3,7 @@
 use mmt_shared::contact::Coupling;
 use mmt_shared::geometry::{Pose, Vec2};
 use mmt_shared::params::{GRAVITY, ModelParams, ParamsError, WORKSPACE_M};
+use mmt_shared::range::{OutOfRange, in_range};
 use serde::{Deserialize, Serialize};
 
 use super::bounded::Bounded;
@@ -96,19 +97,8 @@ impl Default for EnvironmentConfig {
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum EnvironmentError {
     /// A number lies outside its accepted range or is not a number.
-    #[error("environment: {name} {value} is outside the accepted range {min} to {max} {unit}")]
-    OutOfRange {
-        /// Which number.
-        name: &'static str,
-        /// What it was.
-        value: f64,
-        /// Least accepted value.
-        min: f64,
-        /// Greatest accepted value.
-        max: f64,
-        /// Unit of all three.
-        unit: &'static str,
-    },
+    #[error("environment: {0}")]
+    OutOfRange(#[from] OutOfRange),
     /// m, b, c, I or e could not be a model's parameters, so that no estimate of them could be right.
     #[error("environment: {0}")]
     Parameters(#[from] ParamsError),
@@ -233,24 +223,7 @@ impl EnvironmentConfig {
         let distance = wall.distance_m;
         let least = distance - wall.clearance(outline, &self.pose);
         // a body may start flush: room for rounding
-        in_range("wall distance", "m", distance, (least - 1e-9, WALL_M.1))
+        let room = (least - 1e-9, WALL_M.1);
+        Ok(in_range("wall distance", "m", distance, room)?)
     }
-}
-
-fn in_range(
-    name: &'static str,
-    unit: &'static str,
-    value: f64,
-    (min, max): (f64, f64),
-) -> Result<(), EnvironmentError> {
-    if (min..=max).contains(&value) {
-        return Ok(());
-    }
-    Err(EnvironmentError::OutOfRange {
-        name,
-        value,
-        min,
-        max,
-        unit,
-    })
 }
