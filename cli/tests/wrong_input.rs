@@ -117,6 +117,11 @@ fn a_wrong_configuration_is_refused_with_line_and_caret() {
             "[environment]\nmass_kg = -1.0\n",
             &["mass", "-1", "what to do"],
         ),
+        (
+            "tool_force_max_n = 0.0\n",
+            &["tool force", "limit 0 ", "0.1 to 1000 N", "what to do"],
+        ),
+        ("tool_force_max_n = nan\n", &["tool force", "NaN"]),
         ("= 1", &["line 1"]),
     ] {
         std::fs::write(&file, text).unwrap();

@@ -14,6 +14,7 @@ pub mod sensing;
 pub mod shadow;
 pub mod slave;
 pub mod square;
+pub mod tool_force;
 pub mod trigger;
 
 #[cfg(feature = "io")]

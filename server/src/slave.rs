@@ -9,25 +9,27 @@ use mmt_shared::geometry::{BoxFootprint, Pose, Twist, Vec2, wrap_angle};
 use mmt_shared::metrics::ForceMetrics;
 use mmt_shared::params::{ModelParams, ModelState, inertia_of_square};
 use mmt_shared::settings::{Mode, ModelSettings, PoseCorrection};
-use mmt_shared::time::{TICK_S, Time};
+use mmt_shared::time::Time;
 use mmt_shared::wire::{Cause, ForceCounts, HandPort, HipSample, Tool, Update};
 
 use crate::bilateral::ToolPort;
 use crate::environment::{Environment, EnvironmentConfig};
+use crate::estimator::obstacle::OBSTACLE_N;
 use crate::estimator::{Estimate, Estimator, EstimatorConfig, Measured, Seen};
 use crate::model_error::ModelError;
-use crate::playout::{Played, PlayoutBuffer};
+use crate::playout::PlayoutBuffer;
 use crate::pose_observer::{ObserverConfig, PoseObserver};
 use crate::sensing::Sensing;
 use crate::shadow::{Shadow, TriggerReference};
+use crate::tool_force::ToolForce;
 use crate::trigger::{ContactDetector, Scheme, Trigger, TriggerInput};
 
 mod config;
+mod drive;
 
 pub use config::{SlaveConfig, SlaveError, StartModel};
 
-/// A tool that is further from the played HIP is behind it, m: 0.1 N at 1000 N/m.
-const BEHIND_M: f64 = 1e-4;
+use drive::ToolDrive;
 
 /// What one tick of the slave gave.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -38,9 +40,11 @@ pub struct SlaveTick {
     pub tool: Vec2,
     /// f_s as measured, N, on the object.
     pub f_s: Vec2,
+    /// Contact force as it is, N: for reports.
+    pub true_force: Vec2,
     /// The shadow's force, N: f_m as the trigger sees it.
     pub f_shadow: Vec2,
-    /// f_m as the master rendered it for this sample, N; none if the sample was lost.
+    /// f_m as the master rendered it for this sample, N; none if the sample was lost or the tool is held back from it.
     pub f_m: Option<Vec2>,
     /// Whether the slave is in contact.
     pub in_contact: bool,
@@ -65,15 +69,9 @@ pub struct Slave {
     echo: Vec2,
     /// f_s at the last update, N.
     f_s_told: Vec2,
-    /// The tool where it is not at the played HIP, m.
-    own_tool: Option<Vec2>,
-    /// Whether it goes only as far as the energy allows.
-    passive: bool,
+    drive: ToolDrive,
     /// Whether the master wants the tool's force.
     streams: bool,
-    /// Whether the tool is behind the HIP.
-    behind: bool,
-    tool_port: ToolPort,
     model_error: ModelError,
     trigger: Trigger,
     timer_carries_pose: bool,
@@ -143,11 +141,11 @@ impl Slave {
             reference: config.trigger_reference,
             echo: Vec2::zeros(),
             f_s_told: Vec2::zeros(),
-            own_tool: None,
-            passive: false,
+            drive: ToolDrive::new(
+                ToolPort::new(sensing.force_noise_n, config.playout.speed_max_m_per_s),
+                ToolForce::try_new(config.tool_force_max_n, coupling)?,
+            ),
             streams: false,
-            behind: false,
-            tool_port: ToolPort::new(sensing.force_noise_n, config.playout.speed_max_m_per_s),
             model_error: ModelError::default(),
             trigger: Trigger::new(config.trigger),
             timer_carries_pose: config.trigger.timer_carries_pose,
@@ -244,26 +242,27 @@ impl Slave {
     /// The tool's port, as time-domain passivity control sees it.
     #[must_use]
     pub fn tool_port(&self) -> &ToolPort {
-        &self.tool_port
+        self.drive.port()
+    }
+
+    /// The limit of the tool's force, and what came of it.
+    #[must_use]
+    pub fn tool_force(&self) -> &ToolForce {
+        self.drive.force()
     }
 
     /// Takes in what the hand's port says, newer than all before.
     pub fn hear_hand(&mut self, port: &HandPort) {
-        let passive = port.passive_tool;
         self.streams = port.wants_force;
-        self.tool_port.receive(port.in_j);
-        if passive && !self.passive {
-            self.tool_port.begin();
-            self.own_tool = self.own_tool.or(self.playout.played_hip());
-        }
-        self.passive = passive;
+        self.drive
+            .pay(port.in_j, port.passive_tool, self.playout.played_hip());
     }
 
     /// What the hand may want to know of the tool after a tick: with its force if the master wants that, which is then to
     /// go out at once.
     #[must_use]
     pub fn tool(&self, tick: &SlaveTick) -> Tool {
-        let port = &self.tool_port;
+        let port = self.tool_port();
         Tool {
             answers: tick.stamp,
             force: self.streams.then(|| ForceCounts::nearest(port.held())),
@@ -280,14 +279,15 @@ impl Slave {
 
     /// One sample period. None before the first HIP sample is due.
     pub fn tick(&mut self, now: Time) -> Option<SlaveTick> {
+        let before = self.playout.played_hip();
         let played = self.playout.advance(now)?;
-        let played = self.lead_tool(played);
+        let played = self.drive.lead(before, played);
         // every pose of a tick is the one that the tool met, before the object moves on
         let truth = self.environment.pose();
         let contact = self.environment.step(played.hip, played.velocity);
         let sensed = self.sensing.sense(now, played.hip, contact.force, &truth);
         let in_contact = self.contact.step(sensed.force.norm());
-        self.tool_port.measured(sensed.force);
+        self.drive.measured(sensed.force);
         self.observer
             .step(now, sensed.tool, sensed.force, in_contact, &self.params);
         if let Some(vision) = sensed.vision {
@@ -300,7 +300,7 @@ impl Slave {
             self.force.push(sensed.force, f_m);
         }
         // where the HIP was guessed, or the tool is not at it, tool and model meet different things
-        if played.force.is_some() && !self.behind {
+        if played.force.is_some() && !self.drive.is_behind() {
             self.model_error
                 .push(sensed.force, self.shadow.rendered().force);
         }
@@ -308,6 +308,7 @@ impl Slave {
             stamp: played.stamp,
             tool: played.hip,
             f_s: sensed.force,
+            true_force: contact.force,
             f_shadow: self.shadow.rendered().force,
             f_m: played.force,
             in_contact,
@@ -317,28 +318,6 @@ impl Slave {
         let cause = self.trigger.decide(now, &self.trigger_input(&tick));
         tick.update = cause.map(|cause| self.send(cause, &tick));
         Some(tick)
-    }
-
-    /// The tool follows the played HIP, or goes towards it as far as the energy allows. When it may follow again it
-    /// catches up within the speed limit.
-    fn lead_tool(&mut self, played: Played) -> Played {
-        let Some(tool) = self.own_tool else {
-            return played;
-        };
-        let wanted = played.hip - tool;
-        let way = match self.passive {
-            true => self.tool_port.allowed(wanted),
-            false => self.tool_port.within_speed(wanted),
-        };
-        self.tool_port.moved(way);
-        self.behind = (wanted - way).norm() > BEHIND_M;
-        let there = !self.passive && way == wanted;
-        self.own_tool = Some(tool + way).filter(|_| !there);
-        Played {
-            hip: tool + way,
-            velocity: way / TICK_S,
-            ..played
-        }
     }
 
     fn follow_master(&mut self, stamp: Time) {
@@ -363,7 +342,12 @@ impl Slave {
             side,
         });
         let Estimate {
-            m, b, c, holding, ..
+            m,
+            b,
+            c,
+            holding,
+            sticking,
+            ..
         } = self.estimator.step(&Measured {
             tool,
             force,
@@ -371,6 +355,11 @@ impl Slave {
             seen,
         });
         let inertia = inertia_of_square(m, side);
+        // a tool that may press no harder does not find out how hard the object is held
+        let holding = holding.map(|found| match sticking && self.drive.is_held_back() {
+            true => OBSTACLE_N,
+            false => found,
+        });
         let c = holding.unwrap_or(c);
         let e = c * self.observer.friction_radius();
         match ModelParams::try_new(m, b, c, inertia, e, &self.settings.coupling) {
@@ -386,6 +375,10 @@ impl Slave {
             TriggerReference::Shadow => (shadow.force, shadow.in_contact()),
             TriggerReference::Echo => (self.echo, self.echo != Vec2::zeros()),
             TriggerReference::None => (self.f_s_told, tick.in_contact),
+        };
+        let (f_m, shadow_in_contact) = match self.drive.is_held_back() {
+            true => held_back(tick, f_m, shadow_in_contact),
+            false => (f_m, shadow_in_contact),
         };
         let pose = self.shadow.ahead().state().pose;
         TriggerInput {
@@ -456,4 +449,13 @@ impl Slave {
         self.shadow.send(&update);
         update
     }
+}
+
+/// What the trigger is told of the model where the tool is held back from the HIP: f_m (N), and whether it is in contact.
+/// A model that says more at the HIP than is measured on the way there is not contradicted, nor is one that says
+/// nothing of where the tool is; one that says less is.
+fn held_back(tick: &SlaveTick, f_m: Vec2, model_in_contact: bool) -> (Vec2, bool) {
+    let contradicted = model_in_contact && f_m.dot(&tick.f_s) < tick.f_s.norm_squared();
+    let f_m = if contradicted { f_m } else { tick.f_s };
+    (f_m, tick.in_contact)
 }

@@ -51,6 +51,8 @@ pub struct RunReport<C> {
     pub model: ModelReport,
     /// How near the model's pose was to the true one.
     pub pose: PoseReport,
+    /// The slave's tool.
+    pub tool: ToolReport,
     /// Energy at the hand.
     pub passivity: PassivityReport,
     /// The path between the two sides.
@@ -84,6 +86,7 @@ impl<C> RunReport<C> {
             force: ForceReport::default(),
             model: ModelReport::default(),
             pose: PoseReport::default(),
+            tool: ToolReport::default(),
             passivity: PassivityReport::default(),
             link: LinkReport::default(),
             emulation: UpDown::default(),
@@ -410,6 +413,15 @@ impl From<&PoseError> for PoseReport {
             angle_max_rad: error.angle_max_rad().into(),
         }
     }
+}
+
+/// The slave's tool and the limit of its force.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct ToolReport {
+    /// For how long the limit shortened its way, s.
+    pub held_s: Number,
+    /// Largest force that was measured between tool and object, N.
+    pub force_peak_n: Number,
 }
 
 /// Energy at the hand; `docs/passivity.md` says what the two mean together.

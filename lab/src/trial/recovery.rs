@@ -105,6 +105,7 @@ mod tests {
             stamp: Time::ZERO,
             tool: Vec2::zeros(),
             f_s: Vec2::new(2.0, 0.0),
+            true_force: Vec2::new(2.0, 0.0),
             f_shadow: Vec2::new(2.0 * (1.0 - error), 0.0),
             f_m: None,
             in_contact,

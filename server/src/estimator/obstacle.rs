@@ -16,7 +16,7 @@ const IMPACT_TICKS: u32 = 5;
 /// come to before more is told.
 const MARGIN: (f64, f64) = (2.0, 0.8);
 /// Friction beyond which more makes no difference to a model, N.
-const MOST_N: f64 = 150.0;
+pub const OBSTACLE_N: f64 = 150.0;
 
 /// What a tick of contact is like, as [`Obstacle`] takes it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -49,7 +49,7 @@ impl Obstacle {
         if self.stands && !slides {
             let (most, enough) = MARGIN;
             if self.holding.is_none_or(|holding| force > enough * holding) {
-                self.holding = Some((most * force).min(MOST_N));
+                self.holding = Some((most * force).min(OBSTACLE_N));
             }
             return false;
         }
@@ -58,12 +58,12 @@ impl Obstacle {
         self.held_ticks = if held { self.held_ticks + 1 } else { 0 };
         if self.held_ticks >= HOLD_TICKS {
             self.stands = true;
-            self.holding = Some((MARGIN.0 * force).min(MOST_N));
+            self.holding = Some((MARGIN.0 * force).min(OBSTACLE_N));
             return true;
         }
         let hard = moving == Moving::SlidesOn && beyond(force - motion, PUSH_NEEDS, c);
         self.hard_ticks = if hard { self.hard_ticks + 1 } else { 0 };
-        self.holding = (self.hard_ticks >= IMPACT_TICKS).then_some(force.min(MOST_N));
+        self.holding = (self.hard_ticks >= IMPACT_TICKS).then_some(force.min(OBSTACLE_N));
         false
     }
 

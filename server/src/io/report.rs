@@ -13,8 +13,10 @@ use mmt_shared::io::spread;
 use mmt_shared::metrics::{ForceSummary, UpdateCounts};
 use mmt_shared::report::{
     ArchitectureReport, Counts, DelayReport, EstimateReport, ForceReport, LinkReport, LoopReport,
-    MessagesReport, ModelReport, QuantilesReport, UpDown, UpdatesReport, WireReport, ending_name,
+    MessagesReport, ModelReport, QuantilesReport, ToolReport, UpDown, UpdatesReport, WireReport,
+    ending_name,
 };
+use mmt_shared::time::TICK_S;
 use mmt_shared::wire::{
     Ending, Farewell, ForceTotals, Identified, LoopTotals, MasterTotals, SlaveTotals, Traffic,
     UpdateDrops,
@@ -26,6 +28,7 @@ use super::session::Lost;
 use super::worker::Finished;
 use crate::link::SlaveLink;
 use crate::slave::{Slave, SlaveConfig};
+use crate::tool_force::ToolForce;
 
 /// IP and UDP headers of a datagram, bytes.
 const HEADERS_IPV4: u64 = 28;
@@ -114,6 +117,7 @@ pub(super) fn report(
     if let Some(finished) = &outcome.finished {
         report.force = ForceReport::new(&finished.slave.force().summary(), None);
         report.model = model(&finished.slave);
+        report.tool = tool(finished.slave.tool_force());
         report.slave_loop = slave_loop(finished);
     }
     report
@@ -194,6 +198,13 @@ fn model(slave: &Slave) -> ModelReport {
         mass_kg,
         damping_ns_per_m,
         friction_n,
+    }
+}
+
+fn tool(force: &ToolForce) -> ToolReport {
+    ToolReport {
+        held_s: (force.held_ticks() as f64 * TICK_S).into(),
+        force_peak_n: force.peak_n().into(),
     }
 }
 

@@ -11,6 +11,7 @@ use crate::link::Repeats;
 use crate::playout::{PlayoutConfig, PlayoutError};
 use crate::sensing::{SensingConfig, SensingError};
 use crate::shadow::TriggerReference;
+use crate::tool_force::{TOOL_FORCE_MAX_N, ToolForceError};
 use crate::trigger::TriggerConfig;
 
 /// What the local model starts from before anything is known of the object.
@@ -53,6 +54,8 @@ pub struct SlaveConfig {
     pub sensing: SensingConfig,
     /// Buffer for the master's samples.
     pub playout: PlayoutConfig,
+    /// The tool presses with no more than this on what it touches, N. Default 15: twice what the hand's device gives.
+    pub tool_force_max_n: f64,
     /// The estimator of m, b and c; the mode's own if absent. It starts from `start` in any case.
     pub estimator: Option<EstimatorConfig>,
     /// When updates are sent.
@@ -82,6 +85,7 @@ impl SlaveConfig {
             environment: EnvironmentConfig::default(),
             sensing: SensingConfig::default(),
             playout: PlayoutConfig::default(),
+            tool_force_max_n: TOOL_FORCE_MAX_N,
             estimator: None,
             trigger: TriggerConfig::of_mode(mode),
             trigger_reference: TriggerReference::default(),
@@ -110,6 +114,9 @@ pub enum SlaveError {
     /// The play-out buffer's numbers are wrong.
     #[error(transparent)]
     Playout(#[from] PlayoutError),
+    /// The limit of the tool's force is wrong.
+    #[error(transparent)]
+    ToolForce(#[from] ToolForceError),
     /// The estimator's settings are wrong.
     #[error("estimator: {0}")]
     Estimator(#[from] SettingOutOfRange),

@@ -75,6 +75,7 @@ impl<C> fmt::Display for RunReport<C> {
         self.updates(f)?;
         self.force(f)?;
         self.model(f)?;
+        self.tool(f)?;
         self.passivity(f)?;
         self.network(f)?;
         self.emulation(f)?;
@@ -231,6 +232,14 @@ impl<C> RunReport<C> {
                 after("max", number(mm(pose.angle_max_rad), 1, " mrad")),
             ],
         )
+    }
+
+    fn tool(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let mut rows = section(f, "Tool");
+        let largest = number(self.tool.force_peak_n, 2, " N");
+        rows.row("largest force", &[largest])?;
+        let held = number(self.tool.held_s, 3, " s");
+        rows.row("held back for", &[held])
     }
 
     fn passivity(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

@@ -63,6 +63,10 @@ fn full() -> RunReport<Value> {
     report.model.damping_ns_per_m = EstimateReport::new(3.03, 3.0);
     report.model.friction_n = EstimateReport::new(2.06, 2.0601);
     report.pose = PoseReport::from(&pose);
+    report.tool = ToolReport {
+        held_s: 0.25.into(),
+        force_peak_n: 15.02.into(),
+    };
     report.passivity = PassivityReport {
         energy_injected_j: 0.0.into(),
         observer_min_j: (-0.2e-3).into(),
@@ -146,6 +150,7 @@ const REQUIRED: &str = "version command seed duration_s ending configuration dro
     model.damping_ns_per_m.estimate model.damping_ns_per_m.truth \
     model.friction_n.estimate model.friction_n.truth \
     pose.position_rms_m pose.position_max_m pose.angle_rms_rad pose.angle_max_rad \
+    tool.held_s tool.force_peak_n \
     passivity.energy_injected_j passivity.observer_min_j \
     link.rtt_ms.p50 link.rtt_ms.p99 link.loss_up link.loss_down \
     emulation.up.released emulation.up.late_us.p50 emulation.up.late_us.p99 \

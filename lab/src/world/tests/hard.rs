@@ -35,6 +35,8 @@ struct Felt {
     observer_min_mj: f64,
     /// Largest force between the tool and the object, N.
     slave_peak_n: f64,
+    /// For how long its limit held the tool back, s.
+    held_s: f64,
 }
 
 /// Runs 25 s and calls `before` before every tick. No scenario gives the hand energy or stops the work.
@@ -44,7 +46,7 @@ fn felt(name: &str, config: &WorldConfig, mut before: impl FnMut(&mut World)) ->
     for _ in 0..25_000 {
         before(&mut world);
         let tick = world.step();
-        slave_peak_n = slave_peak_n.max(tick.slave.map_or(0.0, |slave| slave.f_s.norm()));
+        slave_peak_n = slave_peak_n.max(tick.slave.map_or(0.0, |slave| slave.true_force.norm()));
     }
     let outcome = world.outcome();
     let pushes = world.operator().pushes_completed().unwrap();
@@ -58,6 +60,7 @@ fn felt(name: &str, config: &WorldConfig, mut before: impl FnMut(&mut World)) ->
         injected_mj: outcome.energy_injected_j * 1e3,
         observer_min_mj: outcome.observer_min_j * 1e3,
         slave_peak_n,
+        held_s: world.slave().tool_force().held_ticks() as f64 * TICK.as_secs_f64(),
     };
     println!("{name:40} {felt:.3?}");
     assert!(felt.injected_mj <= 1e-6, "{name}: {felt:?}");
@@ -107,18 +110,56 @@ fn a_face_that_is_changed_during_the_delay_is_the_one_that_is_felt() {
     );
 }
 
+/// The first push meets it after 12 cm.
+const WALL: Wall = Wall {
+    distance_m: 0.30,
+    angle_rad: 0.0,
+};
+
 #[test]
-fn a_wall_that_the_model_does_not_know_is_felt_no_harder_than_the_hand_presses() {
-    for one_way_ms in [0, 500] {
+fn a_wall_that_the_model_does_not_know_is_pressed_on_no_harder_than_the_tool_may() {
+    for one_way_ms in [0, 50, 250, 500, 1000, 2000] {
+        // with a stiff device and a noisy sensor as well
+        for (k_p, noise_n, seed) in [(1000.0, 0.01, 1), (3000.0, 0.01, 2), (1000.0, 0.03, 3)] {
+            let mut config = delayed(one_way_ms).seeded(seed);
+            config.stiffness_n_per_m = Some(k_p);
+            config.slave.sensing.force_noise_n = noise_n;
+            config.slave.environment.wall = Some(WALL);
+            let name = format!("{one_way_ms} ms, a wall, {k_p} N/m, noise {noise_n} N");
+            let felt = felt(&name, &config, |_| {});
+            assert!(felt.peak_n <= 8.0 + 1e-9, "{felt:?}");
+            assert!(felt.breaks_per_push <= 6.0, "{felt:?}");
+            // as exactly as the sensor measures
+            let most_n = config.slave.tool_force_max_n + 6.0 * noise_n;
+            assert!(felt.slave_peak_n <= most_n, "{felt:?}");
+            assert!(felt.held_s > 1.0, "{felt:?}");
+        }
+    }
+}
+
+#[test]
+fn without_a_limit_the_tool_follows_the_hand_into_an_object_that_a_wall_stops() {
+    for (one_way_ms, least_n) in [(0, 20.0), (500, 150.0)] {
         let mut config = delayed(one_way_ms);
-        // the first push meets it after 12 cm
-        config.slave.environment.wall = Some(Wall {
-            distance_m: 0.30,
-            angle_rad: 0.0,
-        });
-        let felt = felt(&format!("{one_way_ms} ms, a wall"), &config, |_| {});
-        assert!(felt.peak_n <= 8.0 + 1e-9, "{felt:?}");
-        assert!(felt.breaks_per_push <= 6.0, "{felt:?}");
+        config.slave.environment.wall = Some(WALL);
+        config.slave.tool_force_max_n = 1000.0;
+        let felt = felt(&format!("{one_way_ms} ms, no limit"), &config, |_| {});
+        assert!(felt.slave_peak_n > least_n, "the effect exists: {felt:?}");
+    }
+}
+
+#[test]
+fn a_limit_of_the_force_that_is_not_reached_changes_no_bit() {
+    for one_way_ms in [0, 500] {
+        let digest = |tool_force_max_n| {
+            let mut config = delayed(one_way_ms);
+            config.slave.tool_force_max_n = tool_force_max_n;
+            let mut world = World::try_new(&config).unwrap();
+            world.run(Duration::from_secs(15), |_| {});
+            assert_eq!(world.slave().tool_force().held_ticks(), 0);
+            world.digest()
+        };
+        assert_eq!(digest(15.0), digest(1000.0), "{one_way_ms} ms");
     }
 }
 

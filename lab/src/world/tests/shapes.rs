@@ -12,12 +12,13 @@ use mmt_shared::settings::Mode;
 const SEEDS: std::ops::RangeInclusive<u64> = 1..=3;
 const SECONDS: u64 = 20;
 /// Highest relative error and packet rate, 1/s, where the square that the slave begins with is far from the
-/// object. The brick's is mostly that of first touches: its unknown faces are up to 8 cm too far out.
+/// object. The brick's is mostly that of first touches: its unknown faces are up to 8 cm too far out. At the wall the time
+/// in which the tool is held back does not count, so what is left is the way there.
 const OTHERS: [(&str, f64, f64); 4] = [
     ("brick", 0.36, 5.0),
     ("disc", 0.20, 10.0),
     ("polygon", 0.26, 10.0),
-    ("wall", 0.15, 10.0),
+    ("wall", 0.27, 10.0),
 ];
 /// The same for all the others.
 const BOX: (f64, f64) = (0.19, 5.0);

@@ -1,0 +1,130 @@
+//! Drives the tool: to the played HIP, or as far towards it as energy, force and speed allow.
+//!
+//! It must never move the tool faster than the limit of play-out, and never say that the tool is at the HIP where it is not.
+
+use mmt_shared::geometry::Vec2;
+use mmt_shared::time::TICK_S;
+
+use crate::bilateral::ToolPort;
+use crate::playout::Played;
+use crate::tool_force::ToolForce;
+
+/// A tool that is further from the played HIP is behind it, m: 0.1 N at 1000 N/m.
+const BEHIND_M: f64 = 1e-4;
+
+/// The tool between play-out and the object.
+#[derive(Clone, Debug)]
+pub(super) struct ToolDrive {
+    /// Where it is while it is not at the played HIP, m.
+    own: Option<Vec2>,
+    /// Whether it goes only as far as the energy allows.
+    passive: bool,
+    /// Whether it is behind the HIP, whatever keeps it there.
+    behind: bool,
+    /// Whether the limit of the force keeps it there, or has and it is still catching up.
+    held_back: bool,
+    port: ToolPort,
+    force: ToolForce,
+}
+
+impl ToolDrive {
+    pub(super) fn new(port: ToolPort, force: ToolForce) -> Self {
+        Self {
+            own: None,
+            passive: false,
+            behind: false,
+            held_back: false,
+            port,
+            force,
+        }
+    }
+
+    pub(super) fn port(&self) -> &ToolPort {
+        &self.port
+    }
+
+    pub(super) fn force(&self) -> &ToolForce {
+        &self.force
+    }
+
+    /// Whether the tool is behind the HIP.
+    pub(super) fn is_behind(&self) -> bool {
+        self.behind
+    }
+
+    /// Whether the limit of the force keeps the tool from the HIP.
+    pub(super) fn is_held_back(&self) -> bool {
+        self.held_back
+    }
+
+    /// Takes in E_in of the master's port, J, and whether the tool may go only as far as that pays for. `hip` is the
+    /// HIP that was played last, m.
+    pub(super) fn pay(&mut self, other_in_j: f64, passive: bool, hip: Option<Vec2>) {
+        self.port.receive(other_in_j);
+        if passive && !self.passive {
+            self.port.begin();
+            self.own = self.own.or(hip);
+        }
+        self.passive = passive;
+    }
+
+    /// One tick: the tool follows the played HIP from `before` (the one played last, m), or goes towards it. When it may
+    /// follow again it catches up within the speed limit. The force of the master is that of the HIP, not of a tool that
+    /// is held back.
+    pub(super) fn lead(&mut self, before: Option<Vec2>, played: Played) -> Played {
+        let Some(tool) = self.own.or(before) else {
+            return played;
+        };
+        let wanted = played.hip - tool;
+        let follows = self.own.is_none() && !self.passive;
+        let free = match (follows, self.passive) {
+            (true, _) => wanted,
+            (_, true) => self.port.allowed(wanted),
+            (_, false) => self.port.within_speed(wanted),
+        };
+        let period_s = if follows {
+            period_s(&wanted, &played)
+        } else {
+            TICK_S
+        };
+        let allowed = self.force.allowed(free, period_s, self.port.held());
+        let held = allowed != free;
+        if follows && !held {
+            self.force.moved(played.velocity, false);
+            return played;
+        }
+        let way = match held {
+            true => self.port.within_speed(allowed),
+            false => free,
+        };
+        let velocity = way / period_s;
+        self.port.moved(way);
+        self.force.moved(velocity, held);
+        self.behind = (wanted - way).norm() > BEHIND_M;
+        self.held_back = held || (self.held_back && self.behind);
+        let there = !self.passive && way == wanted;
+        self.own = Some(tool + way).filter(|_| !there);
+        Played {
+            hip: tool + way,
+            velocity,
+            force: played.force.filter(|_| !self.held_back),
+            ..played
+        }
+    }
+
+    /// Takes the force that is measured where the tool is, N.
+    pub(super) fn measured(&mut self, force: Vec2) {
+        self.port.measured(force);
+        self.force.measured(force);
+    }
+}
+
+/// How long play-out took for its way (m), s: a tick, and more after ticks that were missed.
+fn period_s(way: &Vec2, played: &Played) -> f64 {
+    let speed = played.velocity.norm();
+    if speed > 0.0 {
+        (way.norm() / speed).max(TICK_S)
+    } else {
+        TICK_S
+    }
+}

@@ -1,0 +1,266 @@
+//! The limit on the force with which the tool presses on the object.
+//!
+//! An object that a wall stops would be pressed on with k_p times the way that the hand has gone since, which at a delay is
+//! a lot. So the part of the tool's way that would raise the contact force above the limit is not gone. Pure: the sensor's
+//! force in, a way out, a tick at a time. It must never shorten the way along the face, and never one that is allowed.
+
+use mmt_shared::contact::Coupling;
+use mmt_shared::geometry::Vec2;
+
+/// Default of the limit, N. The hand presses with 8 N at the most (`device`'s profiles), so a tool that does what is felt
+/// stays below it; and it is the bound that outages are held to (15 N after 60 ms, `lab/src/world/tests/hard.rs`).
+pub const TOOL_FORCE_MAX_N: f64 = 15.0;
+/// Accepted limits, N: from twice the force that counts as noise up to what no tabletop arm exerts.
+const LIMIT_N: (f64, f64) = (0.1, 1000.0);
+
+/// A limit that is no limit, or none that a tool can keep.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[error("tool force: limit {value} is outside the accepted range {min} to {max} N")]
+pub struct ToolForceError {
+    /// What it was, N.
+    pub value: f64,
+    /// Least accepted value, N.
+    pub min: f64,
+    /// Greatest accepted value, N.
+    pub max: f64,
+}
+
+/// The limit, and what came of it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ToolForce {
+    max_n: f64,
+    coupling: Coupling,
+    /// The tool's velocity at the last measured force, m/s.
+    velocity: Vec2,
+    held_ticks: u64,
+    peak_n: f64,
+}
+
+impl ToolForce {
+    /// A tool that presses with `max_n` (N) at the most on what it touches by `coupling`.
+    ///
+    /// # Errors
+    /// When the limit is not within its range.
+    pub fn try_new(max_n: f64, coupling: Coupling) -> Result<Self, ToolForceError> {
+        let (min, max) = LIMIT_N;
+        if !(min..=max).contains(&max_n) {
+            return Err(ToolForceError {
+                value: max_n,
+                min,
+                max,
+            });
+        }
+        Ok(Self {
+            max_n,
+            coupling,
+            velocity: Vec2::zeros(),
+            held_ticks: 0,
+            peak_n: 0.0,
+        })
+    }
+
+    /// Ticks in which the limit shortened the tool's way.
+    #[must_use]
+    pub fn held_ticks(&self) -> u64 {
+        self.held_ticks
+    }
+
+    /// Largest force that was measured, N.
+    #[must_use]
+    pub fn peak_n(&self) -> f64 {
+        self.peak_n
+    }
+
+    /// The part of the way (m, in `period_s`) that keeps the force within the limit, where the tool exerts `force` (N, on
+    /// the object, zero where it is noise). Above the limit it leads back. A first touch cannot be foreseen: it costs
+    /// k_p |way| + k_d |way| / T, T being the period.
+    ///
+    /// The next force follows from the law of contact with an object that keeps its velocity (an object at rest is the
+    /// worst case but for one that comes towards the tool), so the gain on the sensor's noise is 1: the force is as
+    /// steady as it is measured, and the tool does not chatter.
+    #[must_use]
+    pub fn allowed(&self, way: Vec2, period_s: f64, force: Vec2) -> Vec2 {
+        let size = force.norm();
+        if size <= 0.0 {
+            return way;
+        }
+        let n = force / size;
+        let Coupling {
+            stiffness_n_per_m: k_p,
+            damping_ns_per_m: k_d,
+        } = self.coupling;
+        // f(k+1) = f(k) + (k_p + k_d/T) n·way − k_d n·v(k) ≤ f_max
+        let at_rest = size - k_d * n.dot(&self.velocity);
+        let most = (self.max_n - at_rest) / (k_p + k_d / period_s);
+        let along = n.dot(&way);
+        if along <= most {
+            return way;
+        }
+        way - n * (along - most)
+    }
+
+    /// Takes the velocity that the tool has gone at in this tick (m/s), and whether the limit shortened its way.
+    pub fn moved(&mut self, velocity: Vec2, held: bool) {
+        self.velocity = velocity;
+        self.held_ticks += u64::from(held);
+    }
+
+    /// Takes the force that is measured there, N.
+    pub fn measured(&mut self, force: Vec2) {
+        self.peak_n = self.peak_n.max(force.norm());
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use mmt_shared::rng::Substream;
+    use mmt_shared::time::TICK_S;
+
+    const SOFT: Coupling = Coupling {
+        stiffness_n_per_m: 1000.0,
+        damping_ns_per_m: 10.0,
+    };
+    /// The way of a tick at 0.6 m/s, m.
+    const QUICK: f64 = 6e-4;
+
+    /// A tool at x that wants to be at a place behind a wall at 0; what it exerts, and whether it was held.
+    struct Press {
+        limit: ToolForce,
+        x: f64,
+        force: Vec2,
+        noise: Option<Substream>,
+    }
+
+    impl Press {
+        fn new(max_n: f64, coupling: Coupling, noise: Option<u64>) -> Self {
+            Self {
+                limit: ToolForce::try_new(max_n, coupling).unwrap(),
+                x: -0.01,
+                force: Vec2::zeros(),
+                noise: noise.map(|seed| Substream::new(seed, "test/noise", 0)),
+            }
+        }
+
+        /// One tick towards `aim`; the true force.
+        fn tick(&mut self, aim: f64) -> f64 {
+            let wanted = Vec2::new((aim - self.x).clamp(-QUICK, QUICK), 0.0);
+            let way = self.limit.allowed(wanted, TICK_S, self.force);
+            self.x += way.x;
+            let velocity = way / TICK_S;
+            self.limit.moved(velocity, way != wanted);
+            let coupling = self.limit.coupling;
+            let f = match self.x > 0.0 {
+                true => coupling.force(self.x, velocity.x),
+                false => 0.0,
+            };
+            let noise = self.noise.as_mut().map_or(0.0, |noise| noise.normal());
+            let measured = Vec2::new(f + 0.01 * noise, 0.0);
+            self.force = if measured.x > 0.04 {
+                measured
+            } else {
+                Vec2::zeros()
+            };
+            self.limit.measured(measured);
+            f
+        }
+    }
+
+    #[test]
+    fn a_press_on_a_wall_comes_to_the_limit_and_stays_there() {
+        for (coupling, aim) in [
+            (SOFT, 0.2),
+            (Coupling::for_stiffness(3000.0), 0.2),
+            (SOFT, 0.0151),
+        ] {
+            let mut press = Press::new(15.0, coupling, None);
+            let forces: Vec<f64> = (0..2000).map(|_| press.tick(aim)).collect();
+            let most = forces.iter().copied().fold(0.0, f64::max);
+            assert!(most <= 15.0 + 1e-9, "{most} N");
+            assert!(forces[1999] > 14.99, "{} N", forces[1999]);
+            assert!(press.limit.held_ticks() > 100);
+        }
+        let mut press = Press::new(15.0, SOFT, None);
+        (0..2500).for_each(|n| {
+            press.tick(f64::from(n.min(2000)) * 7.4e-6);
+        });
+        assert_eq!(press.limit.held_ticks(), 0, "14.8 N are allowed");
+    }
+
+    #[test]
+    fn a_first_touch_at_full_speed_cannot_be_foreseen() {
+        for (k_p, most_n) in [(1000.0, 6.6), (3000.0, 13.8)] {
+            let coupling = Coupling::for_stiffness(k_p);
+            let limit = ToolForce::try_new(1.0, coupling).unwrap();
+            let way = Vec2::new(QUICK, 0.0);
+            assert_eq!(limit.allowed(way, TICK_S, Vec2::zeros()), way);
+            assert!((coupling.force(QUICK, QUICK / TICK_S) - most_n).abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn a_noisy_sensor_makes_the_force_no_more_unsteady_than_it_is() {
+        let mut press = Press::new(15.0, SOFT, Some(1));
+        let forces: Vec<f64> = (0..20_000).map(|_| press.tick(0.2)).skip(1000).collect();
+        let n = forces.len() as f64;
+        let mean = forces.iter().sum::<f64>() / n;
+        let deviation = (forces.iter().map(|f| (f - mean).powi(2)).sum::<f64>() / n).sqrt();
+        let most = forces.iter().copied().fold(0.0, f64::max);
+        assert!((mean - 15.0).abs() < 1e-3, "{mean} N");
+        assert!(deviation < 0.0105, "{deviation} N at a noise of 0.01 N");
+        assert!(most < 15.05, "{most} N");
+    }
+
+    #[test]
+    fn it_goes_back_at_once_and_slides_along_the_face_freely() {
+        let mut press = Press::new(15.0, SOFT, None);
+        (0..500).for_each(|_| {
+            press.tick(0.2);
+        });
+        let (limit, force) = (press.limit, press.force);
+        let way = limit.allowed(Vec2::new(QUICK, 3e-4), TICK_S, force);
+        assert_eq!(way.y, 3e-4);
+        assert!(way.x.abs() < 1e-9, "{way}");
+        let back = Vec2::new(-QUICK, 1e-4);
+        assert_eq!(limit.allowed(back, TICK_S, force), back);
+        assert_eq!(
+            limit.allowed(back, TICK_S, Vec2::zeros()),
+            back,
+            "nothing touched"
+        );
+    }
+
+    #[test]
+    fn a_tool_that_is_pressed_on_gives_way() {
+        let mut limit = ToolForce::try_new(15.0, SOFT).unwrap();
+        limit.moved(Vec2::zeros(), false);
+        let way = limit.allowed(Vec2::zeros(), TICK_S, Vec2::new(0.0, 26.0));
+        assert!((way - Vec2::new(0.0, -1e-3)).norm() < 1e-12, "{way}");
+    }
+
+    #[test]
+    fn an_object_that_is_pushed_at_a_steady_speed_meets_no_limit() {
+        // 12 N at 0.3 m/s: the damping's share of the force is not the tool's own doing
+        let mut limit = ToolForce::try_new(15.0, SOFT).unwrap();
+        limit.moved(Vec2::new(0.3, 0.0), false);
+        let way = Vec2::new(3e-4, 0.0);
+        assert_eq!(limit.allowed(way, TICK_S, Vec2::new(12.0, 0.0)), way);
+        // nor after four missed ticks, since the speed is the same
+        let late = way * 5.0;
+        assert_eq!(
+            limit.allowed(late, 5.0 * TICK_S, Vec2::new(12.0, 0.0)),
+            late
+        );
+    }
+
+    #[test]
+    fn a_limit_that_is_none_is_refused_by_name() {
+        for value in [0.0, -1.0, 1e4, f64::NAN, f64::INFINITY] {
+            let error = ToolForce::try_new(value, SOFT).unwrap_err().to_string();
+            assert!(
+                error.starts_with("tool force: limit ") && error.ends_with("0.1 to 1000 N"),
+                "{error}"
+            );
+        }
+    }
+}
