@@ -17,6 +17,10 @@ use crate::choice::{Choice, Chosen};
 pub const FADE_TICKS: u16 = 200;
 /// So long a fade waits for the hand to let go of what it feels, ticks: longer than a push. Both are passive meanwhile.
 pub const PATIENCE_TICKS: u32 = 5000;
+/// When the packing of the samples changes, the slave's play-out learns that within this, s, ...
+const LEARNS_S: f64 = 0.6;
+/// ... and takes so many times the difference to come down to it (`docs/model.md`, Play-out).
+const UNPACKS: f64 = 100.0;
 /// A force of the tool that is older than this, ticks, is not faded in.
 const FRESH_TICKS: u32 = 100;
 
@@ -39,6 +43,12 @@ pub struct Either {
     fixed: Option<Chosen>,
     /// Share of the model, in ticks of a fade: 0 is the tool's force alone.
     model_share: u16,
+    /// How long the first sample of a packet waits for the last, s, while the tool's force is not wanted.
+    packing_s: f64,
+    /// What of that is in the round trip now, s.
+    packed_s: f64,
+    /// For how long it has been wanted, or not.
+    since_ticks: u32,
     round_trip_s: Option<f64>,
     model_error: f64,
     received: Vec2,
@@ -73,6 +83,9 @@ impl Either {
             choice: Choice::for_stiffness(k_p),
             fixed,
             model_share: FADE_TICKS,
+            packing_s: 0.0,
+            packed_s: 0.0,
+            since_ticks: 0,
             round_trip_s: None,
             model_error: 1.0,
             received: Vec2::zeros(),
@@ -89,6 +102,11 @@ impl Either {
             hand_force: Vec2::zeros(),
             outcome: ChoiceOutcome::default(),
         })
+    }
+
+    /// So many samples go out in a packet while the tool's force is not wanted: that is no part of the path of a force.
+    pub fn packs(&mut self, samples_per_command: u8) {
+        self.packing_s = f64::from(samples_per_command.saturating_sub(1)) * TICK_S;
     }
 
     /// The choice and what it rests on.
@@ -148,10 +166,16 @@ impl Either {
         self.last_velocity = v;
         self.silent_ticks = self.silent_ticks.saturating_add(1);
 
-        let chosen = self.choice.tick(self.round_trip_s.take(), self.model_error);
+        let round_trip_s = self.round_trip_without_packing();
+        let chosen = self.choice.tick(round_trip_s, self.model_error);
         let chosen = self.fixed.unwrap_or(chosen);
         self.fade(chosen, model, rendered);
-        self.wants_force = chosen == Chosen::Tdpa || self.model_share < FADE_TICKS;
+        let wants_force = chosen == Chosen::Tdpa || self.model_share < FADE_TICKS;
+        self.since_ticks = match wants_force == self.wants_force {
+            true => self.since_ticks.saturating_add(1),
+            false => 0,
+        };
+        self.wants_force = wants_force;
         let share = self.model_share();
         self.of_model = rendered.force * share;
         let margin_j = self.network.margin_j(self.other_in_j);
@@ -185,6 +209,20 @@ impl Either {
             wants_force: self.wants_force,
             passive_tool: self.model_share == 0,
         }
+    }
+
+    /// The newest round trip (s) as it is for a force, each sample in a packet of its own.
+    fn round_trip_without_packing(&mut self) -> Option<f64> {
+        let seen_s = self.round_trip_s.take()?;
+        let settles_s = LEARNS_S + UNPACKS * self.packing_s;
+        if f64::from(self.since_ticks) * TICK_S > settles_s + seen_s {
+            self.packed_s = if self.wants_force {
+                0.0
+            } else {
+                self.packing_s
+            };
+        }
+        Some((seen_s - self.packed_s).max(0.0))
     }
 
     /// One tick's step towards what is chosen, once the hand has let go or will not.

@@ -81,6 +81,15 @@ impl Master {
         }
     }
 
+    /// The same, of which so many samples go out in a packet while only the model's force is felt.
+    #[must_use]
+    pub fn packing(mut self, samples_per_command: u8) -> Self {
+        if let Some(either) = &mut self.either {
+            either.packs(samples_per_command);
+        }
+        self
+    }
+
     /// Whose force is felt, where there is a choice.
     #[must_use]
     pub fn either(&self) -> Option<&Either> {

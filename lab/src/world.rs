@@ -149,7 +149,8 @@ impl World {
             program: Label::clipped("lab"),
         };
         let limiter = ForceLimiter::try_new(device.limits())?;
-        let master = Master::with_architecture(&welcome, limiter, config.architecture);
+        let master = Master::with_architecture(&welcome, limiter, config.architecture)
+            .packing(config.samples_per_command);
         let view: View = master.view();
         let scripted = Scripted::try_new(config.operator, view)?;
         let operator = Operator::Scripted(Box::new(scripted));

@@ -253,6 +253,10 @@ impl Slave {
 
     /// Takes in what the hand's port says, newer than all before.
     pub fn hear_hand(&mut self, port: &HandPort) {
+        if port.wants_force && !self.streams {
+            // each sample comes alone from now on, and the hand feels the delay
+            self.playout.repack();
+        }
         self.streams = port.wants_force;
         self.drive
             .pay(port.in_j, port.passive_tool, self.playout.played_hip());

@@ -166,3 +166,24 @@ fn a_model_that_has_taken_nothing_is_not_faded_into_a_hand_that_presses_it_and_i
     assert_eq!(run(8000..20_000, -0.199, 0.01), (Chosen::Mediated, 0.0));
     assert_eq!(run(20_000..20_300, -0.21, 0.01), (Chosen::Mediated, 1.0));
 }
+
+#[test]
+fn the_time_that_samples_wait_for_their_packet_is_no_part_of_a_forces_path() {
+    // 4 ms of path, and 9 ms more where the samples come ten to a packet
+    let mut master = master(Architecture::Auto).packing(10);
+    let rest = Vec2::new(-0.3, 0.0);
+    let mut run = |ticks: std::ops::Range<u64>, age_ms: u64, model_error: f64| {
+        for n in ticks {
+            let news = says(n.saturating_sub(age_ms), Vec2::zeros(), model_error);
+            master.hear_tool(Time::from_millis(n), &news);
+            turn(&mut master, n, rest);
+        }
+        choice(&master).round_trip_s().unwrap() * 1e3
+    };
+    // a model that is right: only its samples are sent
+    assert!((run(20..1400, 13, 0.0) - 13.0).abs() < 0.1, "not settled");
+    assert!((run(1400..4000, 13, 0.0) - 4.0).abs() < 0.1);
+    // one that is wrong: every sample is sent alone, and play-out comes down to it
+    assert!((run(4000..5500, 13, 0.4) - 4.0).abs() < 0.1);
+    assert!((run(5500..9000, 4, 0.4) - 4.0).abs() < 0.1);
+}

@@ -68,7 +68,8 @@ pub(super) async fn run_with(
         slave = %opened.line.address, program = %welcome.program, scheme = %welcome.scheme,
         "the session begins"
     );
-    let master = Master::with_architecture(welcome, limiter, options.architecture);
+    let master = Master::with_architecture(welcome, limiter, options.architecture)
+        .packing(options.commands.samples_per_command);
     let operator = options.operator.begin(master.view())?;
     let parts = HapticParts {
         master,

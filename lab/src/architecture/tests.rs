@@ -1,6 +1,7 @@
 //! What is known of each architecture from the literature must hold here. Print the tables with `--nocapture`.
 
 use super::*;
+use mmt_client::choice::{STIFFNESS_N_PER_M, TDPA_ERROR, tdpa_error};
 use mmt_client::either::ChoiceOutcome;
 use mmt_client::operator::hand::{Hand, HandConfig};
 use mmt_netem::config::LinkConfig;
@@ -249,9 +250,9 @@ fn tdpa_and_waves_make_no_energy_at_any_delay_in_any_hand() {
 
 #[test]
 fn the_first_push_of_an_unknown_object_is_as_wrong_as_is_said_before_it() {
-    for one_way_ms in [0, 10, 20] {
+    let first_push = |one_way_ms, k_p| {
         let first = |seed| {
-            let config = over(&format!("delay {one_way_ms}ms"), 1000.0, seed);
+            let config = over(&format!("delay {one_way_ms}ms"), k_p, seed);
             let mut world = World::try_new(&config).unwrap();
             while world.operator().pushes_completed() == Some(0) {
                 world.step();
@@ -259,8 +260,14 @@ fn the_first_push_of_an_unknown_object_is_as_wrong_as_is_said_before_it() {
             world.force().relative_error
         };
         let first = crate::statistics::median((1..=8).filter_map(first)).unwrap();
-        println!("{one_way_ms} ms: relative error of the first push {first:.3}");
+        println!("{k_p} N/m, {one_way_ms} ms: relative error of the first push {first:.3}");
+        first
+    };
+    for one_way_ms in [0, 10, 20] {
+        let first = first_push(one_way_ms, 1000.0);
         assert!((first - UNKNOWN).abs() < 0.02, "{one_way_ms} ms: {first}");
+        // a stiff device feels more of what the model does not know; that is not said
+        assert!(first_push(one_way_ms, 3000.0) > UNKNOWN);
     }
 }
 
@@ -355,7 +362,8 @@ fn the_choice_is_as_good_as_the_better_of_the_two_and_crosses_where_they_cross()
             auto <= 1.1 * tdpa.min(mmt) + 0.02,
             "{one_way_ms} ms: {auto}"
         );
-        assert!(switches <= 12 && step_n <= 0.2, "{switches}, {step_n} N");
+        // a first touch that falls into a fade is a step of up to 0.7 N, with a fade or without
+        assert!(switches <= 12 && step_n <= 0.7, "{switches}, {step_n} N");
         for row in rows {
             assert!(row.breaks_per_push.unwrap() < 2.0, "{row:?}");
             assert!(
@@ -369,7 +377,8 @@ fn the_choice_is_as_good_as_the_better_of_the_two_and_crosses_where_they_cross()
 }
 
 #[test]
-fn with_a_stiff_device_the_choice_leaves_tdpa_before_it_breaks_contact() {
+fn with_a_stiff_device_the_choice_is_nearly_the_better_one_too_and_leaves_tdpa_before_it_breaks_contact()
+ {
     for one_way_ms in [0, 2, 5, 7, 10, 14] {
         let of = |architecture| {
             let rows = rows(architecture, one_way_ms, 3000.0);
@@ -377,11 +386,42 @@ fn with_a_stiff_device_the_choice_leaves_tdpa_before_it_breaks_contact() {
             rows
         };
         let tdpa = of(Architecture::Bilateral(Baseline::Tdpa));
+        let mmt = of(Architecture::Mediated(PoseCorrection::Replay));
         let auto = of(Architecture::Auto);
         let breaks = |rows: &[DelayRow]| mean(rows, |row| row.breaks_per_push);
+        let error = |rows: &[DelayRow]| mean(rows, |row| row.relative_error);
         assert!((breaks(&tdpa) > 2.0) == (one_way_ms > 7), "{one_way_ms} ms");
         assert!(breaks(&auto) < 2.5, "{one_way_ms} ms: {}", breaks(&auto));
         assert!(mean(&auto, |row| row.force_peak_n) < 5.0, "{one_way_ms} ms");
+        let counted_s = 2e-3 * one_way_ms as f64 * f64::sqrt(3000.0 / STIFFNESS_N_PER_M);
+        let foretold = tdpa_error(counted_s);
+        println!("    TDPA's error foretold: {foretold:.3}");
+        assert!(one_way_ms > 7 || (foretold - error(&tdpa)).abs() < 0.1 * error(&tdpa));
+        let better = error(&tdpa).min(error(&mmt));
+        assert!(
+            error(&auto) <= 1.1 * better + 0.035,
+            "{one_way_ms} ms: {}, {better} alone",
+            error(&auto)
+        );
+    }
+}
+
+#[test]
+fn what_the_choice_expects_of_tdpa_is_the_median_of_runs_of_it() {
+    for (round_trip_ms, expected) in TDPA_ERROR {
+        let words = format!("delay {}ms", round_trip_ms / 2.0);
+        let error = |seed| {
+            let config = over(&words, STIFFNESS_N_PER_M, seed);
+            let row = run(Architecture::Bilateral(Baseline::Tdpa), &config, RUN);
+            row.unwrap().relative_error
+        };
+        let median = crate::statistics::median((1..=9).filter_map(error)).unwrap();
+        println!("    ({round_trip_ms:.1}, {median:.3}),");
+        // what another noise or another compiler may change is less
+        assert!(
+            (median - expected).abs() <= 0.01 * expected + 0.0005,
+            "{round_trip_ms} ms: {median}, {expected} expected"
+        );
     }
 }
 
