@@ -35,6 +35,14 @@ fn full() -> RunReport<Value> {
     report.seed = Some(1);
     report.duration_s = 20.0.into();
     report.ending = Some(ending_name(Ending::Finished).to_owned());
+    report.architecture = ArchitectureReport {
+        tool_share: 0.204.into(),
+        switches: Some(2),
+        fade_step_max_n: 0.03.into(),
+        round_trip_ms: 14.9.into(),
+        model_error: 0.071.into(),
+        ..ArchitectureReport::named(Architecture::Auto)
+    };
     report.pushes = PushesReport::new(2, &breaks);
     report.updates.set_sent(&counts);
     report.updates.applied = Some(30);
@@ -132,14 +140,16 @@ fn paths(value: &Value, prefix: &str, into: &mut Vec<String>) {
 }
 
 const REQUIRED: &str = "version command seed duration_s ending configuration drops \
+    architecture.name architecture.tool_share architecture.switches \
+    architecture.fade_step_max_n architecture.round_trip_ms architecture.model_error \
     pushes.completed pushes.contact_breaks_per_push \
     updates.sent updates.rate_hz updates.contact_rate_hz updates.by_cause updates.applied \
     updates.repeated updates.repeated_by_cause \
     updates.dropped updates.age_ms.mean updates.age_ms.max \
     messages.up.commands messages.up.updates messages.up.repeats messages.up.scenes \
-    messages.up.heartbeats messages.up.rate_hz \
+    messages.up.tools messages.up.heartbeats messages.up.rate_hz \
     messages.down.commands messages.down.updates messages.down.repeats messages.down.scenes \
-    messages.down.heartbeats messages.down.rate_hz \
+    messages.down.tools messages.down.heartbeats messages.down.rate_hz \
     wire.up.datagrams wire.up.bytes wire.up.rate_hz wire.up.bits_per_s wire.up.header_bytes \
     wire.down.datagrams wire.down.bytes wire.down.rate_hz wire.down.bits_per_s \
     wire.down.header_bytes \
@@ -194,6 +204,7 @@ fn every_key_is_filled_by_a_run_in_which_it_has_a_meaning() {
         "messages.up.updates",
         "messages.up.repeats",
         "messages.up.scenes",
+        "messages.up.tools",
         "messages.down.commands",
     ];
     for path in REQUIRED.split_whitespace() {
@@ -247,6 +258,22 @@ fn numbers_that_are_not_finite_become_null() {
 }
 
 #[test]
+fn what_was_felt_is_shown_where_there_was_a_choice_and_the_tools_messages_where_there_were_any() {
+    let mut report = full();
+    report.architecture = ArchitectureReport::named(Architecture::Mmt);
+    assert!(!report.to_string().contains("Felt"));
+    let kinds = KindCounts {
+        updates: 33,
+        tools: 4542,
+        ..KindCounts::default()
+    };
+    report.messages.down = MessagesReport::down(&kinds, 0, 20.0);
+    let row = "  messages down             228.8 /s           33 updates         4542 of the tool   0 heartbeats";
+    let shown = report.to_string();
+    assert!(shown.lines().any(|line| line == row), "{shown}");
+}
+
+#[test]
 fn a_document_that_was_written_is_read_back_the_same() {
     for report in [empty(), full()] {
         let document = serde_json::to_value(&report).unwrap();
@@ -275,6 +302,8 @@ fn the_table_of_a_full_report_is_aligned_and_stays_within_100_columns() {
         "  for deadband              30",
         "  repeats, deadband         20",
         "  messages up               100.2 /s           2000 commands      3 heartbeats",
+        "  tool felt alone           20.4 %",
+        "  largest step of a fade    0.030 N in a tick",
         "  mass m                    0.707 kg           truth 0.700 kg     error 1.0 %",
         "  loss                      up 1.0 %           down 1.2 %",
         "  datagrams up              2100               105.0 /s           336000 B           157.9 kbit/s",
