@@ -400,10 +400,13 @@ impl PoseObserver {
             (Some(was), Some(is)) if was.face == is.face => {
                 let along = gone_by - is.inward * is.inward.dot(&gone_by);
                 self.pose.position += along * gain;
+                let known = self.footprint.offset(is.face);
                 self.learn_offset(
                     was.face,
                     was.inward.dot(&(vision.pose.position - was.surface)),
                 );
+                // the face stays where it is touched: that the centre lies elsewhere is no motion
+                self.pose.position += is.inward * (self.footprint.offset(is.face) - known);
             }
             (None, None) => self.pose.position += gone_by * gain,
             _ => {}

@@ -182,7 +182,8 @@ impl LocalModel {
     /// Compares at the stamp that the update answers; the ticks bleed the difference in.
     fn match_stamps(&mut self, update: &Update) {
         let carved = !update.slave_in_contact;
-        self.take_footprint(update, carved);
+        let shift = self.take_footprint(update, carved);
+        self.correction.count(shift);
         self.aim(update);
     }
 
@@ -194,7 +195,9 @@ impl LocalModel {
             .aim(&update.state.pose, &then.motion.pose, &then.corrected);
     }
 
-    /// Begins to replay the HIP from the sample that the update answers; the ticks go on with it.
+    /// Begins to replay the HIP from the sample that the update answers; the ticks go on with it. Until it
+    /// has caught up the face goes on to where the last replay has it: with the old centre and the new
+    /// offset it would recede from a hand that it may not have to leave.
     fn restart(&mut self, update: &Update) {
         self.take_footprint(update, false);
         self.replay.begin(update, &self.history);
@@ -202,12 +205,12 @@ impl LocalModel {
 
     /// Takes over the face offsets. The face that the HIP touches, or is in front of, stays where it is:
     /// the centre moves instead (which no force notices), and the bleed brings the plane to its place.
-    /// Only where it is to be `carved` does a face that recedes do so at once.
-    fn take_footprint(&mut self, update: &Update, carved: bool) {
+    /// Only where it is to be `carved` does a face that recedes do so at once. Returns the centre's shift.
+    fn take_footprint(&mut self, update: &Update, carved: bool) -> Vec2 {
         let received = update.state.footprint;
         let Some((_, hip)) = self.previous else {
             self.body.state.footprint = received;
-            return;
+            return Vec2::zeros();
         };
         let touched = self.body.god.touched();
         let face = touched.unwrap_or_else(|| self.body.gap(hip).0);
@@ -215,11 +218,11 @@ impl LocalModel {
         let growth = received.offset(face) - state.footprint.offset(face);
         state.footprint = received;
         if growth <= 0.0 && carved {
-            return;
+            return Vec2::zeros();
         }
         let shift = -rotate(state.pose.angle, face.outward()) * growth;
         state.pose.position += shift;
-        self.correction.count(shift);
+        shift
     }
 
     /// One sample period: the HIP (m, world) with its stamp in, the force out.

@@ -5,6 +5,7 @@
 //! pure function of the configuration, the views and the forces. Its HIP must never jump, never leave
 //! the finite numbers, and never enter the box but by the face it means to push.
 
+mod care;
 mod config;
 
 use mmt_shared::geometry::{BoxFootprint, Face, Pose, Vec2, rotate};
@@ -14,6 +15,7 @@ use serde::{Deserialize, Serialize};
 use super::hand::Hand;
 use super::route;
 use super::stroke::Stroke;
+use care::Care;
 
 pub use config::{Picture, ScriptedConfig, ScriptedError};
 
@@ -25,6 +27,10 @@ const REACTION_TICKS: u32 = 80;
 /// Time from the touch to the full speed of the push, s: a hand loads what it touches before it shoves, and
 /// a movement of two to three seconds takes about a third of it to reach its speed.
 const PUSH_ONSET_S: f64 = 0.8;
+/// Press of a hand that rests on a face, N: a light touch, below 1 N (Jeka and Lackner 1994).
+const REST_PRESS_N: f64 = 0.5;
+/// Time in which a resting hand makes up for a press that has changed, s: the voluntary reaction to a touch.
+const REST_REACTION_S: f64 = 0.15;
 /// A goal is reached when the wish is this near, m.
 const REACHED_M: f64 = 0.005;
 /// Rate at which a lateral error is steered out, 1/s, and the most speed for it, m/s.
@@ -67,7 +73,7 @@ pub enum Phase {
     Travel,
     /// Slowly towards the face, until it touches.
     Approach,
-    /// Rests at the first touch of a face.
+    /// Rests after a nudge, with a light press.
     Dwell,
     /// Pushes.
     Push,
@@ -92,8 +98,7 @@ pub struct Scripted {
     pushes_completed: u64,
     /// Way made along the face's normal in this push, m.
     pushed: f64,
-    /// Faces that were dwelled at, in the order of [`Face::ALL`].
-    dwelled: [bool; 4],
+    care: Care,
     /// Ticks without contact in a row.
     ticks_in_air: u32,
     /// Where the operator wants the HIP, m, and its velocity, m/s.
@@ -123,7 +128,7 @@ impl Scripted {
             pushes_begun: 0,
             pushes_completed: 0,
             pushed: 0.0,
-            dwelled: [config.dwell_s <= 0.0; 4],
+            care: Care::new(config.dwell_s > 0.0, config.nudge_m),
             ticks_in_air: 0,
             wanted: start,
             wanted_velocity: Vec2::zeros(),
@@ -201,16 +206,21 @@ impl Scripted {
             Phase::Travel if self.distance_to(self.stand_off()) < REACHED_M => {
                 self.enter(Phase::Approach);
             }
-            Phase::Approach if self.seen.in_contact => match self.dwells() {
-                true => self.enter(Phase::Dwell),
-                false => self.enter(Phase::Push),
-            },
+            Phase::Approach if self.seen.in_contact => {
+                self.care.touch(self.seen.pose.position);
+                self.enter(Phase::Push);
+            }
             Phase::Dwell if self.seconds_in_phase() >= self.config.dwell_s => {
-                self.enter(Phase::Approach);
+                let position = self.seen.pose.position;
+                self.care.rested(self.face, position, self.pushed);
+                self.enter(Phase::Push);
             }
             Phase::Push if self.pushed >= self.config.push_m => {
                 self.pushes_completed += 1;
                 self.enter(Phase::Hold);
+            }
+            Phase::Push if self.nudges() && self.care.is_nudged(self.pushed) => {
+                self.enter(Phase::Dwell);
             }
             Phase::Push if self.ticks_in_air > REACTION_TICKS => self.enter(Phase::Approach),
             Phase::Approach | Phase::Push if late => self.enter(Phase::Retract),
@@ -222,16 +232,14 @@ impl Scripted {
         }
     }
 
-    /// Whether this is the first touch of the face; it is not the next time.
-    fn dwells(&mut self) -> bool {
-        let place = Face::ALL.iter().position(|face| *face == self.face);
-        let known = place.and_then(|place| self.dwelled.get_mut(place));
-        known.is_some_and(|known| !std::mem::replace(known, true))
+    fn nudges(&self) -> bool {
+        self.care.nudges(self.face)
     }
 
     fn next_push(&mut self) {
         self.pushes_begun += 1;
         self.pushed = 0.0;
+        self.care.begin();
         self.stroke = Stroke::draw(&self.config, self.pushes_begun);
         self.face = self.next_face();
         self.enter(Phase::Travel);
@@ -261,13 +269,25 @@ impl Scripted {
             Phase::Travel => self.travel(),
             Phase::Approach => self.forward(config.approach_m_per_s),
             Phase::Push => self.forward(self.push_speed() * self.ease()),
-            Phase::Dwell | Phase::Hold => Vec2::zeros(),
+            Phase::Dwell => self.rest_on_face(),
+            Phase::Hold => Vec2::zeros(),
             Phase::Retract => self.towards(self.retreat()),
         }
     }
 
-    /// From the approach's speed at the touch up to the stroke's.
+    /// Keeps a light press on the face and goes after it if it recedes.
+    fn rest_on_face(&self) -> Vec2 {
+        let inward = self.seen.inward(self.face);
+        let press = self.hand.pull(self.wanted).dot(&inward);
+        let way = (REST_PRESS_N - press) / self.config.hand.stiffness_n_per_m;
+        inward * (way / REST_REACTION_S)
+    }
+
+    /// From the approach's speed at the touch up to the stroke's; a nudge keeps the approach's.
     fn push_speed(&self) -> f64 {
+        if self.nudges() {
+            return self.config.approach_m_per_s;
+        }
         let seconds = self.seconds_in_phase();
         let share = (seconds / PUSH_ONSET_S).min(1.0);
         let approach = self.config.approach_m_per_s;

@@ -241,3 +241,4 @@ fn loss_on_the_way_up_changes_no_draw_on_the_way_down() {
 
 mod delay;
 mod hard;
+mod sight;

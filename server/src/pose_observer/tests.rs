@@ -264,3 +264,22 @@ fn a_box_stays_a_box_after_two_bad_images_and_is_told_where_it_is() {
     assert_eq!(observer.pose_ahead(1.0, 0.3), observer.pose());
     assert_eq!(observer.body_rate(), observer.twist().angular);
 }
+
+#[test]
+fn a_box_at_rest_whose_face_is_learned_does_not_seem_to_move() {
+    let mut observer = observer(true);
+    let force = Vec2::new(1.0, 0.0);
+    let tool = Vec2::new(-HALF, 0.0) + force / COUPLING.stiffness_n_per_m;
+    let mut fastest = 0.0_f64;
+    for n in 1..=500 {
+        let now = Time::ZERO + TICK * n;
+        observer.step(now, tool, force, true, &params());
+        if n % 33 == 0 {
+            let (taken, pose) = (now, Pose::default());
+            observer.see(&VisionSample { taken, pose });
+        }
+        fastest = fastest.max(observer.twist().linear.norm());
+    }
+    assert!((observer.footprint().west - HALF).abs() < 1e-6, "learned");
+    assert!(fastest < 1e-6, "{fastest} m/s");
+}

@@ -31,9 +31,11 @@ pub struct ScriptedConfig {
     pub stand_off_m: f64,
     /// Speed of the approach, m/s. Default 0.06.
     pub approach_m_per_s: f64,
-    /// Rest at the first touch of each face, s: a careful operator waits until the answer to its touch can have come.
-    /// Default 0, none.
+    /// Rest after a nudge, s: a careful operator nudges a face that it has not pushed yet and waits until the answer
+    /// must have come; it nudges again if the box turns out not to have moved. Default 0, no nudges.
     pub dwell_s: f64,
+    /// Length of a nudge, m, at the speed of the approach. Default 0.04: past a face that is 2 cm further away, and a push.
+    pub nudge_m: f64,
     /// Length of a push from contact, m. Default 0.35.
     pub push_m: f64,
     /// Range of a push's mean speed, m/s; drawn uniformly. Default 0.10 to 0.22.
@@ -71,6 +73,7 @@ impl Default for ScriptedConfig {
             stand_off_m: 0.05,
             approach_m_per_s: 0.06,
             dwell_s: 0.0,
+            nudge_m: 0.04,
             push_m: 0.35,
             push_speed_m_per_s: (0.10, 0.22),
             slow_share: 0.30,
@@ -114,6 +117,7 @@ impl ScriptedConfig {
             ("stand_off_m", self.stand_off_m, (CLOSE_M, 0.5)),
             ("approach_m_per_s", self.approach_m_per_s, (0.01, 0.1)),
             ("dwell_s", self.dwell_s, (0.0, 60.0)),
+            ("nudge_m", self.nudge_m, (0.01, 0.2)),
             ("push_m", self.push_m, (0.01, 1.0)),
             ("push_speed_m_per_s.0", slowest, speeds),
             ("push_speed_m_per_s.1", fastest, (slowest, 0.3)),

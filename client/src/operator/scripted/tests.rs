@@ -303,3 +303,57 @@ fn a_hand_that_pushes_into_air_approaches_again_and_loads_before_it_shoves() {
     ticks(&mut scripted, 2, false);
     assert_eq!(scripted.phase(), Phase::Approach);
 }
+
+#[test]
+fn a_careful_operator_nudges_each_face_once_and_rests_on_it_lightly() {
+    let mut slab = Slab::new(2.0);
+    let mut config = seeded(1);
+    (config.dwell_s, config.hand.tremor_m) = (1.0, 0.0);
+    let mut operator = Scripted::try_new(config, slab.view()).unwrap();
+    slab.last_hip = operator.hip();
+    let (mut rests, mut breaks, mut touched, mut before) = (Vec::new(), 0, false, Phase::Travel);
+    for _ in 0..60_000 {
+        let hip = operator.step(&slab.view(), -slab.force);
+        if before == Phase::Dwell && operator.phase() == Phase::Push {
+            rests.push((operator.face(), operator.pushed, slab.force.norm()));
+        }
+        before = operator.phase();
+        slab.step(hip);
+        let touches = slab.god.touched().is_some();
+        breaks += u64::from(touched && !touches);
+        touched = touches;
+    }
+    let faces: Vec<Face> = rests.iter().map(|(face, ..)| *face).collect();
+    assert_eq!(faces, [Face::West, Face::South, Face::East, Face::North]);
+    for (face, pushed, press) in rests {
+        assert!((pushed - config.nudge_m).abs() < 2e-3, "{face:?}: {pushed}");
+        assert!((press - REST_PRESS_N).abs() < 0.02, "{face:?}: {press} N");
+    }
+    let pushes = operator.pushes_completed();
+    assert!(pushes >= 6 && breaks <= pushes + 1, "{breaks} in {pushes}");
+}
+
+#[test]
+fn a_resting_hand_goes_after_a_face_that_recedes() {
+    let mut slab = Slab::new(2.0);
+    let mut config = seeded(1);
+    config.dwell_s = 5.0;
+    let mut operator = Scripted::try_new(config, slab.view()).unwrap();
+    let mut ticks = |slab: &mut Slab, operator: &mut Scripted, n: u32| {
+        for _ in 0..n {
+            let hip = operator.step(&slab.view(), -slab.force);
+            slab.step(hip);
+        }
+    };
+    while operator.phase() != Phase::Dwell {
+        ticks(&mut slab, &mut operator, 1);
+    }
+    ticks(&mut slab, &mut operator, 1000);
+    let inward = slab.view().inward(Face::West);
+    slab.pose.position += inward * 0.004;
+    ticks(&mut slab, &mut operator, 1);
+    assert_eq!(slab.force, Vec2::zeros(), "it is gone");
+    ticks(&mut slab, &mut operator, 2000);
+    assert_eq!(operator.phase(), Phase::Dwell);
+    assert!(slab.force.norm() > 0.3, "{} N", slab.force);
+}

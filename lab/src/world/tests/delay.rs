@@ -12,22 +12,24 @@ use proptest::prelude::*;
 
 /// Runs of 40 s over one network, put together.
 #[derive(Clone, Copy, Debug, Default)]
-struct Row {
+pub(super) struct Row {
     /// Largest of all seeds.
-    peak_n: f64,
-    breaks_per_push: f64,
+    pub(super) peak_n: f64,
+    pub(super) breaks_per_push: f64,
     /// Mean over the seeds, as are the next two.
-    pose_rms_mm: f64,
+    pub(super) pose_rms_mm: f64,
     contact_rate_hz: f64,
     relative_error: f64,
     /// Sum over the seeds.
-    injected_mj: f64,
+    pushes: u64,
+    /// Sum over the seeds.
+    pub(super) injected_mj: f64,
     /// Least of all seeds.
-    observer_min_mj: f64,
+    pub(super) observer_min_mj: f64,
 }
 
 impl Row {
-    fn of(
+    pub(super) fn of(
         words: &str,
         seeds: std::ops::RangeInclusive<u64>,
         change: impl Fn(&mut WorldConfig),
@@ -48,6 +50,7 @@ impl Row {
             row.injected_mj += outcome.energy_injected_j * 1e3;
             row.observer_min_mj = row.observer_min_mj.min(outcome.observer_min_j * 1e3);
         }
+        row.pushes = pushes;
         row.breaks_per_push = breaks as f64 / pushes as f64;
         row
     }
@@ -82,41 +85,6 @@ fn up_to_half_a_second_each_way_the_hand_feels_no_network() {
             assert!(row.contact_rate_hz <= 12.0 * room, "{words}: {row:?}");
             assert!(row.injected_mj <= 1.0, "{words}: {row:?}");
             assert!(row.observer_min_mj >= -1.0, "{words}: {row:?}");
-        }
-    }
-}
-
-/// At a second and more what is not known at the first touch decides: for a round trip the box is pushed
-/// with a side that is 2 cm too far out. If its size is known, the targets of 6 and 9 mm are met.
-#[test]
-fn beyond_half_a_second_the_unknown_side_decides() {
-    for (one_way_ms, unknown_mm, known_mm, breaks) in
-        [(1000, 8.0, 6.0, 1.05), (2000, 15.0, 9.0, 1.2)]
-    {
-        for faults in ["", " 10ms loss 20%"] {
-            let words = format!("delay {one_way_ms}ms{faults}");
-            let unknown = Row::of(&words, 1..=3, |_| {});
-            let known = Row::of(&words, 1..=3, |config| config.slave.start.side_m = 0.36);
-            println!(
-                "{words:28} {unknown:.3?}\n{:28} {known:.3?}",
-                "  side known"
-            );
-            let dwell = Row::of(&words, 1..=3, |config| {
-                config.operator.dwell_s = one_way_ms as f64 * 2e-3 + 1.0;
-            });
-            println!("{:28} {dwell:.3?}", "  a dwell at each face");
-            // the touches of a dwell are contacts and no pushes: they are not held against it
-            assert!(
-                dwell.pose_rms_mm < unknown.pose_rms_mm,
-                "{words}: {dwell:?}"
-            );
-            assert!(dwell.peak_n <= 4.0 && dwell.observer_min_mj >= -1.0);
-            for (row, most_mm) in [(unknown, unknown_mm), (known, known_mm)] {
-                assert!(row.pose_rms_mm <= most_mm, "{words}: {row:?}");
-                assert!(row.peak_n <= 4.0, "{words}: {row:?}");
-                assert!(row.breaks_per_push <= breaks, "{words}: {row:?}");
-                assert!(row.injected_mj <= 1.0 && row.observer_min_mj >= -1.0);
-            }
         }
     }
 }

@@ -135,3 +135,30 @@ fn a_face_that_is_not_there_goes_away_from_the_hand_without_letting_go_at_once()
     }
     assert!(!model.rendered().in_contact());
 }
+
+#[test]
+fn while_an_answer_is_replayed_the_face_does_not_leave_a_resting_hand() {
+    let mut model = replayed();
+    push(&mut model, 1..=1500);
+    let hip = model.history().newest().unwrap().hip + Vec2::new(5e-4, 0.0);
+    let mut rest = |model: &mut LocalModel, n| model.step(Time::from_millis(n), hip);
+    let held = (1501..=2000).map(|n| rest(&mut model, n)).last().unwrap();
+    assert!(held.force.x > 0.2, "it rests lightly: {held:?}");
+    // the slave met the same face on a box that is 2 cm narrower
+    let mut told = answer(&model, 600);
+    told.state.footprint = BoxFootprint::square(0.36);
+    told.state.pose.position.x -= 0.02;
+    model.apply(&told);
+    let (mut ticks, mut softest) = (0, f64::MAX);
+    for n in 2001..=2500 {
+        let rendered = rest(&mut model, n);
+        ticks += u64::from(!model.is_replayed());
+        softest = softest.min(rendered.force.x);
+    }
+    assert!(ticks > 50, "the replay takes its time: {ticks} ticks");
+    assert!(
+        softest > held.force.x - 1e-3,
+        "{softest} N, before {held:?}"
+    );
+    assert!((model.state().footprint.west - 0.18).abs() < 1e-12);
+}
