@@ -339,7 +339,7 @@ fn a_resting_hand_goes_after_a_face_that_recedes() {
     let mut config = seeded(1);
     config.dwell_s = 5.0;
     let mut operator = Scripted::try_new(config, slab.view()).unwrap();
-    let mut ticks = |slab: &mut Slab, operator: &mut Scripted, n: u32| {
+    let ticks = |slab: &mut Slab, operator: &mut Scripted, n: u32| {
         for _ in 0..n {
             let hip = operator.step(&slab.view(), -slab.force);
             slab.step(hip);

@@ -83,7 +83,7 @@ fn is_pushing(world: &World) -> bool {
 #[test]
 fn a_hand_deep_inside_the_model_after_a_long_delay_is_not_thrown_out() {
     // the model's faces are 7 cm too far out, or 5 cm too far in: a round trip of pushing what is not there
-    for (one_way_ms, breaks) in [(0, 1.1), (1000, 2.5)] {
+    for one_way_ms in [0, 1000] {
         for side_m in [0.50, 0.26] {
             let mut config = delayed(one_way_ms);
             config.slave.start.side_m = side_m;
@@ -95,7 +95,7 @@ fn a_hand_deep_inside_the_model_after_a_long_delay_is_not_thrown_out() {
             assert!(felt.peak_n <= 4.0, "{felt:?}");
             assert!(felt.pose_rms_mm <= 30.0, "{felt:?}");
             assert!(felt.step_n <= 1.6, "{felt:?}");
-            assert!(felt.breaks_per_push <= breaks, "{felt:?}");
+            assert!(felt.breaks_per_push <= 1.1, "{felt:?}");
         }
     }
 }
@@ -292,7 +292,7 @@ fn a_box_that_is_spun_far_from_the_linear_range_is_felt_where_it_is() {
             println!("    turned by up to {:.2} rad within 2 s", turned.most);
             assert!(turned.most > 1.0, "{} rad", turned.most);
             assert!(felt.peak_n <= 4.0 && felt.step_n <= 1.6, "{felt:?}");
-            assert!(felt.breaks_per_push <= 1.5, "{felt:?}");
+            assert!(felt.breaks_per_push <= 1.1, "{felt:?}");
             assert!(felt.pose_rms_mm <= most_mm, "{felt:?}");
         }
     }

@@ -141,7 +141,7 @@ fn while_an_answer_is_replayed_the_face_does_not_leave_a_resting_hand() {
     let mut model = replayed();
     push(&mut model, 1..=1500);
     let hip = model.history().newest().unwrap().hip + Vec2::new(5e-4, 0.0);
-    let mut rest = |model: &mut LocalModel, n| model.step(Time::from_millis(n), hip);
+    let rest = |model: &mut LocalModel, n| model.step(Time::from_millis(n), hip);
     let held = (1501..=2000).map(|n| rest(&mut model, n)).last().unwrap();
     assert!(held.force.x > 0.2, "it rests lightly: {held:?}");
     // the slave met the same face on a box that is 2 cm narrower
