@@ -272,7 +272,7 @@ fn the_haptic_tick_never_allocates() {
         let haptic = &sides.haptic;
         let (contact, applied) = (haptic.contact, haptic.applied);
         assert!(contact > TICKS / 5, "{mode:?}: {contact} ticks of contact");
-        assert!(applied > 20, "{mode:?}: {applied} updates applied");
+        assert!(applied > 15, "{mode:?}: {applied} updates applied");
         assert!(haptic.operator.pushes_completed() >= Some(1), "{mode:?}");
         let felt = haptic.master.either().unwrap().outcome();
         let tool = felt.tool_ticks;
@@ -383,8 +383,8 @@ fn the_slaves_own_parts_never_allocate() {
         down = slaved.down;
     }
     assert_eq!(samples, TICKS, "every command was read, each with a sample");
-    assert!(updates > 20, "{updates} updates written");
-    assert!(parts.decided > 20, "{} decisions to send", parts.decided);
+    assert!(updates > 15, "{updates} updates written");
+    assert!(parts.decided > 15, "{} decisions to send", parts.decided);
     for estimator in &parts.estimators {
         assert!(estimator.estimate().samples > 1000, "the estimators worked");
     }
