@@ -69,6 +69,28 @@ impl Loss {
     }
 }
 
+/// What is known of the object's size when it is first touched: the slave starts from a side of 40 cm, and it is 36.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Size {
+    /// Nothing, and the operator pushes all the same.
+    Unknown,
+    /// Nothing, and the operator nudges each new face and rests until the answer must have come.
+    Nudged,
+    /// Vision has told it.
+    Known,
+}
+
+impl Size {
+    /// As `delay-view.csv` spells it.
+    pub(super) const fn name(self) -> &'static str {
+        match self {
+            Self::Unknown => "unknown",
+            Self::Nudged => "nudged",
+            Self::Known => "known",
+        }
+    }
+}
+
 /// Where in the grid a run stands.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Place {
@@ -78,6 +100,7 @@ pub(super) struct Place {
     pub(super) loss: Loss,
     pub(super) k_p: u64,
     pub(super) picture: Picture,
+    pub(super) size: Size,
 }
 
 impl Place {
@@ -89,6 +112,7 @@ impl Place {
             loss: Loss::None,
             k_p: 1000,
             picture: Picture::Model,
+            size: Size::Unknown,
         }
     }
 
@@ -113,6 +137,12 @@ impl Place {
             ..WorldConfig::default()
         };
         config.operator.view = self.picture;
+        match self.size {
+            Size::Unknown => {}
+            // a round trip, and a second to see what it did
+            Size::Nudged => config.operator.dwell_s = 2e-3 * self.one_way_ms as f64 + 1.0,
+            Size::Known => config.slave.start.side_m = config.slave.environment.side_m,
+        }
         // what the other architectures do not have either
         config.slave.repeats_ms = Repeats::NONE;
         config.slave.stretch_max = StretchMax::OFF;
@@ -175,14 +205,22 @@ pub(super) fn all_places() -> Vec<Place> {
     places
 }
 
-/// Replay, with the operator looking at the local model or at the delayed picture.
+/// Replay, with the operator looking at the local model or at the delayed picture; and what the object's size does.
 pub(super) fn picture_places() -> Vec<Place> {
     let replay = Architecture::Mediated(PoseCorrection::Replay);
-    let of = |picture| {
+    let of = |(picture, size)| {
         PICTURE_MS.map(|ms| Place {
             picture,
+            size,
             ..Place::plain(replay, ms)
         })
     };
-    [of(Picture::Model), of(Picture::Delayed)].concat()
+    [
+        (Picture::Model, Size::Unknown),
+        (Picture::Model, Size::Nudged),
+        (Picture::Model, Size::Known),
+        (Picture::Delayed, Size::Unknown),
+    ]
+    .map(of)
+    .concat()
 }

@@ -195,9 +195,10 @@ pub(super) fn replayed(groups: &[Group]) -> Table {
 
 pub(super) fn views(groups: &[Group]) -> Table {
     let mut table = Table::new(
-        "What the operator looks at (MMT with replay): mean over the seeds",
+        "What the operator looks at and knows of the size (MMT with replay): mean over the seeds",
         &[
             ("view", 0),
+            ("size", 0),
             ("one_way_ms", 0),
             ("pushes", 1),
             ("pose_rms_mm", 2),
@@ -213,6 +214,7 @@ pub(super) fn views(groups: &[Group]) -> Table {
         };
         table.push([
             view.into(),
+            place.size.name().into(),
             place.one_way_ms.into(),
             mean(rows, |row| Some(row.pushes as f64)),
             mean(rows, |row| row.pose_rms_mm),
