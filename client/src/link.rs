@@ -55,7 +55,7 @@ impl CommandConfig {
 pub enum FromSlave {
     /// An accepted update, newer than all before.
     Update(Update),
-    /// What the slave sees.
+    /// What the slave sees, newer than all before.
     Scene(Scene),
     /// What the tool feels, newer than all before.
     Tool(Tool),
@@ -147,7 +147,7 @@ impl MasterLink {
                     }
                 }
             }
-            Matter::Scene(scene) => Some(FromSlave::Scene(scene)),
+            Matter::Scene(scene) => opened.is_newest.then_some(FromSlave::Scene(scene)),
             Matter::Tool(tool) => opened.is_newest.then_some(FromSlave::Tool(tool)),
             Matter::Command(_) | Matter::Heartbeat => None,
         }

@@ -36,7 +36,7 @@ local function declare(kind, names, ...)
 end
 
 declare("string", "magic type")
-declare("uint8", "version samples_per_command")
+declare("uint8", "version samples_per_command scene_hz")
 declare("uint16", "flags", base.HEX)
 declare("uint32", "length number echo.number echo.received newest_update samples.ticks sequence newest_command")
 declare("uint64", "sent echo.sent echo.held_ns samples.stamp answers")
@@ -347,6 +347,7 @@ local function hello(r)
     r:floats("", "stiffness_n_per_m damping_ns_per_m")
     r.tree:add(fields.samples_per_command, r:take(1))
     r:choice("architecture", { "mmt", "tdpa", "auto" })
+    r.tree:add(fields.scene_hz, r:take(1))
     r:floats("", "hip hip")
     r:text("program")
 end

@@ -4,13 +4,17 @@ mod repeats;
 
 pub use repeats::{REPEATS_MAX, Repeats, RepeatsError};
 
+use std::time::Duration;
+
 use mmt_shared::link_end::{HEARTBEAT, LinkEnd, Outgoing, SealError};
 use mmt_shared::metrics::UpdateCounts;
 use mmt_shared::rate_control::StretchMax;
 use mmt_shared::time::Time;
-use mmt_shared::wire::{Architecture, Command, HipSample, Matter, Side, Tool, Update};
+use mmt_shared::wire::{Architecture, Command, HipSample, Matter, Scene, Side, Tool, Update};
 
 use repeats::Repeating;
+
+const SECOND: Duration = Duration::from_secs(1);
 
 /// How the slave's end of a session's link works.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -23,6 +27,8 @@ pub struct SlaveLinkConfig {
     pub samples_per_command: u8,
     /// Whose force the master's hand feels, as its hello says.
     pub architecture: Architecture,
+    /// Scenes that the master wants to see, 1/s, as its hello says.
+    pub scene_hz: u8,
 }
 
 /// The slave's end of the link.
@@ -35,6 +41,7 @@ pub struct SlaveLink {
     repeating: Option<Repeating>,
     repeated: UpdateCounts,
     tool_sent: Time,
+    scene_sent: Time,
 }
 
 impl SlaveLink {
@@ -49,6 +56,7 @@ impl SlaveLink {
             repeating: None,
             repeated: UpdateCounts::default(),
             tool_sent: now,
+            scene_sent: now,
         }
     }
 
@@ -173,6 +181,30 @@ impl SlaveLink {
     ) -> Result<Option<usize>, SealError> {
         self.tool_sent = now;
         tool.map(|tool| self.end.seal(now, Outgoing::Tool(tool), out))
+            .transpose()
+    }
+
+    /// When the next scene is due, seldomer under congestion; never where nobody looks.
+    #[must_use]
+    pub fn scene_due(&self) -> Option<Time> {
+        let hz = self.config.scene_hz;
+        let period = SECOND.checked_div(hz.into())?;
+        Some(self.scene_sent + period.mul_f64(self.end.stretch()))
+    }
+
+    /// Writes a scene to `out`; returns its length. None without one, which is then due a period later.
+    ///
+    /// # Errors
+    /// When it cannot be sealed.
+    pub fn send_scene(
+        &mut self,
+        now: Time,
+        scene: Option<&Scene>,
+        out: &mut [u8],
+    ) -> Result<Option<usize>, SealError> {
+        self.scene_sent = now;
+        scene
+            .map(|scene| self.end.seal(now, Outgoing::Scene(scene), out))
             .transpose()
     }
 

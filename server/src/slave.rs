@@ -10,7 +10,7 @@ use mmt_shared::metrics::ForceMetrics;
 use mmt_shared::params::{ModelParams, ModelState, inertia_of_square};
 use mmt_shared::settings::{Mode, ModelSettings, PoseCorrection};
 use mmt_shared::time::Time;
-use mmt_shared::wire::{Cause, ForceCounts, HandPort, HipSample, Tool, Update};
+use mmt_shared::wire::{Cause, ForceCounts, HandPort, HipSample, Scene, Tool, Update};
 
 use crate::bilateral::ToolPort;
 use crate::environment::{Environment, EnvironmentConfig};
@@ -273,6 +273,17 @@ impl Slave {
             in_contact: tick.in_contact,
             in_j: port.energy().in_j,
             model_error: self.model_error.relative(),
+        }
+    }
+
+    /// What a viewer sees after a tick: the object where the slave takes it to be.
+    #[must_use]
+    pub fn scene(&self, tick: &SlaveTick) -> Scene {
+        Scene {
+            answers: tick.stamp,
+            object: self.observer.pose(),
+            tool: tick.tool,
+            force: tick.f_s,
         }
     }
 

@@ -85,9 +85,9 @@ def command(fields, newest_update, samples):
 
 
 def hello(token, coupling, samples_per_command, hip, program):
-    operator, mmt = u32(0), u32(0)
+    operator, mmt, no_scenes = u32(0), u32(0), bytes([0])
     return (header(HELLO) + token + operator + f64(*coupling) + bytes([samples_per_command])
-            + mmt + f64(*hip) + text(program))
+            + mmt + no_scenes + f64(*hip) + text(program))
 
 
 def master_farewell(duration_ns, traffic, applied, dropped, ticks):

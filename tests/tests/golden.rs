@@ -165,7 +165,7 @@ fn of_stream_message(message: &StreamMessage) -> Decoded {
                 "stiffness_n_per_m": hello.coupling.stiffness_n_per_m,
                 "damping_ns_per_m": hello.coupling.damping_ns_per_m,
                 "samples_per_command": hello.samples_per_command,
-                "architecture": hello.architecture.name(),
+                "architecture": hello.architecture.name(), "scene_hz": hello.scene_hz,
                 "hip": [hello.hip.x, hello.hip.y], "program": hello.program,
             });
             (fields, written(|out| encode_hello(&hello, out)))

@@ -122,6 +122,7 @@ fn slave_link() -> SlaveLinkConfig {
         stretch_max: StretchMax::RECOMMENDED,
         samples_per_command: commands().samples_per_command,
         architecture: Architecture::Tdpa,
+        scene_hz: 0,
     }
 }
 

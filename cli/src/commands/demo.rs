@@ -60,9 +60,10 @@ pub(crate) fn run(arguments: &DemoArguments, messages: &Messages) -> Result<(), 
     };
     let mut options = master_options(arguments, transport, &emulation, started.pairing, truth_to);
     options.commands.stretch_max = stretch_max;
+    let dashboard = !arguments.json && !emulation.takes_orders();
+    options.scene_hz = Viewer::scene_hz(dashboard);
     let (master, master_live) = master::start(options, stop.receiver())?;
 
-    let dashboard = !arguments.json && !emulation.takes_orders();
     let mut viewer = Viewer::new(caption, dashboard, messages, &stop);
     let mut master_ended = None;
     while master.is_running() || slave.is_running() {
@@ -180,6 +181,7 @@ fn master_options(
         }),
         duration: Some(arguments.duration),
         architecture: architecture(arguments),
+        scene_hz: 0,
         commands: CommandConfig {
             samples_per_command: SAMPLES_PER_COMMAND,
             repeat_samples: arguments.repeat_samples,

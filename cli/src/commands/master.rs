@@ -44,6 +44,8 @@ pub(crate) fn run(arguments: MasterArguments, messages: &Messages) -> Result<(),
     let (netem, seed) = (Some(&arguments.netem), arguments.seed);
     let emulation = Emulation::start(&arguments.emulation, seed, netem, None)?;
     options.netem_extras = emulation.extras(Direction::Up);
+    let dashboard = !arguments.json && !emulation.takes_orders();
+    options.scene_hz = Viewer::scene_hz(dashboard);
     if !arguments.netem.is_transparent() {
         note(effect(Direction::Up, &arguments.netem)?);
     }
@@ -57,7 +59,6 @@ pub(crate) fn run(arguments: MasterArguments, messages: &Messages) -> Result<(),
     let stop = Stop::on_signals()?;
     let path = options.path.clone();
     let (host, live) = start(options, stop.receiver())?;
-    let dashboard = !arguments.json && !emulation.takes_orders();
     let mut viewer = Viewer::new(caption, dashboard, messages, &stop);
     while host.is_running() {
         let master = Some(*live.borrow());
@@ -121,6 +122,7 @@ fn options(arguments: &MasterArguments) -> Result<MasterOptions, Failure> {
         operator: operator(arguments)?,
         duration: arguments.duration,
         architecture: arguments.architecture.into(),
+        scene_hz: 0,
         commands: CommandConfig {
             samples_per_command: arguments.samples_per_command,
             repeat_samples: arguments.repeat_samples,

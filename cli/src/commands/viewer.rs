@@ -9,6 +9,8 @@ use crate::view::{Caption, History, Screen, Snapshot, line};
 
 /// Time between two looks: 20 a second are as much as an eye can use.
 const LOOK: Duration = Duration::from_millis(50);
+/// Scenes a second that a dashboard asks for: one a look.
+const SCENE_HZ: u8 = 20;
 /// Time between two plain lines.
 const LINE: Duration = Duration::from_secs(1);
 
@@ -30,6 +32,14 @@ impl Viewer {
             screen: dashboard.then(|| Screen::take(messages)).flatten(),
             next_line: Instant::now() + LINE,
             stop: stop.clone(),
+        }
+    }
+
+    /// How many scenes a second are looked at, with a dashboard or without one.
+    pub(super) fn scene_hz(dashboard: bool) -> u8 {
+        match dashboard && Screen::is_there() {
+            true => SCENE_HZ,
+            false => 0,
         }
     }
 

@@ -1,4 +1,4 @@
-//! The dashboard: charts of the forces above, panels of numbers below, messages at the bottom.
+//! The dashboard: charts of the forces and the scene above, panels of numbers below, messages at the bottom.
 
 use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect};
@@ -7,6 +7,7 @@ use ratatui::text::{Line, Span};
 use ratatui::widgets::{Block, Paragraph, Sparkline};
 
 use super::panels::{link_panel, loop_panel, model_panel, update_panel};
+use super::scene::render_scene;
 use super::{Caption, History, Snapshot};
 
 /// Messages shown at the bottom.
@@ -16,6 +17,8 @@ const PANEL_HEIGHT: u16 = 9;
 /// Widths of the panels; the last one takes what is left.
 const UPDATES_WIDTH: u16 = 25;
 const MODEL_WIDTH: u16 = 32;
+/// Width of the scene beside the charts.
+const SCENE_WIDTH: u16 = 30;
 /// The least full scale of a force chart, N: noise shall not fill it.
 const SCALE_MIN_N: f64 = 1.0;
 
@@ -53,7 +56,10 @@ pub(super) fn render(
     ]);
     let [head, charts, panels, bottom] = rows.areas(frame.area());
     render_head(frame, head, caption, &history.newest());
+    let [charts, scene] =
+        Layout::horizontal([Constraint::Min(0), Constraint::Length(SCENE_WIDTH)]).areas(charts);
     render_charts(frame, charts, history);
+    render_scene(frame, scene, history.newest().master.as_ref());
     render_panels(frame, panels, caption, history);
     let lines: Vec<Line<'_>> = messages
         .iter()

@@ -5,6 +5,7 @@ mod dashboard;
 mod history;
 mod lines;
 mod panels;
+mod scene;
 mod screen;
 
 use mmt_client::io::MasterLive;

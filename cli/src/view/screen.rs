@@ -35,9 +35,14 @@ pub(crate) struct Screen {
 }
 
 impl Screen {
+    /// Whether there is a terminal to take.
+    pub(crate) fn is_there() -> bool {
+        io::stderr().is_terminal()
+    }
+
     /// Takes the terminal that stderr is; none if it is none, or cannot be drawn on.
     pub(crate) fn take(messages: &Messages) -> Option<Self> {
-        if !io::stderr().is_terminal() {
+        if !Self::is_there() {
             return None;
         }
         messages.keep();

@@ -1,9 +1,12 @@
 //! What is on the screen and in the plain line.
 
 use mmt_client::failsafe::LinkState;
-use mmt_shared::geometry::Vec2;
+use mmt_shared::geometry::{BoxFootprint, Pose, Vec2};
+use mmt_shared::time::Time;
+use mmt_shared::wire::Scene;
 use ratatui::Terminal;
 use ratatui::backend::TestBackend;
+use ratatui::style::Color;
 
 use super::*;
 
@@ -26,6 +29,15 @@ fn snapshot(elapsed_s: f64) -> Snapshot {
         pushes: Some(3),
         link: LinkState::Late,
         model_share: Some(0.25),
+        footprint: Some(BoxFootprint::square(0.4)),
+        hip: Vec2::new(-0.3, 0.0),
+        scene: Some(Scene {
+            answers: Time::ZERO,
+            object: Pose::new(0.1, 0.0, 0.3),
+            tool: Vec2::new(-0.25, 0.1),
+            force: Vec2::zeros(),
+        }),
+        scene_age_s: Some(0.21),
         rtt_ms: Some(101.5),
         loss: (Some(0.011), Some(0.009)),
         lateness_p99_us: 63.0,
@@ -68,6 +80,8 @@ fn the_dashboard_shows_every_label_and_number_on_a_small_terminal() {
         "master free",
         "q ends it",
         "recommended",
+        "model now",
+        "remote 210 ms ago",
         "|f_s|",
         "5.00 N",
         "|f_m|",
@@ -134,4 +148,45 @@ fn the_plain_line_has_the_same_numbers_and_leaves_out_what_is_not_known() {
     }
     let text = line(&History::default());
     assert!(!text.contains("f_s") && !text.contains("link"), "{text}");
+}
+
+#[test]
+fn the_scene_shows_the_model_and_behind_it_the_ghost_where_the_slave_saw_it() {
+    let mut terminal = Terminal::new(TestBackend::new(40, 20)).unwrap();
+    let Snapshot { master, .. } = snapshot(1.0);
+    let mut draw = |master: Option<MasterLive>| {
+        let shown = terminal.draw(|frame| {
+            scene::render_scene(frame, frame.area(), master.as_ref());
+        });
+        let cells = shown.unwrap().buffer.content().to_vec();
+        let drawn = |colour| {
+            let places = cells.iter().skip(40).enumerate();
+            let drawn = places.filter(move |(_, cell)| cell.fg == colour && cell.symbol() != " ");
+            let columns: Vec<usize> = drawn.map(|(place, _)| place % 40).collect();
+            let mean = columns.iter().sum::<usize>() as f64 / columns.len() as f64;
+            (columns.len(), mean)
+        };
+        (
+            drawn(Color::Cyan),
+            drawn(Color::DarkGray),
+            drawn(Color::White),
+        )
+    };
+    let (model, ghost, hip) = draw(master);
+    assert!(
+        model.0 > 20 && ghost.0 > 10 && hip.0 == 1,
+        "{model:?} {ghost:?}"
+    );
+    // the model is in the middle, the ghost 10 cm to the right, the HIP 30 cm to the left of 90 cm
+    assert!((model.1 - 19.5).abs() < 1.0, "{model:?}");
+    assert!(
+        ghost.1 > model.1 + 1.0 && hip.1 < model.1 - 10.0,
+        "{ghost:?} {hip:?}"
+    );
+    let blind = master.map(|master| MasterLive {
+        scene: None,
+        ..master
+    });
+    assert_eq!(draw(blind).1.0, 0, "no ghost that never came");
+    assert_eq!(draw(None).0.0, 0);
 }

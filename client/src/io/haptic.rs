@@ -312,6 +312,8 @@ impl HapticLoop {
             updates_applied: u64::from(self.master.applied()),
             pushes: self.operator.pushes_completed(),
             link: done.link,
+            scene: None,
+            scene_age_s: None,
             rtt_ms: None,
             loss: (None, None),
             lateness_p99_us: self.timing.lateness.p99.as_secs_f64() * 1e6,

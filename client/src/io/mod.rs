@@ -29,7 +29,7 @@ use mmt_shared::io::transport::Transport;
 use mmt_shared::io::truth::TruthReceiver;
 use mmt_shared::pairing::Pairing;
 use mmt_shared::report::RunReport;
-use mmt_shared::wire::Architecture;
+use mmt_shared::wire::{Architecture, Scene};
 use serde::Serialize;
 
 use crate::device::DeviceProfile;
@@ -97,6 +97,8 @@ pub struct MasterOptions {
     pub duration: Option<Duration>,
     /// Whose force the hand feels.
     pub architecture: Architecture,
+    /// Scenes that somebody wants to see, 1/s, 0 to 60.
+    pub scene_hz: u8,
     /// How commands are made.
     pub commands: CommandConfig,
     /// Emulated network on what the master sends.
@@ -128,6 +130,10 @@ pub struct MasterLive {
     pub footprint: Option<BoxFootprint>,
     /// m, b, c in use.
     pub params: [f64; 3],
+    /// The remote scene as it last came, where somebody wants to see it.
+    pub scene: Option<Scene>,
+    /// How old it is: the time since the HIP sample that it shows the answer to, s.
+    pub scene_age_s: Option<f64>,
     /// Whether the HIP touches the model.
     pub in_contact: bool,
     /// The model's share of what is felt, 0 to 1, where the tool's force may be felt too.

@@ -229,6 +229,7 @@ fn hello(options: &MasterOptions, hip: Vec2) -> Hello {
         coupling: options.device.coupling(),
         samples_per_command: options.commands.samples_per_command,
         architecture: options.architecture,
+        scene_hz: options.scene_hz,
         hip,
         program: Label::clipped(PROGRAM),
     }

@@ -10,7 +10,7 @@ use bytes::Bytes;
 use mmt_shared::io::clock::Clock;
 use mmt_shared::io::transport::{Connection, ConnectionError};
 use mmt_shared::io::wake::Wakeup;
-use mmt_shared::wire::{DATAGRAM_MAX, Farewell, SlaveTotals};
+use mmt_shared::wire::{DATAGRAM_MAX, Farewell, Scene, SlaveTotals};
 use tokio::sync::watch;
 use tokio::time::{MissedTickBehavior, interval};
 
@@ -56,6 +56,7 @@ pub(super) struct Pump<'a> {
     /// The slave's farewell, if it came.
     pub(super) told: Option<Farewell<SlaveTotals>>,
     shown: LinkState,
+    scene: Option<Scene>,
 }
 
 /// Waits until somebody wants the session to end.
@@ -89,6 +90,7 @@ impl<'a> Pump<'a> {
             listening: true,
             told: None,
             shown: LinkState::default(),
+            scene: None,
         }
     }
 
@@ -139,7 +141,11 @@ impl<'a> Pump<'a> {
             self.shown = look.link;
             tracing::info!(link = look.link.name(), "the link");
         }
+        let now = self.clock.now();
+        let age = |scene: &Scene| now.saturating_since(scene.answers).as_secs_f64();
         self.live.send_replace(MasterLive {
+            scene: self.scene,
+            scene_age_s: self.scene.as_ref().map(age),
             rtt_ms: rtt.map(|rtt| rtt.as_secs_f64() * 1e3),
             loss,
             ended: ended.or(look.ended),
@@ -180,8 +186,8 @@ impl<'a> Pump<'a> {
         match self.link.handle(now, bytes) {
             Some(FromSlave::Update(update)) => self.port.offer(&update),
             Some(FromSlave::Tool(tool)) => self.port.offer_tool(now, &tool),
-            // a scene is for a viewer, and this host has none
-            Some(FromSlave::Scene(_)) | None => {}
+            Some(FromSlave::Scene(scene)) => self.scene = Some(scene),
+            None => {}
         }
         if let Some(path) = &self.path {
             let mut path = path.lock().unwrap_or_else(PoisonError::into_inner);

@@ -30,6 +30,7 @@ const FOR_EVER: Duration = Duration::from_secs(60);
 fn scripted(fake: &Fake) -> MasterOptions {
     MasterOptions {
         architecture: Architecture::Mmt,
+        scene_hz: 0,
         transport: Transport::Quic,
         pairing: fake.pairing(),
         device: DeviceProfile::default(),

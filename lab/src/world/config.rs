@@ -101,6 +101,8 @@ impl WorldConfig {
             stretch_max: self.slave.stretch_max,
             samples_per_command: self.samples_per_command,
             architecture: self.architecture,
+            // nobody looks
+            scene_hz: 0,
         }
     }
 }

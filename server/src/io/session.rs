@@ -140,6 +140,7 @@ pub(super) async fn serve_with(
         stretch_max: config.stretch_max,
         samples_per_command: hello.samples_per_command,
         architecture: hello.architecture,
+        scene_hz: hello.scene_hz,
     };
     let link = SlaveLink::new(shared.clock.now(), link);
     let session = Session::new(

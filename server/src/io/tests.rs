@@ -10,7 +10,7 @@ use mmt_shared::io::identity::Identity;
 use mmt_shared::io::live::LiveCell;
 use mmt_shared::io::transport::Transport;
 use mmt_shared::pairing::{Pairing, Token};
-use mmt_shared::wire::{Cause, Ending, Refusal};
+use mmt_shared::wire::{Architecture, Cause, Ending, Refusal};
 use tokio::sync::watch;
 use tokio::task::JoinHandle;
 use tokio::time::sleep;
@@ -158,6 +158,29 @@ async fn eventually_welcome(pairing: &Pairing) -> Master {
             Err(refusal) => assert_eq!(refusal, Refusal::Busy),
         }
         sleep(Duration::from_millis(50)).await;
+    }
+}
+
+#[tokio::test]
+async fn who_looks_gets_scenes_and_whose_hand_may_feel_the_tool_gets_news_of_it() {
+    for (scene_hz, architecture) in [(0, Architecture::Mmt), (40, Architecture::Auto)] {
+        let host = run(options());
+        let mut master = patiently(Master::connect(&host.pairing)).await;
+        (master.scene_hz, master.architecture) = (scene_hz, architecture);
+        let token = host.pairing.token;
+        patiently(master.hello(token, 1000.0)).await.unwrap();
+        patiently(master.push(100)).await;
+        patiently(master.farewell()).await;
+        let report = host.end().await.unwrap();
+        // a second of pushing: 40 scenes and 20 news of the tool, fewer on a host that was busy
+        let (scenes, tools) = (report.messages.down.scenes, report.messages.down.tools);
+        let (least, most) = if scene_hz > 0 { (5, 60) } else { (0, 0) };
+        let all = [scenes.unwrap(), tools.unwrap()];
+        assert!(all.iter().all(|n| (least..=most).contains(n)), "{all:?}");
+        assert_eq!(
+            report.architecture.name.as_deref(),
+            Some(architecture.name())
+        );
     }
 }
 

@@ -17,7 +17,7 @@ use mmt_shared::io::truth::TruthSender;
 use mmt_shared::io::wake::{self, Waker, Wakeup};
 use mmt_shared::metrics::UpdateCounts;
 use mmt_shared::time::{TICK, Time};
-use mmt_shared::wire::{HandPort, HipSample, Tool, Update};
+use mmt_shared::wire::{HandPort, HipSample, Scene, Tool, Update};
 use rtrb::{Consumer, Producer, RingBuffer};
 use tokio::sync::oneshot;
 use triple_buffer::{Input, Output, triple_buffer};
@@ -54,11 +54,18 @@ pub(super) struct Arrived {
     pub(super) port: Option<HandPort>,
 }
 
+/// What a tick has to tell, besides updates, to whoever asks.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct News {
+    pub(super) tool: Tool,
+    pub(super) scene: Scene,
+}
+
 /// Tokio's side of the thread. Dropping it ends the thread.
 pub(super) struct Worker {
     pub(super) samples: Producer<Arrived>,
     pub(super) updates: Output<Option<Update>>,
-    pub(super) tools: Output<Option<Tool>>,
+    pub(super) news: Output<Option<News>>,
     pub(super) looks: Output<SlaveLive>,
     pub(super) wakeup: Wakeup,
     /// Closed without a word if the thread panicked.
@@ -70,7 +77,7 @@ pub(super) struct Worker {
 pub(super) struct Inside {
     samples: Consumer<Arrived>,
     updates: Input<Option<Update>>,
-    tools: Input<Option<Tool>>,
+    news: Input<Option<News>>,
     looks: Input<SlaveLive>,
     waker: Waker,
     stop: Arc<AtomicBool>,
@@ -96,7 +103,7 @@ impl Worker {
     ) -> io::Result<Self> {
         let (samples_in, samples) = RingBuffer::new(SAMPLES_WAITING);
         let (updates, updates_out) = triple_buffer(&None);
-        let (tools, tools_out) = triple_buffer(&None);
+        let (news, news_out) = triple_buffer(&None);
         let (looks, looks_out) = triple_buffer(&SlaveLive::default());
         let (waker, wakeup) = wake::pair()?;
         let stop = Arc::new(AtomicBool::new(false));
@@ -104,7 +111,7 @@ impl Worker {
         let inside = Inside {
             samples,
             updates,
-            tools,
+            news,
             looks,
             waker,
             stop: Arc::clone(&stop),
@@ -119,7 +126,7 @@ impl Worker {
         Ok(Self {
             samples: samples_in,
             updates: updates_out,
-            tools: tools_out,
+            news: news_out,
             looks: looks_out,
             wakeup,
             finished,
@@ -140,9 +147,15 @@ impl Worker {
 
     /// The newest news of the tool, if their force is wanted and they have not been fetched yet.
     pub(super) fn fresh_force(&mut self) -> Option<Tool> {
-        let fresh = self.tools.update();
-        let tool = self.tools.output_buffer().filter(|_| fresh);
-        tool.filter(|tool| tool.force.is_some())
+        let fresh = self.news.update();
+        let news = self.news.output_buffer().filter(|_| fresh);
+        news.map(|news| news.tool)
+            .filter(|tool| tool.force.is_some())
+    }
+
+    /// The newest news, fetched before or not; none before the first tick.
+    pub(super) fn newest(&mut self) -> Option<News> {
+        *self.news.read()
     }
 }
 
@@ -207,9 +220,9 @@ impl Inside {
     fn hand_over(&mut self, slave: &Slave, tick: &SlaveTick) -> bool {
         *self.looks.input_buffer_mut() = look(slave, tick);
         self.looks.publish();
-        let tool = slave.tool(tick);
-        *self.tools.input_buffer_mut() = Some(tool);
-        self.tools.publish();
+        let (tool, scene) = (slave.tool(tick), slave.scene(tick));
+        *self.news.input_buffer_mut() = Some(News { tool, scene });
+        self.news.publish();
         let mut overtook = false;
         if tick.update.is_some() {
             *self.updates.input_buffer_mut() = tick.update;

@@ -2,7 +2,7 @@
 
 use super::*;
 use mmt_shared::contact::Coupling;
-use mmt_shared::geometry::{BoxFootprint, Pose, Twist};
+use mmt_shared::geometry::{BoxFootprint, Pose, Twist, Vec2};
 use mmt_shared::params::{ModelParams, ModelState};
 use mmt_shared::wire::{Cause, DATAGRAM_MAX, HandPort, SampleBlock};
 
@@ -33,6 +33,7 @@ fn link_of(repeats: &str, architecture: Architecture) -> SlaveLink {
         stretch_max: StretchMax::RECOMMENDED,
         samples_per_command: 10,
         architecture,
+        scene_hz: 0,
     };
     SlaveLink::new(Time::ZERO, config)
 }
@@ -225,4 +226,34 @@ fn news_of_the_tool_are_due_every_fifty_milliseconds_and_stand_for_the_heartbeat
     );
     assert_eq!(link.tool_due(), Some(AT(150)));
     assert_eq!(self::link("none").tool_due(), None);
+}
+
+#[test]
+fn scenes_are_due_as_often_as_somebody_wants_to_see_them() {
+    let config = SlaveLinkConfig {
+        scene_hz: 20,
+        ..link("none").config
+    };
+    let mut link = SlaveLink::new(Time::ZERO, config);
+    let scene = Scene {
+        answers: AT(40),
+        object: Pose::new(0.1, 0.0, 0.2),
+        tool: Vec2::new(-0.1, 0.0),
+        force: Vec2::new(2.0, 0.0),
+    };
+    let mut master = LinkEnd::new(Side::Master, Time::ZERO);
+    let mut out = [0; DATAGRAM_MAX];
+    assert_eq!(link.scene_due(), Some(AT(50)));
+    let length = link.send_scene(AT(50), Some(&scene), &mut out);
+    let length = length.unwrap().unwrap();
+    let opened = master.open(AT(50), &out[..length]).unwrap();
+    assert_eq!(opened.matter, Matter::Scene(scene));
+    assert_eq!(link.scene_due(), Some(AT(100)));
+    assert_eq!(
+        link.send_scene(AT(100), None, &mut out),
+        Ok(None),
+        "nothing to see"
+    );
+    assert_eq!(link.scene_due(), Some(AT(150)));
+    assert_eq!(self::link("none").scene_due(), None, "nobody looks");
 }

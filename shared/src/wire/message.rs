@@ -278,6 +278,9 @@ impl Architecture {
     }
 }
 
+/// The most scenes that a master may ask for, 1/s: no eye sees more.
+pub const SCENE_HZ_MAX: u8 = 60;
+
 /// First message on the stream, master to slave.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hello {
@@ -291,6 +294,8 @@ pub struct Hello {
     pub samples_per_command: u8,
     /// What the hand feels.
     pub architecture: Architecture,
+    /// Scenes that the master wants to see, 1/s: 0, nobody looks, to [`SCENE_HZ_MAX`].
+    pub scene_hz: u8,
     /// Where the HIP is at the start, m.
     pub hip: Vec2,
     /// Name and version of the program, for the other side's log.

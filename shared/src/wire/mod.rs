@@ -29,7 +29,7 @@ pub use header::{
 pub use label::{LABEL_MAX, Label};
 pub use message::{
     Architecture, Cause, Command, Echo, Ending, Envelope, Farewell, ForceCounts, HandPort, Hello,
-    HipCounts, HipSample, Refusal, Role, Scene, Tool, Update, Welcome,
+    HipCounts, HipSample, Refusal, Role, SCENE_HZ_MAX, Scene, Tool, Update, Welcome,
 };
 pub use raw::{HelloError, RawHello, RawUpdate, RawWelcome, WelcomeError};
 pub use samples::{PushError, SAMPLES_MAX, SampleBlock};

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::error::{FieldError, demand, finite};
 use super::label::Label;
-use super::message::{Architecture, Cause, Hello, Role, Scene, Update, Welcome};
+use super::message::{Architecture, Cause, Hello, Role, SCENE_HZ_MAX, Scene, Update, Welcome};
 use super::samples::SAMPLES_MAX;
 use crate::contact::Coupling;
 use crate::geometry::{BoxFootprint, Pose, Twist, Vec2};
@@ -196,6 +196,7 @@ pub struct RawHello {
     coupling: [f64; 2],
     samples_per_command: u8,
     architecture: Architecture,
+    scene_hz: u8,
     hip: [f64; 2],
     program: Label,
 }
@@ -212,6 +213,12 @@ pub enum HelloError {
         /// What the hello says.
         samples: u8,
     },
+    /// More scenes than anybody sees.
+    #[error("{hz} scenes a second are more than the accepted {SCENE_HZ_MAX}")]
+    SceneRate {
+        /// What the hello says, 1/s.
+        hz: u8,
+    },
 }
 
 impl RawHello {
@@ -226,6 +233,7 @@ impl RawHello {
             coupling: [stiffness_n_per_m, damping_ns_per_m],
             samples_per_command: hello.samples_per_command,
             architecture: hello.architecture,
+            scene_hz: hello.scene_hz,
             hip: hello.hip.into(),
             program: hello.program,
         }
@@ -259,6 +267,9 @@ impl RawHello {
         if samples == 0 || usize::from(samples) > SAMPLES_MAX {
             return Err(HelloError::SamplesPerCommand { samples });
         }
+        if self.scene_hz > SCENE_HZ_MAX {
+            return Err(HelloError::SceneRate { hz: self.scene_hz });
+        }
         let [x, y] = self.hip;
         in_range("hip x", "m", x, (-WORKSPACE_M, WORKSPACE_M))?;
         in_range("hip y", "m", y, (-WORKSPACE_M, WORKSPACE_M))?;
@@ -268,6 +279,7 @@ impl RawHello {
             coupling,
             samples_per_command: samples,
             architecture: self.architecture,
+            scene_hz: self.scene_hz,
             hip: Vec2::new(x, y),
             program: self.program,
         })

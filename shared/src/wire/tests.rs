@@ -58,6 +58,7 @@ fn hello() -> Hello {
         coupling: COUPLING,
         samples_per_command: 10,
         architecture: Architecture::Auto,
+        scene_hz: 25,
         hip: Vec2::new(-0.3, 0.0),
         program: Label::clipped("mmt test"),
     }
@@ -575,6 +576,11 @@ fn a_hello_or_welcome_with_a_number_out_of_range_is_not_accepted() {
         bad.settings.coupling.stiffness_n_per_m = k_p;
         let refused = raw::RawWelcome::of(&bad).accept(&bad.settings.coupling);
         assert!(matches!(refused, Err(WelcomeError::Number(_))));
+    }
+    for hz in [61, 255] {
+        let mut bad = hello();
+        bad.scene_hz = hz;
+        assert_eq!(raw_hello(&bad), Err(HelloError::SceneRate { hz }));
     }
     for samples in [0, 33, 255] {
         let mut bad = hello();

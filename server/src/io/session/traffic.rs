@@ -46,7 +46,8 @@ impl Session<'_> {
         loop {
             let now = self.shared.clock.now();
             let due = self.link.end().heartbeat_due();
-            let others = [self.link.repeat_due(), self.link.tool_due()];
+            let link = &self.link;
+            let others = [link.repeat_due(), link.tool_due(), link.scene_due()];
             let due = others.into_iter().flatten().fold(due, Time::min);
             let due = due.saturating_since(now);
             // In this order, so that a flood of datagrams holds up nothing else.
@@ -111,12 +112,17 @@ impl Session<'_> {
         self.send(sealed).map(drop)
     }
 
-    /// News of the tool, repeats and heartbeats, which nothing but the time asks for.
+    /// News of the tool, scenes, repeats and heartbeats, which nothing but the time asks for.
     fn send_due(&mut self) -> Result<(), End> {
         let now = self.shared.clock.now();
         if self.link.tool_due().is_some_and(|due| due <= now) {
-            let tool = self.worker.tools.read().as_ref();
-            let sealed = self.link.send_tool(now, tool, &mut self.buffer);
+            let tool = self.worker.newest().map(|news| news.tool);
+            let sealed = self.link.send_tool(now, tool.as_ref(), &mut self.buffer);
+            self.send(sealed)?;
+        }
+        if self.link.scene_due().is_some_and(|due| due <= now) {
+            let scene = self.worker.newest().map(|news| news.scene);
+            let sealed = self.link.send_scene(now, scene.as_ref(), &mut self.buffer);
             self.send(sealed)?;
         }
         let repeat = self.link.repeat(now, &mut self.buffer);

@@ -1,0 +1,87 @@
+//! What the operator sees, from above: the local model with the HIP, and behind it, as a ghost, the remote scene as it
+//! last came.
+//!
+//! The model is where it is felt; the ghost is as old as the title says. Draws; moves nothing.
+
+use mmt_client::io::MasterLive;
+use mmt_shared::geometry::{BoxFootprint, Pose, Vec2, rotate};
+use ratatui::Frame;
+use ratatui::layout::Rect;
+use ratatui::style::{Color, Style};
+use ratatui::symbols::Marker;
+use ratatui::text::{Line, Span};
+use ratatui::widgets::Block;
+use ratatui::widgets::canvas::{Canvas, Context, Line as Stroke};
+
+/// Half of the width that is shown, m: the box and the way to any of its faces.
+const HALF_WIDTH_M: f64 = 0.45;
+/// A cell of a terminal is about twice as high as it is wide.
+const CELL_HEIGHT: f64 = 2.0;
+const MODEL: Color = Color::Cyan;
+const HIP: Color = Color::White;
+const GHOST: Color = Color::DarkGray;
+
+/// Draws the scene of a master; nothing before its session has begun.
+pub(super) fn render_scene(frame: &mut Frame<'_>, area: Rect, master: Option<&MasterLive>) {
+    let inner_height = f64::from(area.height.saturating_sub(1).max(1));
+    let half_height_m = HALF_WIDTH_M * CELL_HEIGHT * inner_height / f64::from(area.width.max(1));
+    let known = master.and_then(|master| master.footprint.map(|sides| (master, sides)));
+    // the box stays in the middle
+    let middle = known.map_or(Vec2::zeros(), |(master, _)| master.model.position);
+    let canvas = Canvas::default()
+        .block(Block::new().title(title(master)))
+        .marker(Marker::Braille)
+        .x_bounds([middle.x - HALF_WIDTH_M, middle.x + HALF_WIDTH_M])
+        .y_bounds([middle.y - half_height_m, middle.y + half_height_m])
+        .paint(|context| {
+            let Some((master, sides)) = known else {
+                return;
+            };
+            if let Some(scene) = &master.scene {
+                outline(context, &scene.object, &sides, GHOST);
+                mark(context, scene.tool, "+", GHOST);
+            }
+            context.layer();
+            outline(context, &master.model, &sides, MODEL);
+            mark(context, master.hip, "o", HIP);
+        });
+    frame.render_widget(canvas, area);
+}
+
+/// Which is which.
+fn title(master: Option<&MasterLive>) -> Line<'static> {
+    let ghost = match master.and_then(|master| master.scene_age_s) {
+        Some(age_s) => format!("remote {:.0} ms ago", age_s * 1e3),
+        None => "remote -".to_owned(),
+    };
+    Line::from(vec![
+        Span::styled("model now", Style::new().fg(MODEL)),
+        Span::raw("  "),
+        Span::styled(ghost, Style::new().fg(GHOST)),
+    ])
+}
+
+fn outline(context: &mut Context<'_>, pose: &Pose, sides: &BoxFootprint, colour: Color) {
+    let BoxFootprint {
+        east,
+        north,
+        west,
+        south,
+    } = *sides;
+    let corners = [
+        (east, north),
+        (-west, north),
+        (-west, -south),
+        (east, -south),
+    ];
+    let corners = corners.map(|(x, y)| pose.position + rotate(pose.angle, Vec2::new(x, y)));
+    let next = corners.iter().cycle().skip(1);
+    for (from, to) in corners.iter().zip(next) {
+        context.draw(&Stroke::new(from.x, from.y, to.x, to.y, colour));
+    }
+}
+
+fn mark(context: &mut Context<'_>, at: Vec2, sign: &'static str, colour: Color) {
+    let sign = Span::styled(sign, Style::new().fg(colour));
+    context.print(at.x, at.y, Line::from(sign));
+}
