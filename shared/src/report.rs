@@ -128,7 +128,8 @@ pub struct ArchitectureReport {
     pub switches: Option<u64>,
     /// Largest change of the force on the hand in one tick of a fade, N.
     pub fade_step_max_n: Number,
-    /// The round trip that the hand would have felt in the end, play-out included, smoothed, ms.
+    /// The round trip that a force would have taken in the end, smoothed: play-out included, the wait of samples for
+    /// their packet not, ms.
     pub round_trip_ms: Number,
     /// Relative error of the model's force in the end, over the last half second of contact.
     pub model_error: Number,
