@@ -76,11 +76,12 @@ impl WorldConfig {
         self
     }
 
-    /// The slave; where the tool may be felt, its play-out waits for no longer than it has to, as in a session.
+    /// The slave; where the tool may be felt, with the play-out of a session.
     pub(super) fn slave(&self) -> SlaveConfig {
         let mut slave = self.slave.clone();
         if self.architecture.feels_tool() {
-            slave.playout.delay_ms = 0.0;
+            let (packing, architecture) = (self.samples_per_command, self.architecture);
+            slave.playout = slave.playout.for_session(packing, architecture);
         }
         slave
     }
@@ -125,4 +126,23 @@ pub enum WorldError {
     /// The network's numbers are wrong.
     #[error(transparent)]
     Network(#[from] ConfigError),
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_delay_of_play_out_that_was_configured_stays_whatever_the_hand_feels() {
+        for architecture in Architecture::ALL {
+            let mut config = WorldConfig {
+                architecture,
+                ..WorldConfig::default()
+            };
+            let begins = config.slave().playout.delay_ms;
+            assert_eq!(begins == 0.0, architecture.feels_tool());
+            config.slave.playout.delay_ms = 33.0;
+            assert_eq!(config.slave().playout.delay_ms, 33.0);
+        }
+    }
 }

@@ -20,8 +20,8 @@ use mmt_shared::io::truth::TruthSender;
 use mmt_shared::io::versions::CLOSE_FINISHED;
 use mmt_shared::metrics::UpdateCounts;
 use mmt_shared::wire::{
-    Architecture, DATAGRAM_MAX, Ending, Farewell, Hello, Label, Refusal, STREAM_MESSAGE_MAX,
-    SlaveTotals, Welcome, encode_slave_farewell, encode_welcome,
+    DATAGRAM_MAX, Ending, Farewell, Hello, Label, Refusal, STREAM_MESSAGE_MAX, SlaveTotals,
+    Welcome, encode_slave_farewell, encode_welcome,
 };
 use tokio::sync::watch;
 use tokio::time::timeout;
@@ -32,7 +32,6 @@ use super::report::{self, Outcome};
 use super::worker::{Finished, Worker};
 use super::{PROGRAM, SlaveLive, SlaveReport};
 use crate::link::{SlaveLink, SlaveLinkConfig};
-use crate::playout::PlayoutConfig;
 use crate::slave::{Slave, SlaveConfig};
 
 use end::{End, farewell_of};
@@ -108,11 +107,10 @@ pub(super) async fn serve_with(
         lease: _lease,
     } = admitted;
     let config = SlaveConfig {
-        playout: playout_for(
-            shared.config.playout,
-            hello.samples_per_command,
-            hello.architecture,
-        ),
+        playout: shared
+            .config
+            .playout
+            .for_session(hello.samples_per_command, hello.architecture),
         ..shared.config.clone()
     };
     let mut slave = match Slave::try_new(&config, hello.coupling) {
@@ -153,33 +151,6 @@ pub(super) async fn serve_with(
         socket_before,
     );
     session.operate(receive, stop, live).await.map(Some)
-}
-
-/// The configured play-out; if its delay is the default, with the delay that the master's packing needs
-/// instead of the default's ten samples. The jitter that it has room for stays. Where the tool may be felt the delay
-/// grows from none as packing and jitter ask for: it is part of what the hand feels.
-fn playout_for(
-    configured: PlayoutConfig,
-    samples_per_command: u8,
-    architecture: Architecture,
-) -> PlayoutConfig {
-    let default = PlayoutConfig::default();
-    if configured.delay_ms != default.delay_ms {
-        return configured;
-    }
-    if architecture.feels_tool() {
-        return PlayoutConfig {
-            delay_ms: 0.0,
-            ..configured
-        };
-    }
-    let delay = |samples| PlayoutConfig::for_packing_and_jitter(samples, Duration::ZERO).delay_ms;
-    // the default is made for ten samples
-    let jitter_ms = default.delay_ms - delay(10);
-    PlayoutConfig {
-        delay_ms: delay(samples_per_command) + jitter_ms,
-        ..configured
-    }
 }
 
 /// Takes the datagrams that have arrived and were not read, without waiting for more.
@@ -342,37 +313,5 @@ impl<'a> Session<'a> {
         self.send.write_frame(message, FAREWELL_WAIT).await?;
         self.send.finish();
         Ok(())
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn play_out_waits_for_the_masters_packing_unless_its_delay_was_configured() {
-        let default = PlayoutConfig::default();
-        let playout_for = |configured, samples_per_command| {
-            super::playout_for(configured, samples_per_command, Architecture::Mmt)
-        };
-        assert_eq!(playout_for(default, 10), default);
-        let one = playout_for(default, 1);
-        assert!((default.delay_ms - one.delay_ms - 9.0).abs() < 1e-9);
-        let faster = PlayoutConfig {
-            speed_max_m_per_s: 1.0,
-            ..default
-        };
-        assert_eq!(playout_for(faster, 1).speed_max_m_per_s, 1.0);
-        let configured = PlayoutConfig {
-            delay_ms: 33.0,
-            ..default
-        };
-        assert_eq!(playout_for(configured, 1), configured);
-        for architecture in [Architecture::Tdpa, Architecture::Auto] {
-            let from_none = super::playout_for(default, 10, architecture);
-            assert_eq!(from_none.delay_ms, 0.0, "the hand feels it");
-            let kept = super::playout_for(configured, 10, architecture);
-            assert_eq!(kept, configured);
-        }
     }
 }

@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use mmt_shared::wire::Architecture;
 use serde::{Deserialize, Serialize};
 
 /// Accepted play-out delay, ms.
@@ -54,6 +55,24 @@ impl PlayoutConfig {
         }
     }
 
+    /// This play-out for a master that packs so many samples: a delay that is the default becomes the one that its
+    /// packing needs, with the room for jitter that the default has. Where the tool may be felt it begins at none and
+    /// grows as packing and jitter ask for: it is part of what the hand feels. A delay that was configured stays.
+    #[must_use]
+    pub fn for_session(self, samples_per_command: u8, architecture: Architecture) -> Self {
+        let default = Self::default();
+        if self.delay_ms != default.delay_ms {
+            return self;
+        }
+        let delay = |samples| Self::for_packing_and_jitter(samples, Duration::ZERO).delay_ms;
+        let delay_ms = match architecture.feels_tool() {
+            true => 0.0,
+            // the default is made for ten samples
+            false => default.delay_ms + delay(samples_per_command) - delay(10),
+        };
+        Self { delay_ms, ..self }
+    }
+
     pub(super) fn check(&self) -> Result<(), PlayoutError> {
         for (name, unit, value, (min, max)) in [
             ("delay", "ms", self.delay_ms, DELAY_MS),
@@ -100,4 +119,34 @@ pub struct PlayoutError {
     pub max: f64,
     /// Unit of all three.
     pub unit: &'static str,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn play_out_waits_for_the_masters_packing_unless_its_delay_was_configured() {
+        let default = PlayoutConfig::default();
+        assert_eq!(default.for_session(10, Architecture::Mmt), default);
+        let one = default.for_session(1, Architecture::Mmt);
+        assert!((default.delay_ms - one.delay_ms - 9.0).abs() < 1e-9);
+        let faster = PlayoutConfig {
+            speed_max_m_per_s: 1.0,
+            ..default
+        };
+        let faster = faster.for_session(1, Architecture::Mmt);
+        assert_eq!(faster.speed_max_m_per_s, 1.0);
+        let configured = PlayoutConfig {
+            delay_ms: 33.0,
+            ..default
+        };
+        for architecture in Architecture::ALL {
+            assert_eq!(configured.for_session(1, architecture), configured);
+        }
+        for architecture in [Architecture::Tdpa, Architecture::Auto] {
+            let from_none = default.for_session(10, architecture);
+            assert_eq!(from_none.delay_ms, 0.0, "the hand feels it");
+        }
+    }
 }

@@ -54,7 +54,7 @@ pub struct SlaveConfig {
     pub sensing: SensingConfig,
     /// Buffer for the master's samples.
     pub playout: PlayoutConfig,
-    /// The tool presses with no more than this on what it touches, N. Default 15: twice what the hand's device gives.
+    /// The tool presses with no more than this on what it touches, N. Default 15: the hand's device gives 8.
     pub tool_force_max_n: f64,
     /// The estimator of m, b and c; the mode's own if absent. It starts from `start` in any case.
     pub estimator: Option<EstimatorConfig>,
