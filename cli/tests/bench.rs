@@ -28,6 +28,8 @@ fn the_document_has_every_key_for_every_carrier_and_flow() {
         "64",
         "--duration",
         "1ms",
+        "--cores",
+        "any",
         "--json",
     ]);
     let errors = String::from_utf8_lossy(&output.stderr);
@@ -38,6 +40,7 @@ fn the_document_has_every_key_for_every_carrier_and_flow() {
         (&document["rate_hz"], &document["bytes"]),
         (&200.into(), &64.into())
     );
+    assert_eq!(document["cores"], "any");
     let rows = document["rows"].as_array().unwrap();
     let named = |key: &str| {
         let mut names: Vec<_> = rows.iter().map(|row| row[key].as_str().unwrap()).collect();
@@ -93,6 +96,7 @@ fn what_cannot_be_measured_is_refused_with_the_range() {
         ("--size", "15", "16..=1024"),
         ("--size", "1025", "16..=1024"),
         ("--duration", "60", "such as 20s"),
+        ("--cores", "two", "own, any"),
     ] {
         let output = bench(&["transport", option, value]);
         let text = String::from_utf8_lossy(&output.stderr);

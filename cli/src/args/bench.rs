@@ -2,8 +2,8 @@
 
 use std::time::Duration;
 
-use clap::{Args, Subcommand};
-use mmt_lab::io::transport_bench::{BYTES_MAX, BYTES_MIN, RATE_MAX};
+use clap::{Args, Subcommand, ValueEnum};
+use mmt_lab::io::transport_bench::{BYTES_MAX, BYTES_MIN, Cores, RATE_MAX};
 
 use super::values;
 
@@ -34,7 +34,28 @@ pub(crate) struct TransportBenchArguments {
     /// Bytes of a message
     #[arg(long, value_name = "BYTES", default_value_t = 100, value_parser = clap::value_parser!(u16).range(BYTES_MIN as i64..=BYTES_MAX as i64))]
     pub(crate) size: u16,
+    /// Where the two ends run
+    #[arg(long, value_enum, default_value_t = CoresName::Own)]
+    pub(crate) cores: CoresName,
     /// Print one JSON document instead of tables
     #[arg(long)]
     pub(crate) json: bool,
+}
+
+/// Where the two ends run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum CoresName {
+    /// Each on a core of its own that stays awake, as on two hosts set up for low latency
+    Own,
+    /// Where the kernel puts them, often both on one core
+    Any,
+}
+
+impl From<CoresName> for Cores {
+    fn from(name: CoresName) -> Self {
+        match name {
+            CoresName::Own => Self::Own,
+            CoresName::Any => Self::Any,
+        }
+    }
 }

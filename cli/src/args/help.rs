@@ -125,6 +125,7 @@ pub(super) const BENCH: &str = "\
 Examples:
   mmt bench transport
   mmt bench transport --rate 150 --size 180
+  mmt bench transport --cores any
   mmt bench transport --duration 5min --json > transport.json
 
 Bare sockets, raw UDP, QUIC on the single-thread runtime and QUIC on tokio take turns. Real time: repeat it,

@@ -33,6 +33,7 @@ fn transport(arguments: &TransportBenchArguments) -> Result<(), Failure> {
         rate_hz: arguments.rate,
         duration: arguments.duration,
         bytes: usize::from(arguments.size),
+        cores: arguments.cores.into(),
     };
     let stop = Stop::on_signals()?;
     note(format_args!(

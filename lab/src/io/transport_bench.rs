@@ -6,6 +6,7 @@
 
 mod carried;
 mod control;
+mod cores;
 mod report;
 mod slice;
 #[cfg(test)]
@@ -25,9 +26,11 @@ use mmt_shared::wire::DATAGRAM_MAX;
 
 use carried::Carried;
 use control::Control;
+use cores::Places;
 use report::Ledger;
 use slice::{Slice, Turn};
 
+pub use cores::Cores;
 pub use report::BenchReport;
 pub use slice::BYTES_MIN;
 
@@ -51,6 +54,8 @@ pub struct BenchConfig {
     pub duration: Duration,
     /// Bytes of a message, [`BYTES_MIN`] to [`BYTES_MAX`].
     pub bytes: usize,
+    /// Where the two ends run.
+    pub cores: Cores,
 }
 
 /// Who carries the messages.
@@ -168,17 +173,22 @@ enum Rig {
 }
 
 impl Rig {
-    fn try_new(carrier: Carrier, config: &BenchConfig, clock: Clock) -> Result<Self, BenchError> {
+    fn try_new(
+        carrier: Carrier,
+        config: &BenchConfig,
+        places: &Places,
+        clock: Clock,
+    ) -> Result<Self, BenchError> {
         Ok(match carrier {
             Carrier::Control => Self::Control(Control::try_new(clock)?),
-            carried => Self::Carried(Box::new(Carried::try_new(carried, config, clock)?)),
+            carried => Self::Carried(Box::new(Carried::try_new(carried, config, places, clock)?)),
         })
     }
 
-    fn turn(&mut self, slice: &Slice) -> Result<Turn, BenchError> {
+    fn turn(&mut self, places: &Places, slice: &Slice) -> Result<Turn, BenchError> {
         match self {
-            Self::Control(control) => control.turn(slice),
-            Self::Carried(carried) => carried.turn(slice),
+            Self::Control(control) => control.turn(places, slice),
+            Self::Carried(carried) => carried.turn(places, slice),
         }
     }
 }
@@ -197,9 +207,10 @@ pub fn run(config: &BenchConfig, stop: impl Fn() -> bool) -> Result<BenchReport,
         return Err(BenchError::Bytes { bytes });
     }
     let clock = Clock::start();
+    let places = Places::new(config.cores);
     let mut rigs = Vec::new();
     for carrier in Carrier::ALL {
-        rigs.push((carrier, Rig::try_new(carrier, config, clock)?));
+        rigs.push((carrier, Rig::try_new(carrier, config, &places, clock)?));
     }
     let mut ledger = Ledger::try_new()?;
     let mut numbers = 0..;
@@ -210,7 +221,7 @@ pub fn run(config: &BenchConfig, stop: impl Fn() -> bool) -> Result<BenchReport,
                 let number = numbers.next().unwrap_or_default();
                 let start = clock.now() + LEAD;
                 let slice = Slice::new(number, flow, config, start);
-                turns.push((*carrier, flow, rig.turn(&slice)?));
+                turns.push((*carrier, flow, rig.turn(&places, &slice)?));
             }
         }
         // nobody always follows the same one
@@ -227,7 +238,7 @@ pub fn run(config: &BenchConfig, stop: impl Fn() -> bool) -> Result<BenchReport,
     loop {
         round(&mut rigs, Some(&mut ledger))?;
         if clock.now() >= end || stop() {
-            return Ok(ledger.report(config));
+            return Ok(ledger.report(config, places.cores()));
         }
     }
 }

@@ -98,11 +98,22 @@ impl fmt::Display for RealTime {
     }
 }
 
+/// Lets the calling thread run only where nobody else wants to (`SCHED_IDLE`); every host permits it.
+///
+/// # Errors
+/// A sandbox forbids the call.
+pub fn yield_to_all() -> io::Result<()> {
+    set_policy(libc::SCHED_IDLE, 0)
+}
+
 fn set_fifo() -> io::Result<()> {
+    set_policy(libc::SCHED_FIFO | libc::SCHED_RESET_ON_FORK, PRIORITY)
+}
+
+fn set_policy(policy: libc::c_int, priority: u8) -> io::Result<()> {
     let parameters = libc::sched_param {
-        sched_priority: libc::c_int::from(PRIORITY),
+        sched_priority: libc::c_int::from(priority),
     };
-    let policy = libc::SCHED_FIFO | libc::SCHED_RESET_ON_FORK;
     #[allow(unsafe_code, reason = "no safe wrapper of this call exists")]
     // SAFETY: process 0 is the calling thread, and the kernel only reads `parameters`, which outlives the
     // call.
@@ -139,6 +150,17 @@ mod tests {
         for name in ["SCHED_FIFO", "locked memory", "timer slack"] {
             assert!(text.contains(name), "{text}");
         }
+    }
+
+    #[test]
+    fn a_thread_can_give_way_to_all_others_and_no_other_thread_does() {
+        #[allow(unsafe_code, reason = "no safe wrapper of this call exists")]
+        // SAFETY: process 0 is the calling thread; nothing is written.
+        let policy = || unsafe { libc::sched_getscheduler(0) };
+        let before = policy();
+        let during = std::thread::spawn(move || yield_to_all().map(|()| policy()));
+        assert_eq!(during.join().unwrap().unwrap(), libc::SCHED_IDLE);
+        assert_eq!(policy(), before);
     }
 
     #[test]

@@ -3,7 +3,6 @@
 use std::future::Future;
 use std::net::{Ipv4Addr, SocketAddr};
 use std::sync::Arc;
-use std::thread;
 use std::time::{Duration, Instant};
 
 use bytes::Bytes;
@@ -21,6 +20,7 @@ use mmt_shared::io::transport::{Connection, Endpoint};
 use mmt_shared::time::Time;
 use quinn::{Runtime, TokioRuntime};
 
+use super::cores::Places;
 use super::slice::{Side, Slice, Turn};
 use super::{BenchConfig, BenchError, Carrier, Flow};
 
@@ -154,6 +154,7 @@ impl Carried {
     pub(super) fn try_new(
         carrier: Carrier,
         config: &BenchConfig,
+        places: &Places,
         clock: Clock,
     ) -> Result<Self, BenchError> {
         let bytes_per_s = 2 * u64::from(config.rate_hz) * (config.bytes + QUIC_OVERHEAD) as u64;
@@ -166,28 +167,17 @@ impl Carried {
         let near = Begun::try_new(carrier, None, traffic)?;
         let address = far.endpoint.local_addr()?;
         let (listening, calling) = (far.endpoint.clone(), near.endpoint.clone());
-        thread::scope(|scope| {
-            let far = scope.spawn(|| far.connected(clock, true, accept(listening)));
-            let near = near.connected(clock, false, connect(calling, address, &identity, traffic));
-            let far = far.join().map_err(|_| BenchError::Panicked)?;
-            Ok(Self {
-                near: near?,
-                far: far?,
-            })
-        })
+        let connecting = connect(calling, address, &identity, traffic);
+        let (near, far) = places.run(
+            || near.connected(clock, false, connecting),
+            || far.connected(clock, true, accept(listening)),
+        )?;
+        Ok(Self { near, far })
     }
 
-    pub(super) fn turn(&mut self, slice: &Slice) -> Result<Turn, BenchError> {
+    pub(super) fn turn(&mut self, places: &Places, slice: &Slice) -> Result<Turn, BenchError> {
         let (near, far) = (&self.near, &self.far);
-        thread::scope(|scope| {
-            let far = scope.spawn(|| far.turn(slice, 0));
-            let near = near.turn(slice, slice.messages);
-            let far = far.join().map_err(|_| BenchError::Panicked)?;
-            Ok(Turn {
-                near: near?,
-                far: far?,
-            })
-        })
+        places.turn(|| near.turn(slice, slice.messages), || far.turn(slice, 0))
     }
 }
 

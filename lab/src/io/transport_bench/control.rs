@@ -2,11 +2,11 @@
 
 use std::io::{self, ErrorKind};
 use std::net::{Ipv4Addr, SocketAddr, UdpSocket};
-use std::thread;
 use std::time::Duration;
 
 use mmt_shared::io::clock::{Clock, thread_cpu_time};
 
+use super::cores::Places;
 use super::slice::{Side, Slice, Turn};
 use super::{BYTES_MAX, BenchError, Flow};
 
@@ -32,20 +32,12 @@ impl Control {
         Ok(Self { clock, near, far })
     }
 
-    pub(super) fn turn(&mut self, slice: &Slice) -> Result<Turn, BenchError> {
+    pub(super) fn turn(&mut self, places: &Places, slice: &Slice) -> Result<Turn, BenchError> {
         let this = &*self;
-        thread::scope(|scope| {
-            let far = scope.spawn(|| this.far(slice));
-            let near = this.near(slice);
-            let far = far.join().map_err(|_| BenchError::Panicked)?;
-            Ok(Turn {
-                near: near?,
-                far: far?,
-            })
-        })
+        places.turn(|| this.near(slice), || this.far(slice))
     }
 
-    fn near(&self, slice: &Slice) -> io::Result<Side> {
+    fn near(&self, slice: &Slice) -> Result<Side, BenchError> {
         let mut side = Side::new();
         let before = thread_cpu_time();
         for k in 0..slice.messages {
@@ -74,7 +66,7 @@ impl Control {
         Ok(())
     }
 
-    fn far(&self, slice: &Slice) -> io::Result<Side> {
+    fn far(&self, slice: &Slice) -> Result<Side, BenchError> {
         let mut side = Side::new();
         let before = thread_cpu_time();
         while self.clock.now() < slice.end() {

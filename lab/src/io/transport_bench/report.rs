@@ -7,7 +7,7 @@ use std::time::Duration;
 use serde::Serialize;
 
 use super::slice::{Sum, Turn};
-use super::{BenchConfig, BenchError, Carrier, Flow};
+use super::{BenchConfig, BenchError, Carrier, Cores, Flow};
 use crate::table::{Cell, Table};
 
 /// IPv4 and UDP headers, bytes (RFC 791, RFC 768).
@@ -58,11 +58,13 @@ impl Ledger {
         }
     }
 
-    pub(super) fn report(&self, config: &BenchConfig) -> BenchReport {
+    pub(super) fn report(&self, config: &BenchConfig, cores: Cores) -> BenchReport {
         let mut rows = Table::new(
             format!(
-                "{} messages a second of {} bytes over loopback; cpu, packets and bytes for each message, both sides",
-                config.rate_hz, config.bytes
+                "{} messages a second of {} bytes over loopback, {}; cpu, packets and bytes for each message, both sides",
+                config.rate_hz,
+                config.bytes,
+                cores.words()
             ),
             &COLUMNS,
         );
@@ -73,6 +75,7 @@ impl Ledger {
         BenchReport {
             rate_hz: config.rate_hz,
             bytes: config.bytes,
+            cores: cores.name(),
             rows,
             targets: self.targets(config),
         }
@@ -152,6 +155,8 @@ pub struct BenchReport {
     pub rate_hz: u32,
     /// Bytes of a message.
     pub bytes: usize,
+    /// Where the two ends ran: the name of [`Cores`].
+    pub cores: &'static str,
     /// A row for each carrier and flow.
     pub rows: Table,
     /// The targets.
@@ -174,6 +179,7 @@ mod tests {
         rate_hz: 1000,
         duration: Duration::from_secs(1),
         bytes: 100,
+        cores: Cores::Own,
     };
 
     /// 100 messages one way, each of which took so long, with so many packets.
@@ -198,7 +204,7 @@ mod tests {
         ledger.add(Carrier::Control, Flow::OneWay, &turn(10, 100));
         ledger.add(Carrier::RawUdp, Flow::OneWay, &turn(16, 100));
         ledger.add(Carrier::Quic, Flow::OneWay, quic);
-        ledger.report(config)
+        ledger.report(config, Cores::Own)
     }
 
     fn verdicts(report: &BenchReport) -> Vec<String> {
@@ -250,7 +256,7 @@ mod tests {
 
     #[test]
     fn nothing_measured_is_absent_and_no_zero() {
-        let empty = Ledger::try_new().unwrap().report(&CONFIG);
+        let empty = Ledger::try_new().unwrap().report(&CONFIG, Cores::Own);
         assert_eq!(verdicts(&empty), ["not measured"; 3]);
         let json = serde_json::to_value(&empty).unwrap();
         assert!(json["rows"][0]["p50_us"].is_null());

@@ -11,6 +11,7 @@ fn short(bytes: usize) -> Value {
         rate_hz: 500,
         duration: Duration::from_millis(1),
         bytes,
+        cores: Cores::Own,
     };
     let asked = Cell::new(0);
     let stop = || {
@@ -49,6 +50,7 @@ fn what_cannot_be_measured_is_refused_with_the_range() {
         rate_hz: 0,
         duration: Duration::from_millis(1),
         bytes: 100,
+        cores: Cores::Own,
     };
     let text = run(&config, || true).unwrap_err().to_string();
     assert!(text.contains("10000"), "{text}");
