@@ -310,6 +310,12 @@ fn draw_marks(
     Ok(())
 }
 
+/// A label with room behind it: plotters counts 0.46 of the font's size for a letter, and fonts take up to 0.55.
+fn roomy(label: &str) -> String {
+    let room = label.chars().count().div_ceil(5);
+    format!("{label}{:room$}", "")
+}
+
 fn draw_legend<'a, 'b: 'a>(chart: &mut Chart<'a, 'b>, panel: &Panel) -> Result<(), String> {
     let position = match panel.legend {
         Legend::None => return Ok(()),
@@ -329,7 +335,7 @@ fn draw_legend<'a, 'b: 'a>(chart: &mut Chart<'a, 'b>, panel: &Panel) -> Result<(
         chart
             .draw_series(LineSeries::new(nobody, colour))
             .map_err(told)?
-            .label(&series.label)
+            .label(roomy(&series.label))
             .legend(move |(x, y)| Symbol {
                 at: (x + 13, y),
                 mark,

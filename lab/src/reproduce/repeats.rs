@@ -263,8 +263,12 @@ fn figure(cases: &[Case], runs: &[&[Measured]]) -> Figure {
             Series::line(&case.repeats.to_string(), colour, exceeded(times(runs)))
                 .stroked(stroke, 2)
         });
+        let title = match loss.words() {
+            "" => "no loss",
+            words => words,
+        };
         Panel::new(
-            format!("loss {}", loss.name()),
+            title,
             Axis::linear("time from sent to known, ms").over(0.0..400.0),
             Axis::log("share of updates that took longer").over(5e-4..1.0),
             series,
