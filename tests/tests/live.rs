@@ -163,8 +163,8 @@ fn auto_feels_the_tool_while_the_path_is_short_and_the_model_when_it_has_become_
         ("/messages/down/tools", 1000.0, 14_000.0),
         ("/passivity/observer_min_j", -1e-3, 0.0),
         ("/passivity/energy_injected_j", 0.0, 1e-9),
+        // how often contact breaks is the busy host's too: virtual time holds that
         ("/pushes/completed", 1.0, 4.0),
-        ("/pushes/contact_breaks_per_push", 0.0, 3.0),
     ] {
         let value = number(&report, path);
         let value = value.unwrap_or_else(|| panic!("{path} is {:?}", report.pointer(path)));
