@@ -131,6 +131,9 @@ pub enum BenchError {
     /// The system gave no socket, thread or descriptor, or took one back.
     #[error("the operating system: {0}")]
     System(#[from] io::Error),
+    /// The ends cannot have cores of their own.
+    #[error("no core for each end: {0}; measure with --cores any")]
+    Cores(#[source] io::Error),
     /// The socket cannot be counted.
     #[error(transparent)]
     Meter(#[from] WrapError),
@@ -207,7 +210,7 @@ pub fn run(config: &BenchConfig, stop: impl Fn() -> bool) -> Result<BenchReport,
         return Err(BenchError::Bytes { bytes });
     }
     let clock = Clock::start();
-    let places = Places::new(config.cores);
+    let places = Places::try_new(config.cores)?;
     let mut rigs = Vec::new();
     for carrier in Carrier::ALL {
         rigs.push((carrier, Rig::try_new(carrier, config, &places, clock)?));

@@ -4,8 +4,9 @@
 //! message waits until its sender sleeps, which no message between two hosts does. On two cores that sleep, their waking
 //! hides what is measured.
 
-use std::sync::Arc;
+use std::io;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, mpsc};
 use std::thread::{self, JoinHandle};
 
 use mmt_shared::io::realtime::yield_to_all;
@@ -54,7 +55,10 @@ pub(super) struct Places {
 
 impl Places {
     /// The first two cores that the calling thread may use, or none of their own.
-    pub(super) fn new(cores: Cores) -> Self {
+    ///
+    /// # Errors
+    /// There are two, and the system does not let them be kept awake.
+    pub(super) fn try_new(cores: Cores) -> Result<Self, BenchError> {
         let mut places = Self {
             near: None,
             far: None,
@@ -65,12 +69,14 @@ impl Places {
             (places.near, places.far) = (Some(near), Some(far));
             for core in [near, far] {
                 let over = Arc::clone(&places.over);
-                places
-                    .awake
-                    .push(thread::spawn(move || keep_awake(&core, &over)));
+                let (tell, told) = mpsc::sync_channel(1);
+                let awake = move || keep_awake(&core, &over, &tell);
+                places.awake.push(thread::spawn(awake));
+                let is_awake = told.recv().map_err(|_| BenchError::Panicked)?;
+                is_awake.map_err(BenchError::Cores)?;
             }
         }
-        places
+        Ok(places)
     }
 
     /// What they really are.
@@ -88,8 +94,20 @@ impl Places {
         far: impl FnOnce() -> Result<F, BenchError> + Send,
     ) -> Result<(N, F), BenchError> {
         thread::scope(|scope| {
-            let near = scope.spawn(|| stay(self.near.as_ref()).and_then(|()| near()));
-            let far = scope.spawn(|| stay(self.far.as_ref()).and_then(|()| far()));
+            let near = scope.spawn(|| {
+                self.near
+                    .as_ref()
+                    .map_or(Ok(()), stay)
+                    .map_err(BenchError::Cores)?;
+                near()
+            });
+            let far = scope.spawn(|| {
+                self.far
+                    .as_ref()
+                    .map_or(Ok(()), stay)
+                    .map_err(BenchError::Cores)?;
+                far()
+            });
             let near = near.join().map_err(|_| BenchError::Panicked)?;
             let far = far.join().map_err(|_| BenchError::Panicked)?;
             Ok((near?, far?))
@@ -128,23 +146,19 @@ fn first_two() -> Option<(CpuSet, CpuSet)> {
     Some((only(usable.next()?), only(usable.next()?)))
 }
 
-/// Keeps the calling thread on `core`, if there is one.
-fn stay(core: Option<&CpuSet>) -> Result<(), BenchError> {
-    match core {
-        Some(core) => {
-            sched_setaffinity(None, core).map_err(|errno| BenchError::System(errno.into()))
-        }
-        None => Ok(()),
-    }
+/// Keeps the calling thread on `core`.
+fn stay(core: &CpuSet) -> io::Result<()> {
+    Ok(sched_setaffinity(None, core)?)
 }
 
-/// Spins on `core` while nobody else wants it. A thread that cannot give way to all others does not spin.
-fn keep_awake(core: &CpuSet, over: &AtomicBool) {
-    if stay(Some(core)).is_err() || yield_to_all().is_err() {
-        return;
-    }
-    while !over.load(Ordering::Relaxed) {
-        std::hint::spin_loop();
+/// Spins on `core` while nobody else wants it, once it has told that it can give way to all others.
+fn keep_awake(core: &CpuSet, over: &AtomicBool, tell: &mpsc::SyncSender<io::Result<()>>) {
+    let able = stay(core).and_then(|()| yield_to_all());
+    let spins = able.is_ok();
+    if tell.send(able).is_ok() && spins {
+        while !over.load(Ordering::Relaxed) {
+            std::hint::spin_loop();
+        }
     }
 }
 
@@ -163,7 +177,7 @@ mod tests {
     #[test]
     fn each_end_has_its_core_and_the_caller_keeps_its_own() {
         let before = mine().unwrap();
-        let places = Places::new(Cores::Own);
+        let places = Places::try_new(Cores::Own).unwrap();
         let (near, far) = places.run(mine, mine).unwrap();
         match before.as_slice() {
             [first, second, ..] => {
@@ -178,10 +192,18 @@ mod tests {
 
     #[test]
     fn left_to_the_kernel_they_may_run_anywhere() {
-        let places = Places::new(Cores::Any);
+        let places = Places::try_new(Cores::Any).unwrap();
         let (near, far) = places.run(mine, mine).unwrap();
         assert_eq!((&near, &far), (&mine().unwrap(), &mine().unwrap()));
         assert!(places.awake.is_empty());
         assert_eq!(places.cores(), Cores::Any);
+    }
+
+    #[test]
+    fn a_core_that_cannot_be_had_is_told_with_what_to_do() {
+        let mut places = Places::try_new(Cores::Any).unwrap();
+        places.far = Some(CpuSet::new());
+        let error = places.run(mine, mine).unwrap_err().to_string();
+        assert!(error.contains("--cores any"), "{error}");
     }
 }
