@@ -154,7 +154,7 @@ fn auto_feels_the_tool_while_the_path_is_short_and_the_model_when_it_has_become_
         ("/architecture/switches", 2.0, 4.0),
         ("/architecture/tool_share", 0.1, 0.7),
         // what the limiter lets through: on a busy host TDPA's own corrections on the longer path, while it fades out, have
-        // been that large. Of the fade itself virtual time allows 40 mN
+        // been that large. Virtual time holds it to 0.7 N, a first touch in a fade
         ("/architecture/fade_step_max_n", 0.0, 2.0),
         // both ways and the play-out
         ("/architecture/round_trip_ms", 120.0, 300.0),
