@@ -64,3 +64,21 @@ fn panels_that_look_alike_share_the_legend_of_the_first() {
     let none = Figure::of_alike([], Legend::LowerLeft, 2, (100, 100));
     assert!(none.panels.is_empty());
 }
+
+/// Width of the legend's background, pixels.
+fn legend_width(label: &str) -> f64 {
+    let dots = vec![Dot::at(1.0, 2.0), Dot::at(10.0, 1.0)];
+    let mut figure = figure(Vec::new());
+    figure.panels[0].series = vec![Series::line(label, Colour::Blue, dots)];
+    let svg = figure.draw("a").unwrap();
+    let box_of_legend = svg.lines().find(|line| line.contains("opacity=\"0.85\""));
+    let (_, width) = box_of_legend.unwrap().split_once("width=\"").unwrap();
+    width.split_once('"').unwrap().0.parse().unwrap()
+}
+
+#[test]
+fn the_legend_has_room_for_letters_half_as_wide_as_the_font_is_high() {
+    let letters = legend_width(&"n".repeat(30)) - legend_width(&"n".repeat(10));
+    // of 13 pixels
+    assert!(letters >= 20.0 * 6.5, "{letters}");
+}

@@ -1,7 +1,7 @@
-//! Real-time scheduling and memory locking for a loop thread, where the host permits them.
+//! How the host schedules a thread: real time and locked memory for a loop, where it permits them, or behind all others.
 //!
 //! The small OS file: the only one with `unsafe`, because no safe wrapper of `sched_setscheduler` exists.
-//! Nothing here fails the program: what was not obtained is reported with the reason and the remedy. A
+//! What a loop asks for never fails the program: what was not obtained is reported with the reason and the remedy. A
 //! thread under `SCHED_FIFO` must never spin: it would starve the host and be throttled.
 
 use std::fmt;

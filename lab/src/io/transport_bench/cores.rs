@@ -94,20 +94,8 @@ impl Places {
         far: impl FnOnce() -> Result<F, BenchError> + Send,
     ) -> Result<(N, F), BenchError> {
         thread::scope(|scope| {
-            let near = scope.spawn(|| {
-                self.near
-                    .as_ref()
-                    .map_or(Ok(()), stay)
-                    .map_err(BenchError::Cores)?;
-                near()
-            });
-            let far = scope.spawn(|| {
-                self.far
-                    .as_ref()
-                    .map_or(Ok(()), stay)
-                    .map_err(BenchError::Cores)?;
-                far()
-            });
+            let near = scope.spawn(|| placed(self.near.as_ref(), near));
+            let far = scope.spawn(|| placed(self.far.as_ref(), far));
             let near = near.join().map_err(|_| BenchError::Panicked)?;
             let far = far.join().map_err(|_| BenchError::Panicked)?;
             Ok((near?, far?))
@@ -144,6 +132,15 @@ fn first_two() -> Option<(CpuSet, CpuSet)> {
         set
     };
     Some((only(usable.next()?), only(usable.next()?)))
+}
+
+/// Runs an end on its core, if it has one.
+fn placed<T>(
+    core: Option<&CpuSet>,
+    end: impl FnOnce() -> Result<T, BenchError>,
+) -> Result<T, BenchError> {
+    core.map_or(Ok(()), stay).map_err(BenchError::Cores)?;
+    end()
 }
 
 /// Keeps the calling thread on `core`.
@@ -183,6 +180,8 @@ mod tests {
             [first, second, ..] => {
                 assert_eq!(places.cores(), Cores::Own);
                 assert_eq!((near, far), (vec![*first], vec![*second]));
+                let awake = places.awake.iter().filter(|thread| !thread.is_finished());
+                assert_eq!(awake.count(), 2, "they stay awake until the end");
             }
             _ => assert_eq!(places.cores(), Cores::Any),
         }
