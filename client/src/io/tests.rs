@@ -4,12 +4,13 @@ use std::time::Duration;
 
 use mmt_netem::LinkConfig;
 use mmt_shared::contact::Coupling;
-use mmt_shared::geometry::{Twist, Vec2};
+use mmt_shared::geometry::{Pose, Twist, Vec2};
 use mmt_shared::io::connect::ConnectError;
 use mmt_shared::io::transport::Transport;
+use mmt_shared::link_end::Outgoing;
 use mmt_shared::pairing::{Pin, Token};
 use mmt_shared::params::{ModelParams, ModelState};
-use mmt_shared::time::TICK;
+use mmt_shared::time::{TICK, Time};
 use mmt_shared::wire::{
     Architecture, Cause, Ending, ForceTotals, Identified, Refusal, SlaveTotals,
 };
@@ -282,6 +283,35 @@ async fn a_stop_in_the_session_releases_the_hand_and_says_farewell() {
     let last = *master.live.borrow_and_update();
     assert_eq!(last.ended, Some(SessionEnd::Stopped));
     assert_eq!(last.hand_force, Vec2::zeros());
+}
+
+#[tokio::test]
+async fn who_asks_for_scenes_sees_the_last_that_came_and_how_old_it_is() {
+    let fake = Fake::new();
+    let mut options = scripted(&fake);
+    options.duration = None;
+    options.scene_hz = 20;
+    let mut master = start(options, PATIENCE);
+    let mut slave = Session::welcomed(&fake).await;
+    assert_eq!(slave.hello.scene_hz, 20);
+    assert_eq!(master.live.borrow_and_update().scene, None);
+    slave.serve_for(Duration::from_millis(100)).await;
+    let scene = Scene {
+        answers: Time::from_nanos(slave.stamps[0]),
+        object: Pose::new(0.1, 0.2, 0.3),
+        tool: Vec2::new(-0.2, 0.0),
+        force: Vec2::zeros(),
+    };
+    slave.tell(Outgoing::Scene(&scene));
+    slave.serve_for(Duration::from_millis(100)).await;
+    master.stop.send_replace(true);
+    slave.serve().await;
+    slave.say_farewell(Ending::Interrupted, totals()).await;
+    master.end().await.unwrap();
+    let last = *master.live.borrow_and_update();
+    assert_eq!(last.scene, Some(scene));
+    // since the sample that it answers, not since it came
+    assert!(last.scene_age_s > Some(0.15), "{:?}", last.scene_age_s);
 }
 
 #[tokio::test]

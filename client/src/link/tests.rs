@@ -1,6 +1,7 @@
 //! What a command holds: news, repeats, and what congestion leaves of both.
 
 use super::*;
+use mmt_shared::geometry::{Pose, Vec2};
 use mmt_shared::time::TICK;
 use mmt_shared::wire::{DATAGRAM_MAX, HipCounts};
 
@@ -145,4 +146,32 @@ fn congestion_spaces_the_samples_leaves_the_repeats_out_and_goes() {
     let all = commands(&mut link, 20_000..=20_010);
     assert_eq!(all.last().unwrap().len(), 6, "repeats are back");
     assert_eq!(TICK.as_millis(), 1, "a sample is a tick");
+}
+
+#[test]
+fn what_the_slave_sees_and_what_its_tool_feels_count_only_if_newer_than_all_before() {
+    let scene = Scene {
+        answers: Time::ZERO,
+        object: Pose::default(),
+        tool: Vec2::zeros(),
+        force: Vec2::zeros(),
+    };
+    let tool = Tool {
+        answers: Time::ZERO,
+        force: None,
+        in_contact: false,
+        in_j: 0.0,
+        model_error: 0.1,
+    };
+    for message in [Outgoing::Scene(&scene), Outgoing::Tool(&tool)] {
+        let (mut master, mut slave) = (link(10, 0), LinkEnd::new(Side::Slave, Time::ZERO));
+        let mut seal = || {
+            let mut out = [0; DATAGRAM_MAX];
+            let length = slave.seal(Time::ZERO, message, &mut out).unwrap();
+            out[..length].to_vec()
+        };
+        let (first, second) = (seal(), seal());
+        assert!(master.handle(Time::ZERO, &second).is_some());
+        assert_eq!(master.handle(Time::ZERO, &first), None, "overtaken");
+    }
 }

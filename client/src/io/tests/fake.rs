@@ -201,9 +201,13 @@ impl Session {
             slave_in_contact: false,
             state: state(&self.hello.coupling),
         };
+        self.tell(Outgoing::Update(&update));
+    }
+
+    /// Sends a message on its own datagram.
+    pub(super) fn tell(&mut self, message: Outgoing<'_>) {
         let mut out = [0; DATAGRAM_MAX];
-        let now = self.clock.now();
-        let length = self.link.seal(now, Outgoing::Update(&update), &mut out);
+        let length = self.link.seal(self.clock.now(), message, &mut out);
         let bytes = out[..length.unwrap()].to_vec();
         // a master that has gone does not matter here
         let _ = self.connection.send_datagram(bytes.into());
