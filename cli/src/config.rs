@@ -5,7 +5,7 @@
 use std::path::Path;
 
 use mmt_server::slave::SlaveConfig;
-use mmt_shared::settings::Mode;
+use mmt_shared::model::settings::Mode;
 use toml::{Table, Value};
 
 use crate::failure::Failure;

@@ -14,11 +14,12 @@ use mmt_client::link::{CommandConfig, MasterLink};
 use mmt_client::master::Master;
 use mmt_client::operator::Operator;
 use mmt_client::operator::scripted::{Scripted, ScriptedConfig};
-use mmt_shared::geometry::{BoxFootprint, Pose, Twist, Vec2};
-use mmt_shared::params::{ModelParams, ModelState};
-use mmt_shared::settings::Mode;
+use mmt_shared::model::geometry::{BoxFootprint, Pose, Twist, Vec2};
+use mmt_shared::model::params::{ModelParams, ModelState};
+use mmt_shared::model::settings::Mode;
+use mmt_shared::model::update::{Cause, Update};
 use mmt_shared::time::{TICK, Time};
-use mmt_shared::wire::{Cause, DATAGRAM_MAX, Label, Update, Welcome};
+use mmt_shared::wire::{DATAGRAM_MAX, Label, Welcome};
 
 /// A master and an operator who pushes its model: no slave is needed for the hand to feel something.
 struct Haptic {

@@ -8,9 +8,9 @@ use mmt_shared::bilateral::Baseline;
 use mmt_shared::bilateral::message::{ToMaster, ToSlave};
 use mmt_shared::bilateral::passivity::{PortEnergy, RESERVE_J, impedance_controller};
 use mmt_shared::bilateral::wave::{WaveImpedance, WaveReceiver, WaveSender, WaveSum};
-use mmt_shared::geometry::Vec2;
+use mmt_shared::model::geometry::Vec2;
+use mmt_shared::model::sample::{ForceCounts, HipCounts, HipSample};
 use mmt_shared::time::{TICK_S, Time};
-use mmt_shared::wire::{ForceCounts, HipCounts, HipSample};
 
 use crate::limiter::ForceLimiter;
 

@@ -3,8 +3,8 @@
 //! k_p is per world metre. With a scale s (x_world = s x_device) the hand feels s k_p, and a device's
 //! stiffness limit applies to that. No profile may exceed its device's limits.
 
-use mmt_shared::contact::Coupling;
-use mmt_shared::geometry::Vec2;
+use mmt_shared::model::contact::Coupling;
+use mmt_shared::model::geometry::Vec2;
 use serde::Serialize;
 
 use crate::limiter::Limits;

@@ -6,10 +6,11 @@
 //! wait or allocate; what it blends goes through the limiter.
 
 use mmt_shared::bilateral::passivity::{PortEnergy, RESERVE_J, impedance_controller};
-use mmt_shared::geometry::Vec2;
-use mmt_shared::local_model::{LocalModel, Rendered};
+use mmt_shared::model::geometry::Vec2;
+use mmt_shared::model::local_model::{LocalModel, Rendered};
+use mmt_shared::model::tool::{HandPort, Tool};
 use mmt_shared::time::{TICK_S, Time};
-use mmt_shared::wire::{Architecture, HandPort, Tool};
+use mmt_shared::wire::Architecture;
 
 use crate::choice::{Choice, Chosen};
 

@@ -6,7 +6,7 @@
 
 use std::time::Duration;
 
-use mmt_shared::link_end::HEARTBEAT;
+use mmt_shared::channel::datagram_channel::HEARTBEAT;
 use serde::{Deserialize, Serialize};
 
 /// Two heartbeats missed and some jitter: shown, nothing else.

@@ -3,7 +3,7 @@
 //! It must never let out more than F_max, a change of more than S_max a tick, a number that is not
 //! finite, or, once released, a force that grows.
 
-use mmt_shared::geometry::Vec2;
+use mmt_shared::model::geometry::Vec2;
 use serde::{Deserialize, Serialize};
 
 /// Ticks of the ramp in after engaging and out after releasing: 200 ms. Long enough not to startle,

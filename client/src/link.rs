@@ -3,15 +3,15 @@
 //! Pure. An update passes the sequence window and `accept` here or never reaches the model. A sample is never sent
 //! in another form than it was first.
 
-use mmt_shared::contact::Coupling;
-use mmt_shared::link_end::{LinkEnd, Outgoing, SealError};
-use mmt_shared::peer::{Freshness, SequenceWindow};
-use mmt_shared::rate_control::StretchMax;
+use mmt_shared::channel::datagram_channel::{LinkEnd, Outgoing, SealError};
+use mmt_shared::channel::peer::{Freshness, SequenceWindow};
+use mmt_shared::channel::rate_control::StretchMax;
+use mmt_shared::model::contact::Coupling;
+use mmt_shared::model::sample::HipSample;
+use mmt_shared::model::tool::{HandPort, Scene, Tool};
+use mmt_shared::model::update::Update;
 use mmt_shared::time::Time;
-use mmt_shared::wire::{
-    Command, HandPort, HipSample, Matter, SAMPLES_MAX, SampleBlock, Scene, Side, Tool, Update,
-    UpdateDrops,
-};
+use mmt_shared::wire::{Command, Matter, SAMPLES_MAX, SampleBlock, Side, UpdateDrops};
 use serde::{Deserialize, Serialize};
 
 /// Most ticks from one packed sample to the next: play-out takes its velocity from samples of 5 ms.

@@ -7,12 +7,13 @@ mod port;
 
 use std::time::Duration;
 
-use mmt_shared::geometry::Vec2;
-use mmt_shared::local_model::{LocalModel, Rendered};
+use mmt_shared::model::geometry::Vec2;
+use mmt_shared::model::local_model::{LocalModel, Rendered};
+use mmt_shared::model::sample::{ForceCounts, HipCounts, HipSample};
+use mmt_shared::model::tool::{HandPort, Tool};
+use mmt_shared::model::update::Update;
 use mmt_shared::time::Time;
-use mmt_shared::wire::{
-    Architecture, ForceCounts, HandPort, HipCounts, HipSample, Tool, Update, Welcome,
-};
+use mmt_shared::wire::{Architecture, Welcome};
 
 use crate::either::Either;
 use crate::failsafe::LinkState;
@@ -227,11 +228,12 @@ mod tests {
     use super::*;
     use crate::failsafe::RELEASE;
     use crate::limiter::Limits;
-    use mmt_shared::contact::Coupling;
-    use mmt_shared::geometry::{BoxFootprint, Pose, Twist};
-    use mmt_shared::params::{ModelParams, ModelState};
-    use mmt_shared::settings::Mode;
-    use mmt_shared::wire::{Cause, Label};
+    use mmt_shared::model::contact::Coupling;
+    use mmt_shared::model::geometry::{BoxFootprint, Pose, Twist};
+    use mmt_shared::model::params::{ModelParams, ModelState};
+    use mmt_shared::model::settings::Mode;
+    use mmt_shared::model::update::Cause;
+    use mmt_shared::wire::Label;
 
     fn welcome() -> Welcome {
         let coupling = Coupling::for_stiffness(1000.0);

@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use mmt_netem::trace::Sample;
 use mmt_netem::trace::path::PathTrace;
-use mmt_shared::peer::Peer;
+use mmt_shared::channel::peer::Peer;
 use mmt_shared::time::Time;
 
 /// The most samples kept: ten hours at the 25 a second of an ordinary session. What comes later is left out.

@@ -17,7 +17,7 @@ use mmt_client::operator::scripted::{Phase, Picture};
 use mmt_server::playout::PlayoutBuffer;
 use mmt_shared::bilateral::Baseline;
 use mmt_shared::bilateral::message::OVERHEAD_BYTES;
-use mmt_shared::settings::{ModelSettings, PoseCorrection};
+use mmt_shared::model::settings::{ModelSettings, PoseCorrection};
 use mmt_shared::wire;
 use serde::Serialize;
 

@@ -12,8 +12,8 @@ mod motion;
 mod reference;
 
 use mmt_server::environment::{Environment, EnvironmentConfig, EnvironmentError};
-use mmt_shared::contact::Coupling;
-use mmt_shared::params::{GRAVITY, friction_torque_of_square, inertia_of_square};
+use mmt_shared::model::contact::Coupling;
+use mmt_shared::model::params::{GRAVITY, friction_torque_of_square, inertia_of_square};
 use serde::{Deserialize, Serialize};
 
 use motion::{Kind, Motion, Run};

@@ -11,10 +11,10 @@ use std::time::Duration;
 
 use mmt_server::environment::{Environment, EnvironmentError};
 use mmt_server::slave::SlaveTick;
-use mmt_shared::geometry::Vec2;
 use mmt_shared::metrics::{ForceSummary, UpdateCounts};
+use mmt_shared::model::geometry::Vec2;
+use mmt_shared::model::update::Cause;
 use mmt_shared::time::TICK_S;
-use mmt_shared::wire::Cause;
 use serde::{Deserialize, Serialize};
 
 use crate::world::{Traffic, World, WorldConfig, WorldError, WorldTick};

@@ -20,14 +20,15 @@ use mmt_server::environment::Environment;
 use mmt_server::link::SlaveLink;
 use mmt_server::slave::{Slave, SlaveTick};
 use mmt_shared::bilateral::message::OVERHEAD_BYTES;
-use mmt_shared::contact::Coupling;
-use mmt_shared::geometry::Vec2;
 use mmt_shared::metrics::{
     AgeOfInformation, ContactBreaks, ForcePeak, ForceSummary, PoseError, Staleness, UpdateCounts,
 };
+use mmt_shared::model::contact::Coupling;
+use mmt_shared::model::geometry::Vec2;
+use mmt_shared::model::update::Update;
 use mmt_shared::report::{MessagesReport, UpDown, WireReport};
 use mmt_shared::time::{TICK, Time};
-use mmt_shared::wire::{DATAGRAM_MAX, Label, Update, Welcome};
+use mmt_shared::wire::{DATAGRAM_MAX, Label, Welcome};
 use sha2::{Digest, Sha256};
 
 use crate::digest::hex;

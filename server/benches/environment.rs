@@ -5,7 +5,7 @@
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use mmt_server::environment::{Environment, EnvironmentConfig};
-use mmt_shared::geometry::Vec2;
+use mmt_shared::model::geometry::Vec2;
 use std::hint::black_box;
 use std::time::Duration;
 

@@ -9,10 +9,10 @@ use std::time::Duration;
 use criterion::{Criterion, criterion_group, criterion_main};
 use mmt_server::estimator::{Estimator, EstimatorConfig, Measured, Seen};
 use mmt_server::trigger::{Trigger, TriggerConfig, TriggerInput};
-use mmt_shared::contact::Coupling;
-use mmt_shared::geometry::Vec2;
-use mmt_shared::params::ModelParams;
-use mmt_shared::settings::Mode;
+use mmt_shared::model::contact::Coupling;
+use mmt_shared::model::geometry::Vec2;
+use mmt_shared::model::params::ModelParams;
+use mmt_shared::model::settings::Mode;
 use mmt_shared::time::{TICK_S, Time};
 
 const TICKS: usize = 4000;

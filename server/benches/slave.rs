@@ -9,12 +9,12 @@ use std::time::Duration;
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use mmt_server::slave::{Slave, SlaveConfig};
-use mmt_shared::contact::Coupling;
-use mmt_shared::geometry::Vec2;
-use mmt_shared::local_model::LocalModel;
-use mmt_shared::settings::Mode;
+use mmt_shared::model::contact::Coupling;
+use mmt_shared::model::geometry::Vec2;
+use mmt_shared::model::local_model::LocalModel;
+use mmt_shared::model::sample::{ForceCounts, HipCounts, HipSample};
+use mmt_shared::model::settings::Mode;
 use mmt_shared::time::{TICK, Time};
-use mmt_shared::wire::{ForceCounts, HipCounts, HipSample};
 
 /// Ticks of one push, before everything begins anew.
 const TICKS: u32 = 4000;

@@ -16,11 +16,11 @@ use mmt_shared::bilateral::deadband::PerceptualDeadband;
 use mmt_shared::bilateral::message::{ToMaster, ToSlave};
 use mmt_shared::bilateral::passivity::PortEnergy;
 use mmt_shared::bilateral::wave::{WaveReceiver, WaveSender, WaveSum};
-use mmt_shared::contact::Coupling;
-use mmt_shared::geometry::{Pose, Vec2};
 use mmt_shared::metrics::ForceMetrics;
+use mmt_shared::model::contact::Coupling;
+use mmt_shared::model::geometry::{Pose, Vec2};
+use mmt_shared::model::sample::ForceCounts;
 use mmt_shared::time::{TICK_S, Time};
-use mmt_shared::wire::ForceCounts;
 
 use crate::environment::{Environment, EnvironmentConfig};
 use crate::playout::{Played, PlayoutBuffer};

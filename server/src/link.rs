@@ -6,11 +6,14 @@ pub use repeats::{REPEATS_MAX, Repeats, RepeatsError};
 
 use std::time::Duration;
 
-use mmt_shared::link_end::{HEARTBEAT, LinkEnd, Outgoing, SealError};
+use mmt_shared::channel::datagram_channel::{HEARTBEAT, LinkEnd, Outgoing, SealError};
+use mmt_shared::channel::rate_control::StretchMax;
 use mmt_shared::metrics::UpdateCounts;
-use mmt_shared::rate_control::StretchMax;
+use mmt_shared::model::sample::HipSample;
+use mmt_shared::model::tool::{Scene, Tool};
+use mmt_shared::model::update::Update;
 use mmt_shared::time::Time;
-use mmt_shared::wire::{Architecture, Command, HipSample, Matter, Scene, Side, Tool, Update};
+use mmt_shared::wire::{Architecture, Command, Matter, Side};
 
 use repeats::Repeating;
 

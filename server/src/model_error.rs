@@ -2,8 +2,8 @@
 //!
 //! It holds the measured force against the shadow's for the same HIP sample. It must never see the truth.
 
-use mmt_shared::geometry::Vec2;
 use mmt_shared::metrics::F_MIN_N;
+use mmt_shared::model::geometry::Vec2;
 use mmt_shared::time::TICK_S;
 
 /// Memory, s of contact: a third of a push.

@@ -16,10 +16,10 @@ pub use config::{PlayoutConfig, PlayoutError};
 use std::collections::VecDeque;
 use std::time::Duration;
 
-use mmt_shared::geometry::Vec2;
-use mmt_shared::peer::Histogram;
+use mmt_shared::channel::peer::Histogram;
+use mmt_shared::model::geometry::Vec2;
+use mmt_shared::model::sample::HipSample;
 use mmt_shared::time::{TICK, Time};
-use mmt_shared::wire::message::HipSample;
 use serde::{Deserialize, Serialize};
 
 use clock::SenderClock;

@@ -8,11 +8,13 @@
 mod stand_in;
 mod turning;
 
-use mmt_shared::contact::Coupling;
-use mmt_shared::dynamics::Motion;
-use mmt_shared::geometry::{BoxFootprint, Face, Pose, Twist, Vec2, cross, rotate, wrap_angle};
-use mmt_shared::params::{FACE_OFFSET_M, ModelParams};
-use mmt_shared::settings::FrictionLaw;
+use mmt_shared::model::contact::Coupling;
+use mmt_shared::model::dynamics::Motion;
+use mmt_shared::model::geometry::{
+    BoxFootprint, Face, Pose, Twist, Vec2, cross, rotate, wrap_angle,
+};
+use mmt_shared::model::params::{FACE_OFFSET_M, ModelParams};
+use mmt_shared::model::settings::FrictionLaw;
 use mmt_shared::time::{TICK_S, Time};
 
 use crate::sensing::VisionSample;

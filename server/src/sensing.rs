@@ -7,7 +7,7 @@
 
 use std::collections::VecDeque;
 
-use mmt_shared::geometry::{Pose, Vec2};
+use mmt_shared::model::geometry::{Pose, Vec2};
 use mmt_shared::range::{OutOfRange, in_range};
 use mmt_shared::rng::Substream;
 use mmt_shared::time::Time;

@@ -8,12 +8,13 @@
 use std::collections::VecDeque;
 use std::time::Duration;
 
-use mmt_shared::geometry::Vec2;
-use mmt_shared::local_model::{LocalModel, Rendered};
-use mmt_shared::params::ModelState;
-use mmt_shared::settings::ModelSettings;
+use mmt_shared::model::geometry::Vec2;
+use mmt_shared::model::local_model::{LocalModel, Rendered};
+use mmt_shared::model::params::ModelState;
+use mmt_shared::model::sample::HipSample;
+use mmt_shared::model::settings::ModelSettings;
+use mmt_shared::model::update::{Cause, Update};
 use mmt_shared::time::{TICK, Time};
-use mmt_shared::wire::{Cause, HipSample, Update};
 use serde::{Deserialize, Serialize};
 
 /// Updates that may be on their way: a round trip of 4 s with one per sample.

@@ -3,14 +3,16 @@
 //! Play-out, environment, sensing, pose and parameters, shadow, trigger. Pure: the time is an argument,
 //! the seed comes with the configuration, and what it returns is all that it does.
 
-use mmt_shared::contact::Coupling;
-use mmt_shared::correction::{IN_CONTACT, IN_CONTACT_REPLAYED};
-use mmt_shared::geometry::{BoxFootprint, Pose, Twist, Vec2, wrap_angle};
 use mmt_shared::metrics::ForceMetrics;
-use mmt_shared::params::{ModelParams, ModelState, inertia_of_square};
-use mmt_shared::settings::{Mode, ModelSettings, PoseCorrection};
+use mmt_shared::model::contact::Coupling;
+use mmt_shared::model::correction::{IN_CONTACT, IN_CONTACT_REPLAYED};
+use mmt_shared::model::geometry::{BoxFootprint, Pose, Twist, Vec2, wrap_angle};
+use mmt_shared::model::params::{ModelParams, ModelState, inertia_of_square};
+use mmt_shared::model::sample::{ForceCounts, HipSample};
+use mmt_shared::model::settings::{Mode, ModelSettings, PoseCorrection};
+use mmt_shared::model::tool::{HandPort, Scene, Tool};
+use mmt_shared::model::update::{Cause, Update};
 use mmt_shared::time::Time;
-use mmt_shared::wire::{Cause, ForceCounts, HandPort, HipSample, Scene, Tool, Update};
 
 use crate::bilateral::ToolPort;
 use crate::environment::{Environment, EnvironmentConfig};

@@ -4,7 +4,7 @@
 //! resists turning by `b l²/6`. Friction is summed over the nine places of Gauss and Legendre. It must
 //! never be asked in paper mode, which decouples sliding and turning by (5) and (11).
 
-use mmt_shared::params::ModelParams;
+use mmt_shared::model::params::ModelParams;
 use mmt_shared::time::TICK_S;
 
 /// Turning rate below which the resistance is taken to be proportional to it, rad/s.
@@ -78,11 +78,11 @@ pub fn friction_radius(c: f64, drag: f64, speed: f64, omega: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use mmt_shared::contact::Coupling;
-    use mmt_shared::dynamics::Motion;
-    use mmt_shared::geometry::{Twist, Vec2};
-    use mmt_shared::params::friction_torque_of_square;
-    use mmt_shared::settings::FrictionLaw;
+    use mmt_shared::model::contact::Coupling;
+    use mmt_shared::model::dynamics::Motion;
+    use mmt_shared::model::geometry::{Twist, Vec2};
+    use mmt_shared::model::params::friction_torque_of_square;
+    use mmt_shared::model::settings::FrictionLaw;
 
     const SIDE: f64 = 0.36;
     const COUPLING: Coupling = Coupling {

@@ -4,8 +4,8 @@
 //! a lot. So the part of the tool's way that would raise the contact force above the limit is not gone. Pure: the sensor's
 //! force in, a way out, a tick at a time. It must never shorten the way along the face, and never one that is allowed.
 
-use mmt_shared::contact::Coupling;
-use mmt_shared::geometry::Vec2;
+use mmt_shared::model::contact::Coupling;
+use mmt_shared::model::geometry::Vec2;
 
 /// Default of the limit, N. The hand presses with 8 N at the most (`device`'s profiles), so a tool that does what is felt
 /// stays below it; and it is the bound that outages are held to (15 N after 60 ms, `lab/src/world/tests/hard.rs`).

@@ -5,7 +5,7 @@
 #![allow(clippy::unwrap_used, reason = "tests may panic")]
 
 use mmt_server::environment::{Environment, EnvironmentConfig};
-use mmt_shared::geometry::{Pose, Twist, Vec2};
+use mmt_shared::model::geometry::{Pose, Twist, Vec2};
 
 /// c = mu m g, N.
 const C: f64 = 0.3 * 0.7 * 9.81;

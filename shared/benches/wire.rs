@@ -4,14 +4,16 @@ use criterion::{Criterion, criterion_group, criterion_main};
 use std::hint::black_box;
 use std::time::Duration;
 
-use mmt_shared::contact::Coupling;
-use mmt_shared::geometry::{BoxFootprint, Pose, Twist, Vec2};
-use mmt_shared::params::{ModelParams, ModelState};
-use mmt_shared::peer::Peer;
+use mmt_shared::channel::peer::Peer;
+use mmt_shared::model::contact::Coupling;
+use mmt_shared::model::geometry::{BoxFootprint, Pose, Twist, Vec2};
+use mmt_shared::model::params::{ModelParams, ModelState};
+use mmt_shared::model::sample::{ForceCounts, HipCounts, HipSample};
+use mmt_shared::model::update::{Cause, Update};
 use mmt_shared::time::Time;
 use mmt_shared::wire::{
-    Cause, Command, DATAGRAM_MAX, Datagram, Echo, Envelope, ForceCounts, HipCounts, HipSample,
-    Matter, SampleBlock, Side, Update, decode_datagram, encode_command, encode_update,
+    Command, DATAGRAM_MAX, Datagram, Echo, Envelope, Matter, SampleBlock, Side, decode_datagram,
+    encode_command, encode_update,
 };
 
 const COUPLING: Coupling = Coupling {

@@ -5,24 +5,15 @@
 //! behind the feature of that name.
 
 pub mod bilateral;
-pub mod contact;
-pub mod correction;
-pub mod dynamics;
-pub mod geometry;
-pub mod history;
+pub mod channel;
 #[cfg(feature = "io")]
 pub mod io;
-pub mod link_end;
-pub mod local_model;
 pub mod metrics;
+pub mod model;
 pub mod pairing;
-pub mod params;
-pub mod peer;
 pub mod range;
-pub mod rate_control;
 pub mod recording;
 pub mod report;
 pub mod rng;
-pub mod settings;
 pub mod time;
 pub mod wire;

@@ -11,9 +11,9 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::Command as Process;
 
-use mmt_shared::contact::Coupling;
-use mmt_shared::params::ModelState;
-use mmt_shared::settings::{FrictionLaw, PoseCorrection, Smoothing};
+use mmt_shared::model::contact::Coupling;
+use mmt_shared::model::params::ModelState;
+use mmt_shared::model::settings::{FrictionLaw, PoseCorrection, Smoothing};
 use mmt_shared::wire::*;
 use serde_json::{Value, json};
 

@@ -25,11 +25,13 @@ use mmt_server::playout::{PlayoutBuffer, PlayoutConfig};
 use mmt_server::shadow::Shadow;
 use mmt_server::slave::{Slave, SlaveConfig, SlaveTick};
 use mmt_server::trigger::{Trigger, TriggerConfig, TriggerInput};
-use mmt_shared::geometry::Vec2;
-use mmt_shared::rate_control::StretchMax;
-use mmt_shared::settings::Mode;
+use mmt_shared::channel::rate_control::StretchMax;
+use mmt_shared::model::geometry::Vec2;
+use mmt_shared::model::sample::HipSample;
+use mmt_shared::model::settings::Mode;
+use mmt_shared::model::tool::Tool;
 use mmt_shared::time::{TICK, Time};
-use mmt_shared::wire::{Architecture, Command, DATAGRAM_MAX, HipSample, Label, Tool, Welcome};
+use mmt_shared::wire::{Architecture, Command, DATAGRAM_MAX, Label, Welcome};
 
 /// The system's allocator, with a count of every call that takes memory.
 struct Counting;

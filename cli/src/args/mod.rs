@@ -21,9 +21,9 @@ use mmt_lab::replay::ReplayConfig;
 use mmt_netem::LinkConfig;
 use mmt_server::link::Repeats;
 use mmt_server::trigger::Scheme;
+use mmt_shared::channel::rate_control::StretchMax;
+use mmt_shared::model::settings::Mode;
 use mmt_shared::pairing::{Address, Host};
-use mmt_shared::rate_control::StretchMax;
-use mmt_shared::settings::Mode;
 use mmt_shared::wire::Architecture;
 
 pub(crate) use self::netem::EmulationArguments;

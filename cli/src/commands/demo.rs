@@ -14,8 +14,8 @@ use mmt_server::slave::SlaveConfig;
 use mmt_shared::io::identity::Identity;
 use mmt_shared::io::transport::Transport;
 use mmt_shared::io::truth::{self, TruthReceiver, TruthSender};
+use mmt_shared::model::settings::Mode;
 use mmt_shared::pairing::Pairing;
-use mmt_shared::settings::Mode;
 use mmt_shared::wire::Architecture;
 
 use super::netem::wrap::{Emulation, effect};

@@ -14,8 +14,8 @@ use mmt_client::operator::trace::Trace;
 use mmt_netem::Direction;
 use mmt_netem::io::socket::SocketExtras;
 use mmt_netem::trace::mmt::path_text;
-use mmt_shared::geometry::Vec2;
 use mmt_shared::io::connect::ConnectError;
+use mmt_shared::model::geometry::Vec2;
 use mmt_shared::pairing::Pairing;
 use tokio::sync::watch;
 

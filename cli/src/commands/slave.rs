@@ -172,7 +172,7 @@ fn host_failure(error: &SlaveHostError) -> Failure {
 #[cfg(test)]
 mod tests {
     use clap::Parser;
-    use mmt_shared::settings::Mode;
+    use mmt_shared::model::settings::Mode;
 
     use super::*;
     use crate::args::{Arguments, Command};

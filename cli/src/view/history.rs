@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use mmt_shared::wire::Cause;
+use mmt_shared::model::update::Cause;
 
 use super::Snapshot;
 

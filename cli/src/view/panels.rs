@@ -1,6 +1,6 @@
 //! The dashboard's panels of numbers. What is not known is a dash.
 
-use mmt_shared::wire::Cause;
+use mmt_shared::model::update::Cause;
 use ratatui::text::Line;
 use ratatui::widgets::{Block, Paragraph};
 

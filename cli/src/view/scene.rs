@@ -4,7 +4,7 @@
 //! The model is where it is felt; the ghost is as old as the title says. Draws; moves nothing.
 
 use mmt_client::io::MasterLive;
-use mmt_shared::geometry::{BoxFootprint, Pose, Vec2, rotate};
+use mmt_shared::model::geometry::{BoxFootprint, Pose, Vec2, rotate};
 use ratatui::Frame;
 use ratatui::layout::Rect;
 use ratatui::style::{Color, Style};

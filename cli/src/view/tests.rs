@@ -1,9 +1,9 @@
 //! What is on the screen and in the plain line.
 
 use mmt_client::failsafe::LinkState;
-use mmt_shared::geometry::{BoxFootprint, Pose, Vec2};
+use mmt_shared::model::geometry::{BoxFootprint, Pose, Vec2};
+use mmt_shared::model::tool::Scene;
 use mmt_shared::time::Time;
-use mmt_shared::wire::Scene;
 use ratatui::Terminal;
 use ratatui::backend::TestBackend;
 use ratatui::style::Color;

@@ -5,12 +5,13 @@ use std::time::Duration;
 use super::*;
 use crate::limiter::{ForceLimiter, Limits};
 use crate::master::{Master, MasterTick};
-use mmt_shared::contact::Coupling;
-use mmt_shared::geometry::{BoxFootprint, Pose, Twist};
-use mmt_shared::params::{ModelParams, ModelState};
+use mmt_shared::model::contact::Coupling;
+use mmt_shared::model::geometry::{BoxFootprint, Pose, Twist};
+use mmt_shared::model::params::{ModelParams, ModelState};
+use mmt_shared::model::sample::ForceCounts;
+use mmt_shared::model::settings::Mode;
 use mmt_shared::rng::Substream;
-use mmt_shared::settings::Mode;
-use mmt_shared::wire::{ForceCounts, Label, Welcome};
+use mmt_shared::wire::{Label, Welcome};
 
 fn master(architecture: Architecture) -> Master {
     let coupling = Coupling::for_stiffness(1000.0);

@@ -9,12 +9,12 @@ mod port;
 use std::ops::ControlFlow;
 use std::time::Duration;
 
-use mmt_shared::geometry::Vec2;
 use mmt_shared::io::schedule::Tick;
 use mmt_shared::io::ticker::TickerReport;
 use mmt_shared::io::truth::TruthReceiver;
 use mmt_shared::io::wake::Waker;
 use mmt_shared::metrics::{AgeOfInformation, ContactBreaks, ForcePeak, PoseError};
+use mmt_shared::model::geometry::Vec2;
 use mmt_shared::time::Time;
 
 use super::{MasterLive, SessionEnd};

@@ -24,12 +24,13 @@ use std::time::Duration;
 
 use mmt_netem::LinkConfig;
 use mmt_netem::io::socket::SocketExtras;
-use mmt_shared::geometry::{BoxFootprint, Pose, Vec2};
 use mmt_shared::io::transport::Transport;
 use mmt_shared::io::truth::TruthReceiver;
+use mmt_shared::model::geometry::{BoxFootprint, Pose, Vec2};
+use mmt_shared::model::tool::Scene;
 use mmt_shared::pairing::Pairing;
 use mmt_shared::report::RunReport;
-use mmt_shared::wire::{Architecture, Scene};
+use mmt_shared::wire::Architecture;
 use serde::Serialize;
 
 use crate::device::DeviceProfile;

@@ -10,7 +10,8 @@ use bytes::Bytes;
 use mmt_shared::io::clock::Clock;
 use mmt_shared::io::transport::{Connection, ConnectionError};
 use mmt_shared::io::wake::Wakeup;
-use mmt_shared::wire::{DATAGRAM_MAX, Farewell, Scene, SlaveTotals};
+use mmt_shared::model::tool::Scene;
+use mmt_shared::wire::{DATAGRAM_MAX, Farewell, SlaveTotals};
 use tokio::sync::watch;
 use tokio::time::{MissedTickBehavior, interval};
 

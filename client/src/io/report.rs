@@ -9,14 +9,15 @@ use mmt_netem::io::lateness::Lateness;
 use mmt_netem::io::socket::SocketCounters;
 use mmt_shared::io::spread::Quantiles as Spread;
 use mmt_shared::io::transport::DatagramCounts;
+use mmt_shared::model::update::Cause;
 use mmt_shared::report::{
     ArchitectureReport, Counts, DelayReport, EstimateReport, ForceReport, LinkReport, LoopReport,
     MessagesReport, ModelReport, Number, PassivityReport, PoseReport, PushesReport,
     QuantilesReport, UpDown, UpdatesReport, WireReport, ending_name,
 };
 use mmt_shared::wire::{
-    Architecture, Cause, Farewell, Identified, LoopTotals, MasterTotals, Quantiles, SlaveTotals,
-    Traffic, UpdateDrops,
+    Architecture, Farewell, Identified, LoopTotals, MasterTotals, Quantiles, SlaveTotals, Traffic,
+    UpdateDrops,
 };
 
 use super::haptic::HapticOutcome;

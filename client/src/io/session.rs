@@ -3,10 +3,10 @@
 use std::pin::pin;
 use std::thread::JoinHandle;
 
-use mmt_shared::geometry::{BoxFootprint, Pose};
 use mmt_shared::io::clock::Clock;
 use mmt_shared::io::realtime::RealTime;
 use mmt_shared::io::wake;
+use mmt_shared::model::geometry::{BoxFootprint, Pose};
 use mmt_shared::wire::{Farewell, SlaveTotals, UpdateDrops};
 use tokio::sync::{oneshot, watch};
 use tokio::time::{error::Elapsed, timeout};

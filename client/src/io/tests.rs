@@ -3,17 +3,16 @@
 use std::time::Duration;
 
 use mmt_netem::LinkConfig;
-use mmt_shared::contact::Coupling;
-use mmt_shared::geometry::{Pose, Twist, Vec2};
+use mmt_shared::channel::datagram_channel::Outgoing;
 use mmt_shared::io::connect::ConnectError;
 use mmt_shared::io::transport::Transport;
-use mmt_shared::link_end::Outgoing;
+use mmt_shared::model::contact::Coupling;
+use mmt_shared::model::geometry::{Pose, Twist, Vec2};
+use mmt_shared::model::params::{ModelParams, ModelState};
+use mmt_shared::model::update::Cause;
 use mmt_shared::pairing::{Pin, Token};
-use mmt_shared::params::{ModelParams, ModelState};
 use mmt_shared::time::{TICK, Time};
-use mmt_shared::wire::{
-    Architecture, Cause, Ending, ForceTotals, Identified, Refusal, SlaveTotals,
-};
+use mmt_shared::wire::{Architecture, Ending, ForceTotals, Identified, Refusal, SlaveTotals};
 use tokio::sync::watch;
 use tokio::time::{Instant, sleep, timeout};
 

@@ -1,9 +1,10 @@
 //! What a command holds: news, repeats, and what congestion leaves of both.
 
 use super::*;
-use mmt_shared::geometry::{Pose, Vec2};
+use mmt_shared::model::geometry::{Pose, Vec2};
+use mmt_shared::model::sample::HipCounts;
 use mmt_shared::time::TICK;
-use mmt_shared::wire::{DATAGRAM_MAX, HipCounts};
+use mmt_shared::wire::DATAGRAM_MAX;
 
 fn sample(ms: u64) -> HipSample {
     let hip = HipCounts { x: ms as i32, y: 0 };

@@ -3,7 +3,7 @@
 //! It watches the force that is really sent and where the HIP really goes, so that the model, the limiter
 //! and the sampling all count. It must never take part in anything: it only looks.
 
-use mmt_shared::geometry::Vec2;
+use mmt_shared::model::geometry::Vec2;
 
 /// Integrates f·v at the port. A force is held for a tick, so a tick's share is the force (N, on the hand)
 /// times the way (m) that the HIP makes until the next: E = −Σ f_hand(n)·(x(n+1) − x(n)), which is exact

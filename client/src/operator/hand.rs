@@ -3,7 +3,7 @@
 
 use std::f64::consts::TAU;
 
-use mmt_shared::geometry::Vec2;
+use mmt_shared::model::geometry::Vec2;
 use mmt_shared::rng::Substream;
 use mmt_shared::time::TICK_S;
 use serde::{Deserialize, Serialize};

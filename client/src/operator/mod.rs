@@ -8,7 +8,7 @@ pub mod trace;
 
 use std::time::Duration;
 
-use mmt_shared::geometry::Vec2;
+use mmt_shared::model::geometry::Vec2;
 
 use scripted::{Scripted, View};
 use trace::Trace;

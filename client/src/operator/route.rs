@@ -3,7 +3,7 @@
 //! Everything is in the object's frame, m. Each leg stays in a half-plane in front of one face, so no
 //! leg can cut through the box.
 
-use mmt_shared::geometry::{BoxFootprint, Face, Vec2};
+use mmt_shared::model::geometry::{BoxFootprint, Face, Vec2};
 
 /// Nearer to the box than this, the way leads straight out first, m.
 pub(super) const CLOSE_M: f64 = 0.04;

@@ -8,7 +8,7 @@
 mod care;
 mod config;
 
-use mmt_shared::geometry::{BoxFootprint, Face, Pose, Vec2, rotate};
+use mmt_shared::model::geometry::{BoxFootprint, Face, Pose, Vec2, rotate};
 use mmt_shared::time::TICK_S;
 use serde::{Deserialize, Serialize};
 

@@ -9,7 +9,7 @@
 
 use std::time::Duration;
 
-use mmt_shared::geometry::{Vec2, rotate};
+use mmt_shared::model::geometry::{Vec2, rotate};
 use mmt_shared::recording::{ParseError, Push, Recording};
 
 /// The first line of a tool path in CSV, exactly.

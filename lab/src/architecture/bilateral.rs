@@ -22,8 +22,8 @@ use mmt_server::environment::Environment;
 use mmt_server::slave::SlaveError;
 use mmt_shared::bilateral::Baseline;
 use mmt_shared::bilateral::message::{ToMaster, ToSlave, wire_bytes};
-use mmt_shared::geometry::Vec2;
 use mmt_shared::metrics::{ContactBreaks, ForcePeak, ForceSummary};
+use mmt_shared::model::geometry::Vec2;
 use mmt_shared::time::{TICK, Time};
 
 use super::felt::FeltMasses;

@@ -7,7 +7,7 @@
 
 use std::collections::VecDeque;
 
-use mmt_shared::geometry::Vec2;
+use mmt_shared::model::geometry::Vec2;
 use mmt_shared::time::{TICK_S, Time};
 use nalgebra::{Matrix3, Vector3};
 

@@ -6,7 +6,7 @@ use mmt_client::either::ChoiceOutcome;
 use mmt_client::operator::hand::{Hand, HandConfig};
 use mmt_netem::config::LinkConfig;
 use mmt_server::model_error::UNKNOWN;
-use mmt_shared::geometry::Vec2;
+use mmt_shared::model::geometry::Vec2;
 use mmt_shared::rng::Substream;
 use mmt_shared::time::TICK_S;
 

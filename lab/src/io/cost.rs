@@ -1,10 +1,10 @@
 //! What a piece of the system costs in CPU time, which other processes on the machine do not change much.
 
 use mmt_server::estimator::{Estimator, EstimatorConfig, Measured, Seen};
-use mmt_shared::contact::Coupling;
-use mmt_shared::geometry::Vec2;
 use mmt_shared::io::clock::thread_cpu_time;
-use mmt_shared::settings::Mode;
+use mmt_shared::model::contact::Coupling;
+use mmt_shared::model::geometry::Vec2;
+use mmt_shared::model::settings::Mode;
 use mmt_shared::time::TICK_S;
 
 /// Ticks over which the mean is taken.

@@ -3,8 +3,8 @@
 //! It must never let the measured and the reference motion start differently.
 
 use mmt_server::environment::Environment;
-use mmt_shared::geometry::{Twist, Vec2};
-use mmt_shared::params::{SPEED_M_PER_S, TURN_RATE_RAD_PER_S};
+use mmt_shared::model::geometry::{Twist, Vec2};
+use mmt_shared::model::params::{SPEED_M_PER_S, TURN_RATE_RAD_PER_S};
 use mmt_shared::time::TICK_S;
 
 use super::reference::{FinePatch, Line, STEPS, State};

@@ -5,7 +5,7 @@
 //! `Σ 2 k² (sqrt(1 + |f − f_law|²/k²) − 1) + k² Σ ((q − q_start)/sd)²`, q = (ln c, ln e/c, x, y). Fitted
 //! again after each push from where the last fit ended. It must never give a number that is not finite.
 
-use mmt_shared::geometry::Vec2;
+use mmt_shared::model::geometry::Vec2;
 
 use super::surface::{Law, Motion, Surface};
 use crate::statistics::median;

@@ -1,6 +1,6 @@
 //! Held-out prediction: friction fitted on some of the pushes, the forces of the others predicted.
 
-use mmt_shared::geometry::Vec2;
+use mmt_shared::model::geometry::Vec2;
 use mmt_shared::rng::Substream;
 use serde::Serialize;
 

@@ -15,7 +15,7 @@ pub use report::{LawOnPush, LawReport, PushReport, Rates, ReplayReport, Spread};
 pub use surface::{Law, Motion, Surface};
 pub use trigger::Packets;
 
-use mmt_shared::geometry::{Vec2, rotate};
+use mmt_shared::model::geometry::{Vec2, rotate};
 use mmt_shared::recording::{Push, Recording};
 use serde::Serialize;
 

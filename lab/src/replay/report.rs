@@ -3,7 +3,7 @@
 
 use std::fmt;
 
-use mmt_shared::geometry::Vec2;
+use mmt_shared::model::geometry::Vec2;
 use serde::Serialize;
 
 use super::ReplayConfig;

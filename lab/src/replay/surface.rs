@@ -10,7 +10,7 @@
 //! (equivalently: of all forces at that point that the surface bears, the one that does most work on v_p).
 //! The measured turning then enters by v_p alone, which is what makes this prediction the more robust one.
 
-use mmt_shared::geometry::{Vec2, cross, rotate, spin};
+use mmt_shared::model::geometry::{Vec2, cross, rotate, spin};
 use mmt_shared::recording::Push;
 use serde::Serialize;
 

@@ -1,7 +1,7 @@
 //! Laws of the replay, on pushes made by hand.
 
 use super::*;
-use mmt_shared::geometry::Pose;
+use mmt_shared::model::geometry::Pose;
 use mmt_shared::recording::{FingerSample, ForceSample};
 use mmt_shared::rng::Substream;
 

@@ -4,7 +4,7 @@
 //! violate (12) on noise alone. It must see the force held by the master's model and the measured one, and
 //! nothing of the samples to come.
 
-use mmt_shared::geometry::Vec2;
+use mmt_shared::model::geometry::Vec2;
 use mmt_shared::recording::ForceSample;
 use serde::Serialize;
 

@@ -3,8 +3,8 @@
 //! Each variant changes one choice of paper mode; everything else stays.
 
 use mmt_server::estimator::{EstimatorConfig, PaperConfig, Rows};
-use mmt_shared::contact::Coupling;
-use mmt_shared::settings::{Mode, ModelSettings, Smoothing};
+use mmt_shared::model::contact::Coupling;
+use mmt_shared::model::settings::{Mode, ModelSettings, Smoothing};
 
 use super::{Curve, Extent, Findings, Laboratory, ReproduceError, digest, nothing, paper_world};
 use crate::statistics::{Interval, median};

@@ -7,7 +7,7 @@ mod equal_rate;
 
 pub(super) use equal_rate::log_ratio;
 
-use mmt_shared::settings::Mode;
+use mmt_shared::model::settings::Mode;
 use serde::Serialize;
 
 use super::fig5::{Point, points};

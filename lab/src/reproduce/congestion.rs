@@ -48,7 +48,7 @@ mod tests {
     use super::run::Bin;
     use super::*;
     use crate::statistics::median;
-    use mmt_shared::rate_control::StretchMax;
+    use mmt_shared::channel::rate_control::StretchMax;
     use std::time::Duration;
 
     const DURATION: Duration = Duration::from_secs(45);

@@ -4,7 +4,7 @@
 
 use std::fmt::Write as _;
 
-use mmt_shared::settings::Mode;
+use mmt_shared::model::settings::Mode;
 
 use super::{
     Curve, DEADBANDS, Each, Extent, FIG5_CURVES, Findings, Laboratory, ReproduceError, digest,

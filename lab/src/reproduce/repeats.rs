@@ -7,8 +7,8 @@ use std::time::Duration;
 
 use mmt_netem::config::LinkConfig;
 use mmt_server::link::Repeats;
+use mmt_shared::channel::rate_control::StretchMax;
 use mmt_shared::metrics::Staleness;
-use mmt_shared::rate_control::StretchMax;
 
 use super::delay::Loss;
 use super::{Curve, Extent, Findings, Laboratory, ReproduceError, digest, nothing};

@@ -4,8 +4,8 @@
 //! the change where there is one, else from the first touch, since the model starts wrong.
 
 use mmt_server::environment::{Bounded, EnvironmentConfig, GroundPatch, Ripple, Shape, Wall};
-use mmt_shared::geometry::Vec2;
-use mmt_shared::settings::Mode;
+use mmt_shared::model::geometry::Vec2;
+use mmt_shared::model::settings::Mode;
 
 use super::{
     Curve, Extent, Findings, Laboratory, ReproduceError, digest, mode_name, nothing, paper_world,

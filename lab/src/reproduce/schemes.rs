@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use mmt_server::trigger::{MismatchMetric, Scheme};
-use mmt_shared::settings::Mode;
+use mmt_shared::model::settings::Mode;
 
 use super::{
     Curve, Extent, Findings, Laboratory, ReproduceError, digest, mode_name, nothing, paper_world,

@@ -8,7 +8,7 @@ use mmt_client::device::DeviceProfile;
 use mmt_server::playout::PlayoutConfig;
 use mmt_server::slave::SlaveConfig;
 use mmt_server::trigger::{Scheme, TriggerConfig};
-use mmt_shared::settings::{Mode, ModelSettings, PoseCorrection};
+use mmt_shared::model::settings::{Mode, ModelSettings, PoseCorrection};
 
 use crate::world::WorldConfig;
 

@@ -2,7 +2,7 @@
 
 use std::ops::RangeInclusive;
 
-use mmt_shared::settings::Mode;
+use mmt_shared::model::settings::Mode;
 
 use super::{Curve, Extent, Findings, Laboratory, ReproduceError, digest, nothing, paper_world};
 use crate::figure::{Axis, Colour, Dot, Figure, Legend, Panel, Series, Stroke};
@@ -194,7 +194,7 @@ fn envelope(rows: &[&TraceRow], of: &dyn Fn(&TraceRow) -> Option<f64>) -> Vec<Do
 #[cfg(test)]
 mod tests {
     use super::*;
-    use mmt_shared::geometry::Vec2;
+    use mmt_shared::model::geometry::Vec2;
 
     #[test]
     fn the_envelope_keeps_every_peak() {

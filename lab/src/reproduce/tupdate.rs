@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use mmt_server::environment::Ripple;
 use mmt_server::trigger::Scheme;
-use mmt_shared::settings::Mode;
+use mmt_shared::model::settings::Mode;
 
 use super::claims::log_ratio;
 use super::scenarios::strips;

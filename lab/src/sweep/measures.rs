@@ -3,7 +3,7 @@
 //! `docs/sweep.md` explains every column. A measure that has no meaning in a run is empty, never 0; numbers keep
 //! every digit, so that the bytes of a row say whether two machines agree.
 
-use mmt_shared::wire::Cause;
+use mmt_shared::model::update::Cause;
 
 use crate::table::{Cell, Table};
 use crate::trial::Measured;

@@ -10,7 +10,7 @@ use mmt_client::device::DeviceProfile;
 use mmt_server::estimator::EstimatorConfig;
 use mmt_server::slave::SlaveConfig;
 use mmt_server::trigger::TriggerConfig;
-use mmt_shared::settings::Mode;
+use mmt_shared::model::settings::Mode;
 use serde::Deserialize;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue, Deserializer, Error};

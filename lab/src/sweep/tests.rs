@@ -1,7 +1,7 @@
 //! Plans right and wrong, and rows however they are cut.
 
 use mmt_server::trigger::Scheme;
-use mmt_shared::settings::{Mode, PoseCorrection, Smoothing};
+use mmt_shared::model::settings::{Mode, PoseCorrection, Smoothing};
 
 use super::*;
 use crate::reproduce::{Curve, paper_world};

@@ -97,7 +97,7 @@ impl Watch {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use mmt_shared::geometry::{Pose, Vec2};
+    use mmt_shared::model::geometry::{Pose, Vec2};
     use mmt_shared::time::Time;
 
     fn tick(error: f64, in_contact: bool) -> SlaveTick {

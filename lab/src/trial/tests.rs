@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::reproduce::{Curve, paper_world};
-use mmt_shared::settings::Mode;
+use mmt_shared::model::settings::Mode;
 
 fn trial(seconds: u64) -> Trial {
     let config = paper_world(Mode::Recommended, Curve::Hybrid(150).at(0.10)).seeded(3);

@@ -9,8 +9,8 @@ use mmt_client::operator::scripted::{ScriptedConfig, ScriptedError};
 use mmt_netem::config::{ConfigError, LinkConfig};
 use mmt_server::link::SlaveLinkConfig;
 use mmt_server::slave::{SlaveConfig, SlaveError};
-use mmt_shared::rate_control::StretchMax;
-use mmt_shared::settings::ModelSettings;
+use mmt_shared::channel::rate_control::StretchMax;
+use mmt_shared::model::settings::ModelSettings;
 use mmt_shared::wire::Architecture;
 use serde::{Deserialize, Serialize};
 

@@ -4,7 +4,7 @@
 use super::*;
 use mmt_server::playout::PlayoutConfig;
 use mmt_server::slave::SlaveConfig;
-use mmt_shared::settings::Mode;
+use mmt_shared::model::settings::Mode;
 
 mod estimation;
 mod shapes;

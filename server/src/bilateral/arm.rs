@@ -5,7 +5,7 @@
 //! It must never move faster than the tool may.
 
 use mmt_shared::bilateral::wave::WaveImpedance;
-use mmt_shared::geometry::Vec2;
+use mmt_shared::model::geometry::Vec2;
 use mmt_shared::time::TICK_S;
 
 /// Mass of the tool, kg: light against a hand (0.5 kg) and the box (0.7 kg), heavy enough for 1 kHz

@@ -4,7 +4,7 @@
 //! look at the true force: the sensor's is what it has.
 
 use mmt_shared::bilateral::passivity::{PortEnergy, admittance_controller};
-use mmt_shared::geometry::Vec2;
+use mmt_shared::model::geometry::Vec2;
 use mmt_shared::time::TICK_S;
 
 /// A force below this many times the sensor's noise per axis is taken for none: three ticks in ten thousand in free

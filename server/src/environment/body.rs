@@ -4,8 +4,8 @@
 //! solver iteration, so that p_n = p_{n−1} + T v_n to the bit and theta_n = theta_{n−1} +
 //! atan(T omega_n), which is T omega_n to (T omega)³/3. It must never be given a number that is not finite.
 
-use mmt_shared::geometry::{Pose, Twist, Vec2};
-use mmt_shared::params::{SPEED_M_PER_S, TURN_RATE_RAD_PER_S};
+use mmt_shared::model::geometry::{Pose, Twist, Vec2};
+use mmt_shared::model::params::{SPEED_M_PER_S, TURN_RATE_RAD_PER_S};
 use mmt_shared::time::TICK_S;
 use rapier2d_f64::prelude::{
     MassProperties, PhysicsWorld, RigidBodyBuilder, RigidBodyHandle, Vector,

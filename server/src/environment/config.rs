@@ -1,8 +1,8 @@
 //! What an environment is made of, with the default scenario, and the checks on it.
 
-use mmt_shared::contact::Coupling;
-use mmt_shared::geometry::{Pose, Vec2};
-use mmt_shared::params::{GRAVITY, ModelParams, ParamsError, WORKSPACE_M};
+use mmt_shared::model::contact::Coupling;
+use mmt_shared::model::geometry::{Pose, Vec2};
+use mmt_shared::model::params::{GRAVITY, ModelParams, ParamsError, WORKSPACE_M};
 use mmt_shared::range::{OutOfRange, in_range};
 use serde::{Deserialize, Serialize};
 

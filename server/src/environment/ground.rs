@@ -8,7 +8,7 @@
 //! times the friction of a sliding one to break away; the fall to sliding friction takes place at once.
 //! It must never let a held body creep: eps smooths sliding only, the stick test has eps = 0.
 
-use mmt_shared::geometry::{Vec2, cross};
+use mmt_shared::model::geometry::{Vec2, cross};
 use mmt_shared::time::TICK_S;
 use nalgebra::{Matrix3, Vector3};
 

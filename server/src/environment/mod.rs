@@ -24,9 +24,9 @@ pub use outline::{OutlineError, Shape, VERTICES_MAX};
 pub use terrain::{GroundPatch, PATCHES_MAX, Ripple};
 pub use wall::Wall;
 
-use mmt_shared::contact::{Coupling, Touch, contact_force};
-use mmt_shared::geometry::{BoxFootprint, Pose, Twist, Vec2, cross, rotate, spin};
-use mmt_shared::params::{ModelParams, friction_torque_of_square};
+use mmt_shared::model::contact::{Coupling, Touch, contact_force};
+use mmt_shared::model::geometry::{BoxFootprint, Pose, Twist, Vec2, cross, rotate, spin};
+use mmt_shared::model::params::{ModelParams, friction_torque_of_square};
 use mmt_shared::time::TICK_S;
 use nalgebra::Vector3;
 

@@ -3,8 +3,8 @@
 //! Everything is in the object's frame, whose origin is the centroid of the area. It must never hold an
 //! outline that is not convex.
 
-use mmt_shared::geometry::{BoxFootprint, Face, Vec2, cross};
-use mmt_shared::params::FACE_OFFSET_M;
+use mmt_shared::model::geometry::{BoxFootprint, Face, Vec2, cross};
+use mmt_shared::model::params::FACE_OFFSET_M;
 use serde::{Deserialize, Serialize};
 
 use super::bounded::Bounded;

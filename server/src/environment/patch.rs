@@ -4,7 +4,7 @@
 //! or a disc has equal weights, and pure spin about its centre feels the footprint's e exactly. It must
 //! never weigh a point below zero.
 
-use mmt_shared::geometry::Vec2;
+use mmt_shared::model::geometry::Vec2;
 use nalgebra::{Matrix3, SVector, Vector3};
 
 use super::outline::{centroid, doubled_area, edges};

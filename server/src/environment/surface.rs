@@ -3,8 +3,8 @@
 //! The box is followed by the proxy that the local model has too. It must never let the proxy change
 //! edge while the HIP stays behind the edge that it entered by, nor stop it on a round surface.
 
-use mmt_shared::contact::{GodObject, Touch};
-use mmt_shared::geometry::{BoxFootprint, Face, Pose, Vec2, cross, rotate};
+use mmt_shared::model::contact::{GodObject, Touch};
+use mmt_shared::model::geometry::{BoxFootprint, Face, Pose, Vec2, cross, rotate};
 
 use super::bounded::Bounded;
 use super::outline::{VERTICES_MAX, edges};

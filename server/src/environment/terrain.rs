@@ -2,7 +2,7 @@
 //!
 //! Pure functions of a place. It must never give a coefficient below zero.
 
-use mmt_shared::geometry::Vec2;
+use mmt_shared::model::geometry::Vec2;
 use serde::{Deserialize, Serialize};
 
 /// Most rectangles on the ground.

@@ -4,8 +4,8 @@
 //! keeps `a_j·u ≥ −gap_j⁺/T`: exactly inelastic, without penetration to first order in the step. Rest is
 //! always within the limits, so a wall never adds energy. It must never pull, and never push out.
 
-use mmt_shared::geometry::{Pose, Vec2, cross, rotate};
-use mmt_shared::params::SPEED_M_PER_S;
+use mmt_shared::model::geometry::{Pose, Vec2, cross, rotate};
+use mmt_shared::model::params::SPEED_M_PER_S;
 use mmt_shared::time::TICK_S;
 use nalgebra::{Cholesky, Const, Vector3};
 use serde::{Deserialize, Serialize};

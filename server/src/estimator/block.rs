@@ -5,7 +5,7 @@
 //! stacked, two rows a tick, x and y, in which c·sign(v) becomes c·v/|v|. (The sign of each axis by itself
 //! would make friction √2 c at 45°.) The result is the plain minimum, bounded by nothing.
 
-use mmt_shared::geometry::Vec2;
+use mmt_shared::model::geometry::Vec2;
 use nalgebra::{Matrix3, Matrix3x2, Vector3};
 use serde::{Deserialize, Serialize};
 
@@ -195,7 +195,7 @@ fn stacked(a: Vec2, v: Vec2, force: Vec2) -> PlanarRow {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use mmt_shared::geometry::rotate;
+    use mmt_shared::model::geometry::rotate;
 
     const TRUTH: Vector3<f64> = Vector3::new(0.7, 3.0, 2.06);
 

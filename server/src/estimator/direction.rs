@@ -4,7 +4,7 @@
 //! normal. An alpha–beta filter follows it through noise and through the wrap at ±π. It must never use
 //! the direction of a force that is too small to have one.
 
-use mmt_shared::geometry::{Vec2, wrap_angle};
+use mmt_shared::model::geometry::{Vec2, wrap_angle};
 use mmt_shared::time::TICK_S;
 use serde::{Deserialize, Serialize};
 
@@ -108,7 +108,7 @@ impl ForceDirection {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use mmt_shared::geometry::rotate;
+    use mmt_shared::model::geometry::rotate;
     use mmt_shared::rng::Substream;
 
     fn towards(angle: f64, size: f64) -> Vec2 {

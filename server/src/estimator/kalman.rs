@@ -4,7 +4,7 @@
 //! same noise, so they share one covariance and one gain. Part of paper mode: it filters the motion only,
 //! and that is why the paper's m is off.
 
-use mmt_shared::geometry::Vec2;
+use mmt_shared::model::geometry::Vec2;
 use mmt_shared::time::TICK_S;
 use nalgebra::{Matrix3, Matrix3x2, Vector3};
 use serde::{Deserialize, Serialize};

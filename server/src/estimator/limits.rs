@@ -113,8 +113,8 @@ fn recursive(config: &RecommendedConfig) -> [Bound; 10] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use mmt_shared::contact::Coupling;
-    use mmt_shared::settings::Mode;
+    use mmt_shared::model::contact::Coupling;
+    use mmt_shared::model::settings::Mode;
 
     #[test]
     fn the_defaults_of_both_modes_are_accepted() {

@@ -1,13 +1,13 @@
 //! The estimators: mass m, damping b and friction c of the pushed object, (1)–(3) of the paper.
 //!
 //! *Paper mode* is section II-A as printed; *recommended mode* filters force and motion alike and looks
-//! along the contact normal. I and e follow from m and c by (8) and (9), which `mmt_shared::params`
+//! along the contact normal. I and e follow from m and c by (8) and (9), which `mmt_shared::model::params`
 //! holds. The estimators are pure and take one tick of T = 1 ms at a time; they must never allocate in
 //! a tick, and never poison themselves with a number that is not finite.
 
-use mmt_shared::contact::Coupling;
-use mmt_shared::geometry::Vec2;
-use mmt_shared::settings::Mode;
+use mmt_shared::model::contact::Coupling;
+use mmt_shared::model::geometry::Vec2;
+use mmt_shared::model::settings::Mode;
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 

@@ -3,7 +3,7 @@
 //! Section II-A as printed: the tool's motion is taken for the object's, and force and motion are not
 //! filtered alike. It must stay wrong in the way the paper is wrong; nothing here is clamped or gated.
 
-use mmt_shared::geometry::Vec2;
+use mmt_shared::model::geometry::Vec2;
 use mmt_shared::time::TICK_S;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};

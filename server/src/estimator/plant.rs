@@ -3,8 +3,8 @@
 //! Semi-implicit Euler with an exact stick test: f_n from tool and box before the step,
 //! v_n = v_{n−1} + T (f_n − b v_n − c sign v_n)/m, p_n = p_{n−1} + T v_n.
 
-use mmt_shared::contact::Coupling;
-use mmt_shared::geometry::{Vec2, rotate};
+use mmt_shared::model::contact::Coupling;
+use mmt_shared::model::geometry::{Vec2, rotate};
 use mmt_shared::rng::Substream;
 use mmt_shared::time::TICK_S;
 use std::f64::consts::TAU;

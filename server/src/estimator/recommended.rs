@@ -4,8 +4,8 @@
 //! Order of a tick: direction of the force, surface from the force law, gate, the shared filter,
 //! regression. It must never let a sticking tick or a tick without contact reach the regression.
 
-use mmt_shared::contact::Coupling;
-use mmt_shared::geometry::{Vec2, rotate};
+use mmt_shared::model::contact::Coupling;
+use mmt_shared::model::geometry::{Vec2, rotate};
 use mmt_shared::time::TICK_S;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};

@@ -5,7 +5,7 @@
 //! constrained minimum. It must never publish a number that is not finite, and never move when no row
 //! comes.
 
-use mmt_shared::params::MASS_KG;
+use mmt_shared::model::params::MASS_KG;
 use mmt_shared::time::TICK_S;
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};

@@ -5,8 +5,8 @@
 //! f = k_p pen + k_d d(pen)/dt known, pen follows from f and the surface from the tool. It must never
 //! smooth: that is the work of the one filter that force and motion share.
 
-use mmt_shared::contact::Coupling;
-use mmt_shared::geometry::Vec2;
+use mmt_shared::model::contact::Coupling;
+use mmt_shared::model::geometry::Vec2;
 use mmt_shared::time::TICK_S;
 use nalgebra::Vector3;
 

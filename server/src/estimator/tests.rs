@@ -415,7 +415,7 @@ fn heading_speed_and_acceleration_are_those_of_the_pushed_face() {
     push(&mut estimator, &mut plant, &motion, |k, plant, estimate| {
         if k > 500 {
             let heading = estimate.heading.unwrap();
-            let off = mmt_shared::geometry::wrap_angle(heading - plant.heading);
+            let off = mmt_shared::model::geometry::wrap_angle(heading - plant.heading);
             assert!(off.abs() < 0.01, "{off}");
             assert!((estimate.speed - plant.velocity).abs() < 0.02);
             assert!(estimate.acceleration.abs() < 1.5 && !estimate.sticking);

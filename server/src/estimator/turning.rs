@@ -5,8 +5,8 @@
 //! second derivative of a noisy angle: it follows from the moment of the push, and m, b and c stay linear.
 //! It must never change the row of a push through the centre of an object that does not turn.
 
-use mmt_shared::geometry::{Vec2, cross};
-use mmt_shared::params::{FACE_OFFSET_M, TURN_RATE_RAD_PER_S};
+use mmt_shared::model::geometry::{Vec2, cross};
+use mmt_shared::model::params::{FACE_OFFSET_M, TURN_RATE_RAD_PER_S};
 use nalgebra::Vector3;
 
 use super::POSITION_LIMIT;
@@ -90,8 +90,8 @@ pub fn creeping(motion: &SurfaceMotion, normal: Vec2, seen: &Seen) -> Row {
 mod tests {
     use super::*;
     use crate::estimator::{Estimator, EstimatorConfig, Measured, RecommendedConfig};
-    use mmt_shared::contact::Coupling;
-    use mmt_shared::geometry::{Pose, Twist, rotate};
+    use mmt_shared::model::contact::Coupling;
+    use mmt_shared::model::geometry::{Pose, Twist, rotate};
     use mmt_shared::time::TICK_S;
 
     const SIDE: f64 = 0.36;

@@ -7,7 +7,6 @@ use std::time::Duration;
 
 use mmt_netem::io::socket::{EmulatedSocket, SocketMeter, WrapError};
 use mmt_netem::link::LinkId;
-use mmt_shared::contact::Coupling;
 use mmt_shared::io::clock::Clock;
 use mmt_shared::io::congestion::RateCap;
 use mmt_shared::io::live::LiveCell;
@@ -17,6 +16,7 @@ use mmt_shared::io::socket::{self, BindError};
 use mmt_shared::io::transport::{Endpoint, Listener, Transport};
 use mmt_shared::io::truth::TruthSender;
 use mmt_shared::io::versions::CLOSE_FINISHED;
+use mmt_shared::model::contact::Coupling;
 use mmt_shared::pairing::{Address, Host, Pairing};
 use tokio::sync::{mpsc, watch};
 use tokio::time::timeout;

@@ -19,12 +19,12 @@ use std::net::SocketAddr;
 
 use mmt_netem::LinkConfig;
 use mmt_netem::io::socket::SocketExtras;
-use mmt_shared::geometry::{BoxFootprint, Pose, Vec2};
 use mmt_shared::io::identity::Identity;
 use mmt_shared::io::transport::Transport;
 use mmt_shared::io::truth::TruthSender;
+use mmt_shared::model::geometry::{BoxFootprint, Pose, Vec2};
+use mmt_shared::model::update::Cause;
 use mmt_shared::report::RunReport;
-use mmt_shared::wire::Cause;
 use serde::Serialize;
 
 use crate::slave::SlaveConfig;

@@ -11,7 +11,6 @@ use std::time::Duration;
 
 use bytes::Bytes;
 use mmt_netem::io::socket::SocketCounters;
-use mmt_shared::contact::Coupling;
 use mmt_shared::io::clock::Clock;
 use mmt_shared::io::live::LiveCell;
 use mmt_shared::io::stream::WriteFrameError;
@@ -19,6 +18,7 @@ use mmt_shared::io::transport::{Connection, RecvStream, SendStream};
 use mmt_shared::io::truth::TruthSender;
 use mmt_shared::io::versions::CLOSE_FINISHED;
 use mmt_shared::metrics::UpdateCounts;
+use mmt_shared::model::contact::Coupling;
 use mmt_shared::wire::{
     DATAGRAM_MAX, Ending, Farewell, Hello, Label, Refusal, STREAM_MESSAGE_MAX, SlaveTotals,
     Welcome, encode_slave_farewell, encode_welcome,

@@ -9,8 +9,9 @@ use mmt_netem::LinkConfig;
 use mmt_shared::io::identity::Identity;
 use mmt_shared::io::live::LiveCell;
 use mmt_shared::io::transport::Transport;
+use mmt_shared::model::update::Cause;
 use mmt_shared::pairing::{Pairing, Token};
-use mmt_shared::wire::{Architecture, Cause, Ending, Refusal};
+use mmt_shared::wire::{Architecture, Ending, Refusal};
 use tokio::sync::watch;
 use tokio::task::JoinHandle;
 use tokio::time::sleep;
@@ -69,7 +70,7 @@ async fn a_session_goes_from_the_welcome_to_a_report_that_agrees_with_the_master
         ..options()
     });
     let (mut master, welcome) = Master::operate(&host.pairing).await;
-    let coupling = mmt_shared::contact::Coupling::for_stiffness(1000.0);
+    let coupling = mmt_shared::model::contact::Coupling::for_stiffness(1000.0);
     let welcome = welcome.accept(&coupling).unwrap();
     let scheme = SlaveConfig::default().trigger.scheme.to_string();
     assert_eq!(welcome.scheme.as_str(), scheme);

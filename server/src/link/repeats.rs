@@ -6,8 +6,8 @@ use std::fmt;
 use std::str::FromStr;
 use std::time::Duration;
 
+use mmt_shared::model::update::Update;
 use mmt_shared::time::Time;
-use mmt_shared::wire::Update;
 use serde::{Deserialize, Serialize};
 
 /// Most repeats of one update.

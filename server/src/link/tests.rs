@@ -1,10 +1,12 @@
 //! What the slave's end says again, and what it takes for news.
 
 use super::*;
-use mmt_shared::contact::Coupling;
-use mmt_shared::geometry::{BoxFootprint, Pose, Twist, Vec2};
-use mmt_shared::params::{ModelParams, ModelState};
-use mmt_shared::wire::{Cause, DATAGRAM_MAX, HandPort, SampleBlock};
+use mmt_shared::model::contact::Coupling;
+use mmt_shared::model::geometry::{BoxFootprint, Pose, Twist, Vec2};
+use mmt_shared::model::params::{ModelParams, ModelState};
+use mmt_shared::model::tool::HandPort;
+use mmt_shared::model::update::Cause;
+use mmt_shared::wire::{DATAGRAM_MAX, SampleBlock};
 
 const AT: fn(u64) -> Time = Time::from_millis;
 

@@ -1,8 +1,8 @@
 //! Promises of the play-out buffer.
 
 use super::*;
+use mmt_shared::model::sample::{ForceCounts, HipCounts};
 use mmt_shared::rng::Substream;
-use mmt_shared::wire::message::{ForceCounts, HipCounts};
 
 const MS: i64 = 1_000_000;
 /// The master's clock starts elsewhere.

@@ -5,7 +5,7 @@
 //! is that of the tangent, the offset is that of this contact, and the centre is vision's. It must never
 //! take a box for anything else because of one bad image, and never be asked in paper mode.
 
-use mmt_shared::geometry::wrap_angle;
+use mmt_shared::model::geometry::wrap_angle;
 use mmt_shared::time::{TICK, TICK_S, Time};
 
 /// Disagreement about theta that no box causes, rad; six standard deviations of vision's noise if that is more.

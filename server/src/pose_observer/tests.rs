@@ -1,7 +1,7 @@
 //! What the pose observer promises.
 
 use super::*;
-use mmt_shared::params::friction_torque_of_square;
+use mmt_shared::model::params::friction_torque_of_square;
 use mmt_shared::time::TICK;
 
 const COUPLING: Coupling = Coupling {

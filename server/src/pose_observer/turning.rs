@@ -4,7 +4,7 @@
 //! known at once. What resists is learned as a multiple of what a square of this m, b and c would resist.
 //! It must never be believed before the parameters have been learned: until then it says nothing.
 
-use mmt_shared::params::{ModelParams, friction_torque_of_square};
+use mmt_shared::model::params::{ModelParams, friction_torque_of_square};
 use mmt_shared::time::TICK_S;
 
 use crate::square;

@@ -1,11 +1,11 @@
 //! What the shadow promises: an update counts for the master's when the master says so, and not before.
 
 use super::*;
-use mmt_shared::contact::Coupling;
-use mmt_shared::geometry::{BoxFootprint, Pose, Twist};
-use mmt_shared::params::ModelParams;
-use mmt_shared::settings::Mode;
-use mmt_shared::wire::{ForceCounts, HipCounts};
+use mmt_shared::model::contact::Coupling;
+use mmt_shared::model::geometry::{BoxFootprint, Pose, Twist};
+use mmt_shared::model::params::ModelParams;
+use mmt_shared::model::sample::{ForceCounts, HipCounts};
+use mmt_shared::model::settings::Mode;
 
 const COUPLING: Coupling = Coupling {
     stiffness_n_per_m: 1000.0,

@@ -1,8 +1,8 @@
 //! What a slave is made of, and why it could not be.
 
-use mmt_shared::params::ParamsError;
-use mmt_shared::rate_control::StretchMax;
-use mmt_shared::settings::Mode;
+use mmt_shared::channel::rate_control::StretchMax;
+use mmt_shared::model::params::ParamsError;
+use mmt_shared::model::settings::Mode;
 use serde::{Deserialize, Serialize};
 
 use crate::environment::{EnvironmentConfig, EnvironmentError};

@@ -2,7 +2,7 @@
 //!
 //! It must never move the tool faster than the limit of play-out, and never say that the tool is at the HIP where it is not.
 
-use mmt_shared::geometry::Vec2;
+use mmt_shared::model::geometry::Vec2;
 use mmt_shared::time::TICK_S;
 
 use crate::bilateral::ToolPort;

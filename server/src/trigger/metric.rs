@@ -3,8 +3,8 @@
 //! The paper uses the force (12). The other two are made comparable to it: each is 1 where the model is
 //! as wrong as it can usefully be, so that one Delta serves all three.
 
-use mmt_shared::geometry::Vec2;
-use mmt_shared::params::ModelParams;
+use mmt_shared::model::geometry::Vec2;
+use mmt_shared::model::params::ModelParams;
 use serde::{Deserialize, Serialize};
 
 /// Least m, b and c that a change is divided by: kg, N s/m, N. Below, nobody feels a relative change.

@@ -15,11 +15,11 @@ pub use scheme::{Scheme, SchemeError};
 
 use std::time::Duration;
 
-use mmt_shared::geometry::Vec2;
-use mmt_shared::params::ModelParams;
-use mmt_shared::settings::Mode;
+use mmt_shared::model::geometry::Vec2;
+use mmt_shared::model::params::ModelParams;
+use mmt_shared::model::settings::Mode;
+use mmt_shared::model::update::Cause;
 use mmt_shared::time::{TICK_S, Time};
-use mmt_shared::wire::Cause;
 use serde::{Deserialize, Serialize};
 
 /// The shortest time between two updates of the scheme `useful`.

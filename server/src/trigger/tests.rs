@@ -1,7 +1,7 @@
 //! What the trigger promises.
 
 use super::*;
-use mmt_shared::contact::Coupling;
+use mmt_shared::model::contact::Coupling;
 use mmt_shared::rng::Substream;
 
 fn params(m: f64, c: f64) -> ModelParams {

@@ -7,8 +7,8 @@
 
 use std::time::Duration;
 
-use crate::geometry::Vec2;
 use crate::metrics::F_MIN_N;
+use crate::model::geometry::Vec2;
 use crate::time::Time;
 
 /// Delta: a change smaller than this share of the last force is not felt (Weber's law), the upper end of the

@@ -5,8 +5,9 @@
 
 use super::Baseline;
 use super::wave::WaveSum;
+use crate::model::sample::{ForceCounts, HipSample};
 use crate::time::Time;
-use crate::wire::{ForceCounts, HEADER_BYTES, HipSample};
+use crate::wire::HEADER_BYTES;
 
 /// Bytes around the payload of one datagram over IPv4: IP 20 (RFC 791), UDP 8 (RFC 768), QUIC's short header 11
 /// (flags 1, connection ID 8, packet number 2: RFC 9000, 17.3.1), type and length of the DATAGRAM frame 3 (RFC 9221, 4),

@@ -7,7 +7,7 @@
 //! here, `E_out(k) <= E_in_other(k − delay)`. E_in never falls, so old news is safe news, at any delay, jitter or loss.
 //! It must never take in a credit twice.
 
-use crate::geometry::Vec2;
+use crate::model::geometry::Vec2;
 use crate::time::TICK_S;
 
 /// Most damping that pays back a debt, N s/m: of the order of the damping of a hand (25 N s/m), so that it is felt as

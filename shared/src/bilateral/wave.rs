@@ -7,7 +7,7 @@
 //! `u = (b v + f)/√(2b)` goes to the slave, `w = (b v − f)/√(2b)` comes back, and f·v = (|u|² − |w|²)/2.
 //! A wave must never leave a side, or be taken in by one, without the energy for it.
 
-use crate::geometry::Vec2;
+use crate::model::geometry::Vec2;
 use crate::time::TICK_S;
 
 /// Credit of each sending side, J: covers what sampling shifts by a tick (F v T = 0.4 mJ at 2.5 N and 0.15 m/s).

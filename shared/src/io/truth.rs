@@ -5,7 +5,7 @@
 
 use std::sync::Mutex;
 
-use crate::geometry::Pose;
+use crate::model::geometry::Pose;
 use crate::time::Time;
 
 /// Poses that may wait for the master's loop: a quarter of a second. One that finds no room is left out.

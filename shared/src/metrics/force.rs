@@ -7,7 +7,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::mean;
-use crate::geometry::Vec2;
+use crate::model::geometry::Vec2;
 
 /// F_min, N: below, no force is perceived at all (section IV-B).
 pub const F_MIN_N: f64 = 0.04;

@@ -1,6 +1,6 @@
 //! The largest force of a run and the largest change of it within one tick.
 
-use crate::geometry::Vec2;
+use crate::model::geometry::Vec2;
 
 /// Follows a force tick by tick. Fixed size, no allocation.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

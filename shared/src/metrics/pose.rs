@@ -1,7 +1,7 @@
 //! How far the local model's pose is from the true pose of the object, sample by sample.
 
 use super::mean;
-use crate::geometry::{Pose, wrap_angle};
+use crate::model::geometry::{Pose, wrap_angle};
 
 /// Accumulates position and orientation error. Fixed size, no allocation.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

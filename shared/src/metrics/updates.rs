@@ -1,9 +1,9 @@
 //! How many updates were sent and why: the paper's packet rate.
 
 use super::F_MIN_N;
-use crate::geometry::Vec2;
+use crate::model::geometry::Vec2;
+use crate::model::update::Cause;
 use crate::time::TICK_S;
-use crate::wire::message::Cause;
 
 /// Counts updates by cause, and the time that rates are taken over. Fixed size, no allocation.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

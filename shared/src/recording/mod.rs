@@ -13,7 +13,7 @@ mod words;
 
 pub use words::ParseError;
 
-use crate::geometry::{Pose, Vec2, rotate, wrap_angle};
+use crate::model::geometry::{Pose, Vec2, rotate, wrap_angle};
 use words::Words;
 
 /// Length of the two legs of the block, a right triangle, m.

@@ -1,10 +1,10 @@
 //! The document's keys, its nulls, and the table.
 
 use super::*;
-use crate::geometry::{Pose, Vec2};
 use crate::metrics::ForceMetrics;
+use crate::model::geometry::{Pose, Vec2};
+use crate::model::update::Cause;
 use crate::time::Time;
-use crate::wire::message::Cause;
 use serde_json::{Value, json};
 
 fn empty() -> RunReport<Value> {

@@ -7,9 +7,11 @@ use serde::{Deserialize, Serialize};
 use super::body::{Body, read, write};
 use super::error::{DecodeError, EncodeError, FieldError, demand, finite};
 use super::header::{Channel, DATAGRAM_MAX, Kind, Side, open};
-use super::message::{Command, Envelope, HandPort, Scene, Tool, Update};
+use super::message::{Command, Envelope};
 use super::raw::{RawScene, RawUpdate};
 use super::samples::SampleBlock;
+use crate::model::tool::{HandPort, Scene, Tool};
+use crate::model::update::Update;
 
 /// A datagram that was read.
 #[derive(Clone, Copy, Debug, PartialEq)]

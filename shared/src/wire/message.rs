@@ -7,11 +7,12 @@ use serde::{Deserialize, Serialize};
 
 use super::label::Label;
 use super::samples::SampleBlock;
-use crate::contact::Coupling;
-use crate::geometry::{Pose, Vec2};
+use crate::model::contact::Coupling;
+use crate::model::geometry::Vec2;
+use crate::model::params::ModelState;
+use crate::model::settings::ModelSettings;
+use crate::model::tool::HandPort;
 use crate::pairing::Token;
-use crate::params::ModelState;
-use crate::settings::ModelSettings;
 use crate::time::Time;
 
 /// What every datagram carries besides its own matter.
@@ -38,84 +39,6 @@ pub struct Echo {
     pub received: u32,
 }
 
-/// A point on the wire's grid of 0.1 µm. The master rounds the device's reading to it before anything
-/// else, so that both sides compute with the same bits.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct HipCounts {
-    /// x, 0.1 µm.
-    pub x: i32,
-    /// y, 0.1 µm.
-    pub y: i32,
-}
-
-impl HipCounts {
-    /// One count, m.
-    pub const METRES: f64 = 1e-7;
-
-    /// The grid point nearest to `hip` (m), saturating at ±214 m; a NaN becomes 0.
-    #[must_use]
-    pub fn nearest(hip: Vec2) -> Self {
-        let count = |metres: f64| libm::round(metres / Self::METRES) as i32;
-        Self {
-            x: count(hip.x),
-            y: count(hip.y),
-        }
-    }
-
-    /// The point, m.
-    #[must_use]
-    pub fn metres(self) -> Vec2 {
-        Vec2::new(
-            f64::from(self.x) * Self::METRES,
-            f64::from(self.y) * Self::METRES,
-        )
-    }
-}
-
-/// A force on the wire's grid of 0.1 mN.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct ForceCounts {
-    /// x, 0.1 mN.
-    pub x: i32,
-    /// y, 0.1 mN.
-    pub y: i32,
-}
-
-impl ForceCounts {
-    /// One count, N.
-    pub const NEWTONS: f64 = 1e-4;
-
-    /// The grid point nearest to `force` (N), saturating; a NaN becomes 0.
-    #[must_use]
-    pub fn nearest(force: Vec2) -> Self {
-        let count = |newtons: f64| libm::round(newtons / Self::NEWTONS) as i32;
-        Self {
-            x: count(force.x),
-            y: count(force.y),
-        }
-    }
-
-    /// The force, N.
-    #[must_use]
-    pub fn newtons(self) -> Vec2 {
-        Vec2::new(
-            f64::from(self.x) * Self::NEWTONS,
-            f64::from(self.y) * Self::NEWTONS,
-        )
-    }
-}
-
-/// One tick of the master: where the HIP was and the force that the local model rendered for it.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct HipSample {
-    /// The tick's stamp by the master's clock.
-    pub stamp: Time,
-    /// HIP in the world.
-    pub hip: HipCounts,
-    /// f_m, the force on the object that the local model computed for this HIP, before the limiter.
-    pub force: ForceCounts,
-}
-
 /// The master's motion since its last command.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Command {
@@ -126,115 +49,6 @@ pub struct Command {
     pub samples: SampleBlock,
     /// The hand's port, where the hand may feel the tool's force.
     pub port: Option<HandPort>,
-}
-
-/// What the hand's port says to the tool's: time-domain passivity control (TDPA) holds each side to what went in at
-/// the other (`docs/baselines.md`).
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct HandPort {
-    /// E_in, the energy that went in at the hand so far, J; it only grows.
-    pub in_j: f64,
-    /// Whether the slave is to say the tool's force every tick.
-    pub wants_force: bool,
-    /// Whether the tool is to go only as far as the hand has paid for.
-    pub passive_tool: bool,
-}
-
-/// What the tool feels, where the hand may feel it too.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Tool {
-    /// Stamp of the HIP sample that the tool was at, by the master's clock: its age is the round trip that the hand
-    /// would feel, play-out included.
-    pub answers: Time,
-    /// f_s, the measured contact force on the object; none where the master has not asked for it.
-    pub force: Option<ForceCounts>,
-    /// Whether the tool touches the object.
-    pub in_contact: bool,
-    /// E_in of the tool's port, J; it only grows.
-    pub in_j: f64,
-    /// Relative force error of the local model over the last half second of contact, 0 to 1.
-    pub model_error: f64,
-}
-
-/// Why an update was sent.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Cause {
-    /// (12): the force error left the deadband.
-    Deadband,
-    /// T_update passed since the last update.
-    Timer,
-    /// Section III-A, case 1: the master touches, the slave does not.
-    MasterOnlyContact,
-    /// Section III-A, case 2: the slave touches, the master does not.
-    SlaveOnlyContact,
-    /// The slave lost contact.
-    ContactLost,
-    /// The scheme sends every sample.
-    EverySample,
-}
-
-impl Cause {
-    /// All causes, in the order of their numbers on the wire.
-    pub const ALL: [Self; 6] = [
-        Self::Deadband,
-        Self::Timer,
-        Self::MasterOnlyContact,
-        Self::SlaveOnlyContact,
-        Self::ContactLost,
-        Self::EverySample,
-    ];
-
-    /// Its number on the wire and its place in [`Cause::ALL`].
-    #[must_use]
-    pub const fn number(self) -> usize {
-        self as usize
-    }
-
-    /// The name used in reports, files and on screens.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Deadband => "deadband",
-            Self::Timer => "timer",
-            Self::MasterOnlyContact => "master_only_contact",
-            Self::SlaveOnlyContact => "slave_only_contact",
-            Self::ContactLost => "contact_lost",
-            Self::EverySample => "every_sample",
-        }
-    }
-}
-
-/// What an update says: the whole state at one HIP sample, so that it supersedes all earlier ones.
-///
-/// Off the wire comes a [`RawUpdate`](super::RawUpdate); only its `accept` makes one of these.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Update {
-    /// Number of the update, from 1, strictly increasing.
-    pub sequence: u32,
-    /// Why it was sent.
-    pub cause: Cause,
-    /// Stamp of the HIP sample that it answers, by the master's clock.
-    pub answers: Time,
-    /// Number of the newest command that the slave has seen.
-    pub newest_command: u32,
-    /// Whether the slave's tool touches the object.
-    pub slave_in_contact: bool,
-    /// Parameters, footprint, pose and velocity of the object at that sample.
-    pub state: ModelState,
-}
-
-/// What a viewer sees of the remote scene between updates; the model never uses it.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Scene {
-    /// Stamp of the HIP sample that the slave was at, by the master's clock.
-    pub answers: Time,
-    /// The object as the slave sees it.
-    pub object: Pose,
-    /// The tool, m.
-    pub tool: Vec2,
-    /// Measured contact force f_s on the object, N.
-    pub force: Vec2,
 }
 
 /// What a master wants to be.

@@ -28,8 +28,8 @@ pub use header::{
 };
 pub use label::{LABEL_MAX, Label};
 pub use message::{
-    Architecture, Cause, Command, Echo, Ending, Envelope, Farewell, ForceCounts, HandPort, Hello,
-    HipCounts, HipSample, Refusal, Role, SCENE_HZ_MAX, Scene, Tool, Update, Welcome,
+    Architecture, Command, Echo, Ending, Envelope, Farewell, Hello, Refusal, Role, SCENE_HZ_MAX,
+    Welcome,
 };
 pub use raw::{HelloError, RawHello, RawUpdate, RawWelcome, WelcomeError};
 pub use samples::{PushError, SAMPLES_MAX, SampleBlock};

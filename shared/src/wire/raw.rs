@@ -7,13 +7,15 @@ use serde::{Deserialize, Serialize};
 
 use super::error::{FieldError, demand, finite};
 use super::label::Label;
-use super::message::{Architecture, Cause, Hello, Role, SCENE_HZ_MAX, Scene, Update, Welcome};
+use super::message::{Architecture, Hello, Role, SCENE_HZ_MAX, Welcome};
 use super::samples::SAMPLES_MAX;
-use crate::contact::Coupling;
-use crate::geometry::{BoxFootprint, Pose, Twist, Vec2};
+use crate::model::contact::Coupling;
+use crate::model::geometry::{BoxFootprint, Pose, Twist, Vec2};
+use crate::model::params::{ModelParams, ModelState, ParamsError, WORKSPACE_M, in_range};
+use crate::model::settings::{ModelSettings, Smoothing, checked_coupling};
+use crate::model::tool::Scene;
+use crate::model::update::{Cause, Update};
 use crate::pairing::Token;
-use crate::params::{ModelParams, ModelState, ParamsError, WORKSPACE_M, in_range};
-use crate::settings::{ModelSettings, Smoothing, checked_coupling};
 use crate::time::Time;
 
 /// A model's state as it lies on the wire: fifteen numbers.

@@ -9,7 +9,7 @@ use serde::de::{self, SeqAccess, Visitor};
 use serde::ser::SerializeSeq;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-use super::message::{ForceCounts, HipCounts, HipSample};
+use crate::model::sample::{ForceCounts, HipCounts, HipSample};
 use crate::time::{TICK, Time, duration_nanos};
 
 /// The most samples that one command carries: 32 ms of motion, about 260 bytes.

@@ -1,13 +1,16 @@
 //! Promises of the whole format: what is written reads back, and nothing else reads.
 
+use crate::model::sample::{ForceCounts, HipCounts, HipSample};
+use crate::model::tool::{HandPort, Scene, Tool};
+use crate::model::update::{Cause, Update};
 use proptest::prelude::*;
 
 use super::*;
-use crate::contact::Coupling;
-use crate::geometry::{BoxFootprint, Pose, Twist, Vec2};
+use crate::model::contact::Coupling;
+use crate::model::geometry::{BoxFootprint, Pose, Twist, Vec2};
+use crate::model::params::{ModelParams, ModelState, ParamsError};
+use crate::model::settings::{FrictionLaw, Mode, ModelSettings, PoseCorrection, Smoothing};
 use crate::pairing::Token;
-use crate::params::{ModelParams, ModelState, ParamsError};
-use crate::settings::{FrictionLaw, Mode, ModelSettings, PoseCorrection, Smoothing};
 use crate::time::Time;
 
 const COUPLING: Coupling = Coupling {

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::error::{FieldError, finite};
-use super::message::Cause;
+use crate::model::update::Cause;
 
 /// Messages in datagrams, by type.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]

@@ -1,8 +1,8 @@
 //! The document of a replay: the report of a run, as far as its keys have a meaning here, and every table.
 
 use mmt_lab::replay::{HeldOut, Law, LawReport, PushReport, ReplayConfig, ReplayReport};
+use mmt_shared::model::update::Cause;
 use mmt_shared::report::{Counts, Number, RunReport};
-use mmt_shared::wire::Cause;
 use serde::Serialize;
 
 /// The law that the keys of the run report speak of; all laws are in the section `replay`.

@@ -12,7 +12,7 @@ use mmt_lab::reproduce::delay::Duel;
 use mmt_lab::reproduce::{Each, Laboratory, ReproduceError};
 use mmt_lab::transport::{Case, Outcome};
 use mmt_lab::trial::{Measured, Trial, TrialError};
-use mmt_shared::settings::Mode;
+use mmt_shared::model::settings::Mode;
 
 use super::manifest::Manifest;
 use crate::failure::Failure;

@@ -5,8 +5,10 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::Duration;
 
 use mmt_shared::io::wake::Waker;
+use mmt_shared::model::sample::HipSample;
+use mmt_shared::model::tool::{HandPort, Tool};
+use mmt_shared::model::update::Update;
 use mmt_shared::time::Time;
-use mmt_shared::wire::{HandPort, HipSample, Tool, Update};
 use triple_buffer::{Input, Output, triple_buffer};
 
 use crate::io::MasterLive;

@@ -2,7 +2,7 @@
 
 use std::net::SocketAddr;
 
-use mmt_shared::geometry::{BoxFootprint, Pose};
+use mmt_shared::channel::datagram_channel::{LinkEnd, Outgoing};
 use mmt_shared::io::clock::Clock;
 use mmt_shared::io::congestion::RateCap;
 use mmt_shared::io::identity::Identity;
@@ -10,12 +10,13 @@ use mmt_shared::io::listen::Listener;
 use mmt_shared::io::quic::{Traffic, server_endpoint};
 use mmt_shared::io::socket;
 use mmt_shared::io::stream::{read_frame, write_frame};
-use mmt_shared::link_end::{LinkEnd, Outgoing};
-use mmt_shared::settings::Mode;
+use mmt_shared::model::geometry::{BoxFootprint, Pose};
+use mmt_shared::model::settings::Mode;
+use mmt_shared::model::update::Update;
 use mmt_shared::time::Time;
 use mmt_shared::wire::{
     DATAGRAM_MAX, Farewell, Hello, Label, MasterTotals, Matter, STREAM_MESSAGE_MAX, Side,
-    StreamMessage, Update, Welcome, decode_stream_message, encode_refused, encode_slave_farewell,
+    StreamMessage, Welcome, decode_stream_message, encode_refused, encode_slave_farewell,
     encode_welcome,
 };
 use quinn::{Connection, RecvStream, SendStream};

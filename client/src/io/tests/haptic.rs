@@ -1,12 +1,12 @@
 //! What the haptic loop promises, ticked by hand.
 
-use mmt_shared::geometry::Pose;
 use mmt_shared::io::schedule::Tick;
 use mmt_shared::io::truth::{self, TruthReceiver};
 use mmt_shared::io::wake::{self, Wakeup};
 use mmt_shared::metrics::PoseError;
+use mmt_shared::model::geometry::Pose;
+use mmt_shared::model::update::Update;
 use mmt_shared::time::Time;
-use mmt_shared::wire::Update;
 
 use super::fake::{state, welcome_for};
 use super::*;

@@ -4,7 +4,7 @@
 //! This is move and wait, by which people handle things at a delay (Ferrell 1965). It must never look at
 //! anything but the view, and never count a touch without a motion as an answer.
 
-use mmt_shared::geometry::{Face, Vec2};
+use mmt_shared::model::geometry::{Face, Vec2};
 
 /// The box has really been pushed if it is seen this far from where it stood before the nudge, m: five times
 /// what vision errs by default.

@@ -1,8 +1,8 @@
 //! The scripted operator against a small quasi-static box.
 
 use super::*;
-use mmt_shared::contact::{Coupling, GodObject, contact_force};
-use mmt_shared::geometry::{Twist, cross};
+use mmt_shared::model::contact::{Coupling, GodObject, contact_force};
+use mmt_shared::model::geometry::{Twist, cross};
 
 /// A box that slides when pushed harder than `friction_n`, slowly enough to have no inertia.
 struct Slab {

@@ -4,7 +4,7 @@
 
 use mmt_netem::config::LinkConfig;
 use mmt_netem::words::ParseError;
-use mmt_shared::rate_control::StretchMax;
+use mmt_shared::channel::rate_control::StretchMax;
 
 use crate::reproduce::ReproduceError;
 use crate::world::WorldConfig;

@@ -4,7 +4,7 @@
 //! the crossing is read off these runs and must never be written down from elsewhere.
 
 use mmt_shared::bilateral::Baseline;
-use mmt_shared::settings::PoseCorrection;
+use mmt_shared::model::settings::PoseCorrection;
 
 use super::{Group, Place, mean, run};
 use crate::architecture::{Architecture, DelayRow};

@@ -7,7 +7,7 @@ use super::tables::is_clean;
 use crate::architecture::{Architecture, DelayRow};
 use crate::figure::{Axis, Colour, Dot, Figure, Legend, Mark, Panel, Series, Stroke};
 use crate::statistics::median;
-use mmt_shared::settings::PoseCorrection;
+use mmt_shared::model::settings::PoseCorrection;
 
 /// Four measures over the delay, one curve an architecture; zero delay stands at half a millisecond.
 pub(super) fn figure(groups: &[Group]) -> Figure {

@@ -6,8 +6,8 @@ use std::time::Duration;
 
 use mmt_client::operator::scripted::Picture;
 use mmt_server::link::Repeats;
-use mmt_shared::rate_control::StretchMax;
-use mmt_shared::settings::PoseCorrection;
+use mmt_shared::channel::rate_control::StretchMax;
+use mmt_shared::model::settings::PoseCorrection;
 
 use super::Duel;
 use crate::architecture::Architecture;

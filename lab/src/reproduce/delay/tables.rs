@@ -8,7 +8,7 @@ use crate::architecture::{Architecture, DelayRow};
 use crate::statistics::{Interval, median};
 use crate::table::{Cell, Table};
 use mmt_client::operator::scripted::Picture;
-use mmt_shared::settings::PoseCorrection;
+use mmt_shared::model::settings::PoseCorrection;
 
 pub(super) fn runs(groups: &[Group]) -> Table {
     let mut table = Table::new(

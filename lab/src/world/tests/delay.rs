@@ -5,9 +5,9 @@ use super::*;
 use mmt_client::operator::scripted::Picture;
 use mmt_server::link::Repeats;
 use mmt_server::shadow::TriggerReference;
-use mmt_shared::local_model::LocalModel;
+use mmt_shared::model::local_model::LocalModel;
+use mmt_shared::model::settings::{ModelSettings, PoseCorrection};
 use mmt_shared::rng::Substream;
-use mmt_shared::settings::{ModelSettings, PoseCorrection};
 use proptest::prelude::*;
 
 /// Runs of 40 s over one network, put together.

@@ -5,8 +5,8 @@
 
 use super::super::*;
 use mmt_server::playout::PlayoutConfig;
-use mmt_shared::params::ModelParams;
-use mmt_shared::settings::{Mode, ModelSettings, PoseCorrection};
+use mmt_shared::model::params::ModelParams;
+use mmt_shared::model::settings::{Mode, ModelSettings, PoseCorrection};
 
 const SEEDS: std::ops::RangeInclusive<u64> = 1..=10;
 /// What counts as sliding, m/s: the least speed at which the estimator listens.

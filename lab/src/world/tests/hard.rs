@@ -3,7 +3,7 @@
 use super::*;
 use mmt_client::operator::scripted::Phase;
 use mmt_server::environment::Wall;
-use mmt_shared::geometry::Pose;
+use mmt_shared::model::geometry::Pose;
 
 /// How far the real object turns within a round trip of 2 s, rad: the most of a run.
 #[derive(Default)]

@@ -7,7 +7,7 @@ use crate::reproduce::Curve;
 use crate::reproduce::scenarios::{SCENARIOS, Scenario};
 use crate::statistics::Interval;
 use crate::trial::{Measured, Trial};
-use mmt_shared::settings::Mode;
+use mmt_shared::model::settings::Mode;
 
 const SEEDS: std::ops::RangeInclusive<u64> = 1..=3;
 const SECONDS: u64 = 20;

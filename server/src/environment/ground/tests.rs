@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::environment::patch::POINTS;
-use mmt_shared::params::{friction_torque_of_square, inertia_of_square};
+use mmt_shared::model::params::{friction_torque_of_square, inertia_of_square};
 use mmt_shared::rng::Substream;
 
 const SIDE: f64 = 0.36;

@@ -1,7 +1,7 @@
 //! Laws of outlines.
 
 use super::*;
-use mmt_shared::params::{friction_torque_of_square, inertia_of_square};
+use mmt_shared::model::params::{friction_torque_of_square, inertia_of_square};
 
 fn polygon(vertices: &[(f64, f64)]) -> Result<Outline, OutlineError> {
     let vertices: Vec<_> = vertices.iter().map(|(x, y)| Vec2::new(*x, *y)).collect();

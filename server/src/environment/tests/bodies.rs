@@ -1,7 +1,7 @@
 //! Laws of bodies other than the cube, each against a closed form or a direction that must not matter.
 
 use super::*;
-use mmt_shared::geometry::Face;
+use mmt_shared::model::geometry::Face;
 
 const G: f64 = 9.81;
 

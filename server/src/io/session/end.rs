@@ -2,9 +2,9 @@
 
 use std::time::Duration;
 
+use mmt_shared::channel::peer::NumbersSpent;
 use mmt_shared::io::stream::ReadFrameError;
 use mmt_shared::io::transport::{ConnectionError, RecvStream};
-use mmt_shared::peer::NumbersSpent;
 use mmt_shared::wire::{
     DecodeError, Farewell, MasterTotals, STREAM_MESSAGE_MAX, Side, StreamMessage,
     decode_stream_message,

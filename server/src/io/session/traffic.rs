@@ -6,9 +6,9 @@ use std::pin::Pin;
 use std::time::Duration;
 
 use bytes::Bytes;
+use mmt_shared::channel::datagram_channel::SealError;
 use mmt_shared::io::live::LiveCell;
 use mmt_shared::io::transport::SendDatagramError;
-use mmt_shared::link_end::SealError;
 use mmt_shared::time::Time;
 use mmt_shared::wire::{Farewell, MasterTotals};
 use tokio::sync::watch;

@@ -3,21 +3,22 @@
 use std::time::Duration;
 
 use bytes::Bytes;
-use mmt_shared::contact::Coupling;
-use mmt_shared::geometry::Vec2;
+use mmt_shared::channel::datagram_channel::{LinkEnd, Outgoing};
 use mmt_shared::io::clock::Clock;
 use mmt_shared::io::congestion::RateCap;
 use mmt_shared::io::connect::connect;
 use mmt_shared::io::quic::{Traffic, client_endpoint};
 use mmt_shared::io::socket;
 use mmt_shared::io::stream::{read_frame, write_frame};
-use mmt_shared::link_end::{LinkEnd, Outgoing};
+use mmt_shared::model::contact::Coupling;
+use mmt_shared::model::geometry::Vec2;
+use mmt_shared::model::sample::{HipCounts, HipSample};
 use mmt_shared::pairing::{Pairing, Token};
 use mmt_shared::time::{TICK, Time};
 use mmt_shared::wire::{
-    Architecture, Command, DATAGRAM_MAX, Ending, Farewell, Hello, HipCounts, HipSample, Label,
-    MasterTotals, Matter, RawUpdate, RawWelcome, Refusal, Role, STREAM_MESSAGE_MAX, SampleBlock,
-    Side, SlaveTotals, StreamMessage, decode_stream_message, encode_hello, encode_master_farewell,
+    Architecture, Command, DATAGRAM_MAX, Ending, Farewell, Hello, Label, MasterTotals, Matter,
+    RawUpdate, RawWelcome, Refusal, Role, STREAM_MESSAGE_MAX, SampleBlock, Side, SlaveTotals,
+    StreamMessage, decode_stream_message, encode_hello, encode_master_farewell,
 };
 use quinn::{Connection, Endpoint, RecvStream, SendStream};
 use tokio::time::{interval, timeout};

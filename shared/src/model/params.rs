@@ -5,8 +5,8 @@
 
 use serde::Serialize;
 
-use crate::contact::Coupling;
-use crate::geometry::{BoxFootprint, Face, Pose, Twist};
+use crate::model::contact::Coupling;
+use crate::model::geometry::{BoxFootprint, Face, Pose, Twist};
 use crate::range::{self, OutOfRange};
 use crate::time::TICK_S;
 

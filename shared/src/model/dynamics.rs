@@ -4,9 +4,9 @@
 //! recommended mode uses instead. Both are semi-implicit in the pose: velocity first, then the pose with
 //! the new velocity. It must never let ground friction reverse a velocity within an implicit step.
 
-use crate::geometry::{Pose, Twist, Vec2, cross};
-use crate::params::ModelParams;
-use crate::settings::FrictionLaw;
+use crate::model::geometry::{Pose, Twist, Vec2, cross};
+use crate::model::params::ModelParams;
+use crate::model::settings::FrictionLaw;
 use crate::time::TICK_S;
 
 /// Regularisation of the limit surface, m/s: below it friction acts like viscous drag. The stick test
@@ -162,7 +162,7 @@ fn root(map: impl Fn(f64) -> f64, high: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::contact::Coupling;
+    use crate::model::contact::Coupling;
 
     const COUPLING: Coupling = Coupling {
         stiffness_n_per_m: 1000.0,

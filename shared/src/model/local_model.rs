@@ -8,15 +8,15 @@
 mod body;
 mod replay;
 
-use crate::contact::Touch;
-use crate::correction::{Correction, IN_CONTACT, IN_CONTACT_REPLAYED, Tank};
-use crate::dynamics::Motion;
-use crate::geometry::{Vec2, rotate};
-use crate::history::{HISTORY_TICKS, History, Moment};
-use crate::params::{ModelParams, ModelState};
-use crate::settings::{ModelSettings, PoseCorrection, Smoothing};
+use crate::model::contact::Touch;
+use crate::model::correction::{Correction, IN_CONTACT, IN_CONTACT_REPLAYED, Tank};
+use crate::model::dynamics::Motion;
+use crate::model::geometry::{Vec2, rotate};
+use crate::model::history::{HISTORY_TICKS, History, Moment};
+use crate::model::params::{ModelParams, ModelState};
+use crate::model::settings::{ModelSettings, PoseCorrection, Smoothing};
+use crate::model::update::{Cause, Update};
 use crate::time::{TICK, TICK_S, Time};
-use crate::wire::message::{Cause, Update};
 
 use body::Body;
 pub use replay::REPLAYED_PER_TICK;

@@ -4,12 +4,12 @@
 //! what the ticks did to the other. It must never change its parameters for more energy than was paid.
 
 use super::Rendered;
-use crate::contact::{Coupling, GodObject, Touch, contact_force};
-use crate::correction::{Correction, ROOM_M, Tank};
-use crate::dynamics::Motion;
-use crate::geometry::{Face, Vec2, rotate};
-use crate::params::{ModelParams, ModelState};
-use crate::settings::ModelSettings;
+use crate::model::contact::{Coupling, GodObject, Touch, contact_force};
+use crate::model::correction::{Correction, ROOM_M, Tank};
+use crate::model::dynamics::Motion;
+use crate::model::geometry::{Face, Vec2, rotate};
+use crate::model::params::{ModelParams, ModelState};
+use crate::model::settings::ModelSettings;
 
 /// A box and the proxy on it.
 #[derive(Clone, Copy, Debug)]

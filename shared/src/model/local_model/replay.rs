@@ -6,12 +6,12 @@
 //! be corrected. It must never touch the box that is felt, and never take longer in a tick than its share.
 
 use super::body::Body;
-use crate::geometry::Pose;
-use crate::history::History;
-use crate::params::ModelState;
-use crate::settings::ModelSettings;
+use crate::model::geometry::Pose;
+use crate::model::history::History;
+use crate::model::params::ModelState;
+use crate::model::settings::ModelSettings;
+use crate::model::update::Update;
 use crate::time::Time;
-use crate::wire::message::Update;
 
 /// Most samples replayed in a tick, each at the cost of the model's own step: well within a haptic tick's
 /// budget of 10 µs. A second of history, 1000 samples and one more a tick, is caught up with in 53 ticks.

@@ -5,12 +5,14 @@
 
 use std::time::Duration;
 
-use crate::peer::{Arrival, NumbersSpent, Peer};
-use crate::rate_control::{RateController, StretchMax};
+use crate::channel::peer::{Arrival, NumbersSpent, Peer};
+use crate::channel::rate_control::{RateController, StretchMax};
+use crate::model::tool::{Scene, Tool};
+use crate::model::update::Update;
 use crate::time::Time;
 use crate::wire::{
-    Command, EncodeError, KindCounts, Matter, Scene, Side, Tool, Traffic, Update, decode_datagram,
-    encode_command, encode_heartbeat, encode_scene, encode_tool, encode_update,
+    Command, EncodeError, KindCounts, Matter, Side, Traffic, decode_datagram, encode_command,
+    encode_heartbeat, encode_scene, encode_tool, encode_update,
 };
 
 /// Each side sends at least this often: what is needed to call a link dead within a second and to keep

@@ -5,8 +5,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::contact::Coupling;
-use crate::params::{ParamsError, in_range};
+use crate::model::contact::Coupling;
+use crate::model::params::{ParamsError, in_range};
 
 /// Accepted virtual stiffness k_p, N/m: softer is no wall to a hand, stiffer no device of this kind renders.
 pub const STIFFNESS_N_PER_M: (f64, f64) = (50.0, 10_000.0);

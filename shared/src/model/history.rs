@@ -4,9 +4,9 @@
 //! model was *then*. Entries are found by stamp, by search, never by index arithmetic, because ticks may
 //! have been skipped. It allocates once, when made.
 
-use crate::contact::GodObject;
-use crate::dynamics::Motion;
-use crate::geometry::Vec2;
+use crate::model::contact::GodObject;
+use crate::model::dynamics::Motion;
+use crate::model::geometry::Vec2;
 use crate::time::Time;
 
 /// Length of the ring, ticks: 8.192 s, more than a round trip at 2 s one way and a second to spare.

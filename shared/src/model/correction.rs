@@ -5,9 +5,9 @@
 //! from the HIP; motion towards it stores energy in the coupling and is paid from a tank that holds what
 //! the model has dissipated on the ground. What the tank cannot pay is not done.
 
-use crate::contact::{Coupling, Touch};
-use crate::geometry::{Pose, Vec2, rotate};
-use crate::history::PoseChange;
+use crate::model::contact::{Coupling, Touch};
+use crate::model::geometry::{Pose, Vec2, rotate};
+use crate::model::history::PoseChange;
 use crate::time::TICK_S;
 
 /// How fast a correction is bled in.
@@ -202,8 +202,8 @@ fn turn_about(pose: &Pose, pivot: Vec2, turn: f64) -> PoseChange {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::contact::GodObject;
-    use crate::geometry::BoxFootprint;
+    use crate::model::contact::GodObject;
+    use crate::model::geometry::BoxFootprint;
 
     const COUPLING: Coupling = Coupling {
         stiffness_n_per_m: 1000.0,

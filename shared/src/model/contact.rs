@@ -9,7 +9,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::geometry::{BoxFootprint, Face, Pose, Twist, Vec2, rotate};
+use crate::model::geometry::{BoxFootprint, Face, Pose, Twist, Vec2, rotate};
 
 /// Stiffness and damping of the virtual coupling between the HIP and the proxy.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]

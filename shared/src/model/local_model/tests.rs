@@ -1,10 +1,10 @@
 //! What the local model promises: forces, smoothing, and corrections without a jolt.
 
 use super::*;
-use crate::contact::Coupling;
-use crate::correction::ROOM_M;
-use crate::geometry::{BoxFootprint, Pose, Twist};
-use crate::settings::Mode;
+use crate::model::contact::Coupling;
+use crate::model::correction::ROOM_M;
+use crate::model::geometry::{BoxFootprint, Pose, Twist};
+use crate::model::settings::Mode;
 
 mod energy;
 mod replay;

@@ -1,0 +1,48 @@
+//! What the two sides tell each other of the tool and of the hand: port energies, force, and the scene for viewers.
+
+use serde::{Deserialize, Serialize};
+
+use crate::model::geometry::{Pose, Vec2};
+use crate::model::sample::ForceCounts;
+use crate::time::Time;
+
+/// What the hand's port says to the tool's: time-domain passivity control (TDPA) holds each side to what went in at
+/// the other (`docs/baselines.md`).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct HandPort {
+    /// E_in, the energy that went in at the hand so far, J; it only grows.
+    pub in_j: f64,
+    /// Whether the slave is to say the tool's force every tick.
+    pub wants_force: bool,
+    /// Whether the tool is to go only as far as the hand has paid for.
+    pub passive_tool: bool,
+}
+
+/// What the tool feels, where the hand may feel it too.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Tool {
+    /// Stamp of the HIP sample that the tool was at, by the master's clock: its age is the round trip that the hand
+    /// would feel, play-out included.
+    pub answers: Time,
+    /// f_s, the measured contact force on the object; none where the master has not asked for it.
+    pub force: Option<ForceCounts>,
+    /// Whether the tool touches the object.
+    pub in_contact: bool,
+    /// E_in of the tool's port, J; it only grows.
+    pub in_j: f64,
+    /// Relative force error of the local model over the last half second of contact, 0 to 1.
+    pub model_error: f64,
+}
+
+/// What a viewer sees of the remote scene between updates; the model never uses it.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Scene {
+    /// Stamp of the HIP sample that the slave was at, by the master's clock.
+    pub answers: Time,
+    /// The object as the slave sees it.
+    pub object: Pose,
+    /// The tool, m.
+    pub tool: Vec2,
+    /// Measured contact force f_s on the object, N.
+    pub force: Vec2,
+}
