@@ -5,6 +5,7 @@
 
 #![allow(
     clippy::disallowed_methods,
+    clippy::disallowed_types,
     reason = "the command is the shell: arguments, files, terminal, clocks and threads are its business"
 )]
 

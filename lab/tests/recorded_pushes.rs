@@ -3,6 +3,7 @@
 //! The data lie beside the repository. Where they are missing these tests say so loudly, and fail in CI.
 #![allow(
     clippy::disallowed_methods,
+    clippy::print_stderr,
     clippy::unwrap_used,
     reason = "a test reads the recorded files and the environment variable CI, and fails by panicking"
 )]

@@ -5,6 +5,7 @@
 #![allow(
     clippy::disallowed_methods,
     clippy::disallowed_types,
+    clippy::print_stdout,
     reason = "a measurement in real time: it reads the clock and owns sockets and threads"
 )]
 

@@ -5,6 +5,7 @@
 
 #![allow(
     clippy::disallowed_methods,
+    clippy::disallowed_types,
     reason = "the drivers are the shell: they read the clock, own sockets and threads"
 )]
 

@@ -46,7 +46,6 @@ fn coast(environment: &mut Environment) -> f64 {
 #[track_caller]
 fn assert_within_1_5_percent(what: &str, got: f64, want: f64) {
     let error = 100.0 * (got / want - 1.0);
-    println!("{what}: {got:.5} against {want:.5}, {error:+.2} %");
     assert!(error.abs() < 1.5, "{what}: {got} is {error} % off {want}");
 }
 

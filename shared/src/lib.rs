@@ -4,6 +4,22 @@
 //! the local model, metrics, wire messages. The crate is pure; clocks, threads and sockets live in `io`
 //! behind the feature of that name.
 
+#![cfg_attr(
+    not(feature = "io"),
+    forbid(
+        unsafe_code,
+        clippy::disallowed_macros,
+        clippy::disallowed_methods,
+        clippy::disallowed_types,
+        clippy::unwrap_used,
+        clippy::expect_used,
+        clippy::indexing_slicing,
+        clippy::panic,
+        clippy::print_stderr,
+        clippy::print_stdout
+    )
+)]
+
 pub mod bilateral;
 pub mod channel;
 #[cfg(feature = "io")]

@@ -4,16 +4,21 @@
 //! A live run is compared with the median over seeds of virtual time, and repeated if it does not agree. A host that is
 //! too busy for 1 kHz says so by its own loops: if no run kept its time the tolerances are doubled and that is said loudly.
 
-#![allow(clippy::unwrap_used, clippy::panic, reason = "a test may panic")]
+#![allow(
+    clippy::disallowed_methods,
+    clippy::unwrap_used,
+    clippy::panic,
+    reason = "a test may panic, and keeps what it measured"
+)]
 
 use std::time::Duration;
 
+use crate::harness::hosts::{Hosts, HostsError};
+use crate::harness::process::{Running, did_not_run, number, say_loudly};
 use mmt_lab::statistics::median;
 use mmt_lab::world::{World, WorldConfig};
 use mmt_netem::LinkConfig;
 use mmt_server::playout::PlayoutConfig;
-use mmt_tests::hosts::{Hosts, HostsError};
-use mmt_tests::process::{Running, did_not_run, number, say_loudly};
 use serde_json::Value;
 
 /// Half a second there and back, with jitter and loss.
@@ -114,9 +119,11 @@ impl Attempt {
         self.skipped <= SKIPPED_MAX
     }
 
-    /// Prints every measure beside the virtual one; returns those that are further apart than `room` tolerances.
+    /// Writes every measure beside the virtual one; returns those that are further apart than `room` tolerances.
     fn apart(&self, name: &str, rows: &[Row], room: f64) -> Vec<String> {
         let mut apart = Vec::new();
+        let mut table = format!("Agreement of {name} with virtual time\n");
+        table += "  measure                 virtual      live    within\n";
         for (measure, of, share, absolute) in MEASURES {
             let expected = median(rows.iter().filter_map(of)).unwrap();
             let Some(got) = of(&self.row) else {
@@ -125,18 +132,18 @@ impl Attempt {
                     name == "hosts" && measure == "pose_rms_mm",
                     "{name}: no {measure}"
                 );
-                println!("{name:8} {measure:20} virtual {expected:7.3}  live       -");
+                table += &format!("  {measure:20}   {expected:8.3}         -         -\n");
                 continue;
             };
             let most = room * (share * expected + absolute);
-            let line = format!(
-                "{name:8} {measure:20} virtual {expected:7.3}  live {got:7.3}  within {most:.3}"
-            );
-            println!("{line}");
+            let line = format!("  {measure:20}   {expected:8.3}  {got:8.3}  {most:8.3}\n");
+            table += &line;
             if (got - expected).abs() > most {
                 apart.push(line);
             }
         }
+        let file = format!("{}/agreement-{name}.txt", env!("CARGO_TARGET_TMPDIR"));
+        std::fs::write(file, table).unwrap();
         apart
     }
 }

@@ -6,13 +6,13 @@
 
 use std::collections::BTreeMap;
 
-use mmt_shared::wire::{Kind, Side, decode_datagram, decode_stream_message};
-use mmt_tests::architecture::repository::root;
-use mmt_tests::process::did_not_run;
-use mmt_tests::tshark::{
+use crate::harness::process::did_not_run;
+use crate::harness::root;
+use crate::harness::tshark::{
     DATAGRAM_PORT, Field, Fields, Packet, SLAVE_PORT, STREAM_PORT, TsharkError, decode_as, dissect,
     tshark, write_capture,
 };
+use mmt_shared::wire::{Kind, Side, decode_datagram, decode_stream_message};
 use serde_json::Value;
 
 /// Fields that a vector does not name: of the header, the frame, and what its numbers are made of.

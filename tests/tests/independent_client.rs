@@ -7,12 +7,11 @@
 
 use std::path::Path;
 use std::process::{Command, Stdio};
-use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-use mmt_tests::architecture::repository::root;
-use mmt_tests::process::{Ended, ProcessError, Running, did_not_run, number};
-use mmt_tests::tshark::{TsharkError, tshark};
+use crate::harness::process::{Ended, ProcessError, Running, did_not_run, number};
+use crate::harness::tshark::{TsharkError, tshark};
+use crate::harness::{alone, root};
 use serde_json::{Value, json};
 
 /// For what takes seconds; the host may be busy.
@@ -21,12 +20,6 @@ const GENEROUS: Duration = Duration::from_secs(60);
 const REFUSED: i32 = 3;
 const WRONG_PIN: i32 = 4;
 const NO_PROTOCOL: i32 = 5;
-
-/// One session at a time: each wants two cores in real time.
-fn alone() -> MutexGuard<'static, ()> {
-    static TURN: Mutex<()> = Mutex::new(());
-    TURN.lock().unwrap_or_else(PoisonError::into_inner)
-}
 
 fn ok<T>(result: Result<T, ProcessError>) -> T {
     result.unwrap_or_else(|error| panic!("{error}"))

@@ -3,20 +3,14 @@
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test may panic")]
 #![allow(clippy::disallowed_methods, reason = "lets sessions go on for a while")]
 
-use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-use mmt_tests::process::{Ended, ProcessError, Running, number};
+use crate::harness::alone;
+use crate::harness::process::{Ended, ProcessError, Running, number};
 use serde_json::Value;
 
 /// For what needs no more than a start or an end.
 const SOON: Duration = Duration::from_secs(10);
-
-/// One session at a time: each wants two cores in real time.
-fn alone() -> MutexGuard<'static, ()> {
-    static TURN: Mutex<()> = Mutex::new(());
-    TURN.lock().unwrap_or_else(PoisonError::into_inner)
-}
 
 fn ok<T>(result: Result<T, ProcessError>) -> T {
     result.unwrap_or_else(|error| panic!("{error}"))

@@ -5,8 +5,8 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test may panic")]
 
-use mmt_tests::hosts::{Hosts, HostsError, Session};
-use mmt_tests::process::{did_not_run, number};
+use crate::harness::hosts::{Hosts, HostsError, Session};
+use crate::harness::process::{did_not_run, number};
 use serde_json::Value;
 
 /// How long the master operates, s.

@@ -2,6 +2,7 @@
 
 #![allow(
     clippy::disallowed_methods,
+    clippy::disallowed_types,
     reason = "the shell of the lab: threads, files and clocks are its business"
 )]
 

@@ -1,10 +1,4 @@
 //! `mmt sweep` as a process: the same bytes however the rows are cut, and what it says of what is wrong or missing.
-#![allow(
-    clippy::disallowed_methods,
-    clippy::indexing_slicing,
-    clippy::unwrap_used,
-    reason = "a test starts the command, reads its files, and fails by panicking"
-)]
 
 use std::fs;
 use std::path::Path;
@@ -13,8 +7,6 @@ use std::thread;
 use std::time::Duration;
 
 use serde_json::Value;
-
-mod command;
 
 /// Two axes of two values, two seeds: eight rows, each long enough for contact.
 const PLAN: &str = r#"
@@ -46,7 +38,7 @@ impl Bench {
     }
 
     fn command(&self, arguments: &[&str]) -> Command {
-        let mut command = command::mmt(&self.0, &["sweep", "plan.toml"]);
+        let mut command = super::mmt(&self.0, &["sweep", "plan.toml"]);
         command.args(arguments);
         command
     }
@@ -251,7 +243,7 @@ fn a_dry_run_tells_the_rows_and_makes_nothing() {
 
 #[test]
 fn the_plan_of_the_document_is_one_with_the_rows_that_it_says() {
-    let text = include_str!("../../docs/sweep.md");
+    let text = include_str!("../../../docs/sweep.md");
     let plans = text
         .split("```toml\n")
         .skip(1)
@@ -270,7 +262,7 @@ fn the_plan_of_the_document_is_one_with_the_rows_that_it_says() {
 
 #[test]
 fn the_documents_tell_every_column() {
-    let text = include_str!("../../docs/sweep.md");
+    let text = include_str!("../../../docs/sweep.md");
     for key in mmt_lab::sweep::MEASURES {
         assert!(text.contains(&format!("`{key}`")), "{key} is not told");
     }

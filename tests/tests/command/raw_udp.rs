@@ -1,20 +1,12 @@
 //! `--transport udp` as a process: a whole session with its report, the warning, and where it is refused.
-#![allow(
-    clippy::disallowed_methods,
-    clippy::indexing_slicing,
-    clippy::unwrap_used,
-    reason = "a test starts the command, and fails by panicking"
-)]
 
 use std::process::Output;
 
 use serde_json::Value;
 
-mod command;
-
 fn mmt(arguments: &[&str]) -> Output {
     let home = tempfile::tempdir().unwrap();
-    command::mmt(&home, arguments).output().unwrap()
+    super::mmt(&home, arguments).output().unwrap()
 }
 
 fn errors(output: &Output) -> String {

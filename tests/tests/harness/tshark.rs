@@ -1,10 +1,6 @@
 //! tshark with the protocol's dissector: captures made of messages, and what tshark says of captures.
 //!
 //! The only module that starts it. Judges nothing: what a capture should show is the tests' business.
-#![allow(
-    clippy::disallowed_methods,
-    reason = "writes captures and starts tshark, which is what it is for"
-)]
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -12,21 +8,21 @@ use std::process::Command;
 
 use thiserror::Error;
 
-use crate::architecture::repository::root;
+use crate::harness::root;
 
 /// Port of the slave in a capture that [`write_capture`] made; the dissector's default.
-pub const SLAVE_PORT: u16 = 4433;
+pub(crate) const SLAVE_PORT: u16 = 4433;
 /// Port of the master whose messages stand in datagrams.
-pub const DATAGRAM_PORT: u16 = 4001;
+pub(crate) const DATAGRAM_PORT: u16 = 4001;
 /// Port of the master whose messages stand behind their length, as on the stream.
-pub const STREAM_PORT: u16 = 4002;
+pub(crate) const STREAM_PORT: u16 = 4002;
 
 /// Link type of packets that begin with their IP header (`LINKTYPE_RAW`, tcpdump.org).
 const RAW_IP: u32 = 101;
 
 /// Why tshark said nothing.
 #[derive(Debug, Error)]
-pub enum TsharkError {
+pub(crate) enum TsharkError {
     /// It is not installed.
     #[error("tshark does not start: {0}")]
     Missing(std::io::Error),
@@ -45,32 +41,32 @@ pub enum TsharkError {
 
 /// A field of a message as tshark shows it.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Field {
+pub(crate) struct Field {
     /// Its value as text.
-    pub show: String,
+    pub(crate) show: String,
     /// Its bytes in hexadecimal digits.
-    pub bytes: String,
+    pub(crate) bytes: String,
 }
 
 /// What tshark found in a packet: by name, without `mmt.`, every occurrence in its order.
-pub type Fields = BTreeMap<String, Vec<Field>>;
+pub(crate) type Fields = BTreeMap<String, Vec<Field>>;
 
 /// One UDP datagram of a capture, over IPv4, between two ports of one host.
 #[derive(Clone, Copy, Debug)]
-pub struct Packet<'a> {
+pub(crate) struct Packet<'a> {
     /// Port of the sender.
-    pub from: u16,
+    pub(crate) from: u16,
     /// Port of the receiver.
-    pub to: u16,
+    pub(crate) to: u16,
     /// The payload.
-    pub payload: &'a [u8],
+    pub(crate) payload: &'a [u8],
 }
 
 /// Writes a capture (pcap) of these datagrams, one a millisecond. No checksums: they are 0.
 ///
 /// # Errors
 /// The file cannot be written.
-pub fn write_capture(path: &Path, packets: &[Packet<'_>]) -> Result<(), TsharkError> {
+pub(crate) fn write_capture(path: &Path, packets: &[Packet<'_>]) -> Result<(), TsharkError> {
     let mut file = Vec::new();
     // magic, version 2.4 in two halves of 16 bits, time zone, accuracy, longest packet, link type
     for word in [0xa1b2_c3d4, 4 << 16 | 2, 0, 0, 65535, RAW_IP] {
@@ -107,7 +103,7 @@ fn ipv4(packet: &Packet<'_>) -> Vec<u8> {
 
 /// The options that make tshark take the two masters of [`write_capture`] for what they are.
 #[must_use]
-pub fn decode_as() -> Vec<String> {
+pub(crate) fn decode_as() -> Vec<String> {
     let pairs = [(DATAGRAM_PORT, "mmt"), (STREAM_PORT, "mmt_stream")];
     let options = pairs.map(|(port, name)| format!("udp.port=={port},{name}"));
     let options = options.into_iter();
@@ -118,7 +114,7 @@ pub fn decode_as() -> Vec<String> {
 ///
 /// # Errors
 /// It is missing, fails, or the dissector fails in it.
-pub fn tshark(capture: &Path, options: &[String]) -> Result<String, TsharkError> {
+pub(crate) fn tshark(capture: &Path, options: &[String]) -> Result<String, TsharkError> {
     // an empty directory of settings of its own: a person's must change nothing
     let settings = capture.with_extension("settings");
     std::fs::create_dir_all(&settings).map_err(|source| TsharkError::File {
@@ -148,7 +144,7 @@ pub fn tshark(capture: &Path, options: &[String]) -> Result<String, TsharkError>
 ///
 /// # Errors
 /// As [`tshark`].
-pub fn dissect(capture: &Path, options: &[String]) -> Result<Vec<Fields>, TsharkError> {
+pub(crate) fn dissect(capture: &Path, options: &[String]) -> Result<Vec<Fields>, TsharkError> {
     let format = ["-T".to_owned(), "pdml".to_owned()];
     let text = tshark(capture, &[options, &format[..]].concat())?;
     Ok(text.split("<packet>").skip(1).map(fields_of).collect())

@@ -1,18 +1,11 @@
 //! Wrong input of every kind: exit code 2, a message that says what, where and what to do, no panic.
-#![allow(
-    clippy::disallowed_methods,
-    clippy::unwrap_used,
-    reason = "a test starts the command, writes files for it, and fails by panicking"
-)]
 
 use std::process::Output;
-
-mod command;
 
 /// Runs `mmt` with these arguments, with a directory of its own for everything that it keeps.
 fn mmt(arguments: &[&str]) -> (Output, tempfile::TempDir) {
     let home = tempfile::tempdir().unwrap();
-    let output = command::mmt(&home, arguments).output().unwrap();
+    let output = super::mmt(&home, arguments).output().unwrap();
     (output, home)
 }
 
@@ -81,7 +74,7 @@ fn a_wrong_trace_or_record_is_refused_with_its_line() {
         ),
         (&["netem"], &["--listen"]),
     ] {
-        complains(&command::mmt(&home, arguments).output().unwrap(), 2, parts);
+        complains(&super::mmt(&home, arguments).output().unwrap(), 2, parts);
     }
 }
 
@@ -126,7 +119,7 @@ fn a_wrong_configuration_is_refused_with_line_and_caret() {
     ] {
         std::fs::write(&file, text).unwrap();
         let arguments = ["slave", "--listen", "127.0.0.1:0", "--config", "slave.toml"];
-        complains(&command::mmt(&home, &arguments).output().unwrap(), 2, parts);
+        complains(&super::mmt(&home, &arguments).output().unwrap(), 2, parts);
     }
     refuses(
         &["slave", "--listen", "127.0.0.1:0", "--config", "none.toml"],
@@ -151,7 +144,7 @@ fn a_wrong_trace_is_refused_with_file_and_line() {
         std::fs::write(home.path().join(name), text).unwrap();
         let operator = format!("trace:{name}");
         let arguments = ["master", &pairing, "--operator", &operator];
-        complains(&command::mmt(&home, &arguments).output().unwrap(), 2, parts);
+        complains(&super::mmt(&home, &arguments).output().unwrap(), 2, parts);
     }
 }
 
@@ -159,7 +152,7 @@ fn a_wrong_trace_is_refused_with_file_and_line() {
 fn a_wrong_recording_is_refused_before_any_is_replayed() {
     let home = tempfile::tempdir().unwrap();
     std::fs::write(home.path().join("binary.txt"), [0xff, 0xfe]).unwrap();
-    let output = command::mmt(&home, &["replay", "binary.txt"])
+    let output = super::mmt(&home, &["replay", "binary.txt"])
         .output()
         .unwrap();
     complains(&output, 2, &["binary.txt", "UTF-8"]);
@@ -183,7 +176,7 @@ fn an_address_in_use_has_an_exit_code_of_its_own() {
 #[test]
 fn a_wrong_log_filter_is_refused_by_the_name_of_its_variable() {
     let home = tempfile::tempdir().unwrap();
-    let output = command::mmt(&home, &["replay", "x"])
+    let output = super::mmt(&home, &["replay", "x"])
         .env("MMT_LOG", "mmt=loud")
         .output();
     complains(&output.unwrap(), 2, &["MMT_LOG", "debug"]);
@@ -204,7 +197,7 @@ fn nobody_reading_stdout_is_no_panic() {
             "1ms",
         ],
     ] {
-        let mut child = command::mmt(&home, arguments).spawn().unwrap();
+        let mut child = super::mmt(&home, arguments).spawn().unwrap();
         drop(child.stdout.take());
         let output = child.wait_with_output().unwrap();
         let text = String::from_utf8_lossy(&output.stderr);

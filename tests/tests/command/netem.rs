@@ -1,10 +1,4 @@
 //! Emulated networks from the command line, as processes: recorded, met again, changed, marked as degraded.
-#![allow(
-    clippy::disallowed_methods,
-    clippy::indexing_slicing,
-    clippy::unwrap_used,
-    reason = "a test starts the command, writes files for it, and fails by panicking"
-)]
 
 use std::io::Write;
 use std::net::{SocketAddr, UdpSocket};
@@ -13,11 +7,7 @@ use std::time::Duration;
 
 use serde_json::Value;
 
-mod command;
-mod running;
-
-use command::mmt;
-use running::{Running, document};
+use super::{document, finish, mmt, start};
 
 /// p99 above 250 us or anything above 1 ms, by the numbers that stand beside the mark.
 fn is_marked_rightly(p99_us: &Value, max_us: &Value, degraded: &Value) -> bool {
@@ -173,10 +163,10 @@ fn a_relay_carries_any_protocol_and_says_whether_it_was_in_time() {
 fn a_master_keeps_the_path_that_it_met_as_a_trace() {
     let home = tempfile::tempdir().unwrap();
     let arguments = ["slave", "--listen", "127.0.0.1:0", "--once"];
-    let slave = Running::start(mmt(&home, &arguments));
+    let (slave, line) = start(mmt(&home, &arguments));
     let arguments = [
         "master",
-        &slave.first_line,
+        &line,
         "--duration",
         "2s",
         "--netem",
@@ -187,7 +177,7 @@ fn a_master_keeps_the_path_that_it_met_as_a_trace() {
     ];
     let master = document(&mmt(&home, &arguments).output().unwrap());
     assert_eq!(master["ending"], "finished");
-    let (_, code) = slave.finish();
+    let (_, code) = finish(slave);
     assert_eq!(code, Some(0));
 
     let arguments = [
@@ -227,12 +217,12 @@ fn a_relay_prints_its_address_first_and_its_counters_when_interrupted() {
         "loss 100%",
         "--json",
     ];
-    let relay = Running::start(mmt(&home, &arguments));
-    let address: SocketAddr = relay.first_line.parse().unwrap();
+    let (relay, line) = start(mmt(&home, &arguments));
+    let address: SocketAddr = line.parse().unwrap();
     let source = UdpSocket::bind("127.0.0.1:0").unwrap();
     source.send_to(b"lost", address).unwrap();
-    relay.interrupt();
-    let (rest, code) = relay.finish();
+    relay.interrupt().unwrap();
+    let (rest, code) = finish(relay);
     assert_eq!(code, Some(0));
     let document: Value = serde_json::from_str(&rest).unwrap();
     assert_eq!(document["ending"], "interrupted");
@@ -259,8 +249,8 @@ fn a_record_is_compared_with_the_settings_it_was_made_with() {
         "--record",
         file,
     ];
-    let relay = Running::start(mmt(&home, &arguments));
-    let address: SocketAddr = relay.first_line.parse().unwrap();
+    let (relay, line) = start(mmt(&home, &arguments));
+    let address: SocketAddr = line.parse().unwrap();
     let source = UdpSocket::bind("127.0.0.1:0").unwrap();
     let patience = Some(Duration::from_secs(30));
     target.set_read_timeout(patience).unwrap();
@@ -272,8 +262,8 @@ fn a_record_is_compared_with_the_settings_it_was_made_with() {
             assert_eq!(buffer[0], number);
         }
     }
-    relay.interrupt();
-    let (_, code) = relay.finish();
+    relay.interrupt().unwrap();
+    let (_, code) = finish(relay);
     assert_eq!(code, Some(0));
 
     let output = mmt(&home, &["netem", "report", file, "--json"])

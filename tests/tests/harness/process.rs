@@ -1,15 +1,9 @@
-//! The command `mmt` as a process: built once, started, watched, and killed when the test is over.
+//! A process, most of all the command `mmt`: started, watched, and killed when the test is over.
 //!
 //! No call waits without a bound, and no process outlives its guard.
-#![allow(
-    clippy::disallowed_methods,
-    reason = "starts and watches processes, which is what it is for"
-)]
 
 use std::io::{BufRead, BufReader, Read, Write};
-use std::path::PathBuf;
 use std::process::{Child, Command, ExitStatus, Stdio};
-use std::sync::OnceLock;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::thread;
 use std::time::{Duration, Instant};
@@ -23,10 +17,7 @@ const ASK: Duration = Duration::from_millis(10);
 
 /// Why a process did not do what was asked of it.
 #[derive(Debug, Error)]
-pub enum ProcessError {
-    /// The program could not be built.
-    #[error("`cargo build` of the command failed: {0}")]
-    Build(String),
+pub(crate) enum ProcessError {
     /// It could not be started, asked or signalled.
     #[error("{what}: {source}")]
     System {
@@ -35,7 +26,7 @@ pub enum ProcessError {
         /// What the system said.
         source: std::io::Error,
     },
-    /// It did not say or end what it should in time.
+    /// It printed or ended nothing in time.
     #[error("{what} within {seconds} s; so far it said:\n{said}")]
     Late {
         /// What was waited for.
@@ -55,55 +46,12 @@ pub enum ProcessError {
     },
 }
 
-/// The program `mmt`, built in the profile of this test on the first call.
-///
-/// # Errors
-/// The build fails.
-pub fn program() -> Result<PathBuf, ProcessError> {
-    static PROGRAM: OnceLock<Result<PathBuf, String>> = OnceLock::new();
-    let built = PROGRAM.get_or_init(build);
-    built.clone().map_err(ProcessError::Build)
-}
-
-/// A test runs in `target/PROFILE/deps`; the program belongs in `target/PROFILE`.
-fn build() -> Result<PathBuf, String> {
-    let test = std::env::current_exe().map_err(|error| error.to_string())?;
-    let out = test
-        .ancestors()
-        .nth(2)
-        .ok_or("a test without a directory")?;
-    let name = out.file_name().and_then(|name| name.to_str());
-    let profile = match name.ok_or("a profile without a name")? {
-        "debug" => "dev",
-        name => name,
-    };
-    let target = out.parent().ok_or("a profile without a directory")?;
-    let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
-    let mut command = Command::new(cargo);
-    // what cargo says to a test about its own package would make build scripts, and all that needs them, run anew
-    let told = std::env::vars_os().map(|(name, _)| name);
-    for name in told.filter(|name| name.to_string_lossy().starts_with("CARGO_PKG_")) {
-        command.env_remove(name);
-    }
-    let output = command
-        .env_remove("CARGO_MANIFEST_DIR")
-        .args(["build", "--locked", "-p", "mmt-cli", "--bin", "mmt"])
-        .args(["--profile", profile, "--target-dir"])
-        .arg(target)
-        .current_dir(crate::architecture::repository::root())
-        .output()
-        .map_err(|error| error.to_string())?;
-    let program = out.join(format!("mmt{}", std::env::consts::EXE_SUFFIX));
-    if output.status.success() && program.is_file() {
-        Ok(program)
-    } else {
-        Err(String::from_utf8_lossy(&output.stderr).into_owned())
-    }
-}
+/// The program `mmt`, as it was built with this test.
+pub(crate) const PROGRAM: &str = env!("CARGO_BIN_EXE_mmt-under-test");
 
 /// A running process whose output is collected; killed when dropped.
 #[derive(Debug)]
-pub struct Running {
+pub(crate) struct Running {
     name: String,
     child: Child,
     lines: Receiver<Line>,
@@ -119,13 +67,13 @@ enum Line {
 
 /// A process that has ended.
 #[derive(Debug)]
-pub struct Ended {
+pub(crate) struct Ended {
     /// How.
-    pub status: ExitStatus,
+    pub(crate) status: ExitStatus,
     /// The lines of its standard output.
-    pub out: Vec<String>,
+    pub(crate) out: Vec<String>,
     /// Its standard error.
-    pub err: String,
+    pub(crate) err: String,
 }
 
 impl Ended {
@@ -133,7 +81,7 @@ impl Ended {
     ///
     /// # Errors
     /// There is none, or something besides it.
-    pub fn document(&self, skip: usize) -> Result<Value, ProcessError> {
+    pub(crate) fn document(&self, skip: usize) -> Result<Value, ProcessError> {
         let lines: Vec<_> = self.out.iter().skip(skip).map(String::as_str).collect();
         serde_json::from_str(&lines.join("\n")).map_err(|source| ProcessError::Document {
             source,
@@ -147,7 +95,7 @@ impl Running {
     ///
     /// # Errors
     /// The system does not start it.
-    pub fn start(mut command: Command) -> Result<Self, ProcessError> {
+    pub(crate) fn start(mut command: Command) -> Result<Self, ProcessError> {
         let name = format!("{command:?}");
         let mut child = command
             .stdin(Stdio::null())
@@ -173,8 +121,8 @@ impl Running {
     ///
     /// # Errors
     /// It cannot be built or started.
-    pub fn mmt(arguments: &[&str]) -> Result<Self, ProcessError> {
-        let mut command = Command::new(program()?);
+    pub(crate) fn mmt(arguments: &[&str]) -> Result<Self, ProcessError> {
+        let mut command = Command::new(PROGRAM);
         command.args(arguments);
         Self::start(command)
     }
@@ -183,7 +131,7 @@ impl Running {
     ///
     /// # Errors
     /// It does not come in time, or the process ends before.
-    pub fn wait_for_line(
+    pub(crate) fn wait_for_line(
         &mut self,
         within: Duration,
         wanted: impl Fn(&str) -> bool,
@@ -204,6 +152,20 @@ impl Running {
         }
     }
 
+    /// Waits for the first line on standard output, and returns it.
+    ///
+    /// # Errors
+    /// It does not come in time, or the process ends before.
+    pub(crate) fn first_line(&mut self, within: Duration) -> Result<String, ProcessError> {
+        let end = Instant::now() + within;
+        while self.out.is_empty() {
+            let left = end.saturating_duration_since(Instant::now());
+            self.take_line(left)
+                .map_err(|_| self.late("did not print", within))?;
+        }
+        Ok(self.out.first().cloned().unwrap_or_default())
+    }
+
     fn take_line(&mut self, within: Duration) -> Result<String, RecvTimeoutError> {
         match self.lines.recv_timeout(within)? {
             Line::Out(line) => {
@@ -221,7 +183,7 @@ impl Running {
     ///
     /// # Errors
     /// The process cannot be signalled.
-    pub fn interrupt(&self) -> Result<(), ProcessError> {
+    pub(crate) fn interrupt(&self) -> Result<(), ProcessError> {
         let pid = i32::try_from(self.child.id()).ok().and_then(Pid::from_raw);
         let sent = pid.map(|pid| kill_process(pid, Signal::INT));
         sent.unwrap_or(Ok(()))
@@ -232,7 +194,7 @@ impl Running {
     ///
     /// # Errors
     /// It does not end in time; it is killed then.
-    pub fn end(mut self, within: Duration) -> Result<Ended, ProcessError> {
+    pub(crate) fn end(mut self, within: Duration) -> Result<Ended, ProcessError> {
         let end = Instant::now() + within;
         let status = loop {
             let asked = self.child.try_wait();
@@ -284,7 +246,7 @@ fn read(from: Option<impl Read>, say: impl Fn(String) -> bool) {
 
 /// The number at a path of keys such as `/link/rtt_ms/p50`; none if it is null or not there.
 #[must_use]
-pub fn number(document: &Value, path: &str) -> Option<f64> {
+pub(crate) fn number(document: &Value, path: &str) -> Option<f64> {
     document.pointer(path).and_then(Value::as_f64)
 }
 
@@ -293,14 +255,14 @@ pub fn number(document: &Value, path: &str) -> Option<f64> {
 ///
 /// # Panics
 /// With `CI`.
-pub fn did_not_run(test: &str, why: &str) {
+pub(crate) fn did_not_run(test: &str, why: &str) {
     let ci = std::env::var_os("CI").is_some();
     assert!(!ci, "{test} did not run, and CI must run it: {why}");
     say_loudly(&format!("NOT RUN: {test}: {why}"));
 }
 
 /// Says what must not be overlooked although the test passes.
-pub fn say_loudly(what: &str) {
+pub(crate) fn say_loudly(what: &str) {
     // not eprintln: the harness keeps that to itself when a test passes
     let _ = writeln!(std::io::stderr(), "\n**** {what} ****\n");
 }

@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use serde_json::Value;
 
-use crate::process::{Ended, ProcessError, Running, program};
+use crate::harness::process::{Ended, PROGRAM, ProcessError, Running};
 
 const SLAVE: &str = "10.91.1.2";
 const RELAY_TO_SLAVE: &str = "10.91.1.1";
@@ -19,7 +19,7 @@ const SOON: Duration = Duration::from_secs(10);
 
 /// Why there are no hosts, or why a session on them came to nothing.
 #[derive(Debug, thiserror::Error)]
-pub enum HostsError {
+pub(crate) enum HostsError {
     /// Namespaces and cables cannot be made here.
     #[error("{0}")]
     Unavailable(String),
@@ -40,7 +40,6 @@ pub enum HostsError {
 }
 
 /// Runs `ip`; what it says when it fails.
-#[allow(clippy::disallowed_methods, reason = "makes hosts")]
 fn ip(words: &str) -> Result<(), HostsError> {
     let output = Command::new("ip").args(words.split(' ')).output();
     let output =
@@ -55,14 +54,14 @@ fn ip(words: &str) -> Result<(), HostsError> {
 
 /// The three hosts; gone when dropped, with the cables between them.
 #[derive(Debug)]
-pub struct Hosts(());
+pub(crate) struct Hosts(());
 
 impl Hosts {
     /// Makes the hosts and the cables.
     ///
     /// # Errors
     /// This process may not, or has no `ip`.
-    pub fn try_new() -> Result<Self, HostsError> {
+    pub(crate) fn try_new() -> Result<Self, HostsError> {
         if !rustix::process::geteuid().is_root() {
             let why = "it needs root to make network namespaces";
             return Err(HostsError::Unavailable(why.to_owned()));
@@ -83,7 +82,6 @@ impl Hosts {
     }
 
     /// A command that runs on a host.
-    #[allow(clippy::disallowed_methods, reason = "starts processes on hosts")]
     fn on(&self, host: &str, program: &str) -> Command {
         let mut command = Command::new("ip");
         command.args(["netns", "exec", &Self::name(host), program]);
@@ -92,8 +90,7 @@ impl Hosts {
 
     /// Starts `mmt` on a host.
     fn mmt(&self, host: &str, arguments: &[&str]) -> Result<Running, HostsError> {
-        let program = program()?;
-        let mut command = self.on(host, &program.to_string_lossy());
+        let mut command = self.on(host, PROGRAM);
         command.args(arguments);
         Ok(Running::start(command)?)
     }
@@ -141,7 +138,12 @@ impl Hosts {
     ///
     /// # Errors
     /// A process did not do what it should.
-    pub fn session(&self, link: &str, seconds: u64, seed: u64) -> Result<Session, HostsError> {
+    pub(crate) fn session(
+        &self,
+        link: &str,
+        seconds: u64,
+        seed: u64,
+    ) -> Result<Session, HostsError> {
         let seed = seed.to_string();
         let listen = format!("{SLAVE}:4433");
         let slave = [
@@ -222,41 +224,41 @@ fn well(ended: Ended) -> Result<Ended, HostsError> {
 
 /// Counters of one end of a cable.
 #[derive(Clone, Copy, Debug)]
-pub struct Cable {
+pub(crate) struct Cable {
     /// Packets that the host sent.
-    pub sent: f64,
+    pub(crate) sent: f64,
     /// Their bytes, Ethernet's header included.
-    pub sent_bytes: f64,
+    pub(crate) sent_bytes: f64,
     /// Packets that the host received.
-    pub received: f64,
+    pub(crate) received: f64,
     /// Their bytes, Ethernet's header included.
-    pub received_bytes: f64,
+    pub(crate) received_bytes: f64,
 }
 
 /// Counters of a host's UDP.
 #[derive(Clone, Copy, Debug)]
-pub struct Udp {
+pub(crate) struct Udp {
     /// Datagrams sent.
-    pub sent: f64,
+    pub(crate) sent: f64,
     /// Datagrams received.
-    pub received: f64,
+    pub(crate) received: f64,
     /// Datagrams that came and were not taken.
-    pub refused: f64,
+    pub(crate) refused: f64,
 }
 
 /// One session of both hosts through the relay: their reports and what their cables counted.
 #[derive(Debug)]
-pub struct Session {
+pub(crate) struct Session {
     /// The slave's report.
-    pub slave: Value,
+    pub(crate) slave: Value,
     /// The master's report.
-    pub master: Value,
+    pub(crate) master: Value,
     /// What the slave's cable counted.
-    pub slave_cable: Cable,
+    pub(crate) slave_cable: Cable,
     /// What the master's cable counted.
-    pub master_cable: Cable,
+    pub(crate) master_cable: Cable,
     /// What the slave's kernel counted of UDP.
-    pub slave_udp: Udp,
+    pub(crate) slave_udp: Udp,
     /// What the master's kernel counted of UDP.
-    pub master_udp: Udp,
+    pub(crate) master_udp: Udp,
 }

@@ -1,20 +1,12 @@
 //! `mmt bench` as a process: what it prints, what it refuses. Nothing here depends on how fast the machine is.
-#![allow(
-    clippy::disallowed_methods,
-    clippy::indexing_slicing,
-    clippy::unwrap_used,
-    reason = "a test starts the command, and fails by panicking"
-)]
 
 use std::process::Output;
 
 use serde_json::Value;
 
-mod command;
-
 fn bench(arguments: &[&str]) -> Output {
     let home = tempfile::tempdir().unwrap();
-    let mut command = command::mmt(&home, &["bench"]);
+    let mut command = super::mmt(&home, &["bench"]);
     command.args(arguments).output().unwrap()
 }
 

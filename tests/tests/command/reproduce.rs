@@ -1,10 +1,4 @@
 //! `mmt reproduce` as a process: what it writes, that it writes the same again, and that the samples say the same.
-#![allow(
-    clippy::disallowed_methods,
-    clippy::indexing_slicing,
-    clippy::unwrap_used,
-    reason = "a test starts the command, reads its files, and fails by panicking"
-)]
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -14,7 +8,7 @@ use std::process::{Command, Output};
 use serde_json::Value;
 
 fn mmt(arguments: &[&str], out: &Path) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_mmt"))
+    Command::new(super::PROGRAM)
         .args(["reproduce"])
         .args(arguments)
         .args(["--out", out.to_str().unwrap()])

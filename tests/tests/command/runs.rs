@@ -1,19 +1,9 @@
 //! The commands at work, as processes: what they print where, and how they end.
-#![allow(
-    clippy::disallowed_methods,
-    clippy::indexing_slicing,
-    clippy::unwrap_used,
-    reason = "a test starts the command, writes files for it, and fails by panicking"
-)]
 
 use serde_json::Value;
 use std::fmt::Write;
 
-mod command;
-mod running;
-
-use command::mmt;
-use running::{Running, document};
+use super::{document, finish, mmt, start};
 
 /// A recording of pushes along +x of a block that takes 2 N, each 1 cm long.
 fn recording(pushes: u32) -> String {
@@ -102,11 +92,10 @@ fn a_slave_that_nobody_comes_to_prints_its_pairing_string_and_an_empty_report() 
         "robot.example.org",
         "--json",
     ];
-    let slave = Running::start(mmt(&home, &arguments));
-    let line = &slave.first_line;
+    let (slave, line) = start(mmt(&home, &arguments));
     assert!(line.starts_with("mmt://robot.example.org:"), "{line}");
-    slave.interrupt();
-    let (rest, code) = slave.finish();
+    slave.interrupt().unwrap();
+    let (rest, code) = finish(slave);
     assert_eq!(code, Some(0));
     let document: Value = serde_json::from_str(&rest).unwrap();
     assert_eq!(document["command"], "slave");
@@ -136,16 +125,16 @@ fn a_master_that_nobody_answers_says_so_with_a_code_of_its_own() {
 #[test]
 fn a_slave_and_a_master_as_processes_both_end_with_a_report() {
     let home = tempfile::tempdir().unwrap();
-    let slave = Running::start(mmt(
+    let (slave, line) = start(mmt(
         &home,
         &["slave", "--listen", "127.0.0.1:0", "--once", "--json"],
     ));
-    let pairing = slave.first_line.clone();
+    let pairing = line;
     let arguments = ["master", &pairing, "--duration", "2s", "--json"];
     let output = mmt(&home, &arguments).output().unwrap();
     let text = String::from_utf8_lossy(&output.stderr);
     let master = document(&output);
-    let (rest, code) = slave.finish();
+    let (rest, code) = finish(slave);
     assert_eq!(code, Some(0));
     let slave: Value = serde_json::from_str(&rest).unwrap();
     assert_eq!(master["command"], "master");

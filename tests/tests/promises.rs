@@ -1,0 +1,7 @@
+//! What is promised of the command, the wire and the house itself.
+
+mod architecture;
+mod command;
+mod dissector;
+mod golden;
+mod harness;
