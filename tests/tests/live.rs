@@ -5,8 +5,8 @@
 
 use std::time::Duration;
 
-use crate::harness::alone;
 use crate::harness::process::{Ended, ProcessError, Running, number};
+use crate::harness::{alone, is_by_chance};
 use serde_json::Value;
 
 /// For what needs no more than a start or an end.
@@ -65,65 +65,97 @@ fn nothing_is_nan(value: &Value, path: &str) {
 }
 
 #[test]
-fn the_demonstration_runs_end_to_end_and_its_report_is_sane() {
+fn the_demonstration_ends_with_a_report_whose_numbers_belong_together() {
     let _turn = alone();
     let arguments = ["demo", "--duration", "6s", "--seed", "1", "--json"];
-    let ended = ok(ok(Running::mmt(&arguments)).end(Duration::from_secs(20)));
+    let ended = ok(ok(Running::mmt(&arguments)).end(Duration::from_secs(30)));
     ended_with(0, &ended);
     let report = ok(ended.document(0));
     nothing_is_nan(&report, "");
     assert_eq!(ending(&report), "finished");
-    assert_eq!(number(&report, "/seed"), Some(1.0));
-    for (path, least, most) in [
-        ("/duration_s", 5.5, 7.5),
-        ("/pushes/completed", 1.0, 2.0),
-        ("/updates/sent", 5.0, 600.0),
-        ("/updates/applied", 5.0, 600.0),
-        ("/updates/rate_hz", 0.5, 100.0),
-        ("/wire/up/datagrams", 400.0, 3000.0),
-        ("/wire/down/datagrams", 100.0, 3000.0),
-        ("/wire/up/bits_per_s", 1e4, 1e6),
-        ("/wire/down/bits_per_s", 1e3, 1e6),
-        ("/force/contact_samples", 500.0, 6000.0),
-        ("/force/pmse", 0.0, 2.0),
-        ("/force/relative_error", 0.0, 1.0),
-        ("/force/jnd7_share", 0.0, 1.0),
-        ("/model/mass_kg/estimate", 0.5, 0.9),
-        ("/model/mass_kg/truth", 0.7, 0.7),
-        ("/model/damping_ns_per_m/estimate", 0.0, 10.0),
-        ("/model/friction_n/estimate", 1.0, 3.0),
-        // 50 ms ± 5 ms each way
-        ("/link/rtt_ms/p50", 95.0, 160.0),
-        ("/link/loss_up", 0.0, 0.05),
-        ("/link/loss_down", 0.0, 0.08),
-        // packing and twice 5 ms of jitter at least
-        ("/link/playout_delay_ms/p50", 20.0, 101.0),
-        ("/passivity/energy_injected_j", 0.0, 1e-9),
-        ("/passivity/observer_min_j", -1e-3, 0.0),
-        ("/pushes/contact_breaks_per_push", 0.0, 2.0),
-        ("/force/largest_n", 1.0, 8.0),
-        ("/pose/position_rms_m", 1e-5, 0.03),
-        ("/pose/angle_max_rad", 0.0, 0.5),
-        ("/haptic_loop/ticks", 3000.0, 6500.0),
-        ("/haptic_loop/skipped", 0.0, 3000.0),
-        ("/haptic_loop/cpu_us/p50", 0.0, 1000.0),
+    let get = |path: &str| {
+        let found = number(&report, path);
+        found.unwrap_or_else(|| panic!("{path} is {:?}", report.pointer(path)))
+    };
+    assert_eq!((get("/seed"), get("/model/mass_kg/truth")), (1.0, 0.7));
+    counts_belong_together(&report, get);
+    forces_obey_their_limits_and_definitions(get);
+    // 45 to 55 ms each way; the histogram's classes are a percent wide, and a busy host is late
+    let round_trip = get("/link/rtt_ms/p50");
+    assert!((89.0..200.0).contains(&round_trip), "{round_trip} ms");
+    // packing and twice 5 ms of jitter at least
+    assert!(get("/link/playout_delay_ms/p50") >= 20.0);
+    for (way, kinds) in [
+        ("up", &["commands", "heartbeats"][..]),
+        ("down", &["updates", "scenes", "heartbeats"][..]),
     ] {
-        let value = number(&report, path);
-        let value = value.unwrap_or_else(|| panic!("{path} is {:?}", report.pointer(path)));
-        assert!(
-            (least..=most).contains(&value),
-            "{path} is {value}, not {least} to {most}"
-        );
+        let kinds = kinds.iter().map(|kind| format!("/messages/{way}/{kind}"));
+        let sent: f64 = kinds.map(|path| get(&path)).sum();
+        let lost = get(&format!("/link/loss_{way}")) * sent;
+        assert!(is_by_chance(lost, sent, 0.01), "{way}: {lost} of {sent}");
     }
     for path in [
         "/haptic_loop/cpu_us",
         "/haptic_loop/lateness_us",
         "/slave_loop/cpu_us",
     ] {
-        let quantile = |name| number(&report, &format!("{path}/{name}")).unwrap();
-        let (p50, p99, p999) = (quantile("p50"), quantile("p99"), quantile("p999"));
+        let [p50, p99, p999] = ["p50", "p99", "p999"].map(|name| get(&format!("{path}/{name}")));
         assert!(p50 <= p99 && p99 <= p999, "{path}: {p50} {p99} {p999}");
     }
+}
+
+/// What is counted in two places, or twice in one, is the same.
+fn counts_belong_together(report: &Value, get: impl Fn(&str) -> f64) {
+    let duration = get("/duration_s");
+    assert!((5.5..8.0).contains(&duration), "{duration} s");
+    for side in ["haptic_loop", "slave_loop"] {
+        let periods = get(&format!("/{side}/ticks")) + get(&format!("/{side}/skipped"));
+        assert!(periods >= 5500.0, "{side}: {periods} periods");
+    }
+    let causes = report.pointer("/updates/by_cause").unwrap();
+    let causes = causes.as_object().unwrap().values();
+    let sent = get("/updates/sent");
+    assert_eq!(causes.filter_map(Value::as_f64).sum::<f64>(), sent);
+    let repeated = get("/updates/repeated");
+    assert_eq!(get("/messages/down/updates"), sent + repeated);
+    let applied = get("/updates/applied");
+    assert!(0.0 < applied && applied <= sent, "{applied} of {sent}");
+    // contact is a part of the run
+    assert!(get("/updates/contact_rate_hz") > get("/updates/rate_hz"));
+    assert!(get("/pushes/completed") >= 1.0);
+    let (contact, pairs) = (get("/force/contact_samples"), get("/force/samples"));
+    assert!(0.0 < contact && contact <= pairs, "{contact} of {pairs}");
+    for way in ["up", "down"] {
+        let wire = |key| get(&format!("/wire/{way}/{key}"));
+        let bits = 8.0 * (wire("bytes") + wire("header_bytes") * wire("datagrams"));
+        let seconds = bits / wire("bits_per_s");
+        assert!(
+            (seconds / duration - 1.0).abs() < 0.05,
+            "{way}: {seconds} s"
+        );
+        assert!((wire("datagrams") / wire("rate_hz") / seconds - 1.0).abs() < 1e-9);
+    }
+}
+
+/// The metrics keep their definitions, and the hand its device's limits.
+fn forces_obey_their_limits_and_definitions(get: impl Fn(&str) -> f64) {
+    let pmse = get("/force/pmse_x") + get("/force/pmse_y");
+    assert!((get("/force/pmse") / pmse - 1.0).abs() < 1e-9, "(15)");
+    // the model starts wrong, so the first touch is felt wrong; soon after it no longer is
+    let (jnd7, jnd10) = (get("/force/jnd7_share"), get("/force/jnd10_share"));
+    assert!(0.0 < jnd10 && jnd10 <= jnd7 && jnd7 < 0.9, "{jnd10} {jnd7}");
+    let (error, error_n) = (get("/force/relative_error"), get("/force/error_rms_n"));
+    assert!(0.02 < error && error < 0.6, "{error}");
+    assert!(0.0 < error_n && error_n < get("/force/largest_n"));
+    assert!((get("/model/mass_kg/estimate") - 0.7).abs() < 0.1);
+    assert!(get("/force/largest_n") <= 8.0 && get("/force/largest_step_n") <= 2.0);
+    // as measured, with the sensor's noise
+    assert!((1.0..15.2).contains(&get("/tool/force_peak_n")));
+    let (rms, max) = (get("/pose/position_rms_m"), get("/pose/position_max_m"));
+    assert!(0.0 < rms && rms <= max && max < 0.05, "{rms} {max}");
+    assert!(get("/passivity/energy_injected_j") < 1e-9);
+    let least = get("/passivity/observer_min_j");
+    assert!((-1e-3..=0.0).contains(&least), "{least} J");
 }
 
 /// A path that is 0.2 ms long for eight seconds and 60 ms from then on. The hand feels the tool, then the model.

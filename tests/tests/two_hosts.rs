@@ -6,6 +6,7 @@
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test may panic")]
 
 use crate::harness::hosts::{Hosts, HostsError, Session};
+use crate::harness::is_by_chance;
 use crate::harness::process::{did_not_run, number};
 use serde_json::Value;
 
@@ -89,12 +90,6 @@ fn what_one_side_counted_the_other_reports(session: &Session) {
     assert!(0.0 < applied && applied <= sent, "{applied} of {sent}");
 }
 
-/// Whether `lost` of `sent` is what chance makes of the link's loss, but for once in 50 000 runs.
-fn is_by_chance(lost: f64, sent: f64) -> bool {
-    let (mean, deviation) = (LOSS * sent, (LOSS * (1.0 - LOSS) * sent).sqrt());
-    (lost - mean).abs() <= 4.3 * deviation + 1.0
-}
-
 fn what_was_sent_was_received_or_lost(session: &Session) {
     let sides = [
         ("up", &session.master, &session.slave),
@@ -106,13 +101,16 @@ fn what_was_sent_was_received_or_lost(session: &Session) {
         assert!(sent > 20.0 * SECONDS as f64, "{way}: {sent} datagrams");
         assert!(sent >= received, "{way}: {sent} sent, {received} received");
         assert!(
-            is_by_chance(sent - received, sent),
+            is_by_chance(sent - received, sent, LOSS),
             "{way}: {received} of {sent}"
         );
         // by the numbers of the application's own datagrams
         for report in [from, to] {
             let share = get(report, &format!("/link/loss_{way}"));
-            assert!(is_by_chance(share * sent, sent), "{way}: loss {share}");
+            assert!(
+                is_by_chance(share * sent, sent, LOSS),
+                "{way}: loss {share}"
+            );
         }
     }
     let kinds = [

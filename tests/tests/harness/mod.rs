@@ -24,3 +24,9 @@ pub(crate) fn alone() -> MutexGuard<'static, ()> {
     static TURN: Mutex<()> = Mutex::new(());
     TURN.lock().unwrap_or_else(PoisonError::into_inner)
 }
+
+/// Whether `lost` of `sent` is what chance makes of a share of loss, but for once in 50 000 runs.
+pub(crate) fn is_by_chance(lost: f64, sent: f64, share: f64) -> bool {
+    let (mean, deviation) = (share * sent, (share * (1.0 - share) * sent).sqrt());
+    (lost - mean).abs() <= 4.3 * deviation + 1.0
+}
