@@ -19,15 +19,14 @@
 )]
 
 pub mod bilateral;
-pub mod choice;
 pub mod device;
-pub mod either;
 pub mod failsafe;
 pub mod limiter;
 pub mod link;
 pub mod master;
 pub mod operator;
 pub mod path;
+pub mod tdpa;
 
 #[cfg(feature = "io")]
 pub mod io;

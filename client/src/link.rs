@@ -11,7 +11,7 @@ use mmt_shared::model::sample::HipSample;
 use mmt_shared::model::tool::{HandPort, Scene, Tool};
 use mmt_shared::model::update::Update;
 use mmt_shared::time::Time;
-use mmt_shared::wire::{Command, Matter, SAMPLES_MAX, SampleBlock, Side, UpdateDrops};
+use mmt_shared::wire::{Architecture, Command, Matter, SAMPLES_MAX, SampleBlock, Side, UpdateDrops};
 use serde::{Deserialize, Serialize};
 
 /// Most ticks from one packed sample to the next: play-out takes its velocity from samples of 5 ms.
@@ -42,6 +42,21 @@ impl Default for CommandConfig {
 }
 
 impl CommandConfig {
+    /// The same for a hand that feels this architecture: the tool's force cannot wait for a packet to be full, so that
+    /// each sample goes alone, and the next packet comes a tick later, so that none is repeated.
+    #[must_use]
+    pub fn for_architecture(self, architecture: Architecture) -> Self {
+        if architecture.feels_tool() {
+            Self {
+                samples_per_command: 1,
+                repeat_samples: 0,
+                ..self
+            }
+        } else {
+            self
+        }
+    }
+
     /// The most samples that a command can have.
     #[must_use]
     pub fn samples_at_most(&self) -> usize {
@@ -153,8 +168,8 @@ impl MasterLink {
         }
     }
 
-    /// Packs a sample; once the command is full it is written to `out` and its length returned. While the hand's `port`
-    /// wants the tool's force, each sample goes at once. Under congestion only every second, third, … sample is packed.
+    /// Packs a sample; once the command is full it is written to `out` with the hand's `port`, and its length returned.
+    /// Under congestion only every second, third, … sample is packed.
     ///
     /// # Errors
     /// When the command cannot be sealed; its samples are lost then.
@@ -174,18 +189,13 @@ impl MasterLink {
         if self.block.push(sample).is_err() {
             self.samples_refused = self.samples_refused.saturating_add(1);
         }
-        let at_once = port.is_some_and(|port| port.wants_force);
         let full = self.block.len() >= usize::from(self.config.samples_per_command);
-        if !at_once && !full && !self.block.is_full() {
+        if !full && !self.block.is_full() {
             return Ok(None);
         }
         let command = Command {
             newest_update: self.window.newest(),
-            samples: match at_once {
-                // what the next packet says a tick later needs no repeat
-                true => self.block,
-                false => self.with_repeats(),
-            },
+            samples: self.with_repeats(),
             port,
         };
         self.block.clear();

@@ -1,4 +1,4 @@
-//! The master's core: one haptic tick around the local model, and around the tool's force where that may be felt.
+//! The master's core: one haptic tick around the local model, or around the tool's force where the hand feels that.
 //!
 //! HIP in, force out, a sample for the slave. It must never wait, allocate, log or read a clock, and
 //! force leaves it through the limiter only.
@@ -15,10 +15,10 @@ use mmt_shared::model::update::Update;
 use mmt_shared::time::Time;
 use mmt_shared::wire::{Architecture, Welcome};
 
-use crate::either::Either;
 use crate::failsafe::LinkState;
 use crate::limiter::ForceLimiter;
 use crate::operator::scripted::View;
+use crate::tdpa::TdpaHand;
 pub use port::PortObserver;
 
 /// What one haptic tick gave.
@@ -26,11 +26,11 @@ pub use port::PortObserver;
 pub struct MasterTick {
     /// Goes to the slave: the HIP and the force that is felt for it.
     pub sample: HipSample,
-    /// Goes to the tool's port, where the hand may feel the tool's force.
+    /// Goes to the tool's port, where the hand feels the tool's force.
     pub port: Option<HandPort>,
     /// What the model did.
     pub rendered: Rendered,
-    /// Force on the object that is felt, N, before the limiter: f_m, the model's where nothing else may be felt.
+    /// Force on the object that is felt, N, before the limiter: the model's (f_m) or, with TDPA, the tool's.
     pub felt: Vec2,
     /// Goes to the device: force on the hand, N, world, limited.
     pub hand_force: Vec2,
@@ -42,8 +42,8 @@ pub struct MasterTick {
 #[derive(Clone, Debug)]
 pub struct Master {
     model: LocalModel,
-    /// Where the hand may feel the tool's force.
-    either: Option<Either>,
+    /// Where the hand feels the tool's force.
+    tdpa: Option<TdpaHand>,
     limiter: ForceLimiter,
     link: LinkState,
     port: PortObserver,
@@ -60,7 +60,7 @@ impl Master {
         Self::with_architecture(welcome, limiter, Architecture::Mmt)
     }
 
-    /// A master whose hand feels the force of this architecture; the model's, until it has heard of the tool.
+    /// A master whose hand feels the force of this architecture.
     #[must_use]
     pub fn with_architecture(
         welcome: &Welcome,
@@ -68,10 +68,9 @@ impl Master {
         architecture: Architecture,
     ) -> Self {
         limiter.engage();
-        let k_p = welcome.settings.coupling.stiffness_n_per_m;
         Self {
             model: LocalModel::new(welcome.settings, welcome.state),
-            either: Either::new(architecture, k_p),
+            tdpa: architecture.feels_tool().then(TdpaHand::default),
             limiter,
             link: LinkState::Fresh,
             port: PortObserver::default(),
@@ -82,19 +81,10 @@ impl Master {
         }
     }
 
-    /// The same, of which so many samples go out in a packet while only the model's force is felt.
+    /// The hand's port, where the hand feels the tool's force.
     #[must_use]
-    pub fn packing(mut self, samples_per_command: u8) -> Self {
-        if let Some(either) = &mut self.either {
-            either.packs(samples_per_command);
-        }
-        self
-    }
-
-    /// Whose force is felt, where there is a choice.
-    #[must_use]
-    pub fn either(&self) -> Option<&Either> {
-        self.either.as_ref()
+    pub fn tdpa(&self) -> Option<&TdpaHand> {
+        self.tdpa.as_ref()
     }
 
     /// The local model, felt or not.
@@ -144,11 +134,11 @@ impl Master {
     pub fn view(&self) -> View {
         let state = self.model.state();
         let touches_model = self.model.rendered().in_contact();
-        let in_contact = |either: &Either| either.in_contact(touches_model);
+        let tdpa = self.tdpa.as_ref();
         View {
             pose: state.pose,
             footprint: state.footprint,
-            in_contact: self.either.as_ref().map_or(touches_model, in_contact),
+            in_contact: tdpa.map_or(touches_model, TdpaHand::tool_in_contact),
         }
     }
 
@@ -167,10 +157,10 @@ impl Master {
         }
     }
 
-    /// Takes in news of the tool that arrived at `now`, no older than the news before. Without a choice they change nothing.
-    pub fn hear_tool(&mut self, now: Time, tool: &Tool) {
-        if let Some(either) = &mut self.either {
-            either.receive(now, tool);
+    /// Takes in the tool's state that arrived at `now`, no older than the one before. Only with TDPA it changes anything.
+    pub fn handle_tool_state(&mut self, now: Time, tool: &Tool) {
+        if let Some(tdpa) = &mut self.tdpa {
+            tdpa.receive(now, tool);
         }
     }
 
@@ -189,8 +179,8 @@ impl Master {
         }
         let hip = self.hip.metres();
         let rendered = self.model.step(stamp, hip);
-        let felt = match &mut self.either {
-            Some(either) => either.blend(hip, &mut self.model, &rendered),
+        let felt = match &mut self.tdpa {
+            Some(tdpa) => tdpa.step(hip),
             None => rendered.force,
         };
         let force = ForceCounts::nearest(felt);
@@ -200,13 +190,13 @@ impl Master {
             force,
         };
         let hand_force = self.limiter.limit(-felt);
-        if let Some(either) = &mut self.either {
-            either.displayed(hand_force);
+        if let Some(tdpa) = &mut self.tdpa {
+            tdpa.displayed(hand_force);
         }
         self.port.push(hip, hand_force);
         MasterTick {
             sample,
-            port: self.either.as_ref().map(Either::port),
+            port: self.tdpa.as_ref().map(TdpaHand::port),
             rendered,
             felt,
             hand_force,

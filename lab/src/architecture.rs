@@ -18,7 +18,6 @@ use mmt_server::playout::PlayoutBuffer;
 use mmt_shared::bilateral::Baseline;
 use mmt_shared::bilateral::message::OVERHEAD_BYTES;
 use mmt_shared::model::settings::{ModelSettings, PoseCorrection};
-use mmt_shared::wire;
 use serde::Serialize;
 
 use crate::world::{World, WorldConfig, WorldError};
@@ -30,8 +29,6 @@ pub enum Architecture {
     Bilateral(Baseline),
     /// A model's parameters cross it; how the model's pose is corrected.
     Mediated(PoseCorrection),
-    /// TDPA or MMT with replay, by round trip and by how wrong the model has been of late.
-    Auto,
 }
 
 impl Architecture {
@@ -55,7 +52,6 @@ impl Architecture {
             Self::Mediated(PoseCorrection::Snap) => "mmt-snap",
             Self::Mediated(PoseCorrection::MatchedStamps) => "mmt-matched-stamps",
             Self::Mediated(PoseCorrection::Replay) => "mmt-replay",
-            Self::Auto => "auto",
         }
     }
 }
@@ -110,13 +106,6 @@ pub fn run(
             let mut world = Bilateral::try_new(config, baseline, Picture::Delayed)?;
             world.run(duration);
             Ok(bilateral_row(&world, duration))
-        }
-        Architecture::Auto => {
-            let config = WorldConfig {
-                architecture: wire::Architecture::Auto,
-                ..config.clone()
-            };
-            Ok(world_row(World::try_new(&config)?, duration))
         }
         Architecture::Mediated(correction) => {
             let device = DeviceProfile::default().used_with(config.stiffness_n_per_m, None)?;

@@ -150,8 +150,7 @@ impl World {
             program: Label::clipped("lab"),
         };
         let limiter = ForceLimiter::try_new(device.limits())?;
-        let master = Master::with_architecture(&welcome, limiter, config.architecture)
-            .packing(config.samples_per_command);
+        let master = Master::with_architecture(&welcome, limiter, config.architecture);
         let view: View = master.view();
         let scripted = Scripted::try_new(config.operator, view)?;
         let operator = Operator::Scripted(Box::new(scripted));
@@ -327,7 +326,7 @@ impl World {
                     self.outcome.superseded += u32::from(newest.is_some());
                     newest = Some(update);
                 }
-                Some(FromSlave::Tool(tool)) => self.master.hear_tool(packet.due, &tool),
+                Some(FromSlave::Tool(tool)) => self.master.handle_tool_state(packet.due, &tool),
                 Some(FromSlave::Scene(_)) | None => {}
             }
         }
@@ -409,7 +408,7 @@ impl World {
                 }
                 self.slave.stretch(self.slave_link.end().stretch());
                 if let Some(port) = &command.port {
-                    self.slave.hear_hand(port);
+                    self.slave.handle_hand_port(port);
                 }
             }
         }
@@ -433,7 +432,7 @@ impl World {
                 }
             }
         }
-        self.tell_of_tool(now, tick.as_ref());
+        self.send_tool(now, tick.as_ref());
         if let Ok(Some(length)) = self.slave_link.repeat(now, &mut bytes) {
             self.down.push(self.now, length, Packet { bytes, length });
         }
@@ -443,18 +442,14 @@ impl World {
         tick
     }
 
-    /// What the tool feels goes out every tick while the hand wants its force, else when it is due.
-    fn tell_of_tool(&mut self, now: Time, tick: Option<&SlaveTick>) {
-        let Some(tool) = tick.map(|tick| self.slave.tool(tick)) else {
+    /// The tool's state goes out every tick where the hand feels it.
+    fn send_tool(&mut self, now: Time, tick: Option<&SlaveTick>) {
+        let Some(tool) = tick.and_then(|tick| self.slave.tool_state(tick)) else {
             return;
         };
-        let due = self.slave_link.tool_due();
-        if tool.force.is_none() && due.is_none_or(|due| due > now) {
-            return;
-        }
-        self.outcome.forces += u64::from(tool.force.is_some());
+        self.outcome.forces += 1;
         let mut bytes = [0; DATAGRAM_MAX];
-        if let Ok(Some(length)) = self.slave_link.send_tool(now, Some(&tool), &mut bytes) {
+        if let Ok(length) = self.slave_link.send_tool(now, &tool, &mut bytes) {
             self.down.push(self.now, length, Packet { bytes, length });
         }
     }

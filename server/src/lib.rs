@@ -23,7 +23,6 @@ pub mod bilateral;
 pub mod environment;
 pub mod estimator;
 pub mod link;
-pub mod model_error;
 pub mod playout;
 pub mod pose_observer;
 pub mod sensing;

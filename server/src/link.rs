@@ -6,7 +6,7 @@ pub use repeats::{REPEATS_MAX, Repeats, RepeatsError};
 
 use std::time::Duration;
 
-use mmt_shared::channel::datagram_channel::{HEARTBEAT, LinkEnd, Outgoing, SealError};
+use mmt_shared::channel::datagram_channel::{LinkEnd, Outgoing, SealError};
 use mmt_shared::channel::rate_control::StretchMax;
 use mmt_shared::metrics::UpdateCounts;
 use mmt_shared::model::sample::HipSample;
@@ -43,7 +43,6 @@ pub struct SlaveLink {
     samples: u64,
     repeating: Option<Repeating>,
     repeated: UpdateCounts,
-    tool_sent: Time,
     scene_sent: Time,
 }
 
@@ -58,7 +57,6 @@ impl SlaveLink {
             samples: 0,
             repeating: None,
             repeated: UpdateCounts::default(),
-            tool_sent: now,
             scene_sent: now,
         }
     }
@@ -165,26 +163,17 @@ impl SlaveLink {
         Ok(Some(length))
     }
 
-    /// When news of the tool are due although nobody asked for the force; never where the hand cannot feel it.
-    #[must_use]
-    pub fn tool_due(&self) -> Option<Time> {
-        let feels = self.config.architecture.feels_tool();
-        feels.then(|| self.tool_sent + HEARTBEAT)
-    }
-
-    /// Writes news of the tool to `out`; returns their length. None without news, which are then due a period later.
+    /// Writes the tool's state to `out`; returns its length.
     ///
     /// # Errors
-    /// When they cannot be sealed.
+    /// When it cannot be sealed.
     pub fn send_tool(
         &mut self,
         now: Time,
-        tool: Option<&Tool>,
+        tool: &Tool,
         out: &mut [u8],
-    ) -> Result<Option<usize>, SealError> {
-        self.tool_sent = now;
-        tool.map(|tool| self.end.seal(now, Outgoing::Tool(tool), out))
-            .transpose()
+    ) -> Result<usize, SealError> {
+        self.end.seal(now, Outgoing::Tool(tool), out)
     }
 
     /// When the next scene is due, seldomer under congestion; never where nobody looks.

@@ -122,8 +122,6 @@ pub struct PlayoutBuffer {
     wanted_ns: i64,
     looked: u32,
     lateness: Lateness,
-    /// Whether the samples' packing has changed since the clock was learned.
-    repacked: bool,
     extrapolation: Duration,
     clock: SenderClock,
     /// In the order of their stamps, no stamp twice.
@@ -167,7 +165,6 @@ impl PlayoutBuffer {
             wanted_ns: least,
             looked: 0,
             lateness: Lateness::new(),
-            repacked: false,
             extrapolation: Duration::from_nanos((config.extrapolation_ms * 1e6) as u64),
             config,
             clock: SenderClock::default(),
@@ -204,12 +201,6 @@ impl PlayoutBuffer {
                 .observe(arrived, quickest.saturating_since(sample.stamp));
         }
         self.admit(arrived, sample, place);
-    }
-
-    /// From now on the samples come packed otherwise: how late they were says nothing of how late they will be.
-    pub fn repack(&mut self) {
-        self.lateness = Lateness::new();
-        self.repacked = true;
     }
 
     /// The HIP to follow at `now` by the slave's clock; to be called every tick.
@@ -286,9 +277,7 @@ impl PlayoutBuffer {
         self.looked += 1;
         if self.looked >= LOOK_EVERY {
             self.looked = 0;
-            // a delay that was needed stays until it is known to be too long
-            let unknown = if self.repacked { self.wanted_ns } else { least };
-            let needed = self.lateness.p99().map_or(unknown, |late| {
+            let needed = self.lateness.p99().map_or(least, |late| {
                 i64::try_from(late.as_nanos()).map_or(most, |late| late.saturating_add(ROOM_NS))
             });
             self.wanted_ns = needed.clamp(least, most);
@@ -339,7 +328,6 @@ impl PlayoutBuffer {
             last.stamp = last.told;
         }
         self.lateness = Lateness::new();
-        self.repacked = false;
         self.wanted_ns = self.delay_range_ns.0;
         true
     }

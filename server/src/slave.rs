@@ -18,7 +18,6 @@ use crate::bilateral::ToolPort;
 use crate::environment::{Environment, EnvironmentConfig};
 use crate::estimator::obstacle::OBSTACLE_N;
 use crate::estimator::{Estimate, Estimator, EstimatorConfig, Measured, Seen};
-use crate::model_error::ModelError;
 use crate::playout::PlayoutBuffer;
 use crate::pose_observer::{ObserverConfig, PoseObserver};
 use crate::sensing::Sensing;
@@ -72,9 +71,6 @@ pub struct Slave {
     /// f_s at the last update, N.
     f_s_told: Vec2,
     drive: ToolDrive,
-    /// Whether the master wants the tool's force.
-    streams: bool,
-    model_error: ModelError,
     trigger: Trigger,
     timer_carries_pose: bool,
     /// The last parameters that were accepted.
@@ -147,8 +143,6 @@ impl Slave {
                 ToolPort::new(sensing.force_noise_n, config.playout.speed_max_m_per_s),
                 ToolForce::try_new(config.tool_force_max_n, coupling)?,
             ),
-            streams: false,
-            model_error: ModelError::default(),
             trigger: Trigger::new(config.trigger),
             timer_carries_pose: config.trigger.timer_carries_pose,
             params,
@@ -235,12 +229,6 @@ impl Slave {
         self.trigger.scheme_now()
     }
 
-    /// How wrong the model has been of late.
-    #[must_use]
-    pub fn model_error(&self) -> &ModelError {
-        &self.model_error
-    }
-
     /// The tool's port, as time-domain passivity control sees it.
     #[must_use]
     pub fn tool_port(&self) -> &ToolPort {
@@ -253,29 +241,23 @@ impl Slave {
         self.drive.force()
     }
 
-    /// Takes in what the hand's port says, newer than all before.
-    pub fn hear_hand(&mut self, port: &HandPort) {
-        if port.wants_force && !self.streams {
-            // each sample comes alone from now on, and the hand feels the delay
-            self.playout.repack();
-        }
-        self.streams = port.wants_force;
-        self.drive
-            .pay(port.in_j, port.passive_tool, self.playout.played_hip());
+    /// Takes in what the hand's port says, newer than all before: the hand feels the tool, which from now on goes only
+    /// as far as the hand has paid for.
+    pub fn handle_hand_port(&mut self, port: &HandPort) {
+        self.drive.credit(port.in_j, self.playout.played_hip());
     }
 
-    /// What the hand may want to know of the tool after a tick: with its force if the master wants that, which is then to
-    /// go out at once.
+    /// What the hand feels of the tool after a tick, where it does.
     #[must_use]
-    pub fn tool(&self, tick: &SlaveTick) -> Tool {
+    pub fn tool_state(&self, tick: &SlaveTick) -> Option<Tool> {
         let port = self.tool_port();
-        Tool {
+        self.drive.is_passive().then(|| Tool {
             answers: tick.stamp,
-            force: self.streams.then(|| ForceCounts::nearest(port.held())),
+            force: Some(ForceCounts::nearest(port.held())),
             in_contact: tick.in_contact,
             in_j: port.energy().in_j,
-            model_error: self.model_error.relative(),
-        }
+            model_error: 0.0,
+        })
     }
 
     /// What a viewer sees after a tick: the object where the slave takes it to be.
@@ -315,11 +297,6 @@ impl Slave {
         self.echo = played.force.unwrap_or(self.echo);
         if let Some(f_m) = played.force {
             self.force.push(sensed.force, f_m);
-        }
-        // where the HIP was guessed, or the tool is not at it, tool and model meet different things
-        if played.force.is_some() && !self.drive.is_behind() {
-            self.model_error
-                .push(sensed.force, self.shadow.rendered().force);
         }
         let mut tick = SlaveTick {
             stamp: played.stamp,

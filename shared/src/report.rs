@@ -117,22 +117,13 @@ pub struct UpDown<T> {
     pub down: T,
 }
 
-/// Whose force the hand felt; all but the name is null where that was the model's alone.
+/// Whose force the hand felt.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ArchitectureReport {
-    /// `mmt`, `tdpa` or `auto`.
+    /// `mmt` or `tdpa`.
     pub name: Option<String>,
-    /// Share of the master's ticks in which the tool's force was felt alone, 0 to 1.
-    pub tool_share: Number,
-    /// How often `auto` changed its choice.
-    pub switches: Option<u64>,
-    /// Largest change of the force on the hand in one tick of a fade, N.
-    pub fade_step_max_n: Number,
-    /// The round trip that a force would have taken in the end, smoothed: play-out included, the wait of samples for
-    /// their packet not, ms.
+    /// The round trip of the tool's force in the end, smoothed, play-out included, ms; null with `mmt`.
     pub round_trip_ms: Number,
-    /// Relative error of the model's force in the end, over the last half second of contact.
-    pub model_error: Number,
 }
 
 impl ArchitectureReport {

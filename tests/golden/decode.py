@@ -181,7 +181,7 @@ def scene(r):
 def hello(r):
     return {"token": r.take(32).hex(), "role": r.choice(["operator"]),
             "stiffness_n_per_m": r.f64(), "damping_ns_per_m": r.f64(),
-            "samples_per_command": r.u8(), "architecture": r.choice(["mmt", "tdpa", "auto"]),
+            "samples_per_command": r.u8(), "architecture": r.choice(["mmt", "tdpa"]),
             "scene_hz": r.u8(),
             "hip": r.floats(2), "program": r.text()}
 

@@ -318,8 +318,6 @@ pub(crate) enum ArchitectureName {
     Mmt,
     /// The tool's, across the network, with time-domain passivity control
     Tdpa,
-    /// The one of the two that the measured path and the model's error speak for
-    Auto,
 }
 
 impl From<ArchitectureName> for Architecture {
@@ -327,7 +325,6 @@ impl From<ArchitectureName> for Architecture {
         match name {
             ArchitectureName::Mmt => Self::Mmt,
             ArchitectureName::Tdpa => Self::Tdpa,
-            ArchitectureName::Auto => Self::Auto,
         }
     }
 }

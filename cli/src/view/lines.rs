@@ -30,8 +30,6 @@ pub(crate) fn line(history: &History) -> String {
     let (up, down) = now.loss();
     add("loss up", up.map(|share| share * 100.0), 1, " %");
     add("loss down", down.map(|share| share * 100.0), 1, " %");
-    let felt = now.model_share().map(|share| share * 100.0);
-    add("felt of the model", felt, 0, " %");
     add(
         "mass",
         now.slave.map(|slave| mass(slave.estimate)),

@@ -56,11 +56,6 @@ impl Snapshot {
         self.master.map(|master| master.f_m.norm()).or(shadow)
     }
 
-    /// The model's share of what is felt, 0 to 1, where the tool may be felt too.
-    fn model_share(&self) -> Option<f64> {
-        self.master.and_then(|master| master.model_share)
-    }
-
     /// |f_s − f_m|, N, both of the same HIP sample: what the slave's trigger sees.
     fn error(&self) -> Option<f64> {
         self.slave.map(|slave| (slave.f_s - slave.f_shadow).norm())

@@ -61,11 +61,6 @@ pub(super) fn model_panel(caption: &Caption, now: &Snapshot) -> Paragraph<'stati
         "pushes            {:>8}",
         shown(pushes.map(|n| n as f64), 0, "")
     ));
-    // only where there is a choice
-    if let Some(share) = now.model_share() {
-        let percent = shown(Some(share * 100.0), 0, " %");
-        lines.push(format!("felt of the model {percent:>8}"));
-    }
     panel("model", lines)
 }
 

@@ -28,7 +28,6 @@ fn snapshot(elapsed_s: f64) -> Snapshot {
         updates_applied: 20,
         pushes: Some(3),
         link: LinkState::Late,
-        model_share: Some(0.25),
         footprint: Some(BoxFootprint::square(0.4)),
         hip: Vec2::new(-0.3, 0.0),
         scene: Some(Scene {

@@ -18,10 +18,10 @@ use mmt_shared::model::geometry::Vec2;
 use mmt_shared::time::Time;
 
 use super::{MasterLive, SessionEnd};
-use crate::either::{ChoiceOutcome, Either};
 use crate::failsafe::LinkState;
 use crate::master::{Master, MasterTick};
 use crate::operator::Operator;
+use crate::tdpa::TdpaHand;
 
 pub(super) use port::Gone;
 use port::LoopEnd;
@@ -41,7 +41,7 @@ pub struct HapticParts {
     pub operator: Operator,
     /// How long; for ever if absent.
     pub duration: Option<Duration>,
-    /// The network task is woken once for so many samples, and for each while the tool's force is wanted.
+    /// The network task is woken once for so many samples.
     pub samples_per_wake: u8,
     /// The true pose, where the slave lives in this process: for the report.
     pub truth: Option<TruthReceiver>,
@@ -76,36 +76,12 @@ pub struct HapticOutcome {
     pub age: AgeOfInformation,
     /// Error of the model's pose; empty where the truth is not known.
     pub pose: PoseError,
-    /// Whose force was felt, where there was a choice.
-    pub felt: Option<FeltOutcome>,
+    /// The smoothed round trip of the tool's force in the end, s; only where the hand felt it.
+    pub round_trip_s: Option<f64>,
     /// Energy that updates added to the model beyond what its tank paid, J.
     pub energy_injected_j: f64,
     /// The least that the passivity observer at the hand showed, J.
     pub observer_min_j: f64,
-}
-
-/// Whose force was felt, and what that rested on in the end.
-#[derive(Clone, Copy, Debug)]
-pub struct FeltOutcome {
-    /// What became of the choice.
-    pub choice: ChoiceOutcome,
-    /// How often it changed.
-    pub switches: u32,
-    /// The smoothed round trip, s; none if the slave said nothing.
-    pub round_trip_s: Option<f64>,
-    /// The model's relative error.
-    pub model_error: f64,
-}
-
-impl From<&Either> for FeltOutcome {
-    fn from(either: &Either) -> Self {
-        Self {
-            choice: *either.outcome(),
-            switches: either.choice().switches(),
-            round_trip_s: either.choice().round_trip_s(),
-            model_error: either.model_error(),
-        }
-    }
 }
 
 /// The haptic loop's own end. It belongs to one thread.
@@ -176,7 +152,7 @@ impl HapticLoop {
         self.skipped = self.skipped.saturating_add(tick.skipped);
         self.take_update(stamp);
         if let Some((at, tool)) = self.port.newest_tool() {
-            self.master.hear_tool(*at, tool);
+            self.master.handle_tool_state(*at, tool);
         }
         self.consider_end();
         let view = self.master.view();
@@ -231,7 +207,7 @@ impl HapticLoop {
             on_hand: self.on_hand,
             age: self.age,
             pose: self.pose,
-            felt: self.master.either().map(FeltOutcome::from),
+            round_trip_s: self.master.tdpa().and_then(TdpaHand::round_trip_s),
             energy_injected_j: self.master.energy_injected_j(),
             observer_min_j: self.master.port().least_j(),
         }
@@ -285,12 +261,11 @@ impl HapticLoop {
     }
 
     fn give(&mut self, said: Said) {
-        let at_once = said.port.is_some_and(|port| port.wants_force);
         if !self.port.give(said) {
             self.samples_dropped = self.samples_dropped.saturating_add(1);
         }
         self.unwoken = self.unwoken.saturating_add(1);
-        if at_once || self.unwoken >= self.samples_per_wake {
+        if self.unwoken >= self.samples_per_wake {
             self.unwoken = 0;
             self.port.wake();
         }
@@ -308,7 +283,6 @@ impl HapticLoop {
             footprint: Some(state.footprint),
             params: [params.m(), params.b(), params.c()],
             in_contact: self.master.view().in_contact,
-            model_share: self.master.either().map(Either::model_share),
             updates_applied: u64::from(self.master.applied()),
             pushes: self.operator.pushes_completed(),
             link: done.link,

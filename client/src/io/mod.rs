@@ -138,8 +138,6 @@ pub struct MasterLive {
     pub scene_age_s: Option<f64>,
     /// Whether the HIP touches the model.
     pub in_contact: bool,
-    /// The model's share of what is felt, 0 to 1, where the tool's force may be felt too.
-    pub model_share: Option<f64>,
     /// Updates applied.
     pub updates_applied: u64,
     /// Pushes completed.
@@ -171,7 +169,7 @@ pub struct MasterConfiguration {
     pub operator: String,
     /// The scripted operator's numbers.
     pub scripted: Option<ScriptedConfig>,
-    /// Whose force the hand felt: `mmt`, `tdpa` or `auto`.
+    /// Whose force the hand felt: `mmt` or `tdpa`.
     pub architecture: Architecture,
     /// How commands were made.
     #[serde(flatten)]

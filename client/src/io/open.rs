@@ -175,25 +175,15 @@ async fn open_at(
 }
 
 /// What a master sends at the most. A command has up to 70 bytes of its own, 10 for the hand's port and, at any speed
-/// of a hand, at most 16 a sample; QUIC adds 30. While the tool is felt every sample goes at once and alone. The cap
-/// is twice that, with room for handshake and heartbeats.
+/// of a hand, at most 16 a sample; QUIC adds 30. The cap is twice that, with room for handshake and heartbeats.
 fn traffic(commands: &CommandConfig, architecture: Architecture) -> Traffic {
-    let bytes = |own: usize, samples: usize| (own + 16 * samples).min(DATAGRAM_MAX);
-    let packed = bytes(70, commands.samples_at_most());
-    let news = u64::from(commands.samples_per_command.max(1));
-    let load = |per_s: u64, bytes: usize| (per_s + 20) * (bytes as u64 + 30);
-    let (datagram_max, busiest) = match architecture.feels_tool() {
-        false => (packed, load(1000_u64.div_ceil(news), packed)),
-        true => {
-            let packed = bytes(80, commands.samples_at_most());
-            let apart = load(1000, bytes(80, 1));
-            (packed, apart.max(load(1000_u64.div_ceil(news), packed)))
-        }
-    };
+    let own = if architecture.feels_tool() { 80 } else { 70 };
+    let datagram_max = (own + 16 * commands.samples_at_most()).min(DATAGRAM_MAX);
+    let per_s = 1000_u64.div_ceil(u64::from(commands.samples_per_command.max(1))) + 20;
     Traffic {
         datagram_max,
         rate_cap: RateCap {
-            bytes_per_s: 2 * busiest,
+            bytes_per_s: 2 * per_s * (datagram_max as u64 + 30),
         },
     }
 }

@@ -114,18 +114,9 @@ impl Ended {
     }
 
     fn architecture(&self, architecture: Architecture) -> ArchitectureReport {
-        let report = ArchitectureReport::named(architecture);
-        let Some(felt) = self.haptic.felt else {
-            return report;
-        };
-        let choice = &felt.choice;
         ArchitectureReport {
-            tool_share: Number::rate(choice.tool_ticks as f64, choice.ticks as f64),
-            switches: (architecture == Architecture::Auto).then(|| felt.switches.into()),
-            fade_step_max_n: choice.fade_step_n.into(),
-            round_trip_ms: felt.round_trip_s.map(|s| s * 1e3).into(),
-            model_error: felt.model_error.into(),
-            ..report
+            round_trip_ms: self.haptic.round_trip_s.map(|s| s * 1e3).into(),
+            ..ArchitectureReport::named(architecture)
         }
     }
 

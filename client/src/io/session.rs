@@ -57,6 +57,7 @@ pub(super) async fn run_with(
     live: watch::Sender<MasterLive>,
     patience: Patience,
 ) -> Result<MasterReport, MasterHostError> {
+    options.commands = options.commands.for_architecture(options.architecture);
     let limiter = ForceLimiter::try_new(options.device.limits())?;
     let start = options.operator.begin(first_view())?.start();
     let opened = tokio::select! {
@@ -68,8 +69,7 @@ pub(super) async fn run_with(
         slave = %opened.line.address, program = %welcome.program, scheme = %welcome.scheme,
         "the session begins"
     );
-    let master = Master::with_architecture(welcome, limiter, options.architecture)
-        .packing(options.commands.samples_per_command);
+    let master = Master::with_architecture(welcome, limiter, options.architecture);
     let operator = options.operator.begin(master.view())?;
     let parts = HapticParts {
         master,

@@ -75,23 +75,17 @@ fn a_command_repeats_the_samples_of_as_many_commands_as_it_is_told() {
 }
 
 #[test]
-fn while_the_tools_force_is_wanted_each_sample_goes_at_once_and_alone() {
-    let port = |wants_force| {
-        Some(HandPort {
-            in_j: 0.5,
-            wants_force,
-            passive_tool: false,
-        })
-    };
+fn where_the_hand_feels_the_tool_each_sample_goes_alone_with_the_hands_port() {
+    let port = Some(HandPort {
+        in_j: 0.5,
+        ..HandPort::default()
+    });
     let mut link = link(3, 1);
-    let packed = coupled_commands(&mut link, 1..=4, port(false));
-    assert_eq!(packed, [[1, 2, 3]]);
-    // the one that waited goes with the first
-    let at_once = coupled_commands(&mut link, 5..=7, port(true));
-    assert_eq!(at_once, [vec![4, 5], vec![6], vec![7]]);
-    let packed = coupled_commands(&mut link, 8..=13, port(false));
-    assert_eq!(packed[0][packed[0].len() - 3..], [8, 9, 10]);
-    assert_eq!(packed[1], (8..=13).collect::<Vec<_>>());
+    link.config = link.config.for_architecture(Architecture::Tdpa);
+    let alone = coupled_commands(&mut link, 1..=4, port);
+    assert_eq!(alone, [[1], [2], [3], [4]]);
+    let default = CommandConfig::default();
+    assert_eq!(default.for_architecture(Architecture::Mmt), default);
 }
 
 #[test]

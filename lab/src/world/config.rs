@@ -93,6 +93,7 @@ impl WorldConfig {
             repeat_samples: self.repeat_samples,
             stretch_max: self.stretch_max,
         }
+        .for_architecture(self.architecture)
     }
 
     /// How the slave sends.
@@ -100,7 +101,7 @@ impl WorldConfig {
         SlaveLinkConfig {
             repeats: self.slave.repeats_ms,
             stretch_max: self.slave.stretch_max,
-            samples_per_command: self.samples_per_command,
+            samples_per_command: self.commands().samples_per_command,
             architecture: self.architecture,
             // nobody looks
             scene_hz: 0,

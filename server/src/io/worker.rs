@@ -59,7 +59,8 @@ pub(super) struct Arrived {
 /// What a tick has to tell, besides updates, to whoever asks.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct News {
-    pub(super) tool: Tool,
+    /// Where the hand feels the tool.
+    pub(super) tool: Option<Tool>,
     pub(super) scene: Scene,
 }
 
@@ -147,12 +148,11 @@ impl Worker {
         self.updates.output_buffer().filter(|_| fresh)
     }
 
-    /// The newest news of the tool, if their force is wanted and they have not been fetched yet.
-    pub(super) fn fresh_force(&mut self) -> Option<Tool> {
+    /// The newest state of the tool, if it has not been fetched yet.
+    pub(super) fn fresh_tool(&mut self) -> Option<Tool> {
         let fresh = self.news.update();
         let news = self.news.output_buffer().filter(|_| fresh);
-        news.map(|news| news.tool)
-            .filter(|tool| tool.force.is_some())
+        news.and_then(|news| news.tool)
     }
 
     /// The newest news, fetched before or not; none before the first tick.
@@ -212,7 +212,7 @@ impl Inside {
             slave.handle_sample(arrived.at, &arrived.sample, arrived.newest_update);
             slave.stretch(arrived.stretch);
             if let Some(port) = &arrived.port {
-                slave.hear_hand(port);
+                slave.handle_hand_port(port);
             }
         }
         slave.tick(tick.deadline)
@@ -222,7 +222,7 @@ impl Inside {
     fn hand_over(&mut self, slave: &Slave, tick: &SlaveTick) -> bool {
         *self.looks.input_buffer_mut() = look(slave, tick);
         self.looks.publish();
-        let (tool, scene) = (slave.tool(tick), slave.scene(tick));
+        let (tool, scene) = (slave.tool_state(tick), slave.scene(tick));
         *self.news.input_buffer_mut() = Some(News { tool, scene });
         self.news.publish();
         let mut overtook = false;
@@ -230,7 +230,7 @@ impl Inside {
             *self.updates.input_buffer_mut() = tick.update;
             overtook = self.updates.publish();
         }
-        if tick.update.is_some() || tool.force.is_some() {
+        if tick.update.is_some() || tool.is_some() {
             self.waker.wake();
         }
         overtook

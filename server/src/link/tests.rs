@@ -184,7 +184,7 @@ fn a_port_counts_in_the_newest_command_only_and_where_the_hello_has_spoken_of_on
         bytes[..length.unwrap()].to_vec()
     };
     let (first, second) = (command(1, port(0.1)), command(2, port(0.2)));
-    let mut feels = link_of("none", Architecture::Auto);
+    let mut feels = link_of("none", Architecture::Tdpa);
     let taken = feels.handle(AT(3), &second).unwrap();
     assert_eq!(taken.port, port(0.2));
     let late = feels.handle(AT(4), &first).unwrap();
@@ -198,7 +198,7 @@ fn a_port_counts_in_the_newest_command_only_and_where_the_hello_has_spoken_of_on
 }
 
 #[test]
-fn news_of_the_tool_are_due_every_fifty_milliseconds_and_stand_for_the_heartbeat() {
+fn the_tools_state_stands_for_the_heartbeat() {
     let tool = Tool {
         answers: AT(7),
         force: None,
@@ -209,25 +209,11 @@ fn news_of_the_tool_are_due_every_fifty_milliseconds_and_stand_for_the_heartbeat
     let mut link = link_of("none", Architecture::Tdpa);
     let mut master = LinkEnd::new(Side::Master, Time::ZERO);
     let mut out = [0; DATAGRAM_MAX];
-    assert_eq!(link.tool_due(), Some(AT(50)));
-    let length = link
-        .send_tool(AT(50), Some(&tool), &mut out)
-        .unwrap()
-        .unwrap();
+    let length = link.send_tool(AT(40), &tool, &mut out).unwrap();
     let opened = master.open(AT(50), &out[..length]).unwrap();
     assert_eq!(opened.matter, Matter::Tool(tool));
-    assert_eq!(
-        (link.tool_due(), link.end().heartbeat_due()),
-        (Some(AT(100)), AT(100))
-    );
+    assert_eq!(link.end().heartbeat_due(), AT(90));
     assert_eq!(link.end().traffic().sent.tools, 1);
-    assert_eq!(
-        link.send_tool(AT(100), None, &mut out),
-        Ok(None),
-        "nothing to say"
-    );
-    assert_eq!(link.tool_due(), Some(AT(150)));
-    assert_eq!(self::link("none").tool_due(), None);
 }
 
 #[test]

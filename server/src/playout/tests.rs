@@ -441,34 +441,3 @@ fn when_a_long_queue_is_gone_the_tool_does_not_stand_still() {
     let longest = after.map(lag).max().unwrap();
     assert!(longest < Duration::from_millis(400), "{longest:?}");
 }
-
-#[test]
-fn samples_that_are_no_longer_packed_are_waited_for_no_longer_within_a_second_and_a_half() {
-    let config = PlayoutConfig {
-        delay_ms: 0.0,
-        ..PlayoutConfig::default()
-    };
-    let alone_from = 4000;
-    let delay_after = |ms: u64, repacks: bool| {
-        let mut buffer = PlayoutBuffer::try_new(config).unwrap();
-        for k in 0..alone_from + ms {
-            let now = Time::from_millis(k);
-            if k == alone_from && repacks {
-                buffer.repack();
-            }
-            if k >= alone_from {
-                buffer.push(now, &sample(k));
-            } else if k % 10 == 9 {
-                (k - 9..=k).for_each(|j| buffer.push(now, &sample(j)));
-            }
-            buffer.advance(now);
-        }
-        buffer.delay()
-    };
-    assert_eq!(delay_after(0, true), Duration::from_millis(12));
-    // not shorter before it is known to be too long
-    assert_eq!(delay_after(450, true), Duration::from_millis(12));
-    // a bin and the room of 2 ms, and a band of 2 ms that it does not hunt within
-    assert_eq!(delay_after(1500, true), Duration::from_millis(5));
-    assert_eq!(delay_after(1500, false), Duration::from_millis(12));
-}

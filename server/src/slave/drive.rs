@@ -19,8 +19,6 @@ pub(super) struct ToolDrive {
     own: Option<Vec2>,
     /// Whether it goes only as far as the energy allows.
     passive: bool,
-    /// Whether it is behind the HIP, whatever keeps it there.
-    behind: bool,
     /// Whether the limit of the force keeps it there, or has and it is still catching up.
     held_back: bool,
     port: ToolPort,
@@ -32,7 +30,6 @@ impl ToolDrive {
         Self {
             own: None,
             passive: false,
-            behind: false,
             held_back: false,
             port,
             force,
@@ -47,9 +44,9 @@ impl ToolDrive {
         &self.force
     }
 
-    /// Whether the tool is behind the HIP.
-    pub(super) fn is_behind(&self) -> bool {
-        self.behind
+    /// Whether the tool goes only as far as the energy allows.
+    pub(super) fn is_passive(&self) -> bool {
+        self.passive
     }
 
     /// Whether the limit of the force keeps the tool from the HIP.
@@ -57,15 +54,12 @@ impl ToolDrive {
         self.held_back
     }
 
-    /// Takes in E_in of the master's port, J, and whether the tool may go only as far as that pays for. `hip` is the
-    /// HIP that was played last, m.
-    pub(super) fn pay(&mut self, other_in_j: f64, passive: bool, hip: Option<Vec2>) {
+    /// Takes in E_in of the master's port, J: from now on the tool goes only as far as that pays for. `hip` is the HIP
+    /// that was played last, m.
+    pub(super) fn credit(&mut self, other_in_j: f64, hip: Option<Vec2>) {
         self.port.receive(other_in_j);
-        if passive && !self.passive {
-            self.port.begin();
-            self.own = self.own.or(hip);
-        }
-        self.passive = passive;
+        self.own = self.own.or(hip);
+        self.passive = true;
     }
 
     /// One tick: the tool follows the played HIP from `before` (the one played last, m), or goes towards it. When it may
@@ -100,8 +94,8 @@ impl ToolDrive {
         let velocity = way / period_s;
         self.port.moved(way);
         self.force.moved(velocity, held);
-        self.behind = (wanted - way).norm() > BEHIND_M;
-        self.held_back = held || (self.held_back && self.behind);
+        let behind = (wanted - way).norm() > BEHIND_M;
+        self.held_back = held || (self.held_back && behind);
         let there = !self.passive && way == wanted;
         self.own = Some(tool + way).filter(|_| !there);
         Played {

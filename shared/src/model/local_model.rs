@@ -134,12 +134,6 @@ impl LocalModel {
         self.account(before, before, self.energy_now());
     }
 
-    /// Pays for energy (J) that is added to what the hand feels of this model, from what its ground has taken; says
-    /// whether it could. For who fades the model's force in while the HIP presses it.
-    pub fn pay(&mut self, energy_j: f64) -> bool {
-        self.correction.tank.pay(energy_j)
-    }
-
     /// Becomes what `other` is, but for the history, which stays: both took the same samples.
     pub fn take_over(&mut self, other: &Self) {
         self.body = other.body;

@@ -125,21 +125,16 @@ impl<C> RunReport<C> {
         )
     }
 
-    /// Only where there was a choice.
+    /// Only where the hand felt the tool.
     fn architecture(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let of = &self.architecture;
-        let (Some(name), Some(_)) = (&of.name, of.tool_share.get()) else {
+        let (Some(name), Some(_)) = (&of.name, of.round_trip_ms.get()) else {
             return Ok(());
         };
         let mut rows = section(f, "Felt");
         rows.row("architecture", &[Some(name.clone())])?;
-        rows.row("tool felt alone", &[share(of.tool_share)])?;
-        rows.row("switches", &[count(of.switches, "")])?;
-        let step = number(of.fade_step_max_n, 3, " N in a tick");
-        rows.row("largest step of a fade", &[step])?;
         let round_trip = number(of.round_trip_ms, 1, " ms");
-        rows.row("round trip as felt", &[round_trip])?;
-        rows.row("error of the model", &[number(of.model_error, 3, "")])
+        rows.row("round trip as felt", &[round_trip])
     }
 
     fn updates(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

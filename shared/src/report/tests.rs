@@ -36,12 +36,8 @@ fn full() -> RunReport<Value> {
     report.duration_s = 20.0.into();
     report.ending = Some(ending_name(Ending::Finished).to_owned());
     report.architecture = ArchitectureReport {
-        tool_share: 0.204.into(),
-        switches: Some(2),
-        fade_step_max_n: 0.03.into(),
         round_trip_ms: 14.9.into(),
-        model_error: 0.071.into(),
-        ..ArchitectureReport::named(Architecture::Auto)
+        ..ArchitectureReport::named(Architecture::Tdpa)
     };
     report.pushes = PushesReport::new(2, &breaks);
     report.updates.set_sent(&counts);
@@ -140,8 +136,7 @@ fn paths(value: &Value, prefix: &str, into: &mut Vec<String>) {
 }
 
 const REQUIRED: &str = "version command seed duration_s ending configuration drops \
-    architecture.name architecture.tool_share architecture.switches \
-    architecture.fade_step_max_n architecture.round_trip_ms architecture.model_error \
+    architecture.name architecture.round_trip_ms \
     pushes.completed pushes.contact_breaks_per_push \
     updates.sent updates.rate_hz updates.contact_rate_hz updates.by_cause updates.applied \
     updates.repeated updates.repeated_by_cause \
@@ -258,7 +253,7 @@ fn numbers_that_are_not_finite_become_null() {
 }
 
 #[test]
-fn what_was_felt_is_shown_where_there_was_a_choice_and_the_tools_messages_where_there_were_any() {
+fn what_was_felt_is_shown_where_that_was_the_tool_and_the_tools_messages_where_there_were_any() {
     let mut report = full();
     report.architecture = ArchitectureReport::named(Architecture::Mmt);
     assert!(!report.to_string().contains("Felt"));
@@ -302,8 +297,7 @@ fn the_table_of_a_full_report_is_aligned_and_stays_within_100_columns() {
         "  for deadband              30",
         "  repeats, deadband         20",
         "  messages up               100.2 /s           2000 commands      3 heartbeats",
-        "  tool felt alone           20.4 %",
-        "  largest step of a fade    0.030 N in a tick",
+        "  round trip as felt        14.9 ms",
         "  mass m                    0.707 kg           truth 0.700 kg     error 1.0 %",
         "  loss                      up 1.0 %           down 1.2 %",
         "  datagrams up              2100               105.0 /s           336000 B           157.9 kbit/s",

@@ -65,15 +65,13 @@ pub enum Architecture {
     /// Model-mediated teleoperation: the local model's force.
     #[default]
     Mmt,
-    /// The tool's force, with time-domain passivity control, as soon as it comes.
+    /// The tool's force, with time-domain passivity control.
     Tdpa,
-    /// The one of the two that the measured path and the model's error speak for.
-    Auto,
 }
 
 impl Architecture {
     /// All of them, in the order of their numbers on the wire.
-    pub const ALL: [Self; 3] = [Self::Mmt, Self::Tdpa, Self::Auto];
+    pub const ALL: [Self; 2] = [Self::Mmt, Self::Tdpa];
 
     /// Name in options and reports.
     #[must_use]
@@ -81,14 +79,13 @@ impl Architecture {
         match self {
             Self::Mmt => "mmt",
             Self::Tdpa => "tdpa",
-            Self::Auto => "auto",
         }
     }
 
-    /// Whether the hand may feel the tool's force, so that the two ports have to hear of each other.
+    /// Whether the hand feels the tool's force, so that the two ports exchange their energies.
     #[must_use]
     pub const fn feels_tool(self) -> bool {
-        matches!(self, Self::Tdpa | Self::Auto)
+        matches!(self, Self::Tdpa)
     }
 }
 

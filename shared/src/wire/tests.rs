@@ -60,7 +60,7 @@ fn hello() -> Hello {
         role: Role::Operator,
         coupling: COUPLING,
         samples_per_command: 10,
-        architecture: Architecture::Auto,
+        architecture: Architecture::Tdpa,
         scene_hz: 25,
         hip: Vec2::new(-0.3, 0.0),
         program: Label::clipped("mmt test"),

@@ -1,6 +1,6 @@
-//! Where position–force with passivity control and the local model cross, and what the choice between them comes to.
+//! Where position–force with passivity control and the local model cross.
 //!
-//! Short delays in narrow steps for the two and for `auto`; the rest of the sweep is too coarse there. What is said of
+//! Short delays in narrow steps for the two; the rest of the sweep is too coarse there. What is said of
 //! the crossing is read off these runs and must never be written down from elsewhere.
 
 use mmt_shared::bilateral::Baseline;
@@ -34,7 +34,7 @@ pub(super) fn reproduce(
     };
     let mut places = Vec::new();
     for k_p in STIFFNESSES {
-        for architecture in [TDPA, REPLAY, Architecture::Auto] {
+        for architecture in [TDPA, REPLAY] {
             places.extend(NEAR_MS.map(|ms| place(k_p, architecture, ms)));
         }
     }
@@ -48,7 +48,7 @@ pub(super) fn reproduce(
 
 fn near(groups: &[Group]) -> Table {
     let mut table = Table::new(
-        "TDPA, the model, and the choice at short delays: mean over the seeds",
+        "TDPA and the model at short delays: mean over the seeds",
         &[
             ("k_p", 0),
             ("architecture", 0),

@@ -70,6 +70,5 @@ fn look(k: usize, architecture: Architecture) -> (Stroke, Mark, Colour, u32) {
         Architecture::Mediated(PoseCorrection::Replay) => {
             (Stroke::Solid, Mark::Circle, Colour::Black, 3)
         }
-        Architecture::Auto => (Stroke::Solid, Mark::Cross, Colour::Vermilion, 1),
     }
 }

@@ -47,7 +47,7 @@ impl Session<'_> {
             let now = self.shared.clock.now();
             let due = self.link.end().heartbeat_due();
             let link = &self.link;
-            let others = [link.repeat_due(), link.tool_due(), link.scene_due()];
+            let others = [link.repeat_due(), link.scene_due()];
             let due = others.into_iter().flatten().fold(due, Time::min);
             let due = due.saturating_since(now);
             // In this order, so that a flood of datagrams holds up nothing else.
@@ -60,7 +60,7 @@ impl Session<'_> {
                     // Only a runtime that shuts down fails here.
                     woken.map_err(|_| End::Asked)?;
                     self.send_update()?;
-                    self.send_force()?;
+                    self.send_tool()?;
                 }
                 () = sleep(due) => self.send_due()?,
                 _ = looks.tick() => self.look(live)?,
@@ -102,24 +102,19 @@ impl Session<'_> {
         Ok(())
     }
 
-    /// The tool's force, as long as it is wanted.
-    fn send_force(&mut self) -> Result<(), End> {
-        let Some(tool) = self.worker.fresh_force() else {
+    /// The tool's state, where the hand feels it.
+    fn send_tool(&mut self) -> Result<(), End> {
+        let Some(tool) = self.worker.fresh_tool() else {
             return Ok(());
         };
         let now = self.shared.clock.now();
-        let sealed = self.link.send_tool(now, Some(&tool), &mut self.buffer);
-        self.send(sealed).map(drop)
+        let sealed = self.link.send_tool(now, &tool, &mut self.buffer);
+        self.send(sealed.map(Some)).map(drop)
     }
 
-    /// News of the tool, scenes, repeats and heartbeats, which nothing but the time asks for.
+    /// Scenes, repeats and heartbeats, which nothing but the time asks for.
     fn send_due(&mut self) -> Result<(), End> {
         let now = self.shared.clock.now();
-        if self.link.tool_due().is_some_and(|due| due <= now) {
-            let tool = self.worker.newest().map(|news| news.tool);
-            let sealed = self.link.send_tool(now, tool.as_ref(), &mut self.buffer);
-            self.send(sealed)?;
-        }
         if self.link.scene_due().is_some_and(|due| due <= now) {
             let scene = self.worker.newest().map(|news| news.scene);
             let sealed = self.link.send_scene(now, scene.as_ref(), &mut self.buffer);

@@ -13,6 +13,7 @@ use mmt_shared::io::stream::{read_frame, write_frame};
 use mmt_shared::model::contact::Coupling;
 use mmt_shared::model::geometry::Vec2;
 use mmt_shared::model::sample::{HipCounts, HipSample};
+use mmt_shared::model::tool::HandPort;
 use mmt_shared::pairing::{Pairing, Token};
 use mmt_shared::time::{TICK, Time};
 use mmt_shared::wire::{
@@ -164,7 +165,7 @@ impl Master {
         let command = Command {
             newest_update,
             samples,
-            port: None,
+            port: self.architecture.feels_tool().then(HandPort::default),
         };
         let mut out = [0; DATAGRAM_MAX];
         let now = self.clock.now();
