@@ -5,6 +5,7 @@
 
 use mmt_shared::model::contact::Coupling;
 use mmt_shared::model::geometry::Vec2;
+use mmt_shared::range::{OutOfRange, in_range};
 use serde::Serialize;
 
 use crate::limiter::Limits;
@@ -60,30 +61,18 @@ pub enum DeviceError {
         known: String,
     },
     /// The scale is out of range.
-    #[error("scale {value} is outside the accepted range {min} to {max}; change it")]
-    Scale {
-        /// The scale asked for.
-        value: f64,
-        /// Least accepted.
-        min: f64,
-        /// Greatest accepted.
-        max: f64,
-    },
+    #[error(transparent)]
+    Scale(#[from] OutOfRange),
     /// The hand would feel more than the device can render, or nothing.
     #[error(
-        "stiffness {value} N/m is outside the accepted range {min} to {max} N/m of the device \
-         \"{device}\" at scale {scale} (the hand feels scale x stiffness, at most {limit} N/m); \
-         change the stiffness or the scale"
+        "{range} of the device \"{device}\" at scale {scale} (the hand feels scale x stiffness, \
+         at most {limit} N/m); change the stiffness or the scale"
     )]
     Stiffness {
+        /// k_p asked for and the range that is accepted at this scale.
+        range: OutOfRange,
         /// Name of the device.
         device: &'static str,
-        /// k_p asked for, N/m.
-        value: f64,
-        /// Least accepted k_p, N/m.
-        min: f64,
-        /// Greatest accepted k_p at this scale, N/m.
-        max: f64,
         /// The device's own limit, N/m.
         limit: f64,
         /// The scale s.
@@ -126,29 +115,18 @@ impl DeviceProfile {
         scale: Option<f64>,
     ) -> Result<Self, DeviceError> {
         let scale = scale.unwrap_or(self.scale);
-        let (min, max) = SCALE;
-        if !(min..=max).contains(&scale) {
-            return Err(DeviceError::Scale {
-                value: scale,
-                min,
-                max,
-            });
-        }
+        in_range("scale", "", scale, SCALE)?;
         let value = stiffness_n_per_m.unwrap_or(self.stiffness_n_per_m);
         let limit = self.stiffness_max_n_per_m;
         // the ceiling of the simulated hand holds for k_p itself as well: at s < 1 the device allows
         // more than the local model was made for
-        let max = (limit / scale).min(limit);
-        if !(STIFFNESS_MIN_N_PER_M..=max).contains(&value) {
-            return Err(DeviceError::Stiffness {
-                device: self.name,
-                value,
-                min: STIFFNESS_MIN_N_PER_M,
-                max,
-                limit,
-                scale,
-            });
-        }
+        let accepted = (STIFFNESS_MIN_N_PER_M, (limit / scale).min(limit));
+        in_range("stiffness", "N/m", value, accepted).map_err(|range| DeviceError::Stiffness {
+            range,
+            device: self.name,
+            limit,
+            scale,
+        })?;
         Ok(Self {
             stiffness_n_per_m: value,
             scale,
@@ -258,7 +236,7 @@ mod tests {
         let error = falcon.used_with(Some(1501.0), Some(2.0)).unwrap_err();
         assert_eq!(
             error.to_string(),
-            "stiffness 1501 N/m is outside the accepted range 50 to 1500 N/m of the device \
+            "stiffness 1501 is outside the accepted range 50 to 1500 N/m of the device \
              \"falcon\" at scale 2 (the hand feels scale x stiffness, at most 3000 N/m); \
              change the stiffness or the scale"
         );

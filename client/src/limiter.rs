@@ -4,6 +4,7 @@
 //! finite, or, once released, a force that grows.
 
 use mmt_shared::model::geometry::Vec2;
+use mmt_shared::range::{OutOfRange, in_range};
 use serde::{Deserialize, Serialize};
 
 /// Ticks of the ramp in after engaging and out after releasing: 200 ms. Long enough not to startle,
@@ -14,6 +15,8 @@ pub const STEP_MAX_N: f64 = 2.0;
 
 /// Accepted F_max, N: beyond, no device of this project can follow.
 const FORCE_MAX_N: (f64, f64) = (0.1, 50.0);
+/// S_max in messages, with the reason for its range.
+const STEP_MAX_NAME: &str = "step_max_n (least: the ramp to force_max_n; most: twice force_max_n)";
 /// A limited vector is made this much shorter than its limit, so that rounding cannot lift it above.
 const INSIDE: f64 = 1.0 - 32.0 * f64::EPSILON;
 
@@ -36,34 +39,6 @@ impl Default for Limits {
     }
 }
 
-/// Why limits were not accepted.
-#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-pub enum LimitsError {
-    /// F_max is not a force that a device can make.
-    #[error("force_max_n = {value} is outside the accepted range {min} N to {max} N; change it")]
-    ForceMax {
-        /// What it was, N.
-        value: f64,
-        /// Least accepted, N.
-        min: f64,
-        /// Greatest accepted, N.
-        max: f64,
-    },
-    /// S_max is slower than the ramp or larger than a jump from end to end.
-    #[error(
-        "step_max_n = {value} is outside the accepted range {min} N to {max} N \
-         (the 200 ms ramp to force_max_n, and twice force_max_n); change one of them"
-    )]
-    StepMax {
-        /// What it was, N per tick.
-        value: f64,
-        /// Least accepted, N per tick.
-        min: f64,
-        /// Greatest accepted, N per tick.
-        max: f64,
-    },
-}
-
 /// Limits the force on the hand, tick by tick. Starts released.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ForceLimiter {
@@ -81,17 +56,12 @@ impl ForceLimiter {
     ///
     /// # Errors
     /// Names the limit that is not accepted.
-    pub fn try_new(limits: Limits) -> Result<Self, LimitsError> {
-        let (min, max) = FORCE_MAX_N;
-        let value = limits.force_max_n;
-        if !(min..=max).contains(&value) {
-            return Err(LimitsError::ForceMax { value, min, max });
-        }
-        let (min, max) = (value / f64::from(RAMP_TICKS), 2.0 * value);
-        let value = limits.step_max_n;
-        if !(min..=max).contains(&value) {
-            return Err(LimitsError::StepMax { value, min, max });
-        }
+    pub fn try_new(limits: Limits) -> Result<Self, OutOfRange> {
+        let force = limits.force_max_n;
+        in_range("force_max_n", "N", force, FORCE_MAX_N)?;
+        // the 200 ms ramp up to F_max, and a jump from end to end
+        let steps = (force / f64::from(RAMP_TICKS), 2.0 * force);
+        in_range(STEP_MAX_NAME, "N per tick", limits.step_max_n, steps)?;
         Ok(Self {
             limits,
             engaged: false,
@@ -287,7 +257,7 @@ mod tests {
         assert_eq!(with(8.0, 0.04), Ok(()));
         assert!(matches!(
             with(8.0, 0.039),
-            Err(LimitsError::StepMax { value: 0.039, .. })
+            Err(OutOfRange { value: 0.039, .. })
         ));
         assert!(with(8.0, 16.1).is_err());
         for bad in [f64::NAN, 0.0, -8.0, f64::INFINITY] {

@@ -28,7 +28,7 @@ pub mod pose_observer;
 pub mod sensing;
 pub mod shadow;
 pub mod slave;
-pub mod square;
+pub mod square_friction;
 pub mod tool_force;
 pub mod trigger;
 

@@ -11,7 +11,7 @@ mod clock;
 mod config;
 mod lateness;
 
-pub use config::{PlayoutConfig, PlayoutError};
+pub use config::PlayoutConfig;
 
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -19,6 +19,7 @@ use std::time::Duration;
 use mmt_shared::channel::peer::Histogram;
 use mmt_shared::model::geometry::Vec2;
 use mmt_shared::model::sample::HipSample;
+use mmt_shared::range::OutOfRange;
 use mmt_shared::time::{TICK, Time};
 use serde::{Deserialize, Serialize};
 
@@ -156,7 +157,7 @@ impl PlayoutBuffer {
     ///
     /// # Errors
     /// Names the first number of the configuration that is outside its range.
-    pub fn try_new(config: PlayoutConfig) -> Result<Self, PlayoutError> {
+    pub fn try_new(config: PlayoutConfig) -> Result<Self, OutOfRange> {
         config.check()?;
         let least = (config.delay_ms * 1e6) as i64;
         Ok(Self {

@@ -16,8 +16,7 @@ use mmt_shared::time::Time;
 
 use crate::bilateral::ToolPort;
 use crate::environment::{Environment, EnvironmentConfig};
-use crate::estimator::obstacle::OBSTACLE_N;
-use crate::estimator::{Estimate, Estimator, EstimatorConfig, Measured, Seen};
+use crate::estimator::{Estimate, Estimator, EstimatorConfig, Measured, OBSTACLE_N, Seen};
 use crate::playout::PlayoutBuffer;
 use crate::pose_observer::{ObserverConfig, PoseObserver};
 use crate::sensing::Sensing;
@@ -326,7 +325,7 @@ impl Slave {
     }
 
     fn estimate_from(&mut self, tool: Vec2, force: Vec2) {
-        let normal = self.observer.touching().map(|touching| touching.inward);
+        let normal = self.observer.contact().map(|contact| contact.inward);
         // As wide as the faces say; the paper's never change.
         let side = self.observer.footprint().mean_side();
         let seen = Some(Seen {
@@ -412,7 +411,7 @@ impl Slave {
             _ => self.shadow.ahead(),
         };
         if let (Cause::MasterOnlyContact, Some(touch)) = (cause, judged.rendered().touch) {
-            self.observer.carve(tick.tool, touch.face);
+            self.observer.retract_face(tick.tool, touch.face);
         }
         self.f_s_told = tick.f_s;
         self.sequence = self.sequence.saturating_add(1);

@@ -6,24 +6,13 @@
 
 use mmt_shared::model::contact::Coupling;
 use mmt_shared::model::geometry::Vec2;
+use mmt_shared::range::{OutOfRange, in_range};
 
 /// Default of the limit, N. The hand presses with 8 N at the most (`device`'s profiles), so a tool that does what is felt
 /// stays below it; and it is the bound that outages are held to (15 N after 60 ms, `lab/src/world/tests/hard.rs`).
 pub const TOOL_FORCE_MAX_N: f64 = 15.0;
 /// Accepted limits, N: from twice the force that counts as noise up to what no tabletop arm exerts.
 const LIMIT_N: (f64, f64) = (0.1, 1000.0);
-
-/// A limit that is no limit, or none that a tool can keep.
-#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-#[error("tool force: limit {value} is outside the accepted range {min} to {max} N")]
-pub struct ToolForceError {
-    /// What it was, N.
-    pub value: f64,
-    /// Least accepted value, N.
-    pub min: f64,
-    /// Greatest accepted value, N.
-    pub max: f64,
-}
 
 /// The limit, and what came of it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -41,15 +30,8 @@ impl ToolForce {
     ///
     /// # Errors
     /// When the limit is not within its range.
-    pub fn try_new(max_n: f64, coupling: Coupling) -> Result<Self, ToolForceError> {
-        let (min, max) = LIMIT_N;
-        if !(min..=max).contains(&max_n) {
-            return Err(ToolForceError {
-                value: max_n,
-                min,
-                max,
-            });
-        }
+    pub fn try_new(max_n: f64, coupling: Coupling) -> Result<Self, OutOfRange> {
+        in_range("tool force: limit", "N", max_n, LIMIT_N)?;
         Ok(Self {
             max_n,
             coupling,

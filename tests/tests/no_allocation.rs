@@ -364,7 +364,7 @@ fn the_slaves_own_parts_never_allocate() {
             let measured = Measured {
                 tool: met.tool,
                 force: met.f_s,
-                normal: sides.slave.observer().touching().map(|t| t.inward),
+                normal: sides.slave.observer().contact().map(|t| t.inward),
                 seen: Some(seen),
             };
             let (sent, calls) = counted(|| parts.step(now, &met, &measured));

@@ -207,9 +207,7 @@ fn trace(path: &Path, push: Option<usize>) -> Result<Trace, Failure> {
 fn host_failure(error: &MasterHostError) -> Failure {
     use MasterHostError as E;
     let exit = match error {
-        E::Insecure(_) | E::Operator(_) | E::Limits(_) | E::Lookup { .. } | E::NoAddress { .. } => {
-            Exit::Usage
-        }
+        E::Insecure(_) | E::OutOfRange(_) | E::Lookup { .. } | E::NoAddress { .. } => Exit::Usage,
         E::Connect(ConnectError::NoAnswer { .. }) | E::LookupSlow { .. } | E::NoWelcome { .. } => {
             Exit::NoAnswer
         }

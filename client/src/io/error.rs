@@ -10,20 +10,15 @@ use mmt_shared::io::quic::EndpointError;
 use mmt_shared::io::raw_udp::Insecure;
 use mmt_shared::io::socket::BindError;
 use mmt_shared::io::stream::{ReadFrameError, WriteFrameError};
+use mmt_shared::range::OutOfRange;
 use mmt_shared::wire::{DecodeError, EncodeError, Kind, WelcomeError};
-
-use crate::limiter::LimitsError;
-use crate::operator::scripted::ScriptedError;
 
 /// Why there is no report.
 #[derive(Debug, thiserror::Error)]
 pub enum MasterHostError {
-    /// The scripted operator's numbers are wrong.
-    #[error("the scripted operator: {0}")]
-    Operator(#[from] ScriptedError),
-    /// The device's limits are wrong.
-    #[error("the device: {0}")]
-    Limits(#[from] LimitsError),
+    /// A number of the scripted operator or of the device's limits is wrong.
+    #[error(transparent)]
+    OutOfRange(#[from] OutOfRange),
     /// The name could not be looked up.
     #[error(
         "{address} of the pairing string cannot be looked up: {source}; write the host's number instead"

@@ -30,6 +30,7 @@ use mmt_shared::io::truth::TruthReceiver;
 use mmt_shared::model::geometry::{BoxFootprint, Pose, Vec2};
 use mmt_shared::model::tool::Scene;
 use mmt_shared::pairing::Pairing;
+use mmt_shared::range::OutOfRange;
 use mmt_shared::report::RunReport;
 use mmt_shared::wire::Architecture;
 use serde::Serialize;
@@ -38,7 +39,7 @@ use crate::device::DeviceProfile;
 use crate::failsafe::LinkState;
 use crate::link::CommandConfig;
 use crate::operator::Operator;
-use crate::operator::scripted::{Scripted, ScriptedConfig, ScriptedError, View};
+use crate::operator::scripted::{Scripted, ScriptedConfig, View};
 use crate::operator::trace::Trace;
 use crate::path::PathRecorder;
 
@@ -65,7 +66,7 @@ impl OperatorChoice {
     ///
     /// # Errors
     /// Names the first number of the scripted operator that is out of its range.
-    pub fn begin(&self, view: View) -> Result<Operator, ScriptedError> {
+    pub fn begin(&self, view: View) -> Result<Operator, OutOfRange> {
         match self {
             Self::Scripted(config) => Scripted::try_new(*config, view)
                 .map(|scripted| Operator::Scripted(Box::new(scripted))),

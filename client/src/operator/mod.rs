@@ -3,7 +3,6 @@
 pub mod hand;
 mod route;
 pub mod scripted;
-mod stroke;
 pub mod trace;
 
 use std::time::Duration;

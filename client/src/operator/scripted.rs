@@ -5,19 +5,22 @@
 //! pure function of the configuration, the views and the forces. Its HIP must never jump, never leave
 //! the finite numbers, and never enter the box but by the face it means to push.
 
-mod care;
 mod config;
+mod nudge_policy;
+mod push_profile;
+mod view;
 
-use mmt_shared::model::geometry::{BoxFootprint, Face, Pose, Vec2, rotate};
+use mmt_shared::model::geometry::{Face, Vec2, rotate};
+use mmt_shared::range::OutOfRange;
 use mmt_shared::time::TICK_S;
-use serde::{Deserialize, Serialize};
 
 use super::hand::Hand;
 use super::route;
-use super::stroke::Stroke;
-use care::Care;
+use nudge_policy::NudgePolicy;
+use push_profile::PushProfile;
 
-pub use config::{Picture, ScriptedConfig, ScriptedError};
+pub use config::{Picture, ScriptedConfig};
+pub use view::{Phase, View};
 
 /// A push or an approach that takes longer is given up, s: the box is blocked or not there.
 const GIVE_UP_S: f64 = 10.0;
@@ -41,48 +44,6 @@ const BRAKE_SHARE: f64 = 0.6;
 /// Where the HIP starts: in front of the first face, m.
 const START_M: f64 = 0.25;
 
-/// The box as the operator sees it.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct View {
-    /// `world_from_object`.
-    pub pose: Pose,
-    /// How large it is.
-    pub footprint: BoxFootprint,
-    /// Whether the HIP touches it.
-    pub in_contact: bool,
-}
-
-impl View {
-    fn is_finite(&self) -> bool {
-        self.pose.is_finite()
-            && Face::ALL
-                .iter()
-                .all(|face| self.footprint.offset(*face).is_finite())
-    }
-
-    fn inward(&self, face: Face) -> Vec2 {
-        rotate(self.pose.angle, -face.outward())
-    }
-}
-
-/// What the scripted operator is about.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Phase {
-    /// On the way to the stand-off in front of the face.
-    Travel,
-    /// Slowly towards the face, until it touches.
-    Approach,
-    /// Rests after a nudge, with a light press.
-    Dwell,
-    /// Pushes.
-    Push,
-    /// Rests at the end of a push.
-    Hold,
-    /// Backs off.
-    Retract,
-}
-
 /// The scripted operator.
 #[derive(Clone, Debug)]
 pub struct Scripted {
@@ -93,12 +54,12 @@ pub struct Scripted {
     phase: Phase,
     ticks_in_phase: u32,
     face: Face,
-    stroke: Stroke,
+    profile: PushProfile,
     pushes_begun: u64,
     pushes_completed: u64,
     /// Way made along the face's normal in this push, m.
     pushed: f64,
-    care: Care,
+    nudge: NudgePolicy,
     /// Ticks without contact in a row.
     ticks_in_air: u32,
     /// Where the operator wants the HIP, m, and its velocity, m/s.
@@ -111,7 +72,7 @@ impl Scripted {
     ///
     /// # Errors
     /// Names the first number of the configuration that is outside its range.
-    pub fn try_new(config: ScriptedConfig, view: View) -> Result<Self, ScriptedError> {
+    pub fn try_new(config: ScriptedConfig, view: View) -> Result<Self, OutOfRange> {
         config.checked()?;
         let face = Face::West;
         let start =
@@ -124,11 +85,11 @@ impl Scripted {
             phase: Phase::Travel,
             ticks_in_phase: 0,
             face,
-            stroke: Stroke::draw(&config, 0),
+            profile: PushProfile::draw(&config, 0),
             pushes_begun: 0,
             pushes_completed: 0,
             pushed: 0.0,
-            care: Care::new(config.dwell_s > 0.0, config.nudge_m),
+            nudge: NudgePolicy::new(config.dwell_s > 0.0, config.nudge_m),
             ticks_in_air: 0,
             wanted: start,
             wanted_velocity: Vec2::zeros(),
@@ -142,7 +103,7 @@ impl Scripted {
         self.hand.hip()
     }
 
-    /// What it is about.
+    /// What it is doing.
     #[must_use]
     pub fn phase(&self) -> Phase {
         self.phase
@@ -162,7 +123,7 @@ impl Scripted {
 
     /// Moves on by one tick T and returns the HIP, m, world frame.
     ///
-    /// `view` is the box as it is seen now (a view that is not finite is not looked at); `force_on_hand`
+    /// `view` is the box as it is seen now (a view that is not finite is ignored); `force_on_hand`
     /// is the device's force, N.
     pub fn step(&mut self, view: &View, force_on_hand: Vec2) -> Vec2 {
         if view.is_finite() {
@@ -207,19 +168,19 @@ impl Scripted {
                 self.enter(Phase::Approach);
             }
             Phase::Approach if self.seen.in_contact => {
-                self.care.touch(self.seen.pose.position);
+                self.nudge.touch(self.seen.pose.position);
                 self.enter(Phase::Push);
             }
             Phase::Dwell if self.seconds_in_phase() >= self.config.dwell_s => {
                 let position = self.seen.pose.position;
-                self.care.rested(self.face, position, self.pushed);
+                self.nudge.rested(self.face, position, self.pushed);
                 self.enter(Phase::Push);
             }
             Phase::Push if self.pushed >= self.config.push_m => {
                 self.pushes_completed += 1;
                 self.enter(Phase::Hold);
             }
-            Phase::Push if self.nudges() && self.care.is_nudged(self.pushed) => {
+            Phase::Push if self.nudges() && self.nudge.is_nudged(self.pushed) => {
                 self.enter(Phase::Dwell);
             }
             Phase::Push if self.ticks_in_air > REACTION_TICKS => self.enter(Phase::Approach),
@@ -233,14 +194,14 @@ impl Scripted {
     }
 
     fn nudges(&self) -> bool {
-        self.care.nudges(self.face)
+        self.nudge.nudges(self.face)
     }
 
     fn next_push(&mut self) {
         self.pushes_begun += 1;
         self.pushed = 0.0;
-        self.care.begin();
-        self.stroke = Stroke::draw(&self.config, self.pushes_begun);
+        self.nudge.begin();
+        self.profile = PushProfile::draw(&self.config, self.pushes_begun);
         self.face = self.next_face();
         self.enter(Phase::Travel);
     }
@@ -283,7 +244,7 @@ impl Scripted {
         inward * (way / REST_REACTION_S)
     }
 
-    /// From the approach's speed at the touch up to the stroke's; a nudge keeps the approach's.
+    /// From the approach's speed at the touch up to the push's; a nudge keeps the approach's.
     fn push_speed(&self) -> f64 {
         if self.nudges() {
             return self.config.approach_m_per_s;
@@ -291,14 +252,14 @@ impl Scripted {
         let seconds = self.seconds_in_phase();
         let share = (seconds / PUSH_ONSET_S).min(1.0);
         let approach = self.config.approach_m_per_s;
-        approach + (self.stroke.speed(seconds) - approach) * share
+        approach + (self.profile.speed(seconds) - approach) * share
     }
 
     /// Along the face's inward normal, steered onto the lateral place that was drawn.
     fn forward(&self, speed: f64) -> Vec2 {
         let at = self.wanted_in_object();
         let left = route::left_of(self.face);
-        let error = self.stroke.lateral - left.dot(&at);
+        let error = self.profile.lateral - left.dot(&at);
         let steer = (STEER_PER_S * error).clamp(-STEER_MAX_M_PER_S, STEER_MAX_M_PER_S);
         rotate(
             self.seen.pose.angle,
@@ -368,7 +329,7 @@ impl Scripted {
             &self.seen.footprint,
             self.face,
             self.config.stand_off_m,
-            self.stroke.lateral,
+            self.profile.lateral,
         )
     }
 

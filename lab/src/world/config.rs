@@ -3,14 +3,14 @@
 //! Numbers only: it builds nothing and runs nothing.
 
 use mmt_client::device::DeviceError;
-use mmt_client::limiter::LimitsError;
 use mmt_client::link::CommandConfig;
-use mmt_client::operator::scripted::{ScriptedConfig, ScriptedError};
+use mmt_client::operator::scripted::ScriptedConfig;
 use mmt_netem::config::{ConfigError, LinkConfig};
 use mmt_server::link::SlaveLinkConfig;
 use mmt_server::slave::{SlaveConfig, SlaveError};
 use mmt_shared::channel::rate_control::StretchMax;
 use mmt_shared::model::settings::ModelSettings;
+use mmt_shared::range::OutOfRange;
 use mmt_shared::wire::Architecture;
 use serde::{Deserialize, Serialize};
 
@@ -118,12 +118,9 @@ pub enum WorldError {
     /// The device cannot do this.
     #[error(transparent)]
     Device(#[from] DeviceError),
-    /// The device's limits are wrong.
+    /// A number of the device's limits or of the operator is wrong.
     #[error(transparent)]
-    Limits(#[from] LimitsError),
-    /// The operator's numbers are wrong.
-    #[error(transparent)]
-    Operator(#[from] ScriptedError),
+    OutOfRange(#[from] OutOfRange),
     /// The network's numbers are wrong.
     #[error(transparent)]
     Network(#[from] ConfigError),

@@ -15,7 +15,7 @@ const STEADY: f64 = 0.3;
 
 /// Follows a slow speed.
 #[derive(Clone, Copy, Debug)]
-pub struct Creep {
+pub(super) struct Creep {
     weights: [f64; 2],
     averages: [f64; 2],
     least: f64,
@@ -25,7 +25,7 @@ impl Creep {
     /// At rest. `speed_noise` is the standard deviation of the noise in a raw speed, m/s, which comes from
     /// differences of a white position noise.
     #[must_use]
-    pub fn new(speed_noise: f64) -> Self {
+    pub(super) fn new(speed_noise: f64) -> Self {
         let weights = CORNERS.map(stage_weight);
         let [short, _] = weights;
         // differences of white noise through one first-order stage
@@ -38,7 +38,7 @@ impl Creep {
     }
 
     /// Takes the raw speed of one tick along the normal, m/s, and says whether the object creeps forwards.
-    pub fn step(&mut self, speed: f64) -> bool {
+    pub(super) fn step(&mut self, speed: f64) -> bool {
         for (average, weight) in self.averages.iter_mut().zip(self.weights) {
             *average += (speed - *average) * weight;
         }
@@ -47,7 +47,7 @@ impl Creep {
     }
 
     /// Contact was lost: at rest.
-    pub fn reset(&mut self) {
+    pub(super) fn reset(&mut self) {
         self.averages = [0.0; 2];
     }
 }

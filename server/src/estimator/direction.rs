@@ -28,12 +28,13 @@ impl Default for DirectionConfig {
 
 /// Follows the angle of the force on the object, world frame, rad, wrapped into (−π, π].
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ForceDirection {
+pub(super) struct ForceDirection {
     alpha: f64,
     beta: f64,
     force_min: f64,
     ticks_to_forget: u32,
     angle: f64,
+    /// Turning rate of the force, rad/s.
     rate: f64,
     silent: u32,
     known: bool,
@@ -42,7 +43,7 @@ pub struct ForceDirection {
 impl ForceDirection {
     /// A filter that knows no direction yet.
     #[must_use]
-    pub fn new(config: &DirectionConfig) -> Self {
+    pub(super) fn new(config: &DirectionConfig) -> Self {
         // critically damped (fading memory): both poles at exp(−T/tau)
         let pole = libm::exp(-TICK_S / config.time_constant_s);
         Self {
@@ -61,7 +62,7 @@ impl ForceDirection {
     ///
     /// While the force is too small the angle is held for one time constant, then forgotten: the next
     /// touch may be of another face.
-    pub fn step(&mut self, force: Vec2) -> Option<f64> {
+    pub(super) fn step(&mut self, force: Vec2) -> Option<f64> {
         let size = force.norm();
         if size > self.force_min && size.is_finite() {
             let measured = libm::atan2(force.y, force.x);
@@ -76,25 +77,7 @@ impl ForceDirection {
             self.rate = 0.0;
             self.known &= self.silent <= self.ticks_to_forget;
         }
-        self.angle()
-    }
-
-    /// The angle of the force, rad; none while no direction is known.
-    #[must_use]
-    pub fn angle(&self) -> Option<f64> {
         self.known.then_some(self.angle)
-    }
-
-    /// Turning rate of the force, rad/s.
-    #[must_use]
-    pub fn rate(&self) -> f64 {
-        self.rate
-    }
-
-    /// Forgets the direction.
-    pub fn reset(&mut self) {
-        self.known = false;
-        self.rate = 0.0;
     }
 
     fn correct(&mut self, measured: f64) {
@@ -124,7 +107,7 @@ mod tests {
             let angle = direction.step(towards(truth, 2.0)).unwrap();
             if k > 400 {
                 assert!(wrap_angle(angle - truth).abs() < 1e-6, "{k}");
-                assert!((direction.rate() - rate).abs() < 1e-4);
+                assert!((direction.rate - rate).abs() < 1e-4);
             }
         }
     }
@@ -167,6 +150,6 @@ mod tests {
         direction.step(towards(1.0, 1.0));
         direction.step(Vec2::new(f64::NAN, 1.0));
         direction.step(Vec2::new(f64::INFINITY, f64::INFINITY));
-        assert!((direction.angle().unwrap() - 1.0).abs() < 1e-12);
+        assert!((direction.angle - 1.0).abs() < 1e-12);
     }
 }

@@ -10,13 +10,13 @@ use nalgebra::{Vector3, Vector4};
 
 /// Weight of a new sample in a first-order stage of `cutoff` rad/s at the period T: `1 − exp(−ω T)`.
 #[must_use]
-pub fn stage_weight(cutoff: f64) -> f64 {
+pub(super) fn stage_weight(cutoff: f64) -> f64 {
     1.0 - libm::exp(-cutoff * TICK_S)
 }
 
 /// One tick of (1) along the contact normal: `f = m a + b v + c s`.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Row {
+pub(super) struct Row {
     /// Regressor: acceleration a·n (m/s²), velocity v·n (m/s), s = sign(v·n).
     pub regressor: Vector3<f64>,
     /// Force f·n on the object, N.
@@ -26,7 +26,7 @@ pub struct Row {
 impl Row {
     /// This row with the sign of `speed` for s: friction opposes the push alone.
     #[must_use]
-    pub fn with_sign(mut self, speed: f64) -> Self {
+    pub(super) fn with_sign(mut self, speed: f64) -> Self {
         self.regressor.z = 1.0_f64.copysign(speed);
         self
     }
@@ -34,7 +34,7 @@ impl Row {
 
 /// Three equal first-order stages in a row, each with unit gain at rest.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct StateVariableFilter {
+pub(super) struct StateVariableFilter {
     weight: f64,
     stages: [Vector4<f64>; 3],
 }
@@ -42,7 +42,7 @@ pub struct StateVariableFilter {
 impl StateVariableFilter {
     /// A filter at zero whose stages have the corner `cutoff` (rad/s).
     #[must_use]
-    pub fn new(cutoff: f64) -> Self {
+    pub(super) fn new(cutoff: f64) -> Self {
         Self {
             weight: stage_weight(cutoff),
             stages: [Vector4::zeros(); 3],
@@ -50,12 +50,12 @@ impl StateVariableFilter {
     }
 
     /// Back to zero, all signals at once: the next rows are exact from the first on.
-    pub fn restart(&mut self) {
+    pub(super) fn restart(&mut self) {
         self.stages = [Vector4::zeros(); 3];
     }
 
     /// Filters one tick.
-    pub fn step(&mut self, row: Row) -> Row {
+    pub(super) fn step(&mut self, row: Row) -> Row {
         let mut signal = row.regressor.push(row.force);
         for stage in &mut self.stages {
             *stage += (signal - *stage) * self.weight;

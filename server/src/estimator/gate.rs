@@ -1,4 +1,4 @@
-//! When a tick says something about m, b and c: section 3 of the model notes.
+//! When a tick carries information about m, b and c.
 //!
 //! Only while the tool pushes and the object slides, both for a while. While the object sticks the force
 //! is anything between 0 and c, so a sticking tick must never reach the regression.
@@ -28,7 +28,7 @@ impl Default for GateConfig {
 
 /// What a tick is good for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Passage {
+pub(super) enum GateState {
     /// No push, or the object sticks.
     Closed,
     /// First tick of a sliding push: the filter must start here.
@@ -41,7 +41,7 @@ pub enum Passage {
 
 /// Watches force and speed and opens when both have been enough for long enough.
 #[derive(Clone, Copy, Debug)]
-pub struct Gate {
+pub(super) struct Gate {
     config: GateConfig,
     age: u32,
     backwards: bool,
@@ -50,7 +50,7 @@ pub struct Gate {
 impl Gate {
     /// A closed gate.
     #[must_use]
-    pub fn new(config: GateConfig) -> Self {
+    pub(super) fn new(config: GateConfig) -> Self {
         Self {
             config,
             age: 0,
@@ -62,7 +62,7 @@ impl Gate {
     ///
     /// A slow object slides if it is known to creep. A speed that changes sign begins anew: it has been
     /// through zero, where the object may stick.
-    pub fn step(&mut self, force: f64, speed: f64, creeps: bool) -> Passage {
+    pub(super) fn step(&mut self, force: f64, speed: f64, creeps: bool) -> GateState {
         let slides = self.slides(speed) || creeps;
         let speed = if creeps { speed.abs() } else { speed };
         let enough = force > self.config.force_min_n && slides;
@@ -70,7 +70,7 @@ impl Gate {
         self.backwards = speed < 0.0;
         if !enough {
             self.age = 0;
-            return Passage::Closed;
+            return GateState::Closed;
         }
         self.age = if turned {
             1
@@ -78,20 +78,20 @@ impl Gate {
             self.age.saturating_add(1)
         };
         match self.age {
-            1 => Passage::Begins,
-            age if age > self.config.ticks => Passage::Open,
-            _ => Passage::Young,
+            1 => GateState::Begins,
+            age if age > self.config.ticks => GateState::Open,
+            _ => GateState::Young,
         }
     }
 
     /// Whether a smoothed speed (m/s) is fast enough to be known as sliding by itself.
     #[must_use]
-    pub fn slides(&self, speed: f64) -> bool {
+    pub(super) fn slides(&self, speed: f64) -> bool {
         speed.abs() > self.config.speed_min_m_per_s
     }
 
     /// Closes: contact was lost.
-    pub fn close(&mut self) {
+    pub(super) fn close(&mut self) {
         self.age = 0;
     }
 }
@@ -110,19 +110,19 @@ mod tests {
 
     #[test]
     fn it_opens_after_42_ticks_of_sliding_and_not_before() {
-        assert_eq!(pushed(0).step(2.0, 0.1, false), Passage::Begins);
-        assert_eq!(pushed(1).step(2.0, 0.1, false), Passage::Young);
-        assert_eq!(pushed(41).step(2.0, 0.1, false), Passage::Young);
-        assert_eq!(pushed(42).step(2.0, 0.1, false), Passage::Open);
+        assert_eq!(pushed(0).step(2.0, 0.1, false), GateState::Begins);
+        assert_eq!(pushed(1).step(2.0, 0.1, false), GateState::Young);
+        assert_eq!(pushed(41).step(2.0, 0.1, false), GateState::Young);
+        assert_eq!(pushed(42).step(2.0, 0.1, false), GateState::Open);
     }
 
     #[test]
     fn sticking_a_light_touch_and_a_reversal_each_begin_anew() {
         for (force, speed) in [(2.0, 0.020), (0.15, 0.1), (f64::NAN, 0.1), (2.0, f64::NAN)] {
             let mut gate = pushed(100);
-            assert_eq!(gate.step(force, speed, false), Passage::Closed);
-            assert_eq!(gate.step(2.0, 0.1, false), Passage::Begins);
+            assert_eq!(gate.step(force, speed, false), GateState::Closed);
+            assert_eq!(gate.step(2.0, 0.1, false), GateState::Begins);
         }
-        assert_eq!(pushed(100).step(2.0, -0.1, false), Passage::Begins);
+        assert_eq!(pushed(100).step(2.0, -0.1, false), GateState::Begins);
     }
 }

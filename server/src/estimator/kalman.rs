@@ -31,7 +31,7 @@ impl Default for KalmanConfig {
 
 /// The filter of both axes.
 #[derive(Clone, Copy, Debug)]
-pub struct MotionFilter {
+pub(super) struct MotionFilter {
     transition: Matrix3<f64>,
     process_noise: Matrix3<f64>,
     measurement_noise: f64,
@@ -43,7 +43,7 @@ pub struct MotionFilter {
 impl MotionFilter {
     /// A filter that has seen nothing.
     #[must_use]
-    pub fn new(config: &KalmanConfig) -> Self {
+    pub(super) fn new(config: &KalmanConfig) -> Self {
         let (t, q) = (TICK_S, config.jerk_density);
         let (t2, t3) = (t * t, t * t * t);
         // white jerk of density q over one tick
@@ -66,7 +66,7 @@ impl MotionFilter {
     }
 
     /// Takes a measured position (m); returns velocity (m/s) and acceleration (m/s²).
-    pub fn step(&mut self, position: Vec2) -> (Vec2, Vec2) {
+    pub(super) fn step(&mut self, position: Vec2) -> (Vec2, Vec2) {
         let measured = position.transpose();
         let Some(state) = self.state else {
             let state = Matrix3x2::from_rows(&[measured, measured * 0.0, measured * 0.0]);

@@ -3,110 +3,82 @@
 //! Within these limits no division by zero and no growing filter is possible. Nothing here changes a
 //! number; what is out of range is named.
 
+use mmt_shared::range::{Check, OutOfRange, all_in_range};
+
 use super::{EstimatorConfig, PaperConfig, RecommendedConfig};
-
-/// A setting of an estimator is out of range.
-#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-#[error("estimator setting {name} is {value}; give a number from {min} to {max}")]
-pub struct SettingOutOfRange {
-    /// The setting.
-    pub name: &'static str,
-    /// What it was.
-    pub value: f64,
-    /// Least accepted value.
-    pub min: f64,
-    /// Greatest accepted value.
-    pub max: f64,
-}
-
-type Bound = (&'static str, f64, f64, f64);
 
 impl EstimatorConfig {
     /// Checks every number.
     ///
     /// # Errors
     /// Names the first setting that is out of range or not a number.
-    pub fn check(&self) -> Result<(), SettingOutOfRange> {
+    pub fn check(&self) -> Result<(), OutOfRange> {
         match self {
-            Self::Paper(config) => check(&paper(config)).and(check(&prior(config.prior))),
-            Self::Recommended(config) => check(&recommended(config))
-                .and(check(&recursive(config)))
-                .and(check(&prior(config.recursive.prior))),
+            Self::Paper(config) => {
+                all_in_range(paper(config).into_iter().chain(prior(config.prior)))
+            }
+            Self::Recommended(config) => all_in_range(
+                recommended(config)
+                    .into_iter()
+                    .chain(recursive(config))
+                    .chain(prior(config.recursive.prior)),
+            ),
         }
     }
 }
 
-fn check(bounds: &[Bound]) -> Result<(), SettingOutOfRange> {
-    // written so that NaN is outside
-    let outside = |(_, value, min, max): &&Bound| !(value >= min && value <= max);
-    match bounds.iter().find(outside) {
-        None => Ok(()),
-        Some(&(name, value, min, max)) => Err(SettingOutOfRange {
-            name,
-            value,
-            min,
-            max,
-        }),
-    }
-}
-
-fn prior([m, b, c]: [f64; 3]) -> [Bound; 3] {
+fn prior([m, b, c]: [f64; 3]) -> [Check; 3] {
     [
-        ("prior m (kg)", m, 0.05, 50.0),
-        ("prior b (N s/m)", b, 0.0, 200.0),
-        ("prior c (N)", c, 0.0, 200.0),
+        ("estimator: prior m", "kg", m, (0.05, 50.0)),
+        ("estimator: prior b", "N s/m", b, (0.0, 200.0)),
+        ("estimator: prior c", "N", c, (0.0, 200.0)),
     ]
 }
 
-fn paper(config: &PaperConfig) -> [Bound; 3] {
+#[rustfmt::skip]
+fn paper(config: &PaperConfig) -> [Check; 3] {
+    let kalman = &config.kalman;
     [
-        ("window_s", config.window_s, 0.002, 60.0),
-        ("position_noise_m", config.kalman.position_noise_m, 0.0, 0.1),
-        ("jerk_density", config.kalman.jerk_density, 1e-9, 1e9),
+        ("estimator: window_s", "s", config.window_s, (0.002, 60.0)),
+        ("estimator: position_noise_m", "m", kalman.position_noise_m, (0.0, 0.1)),
+        ("estimator: jerk_density", "m^2/s^5", kalman.jerk_density, (1e-9, 1e9)),
     ]
 }
 
-fn recommended(config: &RecommendedConfig) -> [Bound; 8] {
-    let (coupling, gate) = (&config.coupling, &config.gate);
+#[rustfmt::skip]
+fn recommended(config: &RecommendedConfig) -> [Check; 8] {
+    let (coupling, direction, gate) = (&config.coupling, &config.direction, &config.gate);
+    let (k_p, k_d) = (coupling.stiffness_n_per_m, coupling.damping_ns_per_m);
     [
-        ("stiffness_n_per_m", coupling.stiffness_n_per_m, 1.0, 1e12),
-        ("damping_ns_per_m", coupling.damping_ns_per_m, 0.0, 1e6),
-        ("cutoff_rad_per_s", config.cutoff_rad_per_s, 1.0, 3000.0),
-        ("position_noise_m", config.position_noise_m, 0.0, 0.1),
-        (
-            "time_constant_s",
-            config.direction.time_constant_s,
-            0.001,
-            10.0,
-        ),
-        (
-            "direction.force_min_n",
-            config.direction.force_min_n,
-            1e-6,
-            1e3,
-        ),
-        ("gate.force_min_n", gate.force_min_n, 0.0, 1e3),
-        ("gate.speed_min_m_per_s", gate.speed_min_m_per_s, 0.0, 10.0),
+        ("estimator: stiffness_n_per_m", "N/m", k_p, (1.0, 1e12)),
+        ("estimator: damping_ns_per_m", "N s/m", k_d, (0.0, 1e6)),
+        ("estimator: cutoff_rad_per_s", "rad/s", config.cutoff_rad_per_s, (1.0, 3000.0)),
+        ("estimator: position_noise_m", "m", config.position_noise_m, (0.0, 0.1)),
+        ("estimator: time_constant_s", "s", direction.time_constant_s, (0.001, 10.0)),
+        ("estimator: direction.force_min_n", "N", direction.force_min_n, (1e-6, 1e3)),
+        ("estimator: gate.force_min_n", "N", gate.force_min_n, (0.0, 1e3)),
+        ("estimator: gate.speed_min_m_per_s", "m/s", gate.speed_min_m_per_s, (0.0, 10.0)),
     ]
 }
 
-fn recursive(config: &RecommendedConfig) -> [Bound; 10] {
+#[rustfmt::skip]
+fn recursive(config: &RecommendedConfig) -> [Check; 10] {
     let recursive = &config.recursive;
     let ([prior_b, prior_c], [held_b, held_c]) =
         (recursive.prior_deviation, recursive.held_deviation);
     let change = recursive.change.unwrap_or_default();
     [
-        ("forgetting", recursive.forgetting, 0.5, 1.0),
-        ("prior_deviation of b", prior_b, 1e-6, 1e6),
-        ("prior_deviation of c", prior_c, 1e-6, 1e6),
-        ("held_deviation of b", held_b, 1e-6, 1e6),
-        ("held_deviation of c", held_c, 1e-6, 1e6),
+        ("estimator: forgetting", "", recursive.forgetting, (0.5, 1.0)),
+        ("estimator: prior_deviation of b", "N s/m", prior_b, (1e-6, 1e6)),
+        ("estimator: prior_deviation of c", "N", prior_c, (1e-6, 1e6)),
+        ("estimator: held_deviation of b", "N s/m", held_b, (1e-6, 1e6)),
+        ("estimator: held_deviation of c", "N", held_c, (1e-6, 1e6)),
         // less, and taking the noise away could leave nothing
-        ("excitation", recursive.excitation, 2.0, 1e6),
-        ("damping_force_n", recursive.damping_force_n, 0.0, 1e6),
-        ("error_share", change.error_share, 0.0, 1e6),
-        ("after_s", change.after_s, 0.0, 60.0),
-        ("trust", change.trust, 0.0, 1.0),
+        ("estimator: excitation", "", recursive.excitation, (2.0, 1e6)),
+        ("estimator: damping_force_n", "N", recursive.damping_force_n, (0.0, 1e6)),
+        ("estimator: error_share", "", change.error_share, (0.0, 1e6)),
+        ("estimator: after_s", "s", change.after_s, (0.0, 60.0)),
+        ("estimator: trust", "", change.trust, (0.0, 1.0)),
     ]
 }
 
@@ -131,12 +103,12 @@ mod tests {
         let error = EstimatorConfig::Recommended(config).check().unwrap_err();
         assert_eq!(
             error.to_string(),
-            "estimator setting cutoff_rad_per_s is 0; give a number from 1 to 3000"
+            "estimator: cutoff_rad_per_s 0 is outside the accepted range 1 to 3000 rad/s"
         );
         config.cutoff_rad_per_s = 120.0;
         config.recursive.prior = [0.4, f64::NAN, 1.0];
         let error = EstimatorConfig::Recommended(config).check().unwrap_err();
-        assert_eq!(error.name, "prior b (N s/m)");
+        assert_eq!(error.name, "estimator: prior b");
         config.recursive.prior = [0.4, 0.0, 1.0];
         config.recursive.forgetting = 1.001;
         assert!(EstimatorConfig::Recommended(config).check().is_err());

@@ -11,31 +11,35 @@ use mmt_shared::model::settings::Mode;
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 
-pub mod block;
-pub mod creep;
-pub mod direction;
-pub mod filter;
-pub mod gate;
-pub mod kalman;
-pub mod limits;
-pub mod obstacle;
-pub mod paper;
-#[cfg(test)]
-mod plant;
-pub mod quadratic;
-pub mod recommended;
-pub mod recursive;
-pub mod surface;
+mod creep;
+mod direction;
+mod filter;
+mod gate;
+mod kalman;
+mod limits;
+mod obstacle;
+mod paper;
+mod quadratic;
+mod recommended;
+mod recursive;
+mod surface;
 #[cfg(test)]
 mod tests;
-pub mod turning;
+mod turning;
+mod windowed;
 
-pub use block::Rows;
-pub use direction::{DirectionConfig, ForceDirection};
-pub use limits::SettingOutOfRange;
-pub use paper::{PaperConfig, PaperEstimator};
-pub use recommended::{RecommendedConfig, RecommendedEstimator};
+pub use direction::DirectionConfig;
+pub use gate::GateConfig;
+pub use kalman::KalmanConfig;
+pub use obstacle::OBSTACLE_N;
+pub use paper::PaperConfig;
+pub use recommended::RecommendedConfig;
+pub use recursive::{ChangeTest, RecursiveConfig};
 pub use turning::Seen;
+pub use windowed::Rows;
+
+use paper::PaperEstimator;
+use recommended::RecommendedEstimator;
 
 /// Below this speed along the normal the object is taken to stick, m/s: four standard deviations of the
 /// smoothed speed at the default position noise.
@@ -52,7 +56,7 @@ pub struct Measured {
     pub tool: Vec2,
     /// f_s, contact force on the object, world frame, N; positive when the tool pushes the object.
     pub force: Vec2,
-    /// Inward unit normal of the touched face as the slave believes it; none when not in contact. It
+    /// Inward unit normal of the touched face as the pose observer has it; none when not in contact. It
     /// serves until the direction of the force is known.
     pub normal: Option<Vec2>,
     /// Where the slave sees the object; none: it is taken to be pushed through its centre.
@@ -70,7 +74,7 @@ impl Measured {
     }
 }
 
-/// What an estimator believes after a tick.
+/// What an estimator has found after a tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Estimate {
     /// Mass m, kg.
@@ -141,13 +145,6 @@ impl Estimate {
         let motion = Vector3::new(self.acceleration, self.speed, 1.0);
         motion.dot(&(self.covariance * motion)).max(0.0).sqrt()
     }
-
-    /// Standard deviations of m (kg), b (N s/m), c (N).
-    #[must_use]
-    pub fn deviation(&self) -> [f64; 3] {
-        let variance = self.covariance.diagonal();
-        [variance.x, variance.y, variance.z].map(|v| v.max(0.0).sqrt())
-    }
 }
 
 /// Which estimator, and how.
@@ -183,11 +180,14 @@ impl EstimatorConfig {
 
 /// The slave's estimator of m, b and c.
 #[derive(Clone, Debug)]
+pub struct Estimator(Kind);
+
+#[derive(Clone, Debug)]
 #[allow(
     clippy::large_enum_variant,
     reason = "there is one, and it never moves"
 )]
-pub enum Estimator {
+enum Kind {
     /// Section II-A as printed.
     Paper(PaperEstimator),
     /// Along the normal, filtered alike, recursive.
@@ -198,28 +198,29 @@ impl Estimator {
     /// An estimator at its prior. Settings from outside pass [`EstimatorConfig::check`] first.
     #[must_use]
     pub fn new(config: &EstimatorConfig) -> Self {
-        match config {
-            EstimatorConfig::Paper(config) => Self::Paper(PaperEstimator::new(config)),
+        Self(match config {
+            EstimatorConfig::Paper(config) => Kind::Paper(PaperEstimator::new(config)),
             EstimatorConfig::Recommended(config) => {
-                Self::Recommended(RecommendedEstimator::new(config))
+                Kind::Recommended(RecommendedEstimator::new(config))
             }
-        }
+        })
     }
 
-    /// Takes one tick and says what is believed now. Allocates nothing.
+    /// Takes one tick and returns the estimate. Allocates nothing.
     pub fn step(&mut self, measured: &Measured) -> Estimate {
-        match self {
-            Self::Paper(estimator) => estimator.step(measured),
-            Self::Recommended(estimator) => estimator.step(measured),
+        match &mut self.0 {
+            Kind::Paper(estimator) => estimator.step(measured),
+            Kind::Recommended(estimator) => estimator.step(measured),
         }
+        *self.estimate()
     }
 
-    /// What is believed now.
+    /// The estimate after the last tick.
     #[must_use]
     pub fn estimate(&self) -> &Estimate {
-        match self {
-            Self::Paper(estimator) => estimator.estimate(),
-            Self::Recommended(estimator) => estimator.estimate(),
+        match &self.0 {
+            Kind::Paper(estimator) => &estimator.estimate,
+            Kind::Recommended(estimator) => &estimator.estimate,
         }
     }
 }

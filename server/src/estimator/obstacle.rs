@@ -1,6 +1,6 @@
 //! An object that is pushed far harder than its friction explains: something else holds it.
 //!
-//! A wall that nobody told of can be told to the local model only as friction. A model that stands too early
+//! The local model knows no walls: one can be sent to it only as friction. A model that stands too early
 //! is let go for free; one that has run ahead can be brought back only as far as its tank pays. It must never
 //! take ordinary static friction, which gives way at once, for an obstacle, and never outlast the contact.
 
@@ -8,24 +8,25 @@
 const FRICTION_HOLDS: (f64, f64) = (1.25, 0.3);
 /// How long a force beyond that must be held, ticks: a press rises through static friction sooner.
 const HOLD_TICKS: u32 = 20;
-/// Force beyond that of the motion with which even an object that slides has run up against something, likewise.
+/// An object that slides has hit something when the force exceeds what its motion needs by this share of c, and this
+/// much more, N.
 const PUSH_NEEDS: (f64, f64) = (3.0, 1.0);
 /// How long that must last, ticks.
 const IMPACT_TICKS: u32 = 5;
-/// Friction told of an object that stands, as a multiple of the force, and the share of it that the force may
-/// come to before more is told.
+/// Friction that is sent for an object that stands, as a multiple of the force, and the share of it that the force may
+/// come to before more is sent.
 const MARGIN: (f64, f64) = (2.0, 0.8);
 /// Friction beyond which more makes no difference to a model, N.
 pub const OBSTACLE_N: f64 = 150.0;
 
 /// What a tick of contact is like, as [`Obstacle`] takes it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Moving {
+pub(super) enum MotionState {
     /// It slides for certain, and has for so long that its acceleration is known.
     SlidesOn,
     /// It slides for certain.
     Slides,
-    /// Too slow to tell.
+    /// Too slow to be known.
     Slowly,
     /// It sticks.
     Sticks,
@@ -33,7 +34,7 @@ pub enum Moving {
 
 /// Watches for an obstacle.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Obstacle {
+pub(super) struct Obstacle {
     held_ticks: u32,
     hard_ticks: u32,
     stands: bool,
@@ -41,11 +42,10 @@ pub struct Obstacle {
 }
 
 impl Obstacle {
-    /// Takes the force and the share m a + b v of it that the motion needs (N), how the object moves, and c
-    /// (N) as it was estimated before. True in the tick in which the object is found to stand against an
-    /// obstacle.
-    pub fn step(&mut self, force: f64, motion: f64, moving: Moving, c: f64) -> bool {
-        let slides = matches!(moving, Moving::Slides | Moving::SlidesOn);
+    /// Takes the force (N), the share m a + b v of it that is `needed` to move the object so (N), how it moves, and c (N)
+    /// as it was estimated before. True in the tick in which the object is found to stand against an obstacle.
+    pub(super) fn step(&mut self, force: f64, needed: f64, motion: MotionState, c: f64) -> bool {
+        let slides = matches!(motion, MotionState::Slides | MotionState::SlidesOn);
         if self.stands && !slides {
             let (most, enough) = MARGIN;
             if self.holding.is_none_or(|holding| force > enough * holding) {
@@ -54,14 +54,14 @@ impl Obstacle {
             return false;
         }
         self.stands = false;
-        let held = moving == Moving::Sticks && beyond(force, FRICTION_HOLDS, c);
+        let held = motion == MotionState::Sticks && beyond(force, FRICTION_HOLDS, c);
         self.held_ticks = if held { self.held_ticks + 1 } else { 0 };
         if self.held_ticks >= HOLD_TICKS {
             self.stands = true;
             self.holding = Some((MARGIN.0 * force).min(OBSTACLE_N));
             return true;
         }
-        let hard = moving == Moving::SlidesOn && beyond(force - motion, PUSH_NEEDS, c);
+        let hard = motion == MotionState::SlidesOn && beyond(force - needed, PUSH_NEEDS, c);
         self.hard_ticks = if hard { self.hard_ticks + 1 } else { 0 };
         self.holding = (self.hard_ticks >= IMPACT_TICKS).then_some(force.min(OBSTACLE_N));
         false
@@ -69,12 +69,12 @@ impl Obstacle {
 
     /// The friction (N) that holds a model as the obstacle holds the object; none without an obstacle.
     #[must_use]
-    pub fn holding(&self) -> Option<f64> {
+    pub(super) fn holding(&self) -> Option<f64> {
         self.holding
     }
 
     /// Contact was lost.
-    pub fn clear(&mut self) {
+    pub(super) fn clear(&mut self) {
         *self = Self::default();
     }
 }
@@ -94,7 +94,7 @@ mod tests {
         let mut obstacle = Obstacle::default();
         let rise = (most / rate) as u32;
         for n in 0..rise + 100 {
-            obstacle.step((rate * f64::from(n)).min(most), 0.0, Moving::Sticks, C);
+            obstacle.step((rate * f64::from(n)).min(most), 0.0, MotionState::Sticks, C);
         }
         obstacle
     }
@@ -111,36 +111,36 @@ mod tests {
     fn static_friction_that_gives_way_within_20_ms_is_no_obstacle() {
         let mut obstacle = Obstacle::default();
         for _ in 0..19 {
-            assert!(!obstacle.step(1.5 * C, 0.0, Moving::Sticks, C));
+            assert!(!obstacle.step(1.5 * C, 0.0, MotionState::Sticks, C));
         }
-        obstacle.step(1.5 * C, 0.0, Moving::Slides, C);
-        assert!(!obstacle.step(1.5 * C, 0.0, Moving::Sticks, C));
+        obstacle.step(1.5 * C, 0.0, MotionState::Slides, C);
+        assert!(!obstacle.step(1.5 * C, 0.0, MotionState::Sticks, C));
         assert_eq!(obstacle.holding(), None);
     }
 
     #[test]
     fn a_noisy_speed_does_not_end_it_and_sliding_does() {
         let mut obstacle = press(0.02, 5.0);
-        obstacle.step(5.0, 0.0, Moving::Slowly, C);
+        obstacle.step(5.0, 0.0, MotionState::Slowly, C);
         assert!(obstacle.holding().is_some());
-        obstacle.step(5.0, 0.0, Moving::Slides, C);
+        obstacle.step(5.0, 0.0, MotionState::Slides, C);
         assert_eq!(obstacle.holding(), None);
     }
 
     #[test]
     fn an_object_that_moves_on_under_a_force_beyond_any_push_has_hit_something() {
         let mut obstacle = Obstacle::default();
-        for (force, told) in [(3.0 * C + 1.0, None), (10.0, Some(10.0))] {
+        for (force, sent) in [(3.0 * C + 1.0, None), (10.0, Some(10.0))] {
             for _ in 0..5 {
-                assert!(!obstacle.step(force, 0.0, Moving::SlidesOn, C));
+                assert!(!obstacle.step(force, 0.0, MotionState::SlidesOn, C));
             }
-            assert_eq!(obstacle.holding(), told);
+            assert_eq!(obstacle.holding(), sent);
         }
-        obstacle.step(2.0, 0.0, Moving::SlidesOn, C);
+        obstacle.step(2.0, 0.0, MotionState::SlidesOn, C);
         assert_eq!(obstacle.holding(), None);
         for _ in 0..5 {
-            obstacle.step(10.0, 5.0, Moving::SlidesOn, C);
-            obstacle.step(10.0, 0.0, Moving::Slides, C);
+            obstacle.step(10.0, 5.0, MotionState::SlidesOn, C);
+            obstacle.step(10.0, 0.0, MotionState::Slides, C);
         }
         assert_eq!(obstacle.holding(), None, "a quick hand is no obstacle");
     }

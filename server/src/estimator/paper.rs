@@ -8,8 +8,8 @@ use mmt_shared::time::TICK_S;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-use super::block::{Block, Rows};
 use super::kalman::{KalmanConfig, MotionFilter};
+use super::windowed::{Rows, WindowedLeastSquares};
 use super::{Estimate, Measured, STICK_SPEED};
 
 /// Settings of [`PaperEstimator`].
@@ -18,7 +18,7 @@ use super::{Estimate, Measured, STICK_SPEED};
 pub struct PaperConfig {
     /// The filter of the tool's motion.
     pub kalman: KalmanConfig,
-    /// Length of the window of (3), s; 2 ms to 60 s. The paper gives none; 200 ms is a study's choice.
+    /// Length of the window of (3), s; 2 ms to 60 s. The paper gives none. Default 0.2: a third of the shortest push.
     pub window_s: f64,
     /// How a tick becomes rows of (3).
     pub rows: Rows,
@@ -39,49 +39,42 @@ impl Default for PaperConfig {
 
 /// The paper's estimator.
 #[derive(Clone, Debug)]
-pub struct PaperEstimator {
+pub(super) struct PaperEstimator {
     motion: MotionFilter,
-    block: Block,
-    estimate: Estimate,
+    window: WindowedLeastSquares,
+    pub(super) estimate: Estimate,
 }
 
 impl PaperEstimator {
     /// At the prior. Allocates the window here and never again.
     #[must_use]
-    pub fn new(config: &PaperConfig) -> Self {
+    pub(super) fn new(config: &PaperConfig) -> Self {
         let ticks = (config.window_s / TICK_S).round().clamp(2.0, 60_000.0) as usize;
         Self {
             motion: MotionFilter::new(&config.kalman),
-            block: Block::new(ticks, config.rows),
+            window: WindowedLeastSquares::new(ticks, config.rows),
             estimate: Estimate::at(Vector3::from(config.prior)),
         }
     }
 
     /// Takes one tick; a tick with numbers that no sensor gives is passed over.
-    pub fn step(&mut self, measured: &Measured) -> Estimate {
+    pub(super) fn step(&mut self, measured: &Measured) {
         if !measured.is_usable() {
             self.estimate.excited = false;
-            return self.estimate;
+            return;
         }
         let (v, a) = self.motion.step(measured.tool);
         if measured.normal.is_some() {
             self.touch(a, v, measured.force);
         } else {
-            self.block.clear();
+            self.window.clear();
             self.estimate.release();
         }
-        self.estimate
-    }
-
-    /// What is estimated now.
-    #[must_use]
-    pub fn estimate(&self) -> &Estimate {
-        &self.estimate
     }
 
     fn touch(&mut self, a: Vec2, v: Vec2, force: Vec2) {
-        self.block.push(a, v, force);
-        let (condition, solution) = self.block.solve();
+        self.window.push(a, v, force);
+        let (condition, solution) = self.window.solve();
         let estimate = &mut self.estimate;
         estimate.samples = estimate.samples.saturating_add(1);
         estimate.condition = condition;

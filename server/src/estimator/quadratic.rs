@@ -10,7 +10,7 @@ use nalgebra::{Matrix3, Vector3};
 ///
 /// Exact: all eight sets of active bounds are tried. None if M is singular or a number is not finite.
 #[must_use]
-pub fn minimum_above(
+pub(super) fn minimum_above(
     matrix: &Matrix3<f64>,
     q: &Vector3<f64>,
     least: &Vector3<f64>,
@@ -66,7 +66,7 @@ const DETERMINANT_MIN: f64 = 1e-13;
 
 /// Inverse of a Gram matrix; none if it is singular to working precision, whatever the units.
 #[must_use]
-pub fn inverse_of_gram(gram: &Matrix3<f64>) -> Option<Matrix3<f64>> {
+pub(super) fn inverse_of_gram(gram: &Matrix3<f64>) -> Option<Matrix3<f64>> {
     let lengths = gram.m11 * gram.m22 * gram.m33;
     // written so that NaN fails
     if gram.determinant() > DETERMINANT_MIN * lengths {
@@ -81,7 +81,7 @@ pub fn inverse_of_gram(gram: &Matrix3<f64>) -> Option<Matrix3<f64>> {
 /// The condition number of the least-squares problem (square root of the matrix's own, Frobenius norm)
 /// after every column has been scaled to length 1; √3 is perfect, infinity is singular.
 #[must_use]
-pub fn condition(gram: &Matrix3<f64>, inverse: Option<&Matrix3<f64>>) -> f64 {
+pub(super) fn condition(gram: &Matrix3<f64>, inverse: Option<&Matrix3<f64>>) -> f64 {
     let Some(inverse) = inverse else {
         return f64::INFINITY;
     };

@@ -7,15 +7,14 @@
 use mmt_shared::model::contact::Coupling;
 use mmt_shared::model::geometry::{Vec2, rotate};
 use mmt_shared::time::TICK_S;
-use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
 use super::creep::Creep;
 use super::direction::{DirectionConfig, ForceDirection};
 use super::filter::{Row, StateVariableFilter, stage_weight};
-use super::gate::{Gate, GateConfig, Passage};
-use super::obstacle::{Moving, Obstacle};
-use super::recursive::{Recursive, RecursiveConfig, Verdict};
+use super::gate::{Gate, GateConfig, GateState};
+use super::obstacle::{MotionState, Obstacle};
+use super::recursive::{RecursiveConfig, RecursiveLeastSquares, Verdict};
 use super::surface::{Surface, SurfaceMotion};
 use super::turning::{self, Seen};
 use super::{Estimate, Measured, STICK_SPEED};
@@ -72,24 +71,24 @@ impl RecommendedConfig {
 
 /// The recommended estimator.
 #[derive(Clone, Copy, Debug)]
-pub struct RecommendedEstimator {
+pub(super) struct RecommendedEstimator {
     direction: ForceDirection,
     surface: Surface,
     speed_weight: f64,
     gate: Gate,
     creep: Creep,
     filter: StateVariableFilter,
-    recursive: Recursive,
+    recursive: RecursiveLeastSquares,
     /// The regression as it was, newest last.
-    copies: [Recursive; 2],
+    copies: [RecursiveLeastSquares; 2],
     obstacle: Obstacle,
-    estimate: Estimate,
+    pub(super) estimate: Estimate,
 }
 
 impl RecommendedEstimator {
     /// At the prior.
     #[must_use]
-    pub fn new(config: &RecommendedConfig) -> Self {
+    pub(super) fn new(config: &RecommendedConfig) -> Self {
         let speed_min = config
             .gate
             .speed_min_m_per_s
@@ -98,9 +97,9 @@ impl RecommendedEstimator {
             speed_min_m_per_s: speed_min,
             ..config.gate
         };
-        let recursive = Recursive::new(config.recursive, config.acceleration_noise());
-        let mut estimate = Estimate::at(recursive.estimate());
-        estimate.covariance = recursive.covariance();
+        let recursive = RecursiveLeastSquares::new(config.recursive, config.acceleration_noise());
+        let mut estimate = Estimate::at(recursive.estimate);
+        estimate.covariance = recursive.covariance;
         Self {
             direction: ForceDirection::new(&config.direction),
             surface: Surface::new(config.coupling),
@@ -116,7 +115,7 @@ impl RecommendedEstimator {
     }
 
     /// Takes one tick; a tick with numbers that no sensor gives ends the contact for the regression.
-    pub fn step(&mut self, measured: &Measured) -> Estimate {
+    pub(super) fn step(&mut self, measured: &Measured) {
         let usable = measured.is_usable();
         let force = if usable {
             measured.force
@@ -129,13 +128,6 @@ impl RecommendedEstimator {
             None => self.release(),
         }
         self.publish();
-        self.estimate
-    }
-
-    /// What is estimated now.
-    #[must_use]
-    pub fn estimate(&self) -> &Estimate {
-        &self.estimate
     }
 
     fn touch(&mut self, measured: &Measured, angle: Option<f64>, normal: Vec2) {
@@ -150,30 +142,30 @@ impl RecommendedEstimator {
         self.estimate.speed += (v - self.estimate.speed) * self.speed_weight;
         let creeps = self.creep.step(v);
         self.estimate.sticking = !creeps && self.estimate.speed.abs() < STICK_SPEED;
-        let passage = self
+        let gate = self
             .gate
             .step(motion.row.force, self.estimate.speed, creeps);
-        self.slide(passage, &self.row(&motion, normal, measured.seen.as_ref()));
-        self.stand(motion.row.force, passage == Passage::Open);
+        self.slide(gate, &self.row(&motion, normal, measured.seen.as_ref()));
+        self.stand(motion.row.force, gate == GateState::Open);
     }
 
     /// Whether something beyond friction holds the object against this force, N. Before friction has been
     /// seen for a while, nobody can say.
     fn stand(&mut self, force: f64, slides_on: bool) {
         let [older, _] = self.copies;
-        if older.samples() == 0 {
+        if older.samples == 0 {
             return;
         }
         let slides = self.gate.slides(self.estimate.speed);
-        let moving = match (slides, self.estimate.sticking) {
-            (true, _) if slides_on => Moving::SlidesOn,
-            (true, _) => Moving::Slides,
-            (false, true) => Moving::Sticks,
-            (false, false) => Moving::Slowly,
+        let motion = match (slides, self.estimate.sticking) {
+            (true, _) if slides_on => MotionState::SlidesOn,
+            (true, _) => MotionState::Slides,
+            (false, true) => MotionState::Sticks,
+            (false, false) => MotionState::Slowly,
         };
-        let known = older.estimate();
-        let motion = known.x * self.estimate.acceleration + known.y * self.estimate.speed;
-        if self.obstacle.step(force, motion, moving, known.z) {
+        let known = older.estimate;
+        let needed = known.x * self.estimate.acceleration + known.y * self.estimate.speed;
+        if self.obstacle.step(force, needed, motion, known.z) {
             self.recursive = older;
             self.copies = [older; 2];
         }
@@ -192,22 +184,22 @@ impl RecommendedEstimator {
         }
     }
 
-    fn slide(&mut self, passage: Passage, row: &Row) {
-        if passage == Passage::Closed {
+    fn slide(&mut self, gate: GateState, row: &Row) {
+        if gate == GateState::Closed {
             self.estimate.acceleration = 0.0;
             return self.recursive.hold();
         }
-        if passage == Passage::Begins {
+        if gate == GateState::Begins {
             self.filter.restart();
         }
         let filtered = self.filter.step(*row);
         self.estimate.acceleration = filtered.regressor.x;
-        if passage == Passage::Open {
+        if gate == GateState::Open {
             if self.recursive.update(&filtered) == Verdict::Changed {
                 self.gate.close();
             }
             let [_, newer] = self.copies;
-            if self.recursive.samples() >= newer.samples() + COPY_ROWS {
+            if self.recursive.samples >= newer.samples + COPY_ROWS {
                 self.copies = [newer, self.recursive];
             }
         } else {
@@ -225,10 +217,10 @@ impl RecommendedEstimator {
     }
 
     fn publish(&mut self) {
-        let found: Vector3<f64> = self.recursive.estimate();
-        self.estimate.set(found, self.recursive.covariance());
-        self.estimate.condition = self.recursive.condition();
-        self.estimate.excited = self.recursive.excited();
-        self.estimate.samples = self.recursive.samples();
+        let (estimate, found) = (&mut self.estimate, &self.recursive);
+        estimate.set(found.estimate, found.covariance);
+        estimate.condition = found.condition;
+        estimate.excited = found.excited;
+        estimate.samples = found.samples;
     }
 }

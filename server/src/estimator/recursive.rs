@@ -17,7 +17,7 @@ use super::quadratic::{condition, inverse_of_gram, minimum_above};
 const LEAST: Vector3<f64> = Vector3::new(MASS_KG.0, 0.0, 0.0);
 /// Least variance of a filtered row's error, N²: 1 mN r.m.s., the default force noise after the filter.
 const ROW_VARIANCE_MIN: f64 = 1e-6;
-/// Least speed (m/s) at which a row can tell b from c: half of the gate's.
+/// Least speed (m/s) at which a row tells b from c: half of the gate's.
 const TELLING_SPEED: f64 = 0.010;
 /// Pull of m towards the prior in powers of the noise: five times the scatter of the noise's power over
 /// a memory, so that the matrix stays positive when the noise is taken away.
@@ -51,7 +51,7 @@ impl Default for ChangeTest {
 
 /// Whether a row was taken.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Verdict {
+pub(super) enum Verdict {
     /// It counts.
     Taken,
     /// It does not fit: held back.
@@ -60,7 +60,7 @@ pub enum Verdict {
     Changed,
 }
 
-/// Settings of [`Recursive`].
+/// Settings of [`RecursiveLeastSquares`].
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RecursiveConfig {
     /// Weight that a row keeps from tick to tick. 0.998, a memory of 500 ms: half the error in b and c of
@@ -97,7 +97,7 @@ impl Default for RecursiveConfig {
 
 /// The running solution.
 #[derive(Clone, Copy, Debug)]
-pub struct Recursive {
+pub(super) struct RecursiveLeastSquares {
     config: RecursiveConfig,
     /// Variance of the noise in a filtered acceleration, (m/s²)².
     acceleration_noise: f64,
@@ -109,18 +109,23 @@ pub struct Recursive {
     settled: bool,
     founded: bool,
     held: Vector3<f64>,
-    estimate: Vector3<f64>,
-    covariance: Matrix3<f64>,
-    condition: f64,
-    excited: bool,
-    samples: u64,
+    /// m (kg), b (N s/m), c (N).
+    pub(super) estimate: Vector3<f64>,
+    /// Covariance of m, b, c as if the errors of the rows were independent.
+    pub(super) covariance: Matrix3<f64>,
+    /// Condition number of the data in memory: see [`condition`].
+    pub(super) condition: f64,
+    /// Whether the last tick brought data from which m, b and c can all be told.
+    pub(super) excited: bool,
+    /// Rows so far.
+    pub(super) samples: u64,
 }
 
-impl Recursive {
+impl RecursiveLeastSquares {
     /// At the prior. `acceleration_noise` is the variance of the noise in a filtered acceleration,
     /// (m/s²)².
     #[must_use]
-    pub fn new(config: RecursiveConfig, acceleration_noise: f64) -> Self {
+    pub(super) fn new(config: RecursiveConfig, acceleration_noise: f64) -> Self {
         let prior = Vector3::from(config.prior).sup(&LEAST);
         let [b, c] = config.prior_deviation;
         Self {
@@ -143,7 +148,7 @@ impl Recursive {
     }
 
     /// Takes one filtered row.
-    pub fn update(&mut self, row: &Row) -> Verdict {
+    pub(super) fn update(&mut self, row: &Row) -> Verdict {
         let error = row.force - self.estimate.dot(&row.regressor);
         let verdict = self.doubt(row.force, error);
         match verdict {
@@ -154,40 +159,10 @@ impl Recursive {
         verdict
     }
 
-    /// No row this tick: hold, and say so.
-    pub fn hold(&mut self) {
+    /// No row this tick: the estimate is held.
+    pub(super) fn hold(&mut self) {
         self.excited = false;
         self.off_ticks = 0;
-    }
-
-    /// m (kg), b (N s/m), c (N).
-    #[must_use]
-    pub fn estimate(&self) -> Vector3<f64> {
-        self.estimate
-    }
-
-    /// Covariance of m, b, c as if the errors of the rows were independent.
-    #[must_use]
-    pub fn covariance(&self) -> Matrix3<f64> {
-        self.covariance
-    }
-
-    /// Condition number of the data in memory: see [`condition`].
-    #[must_use]
-    pub fn condition(&self) -> f64 {
-        self.condition
-    }
-
-    /// Whether the last tick brought data from which m, b and c can all be told.
-    #[must_use]
-    pub fn excited(&self) -> bool {
-        self.excited
-    }
-
-    /// Rows so far.
-    #[must_use]
-    pub fn samples(&self) -> u64 {
-        self.samples
     }
 
     /// Only a well founded estimate may doubt a row: at first it is the estimate that is wrong.

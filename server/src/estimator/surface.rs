@@ -2,7 +2,8 @@
 //!
 //! The paper takes the tool's motion for the object's (section II-A), but the virtual coupling between
 //! them gives: at 1.5–3 Hz the rate of the penetration is some 10 % of the velocity. With
-//! f = k_p pen + k_d d(pen)/dt known, pen follows from f and the surface from the tool. It must never
+//! f = k_p pen + k_d d(pen)/dt known, pen follows from f and the surface from the tool. The normal is here the direction
+//! of the force, which is known sooner than the pose; the pose observer inverts the same law along a face. It must never
 //! smooth: that is the work of the one filter that force and motion share.
 
 use mmt_shared::model::contact::Coupling;
@@ -14,7 +15,7 @@ use super::filter::Row;
 
 /// Raw motion of the surface point under the tool and the force that caused it, in one tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SurfaceMotion {
+pub(super) struct SurfaceMotion {
     /// The surface point, world frame, m.
     pub point: Vec2,
     /// Its velocity, world frame, m/s.
@@ -25,7 +26,7 @@ pub struct SurfaceMotion {
 
 /// Follows the surface point while the tool touches.
 #[derive(Clone, Copy, Debug)]
-pub struct Surface {
+pub(super) struct Surface {
     coupling: Coupling,
     penetration: f64,
     force: Vec2,
@@ -36,7 +37,7 @@ pub struct Surface {
 impl Surface {
     /// Of an object touched through `coupling`.
     #[must_use]
-    pub fn new(coupling: Coupling) -> Self {
+    pub(super) fn new(coupling: Coupling) -> Self {
         Self {
             coupling,
             penetration: 0.0,
@@ -47,7 +48,7 @@ impl Surface {
     }
 
     /// Contact was lost: the surface is out of sight.
-    pub fn reset(&mut self) {
+    pub(super) fn reset(&mut self) {
         *self = Self::new(self.coupling);
     }
 
@@ -56,7 +57,7 @@ impl Surface {
     /// The motion is known from the third tick on. The force of the row is that of the tick before: tool
     /// and force of one tick give the surface *before* the step in which that force acts, so
     /// `m (v_n − v_{n−1})/T + b v_n + c sign(v_n) = f_n` pairs each motion with the force one tick older.
-    pub fn step(&mut self, tool: Vec2, force: Vec2, normal: Vec2) -> Option<SurfaceMotion> {
+    pub(super) fn step(&mut self, tool: Vec2, force: Vec2, normal: Vec2) -> Option<SurfaceMotion> {
         // (6) with damping, inverted: f = k_p pen_n + k_d (pen_n − pen_{n−1})/T
         let k_d_per_tick = self.coupling.damping_ns_per_m / TICK_S;
         let stiffness = self.coupling.stiffness_n_per_m + k_d_per_tick;

@@ -12,7 +12,7 @@ use nalgebra::Vector3;
 use super::POSITION_LIMIT;
 use super::filter::Row;
 use super::surface::SurfaceMotion;
-use crate::square::friction;
+use crate::square_friction::friction;
 
 /// e/(c l) of the ellipse through the wrenches with which a slow tool pushes a square.
 const CREEP_RADIUS: f64 = 0.30;
@@ -50,7 +50,7 @@ impl Seen {
 /// centre, the tangent t, and v_c·t left out because nothing pushes that way. Without alpha that is
 /// `m (a·n + omega (2 v·t + omega h)) + b v·n + c (F + 6 d/l² M) = (1 + 6 d²/l²) f`.
 #[must_use]
-pub fn shared(motion: &SurfaceMotion, normal: Vec2, speed: f64, seen: &Seen) -> Row {
+pub(super) fn shared(motion: &SurfaceMotion, normal: Vec2, speed: f64, seen: &Seen) -> Row {
     let Seen {
         centre,
         turning: omega,
@@ -75,7 +75,7 @@ pub fn shared(motion: &SurfaceMotion, normal: Vec2, speed: f64, seen: &Seen) -> 
 /// Without inertia the moment and the force on a square lie on its limit surface, so that f = c s with
 /// `s = 1/sqrt(1 + (d/(0.30 l))²)`: 0.3 % off the square's for levers up to 0.14 l.
 #[must_use]
-pub fn creeping(motion: &SurfaceMotion, normal: Vec2, seen: &Seen) -> Row {
+pub(super) fn creeping(motion: &SurfaceMotion, normal: Vec2, seen: &Seen) -> Row {
     let d = cross(motion.point - seen.centre, normal) / seen.side;
     let share = 1.0 / (1.0 + 6.0 * d * d);
     let raw = motion.row.regressor;

@@ -2,12 +2,13 @@
 
 use std::time::Duration;
 
+use mmt_shared::range::{OutOfRange, all_in_range};
 use mmt_shared::wire::Architecture;
 use serde::{Deserialize, Serialize};
 
 /// Accepted play-out delay, ms.
 const DELAY_MS: (f64, f64) = (0.0, 250.0);
-/// Accepted time of extrapolation, ms: at most `reliability.md`'s 30 ms, tripled for studies.
+/// Accepted time of extrapolation, ms: three times the default, for studies.
 const EXTRAPOLATION_MS: (f64, f64) = (0.0, 100.0);
 /// Accepted speed limit, m/s.
 const SPEED_M_PER_S: (f64, f64) = (0.01, 10.0);
@@ -73,52 +74,18 @@ impl PlayoutConfig {
         Self { delay_ms, ..self }
     }
 
-    pub(super) fn check(&self) -> Result<(), PlayoutError> {
-        for (name, unit, value, (min, max)) in [
-            ("delay", "ms", self.delay_ms, DELAY_MS),
-            ("longest delay", "ms", self.delay_max_ms, DELAY_MS),
-            (
-                "extrapolation",
-                "ms",
-                self.extrapolation_ms,
-                EXTRAPOLATION_MS,
-            ),
-            ("speed limit", "m/s", self.speed_max_m_per_s, SPEED_M_PER_S),
-            (
-                "deceleration",
-                "m/s^2",
-                self.deceleration_m_per_s2,
-                DECELERATION_M_PER_S2,
-            ),
-        ] {
-            if !(min..=max).contains(&value) {
-                return Err(PlayoutError {
-                    name,
-                    value,
-                    min,
-                    max,
-                    unit,
-                });
-            }
-        }
-        Ok(())
+    pub(super) fn check(&self) -> Result<(), OutOfRange> {
+        let deceleration = self.deceleration_m_per_s2;
+        #[rustfmt::skip]
+        let checks = [
+            ("play-out: delay", "ms", self.delay_ms, DELAY_MS),
+            ("play-out: longest delay", "ms", self.delay_max_ms, DELAY_MS),
+            ("play-out: extrapolation", "ms", self.extrapolation_ms, EXTRAPOLATION_MS),
+            ("play-out: speed limit", "m/s", self.speed_max_m_per_s, SPEED_M_PER_S),
+            ("play-out: deceleration", "m/s^2", deceleration, DECELERATION_M_PER_S2),
+        ];
+        all_in_range(checks)
     }
-}
-
-/// Why samples cannot be played like this: a number lies outside its accepted range.
-#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-#[error("play-out: {name} {value} is outside the accepted range {min} to {max} {unit}")]
-pub struct PlayoutError {
-    /// Which number.
-    pub name: &'static str,
-    /// What it was.
-    pub value: f64,
-    /// Least accepted value.
-    pub min: f64,
-    /// Greatest accepted value.
-    pub max: f64,
-    /// Unit of all three.
-    pub unit: &'static str,
 }
 
 #[cfg(test)]

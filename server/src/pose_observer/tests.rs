@@ -81,12 +81,12 @@ fn the_direction_of_the_force_gives_theta() {
 }
 
 #[test]
-fn an_unknown_face_is_carved_in_growing_steps_and_a_known_one_stays() {
+fn an_unknown_face_is_retracted_in_growing_steps_and_a_known_one_stays() {
     let mut unknown = observer(true);
     let mut depths = Vec::new();
     for _ in 0..3 {
         let face = -unknown.footprint().west;
-        unknown.carve(Vec2::new(face + 1e-3, 0.0), Face::West);
+        unknown.retract_face(Vec2::new(face + 1e-3, 0.0), Face::West);
         depths.push(-face - unknown.footprint().west);
     }
     assert!((depths[0] - 2e-3).abs() < 1e-12 && depths[1] > depths[0] && depths[2] > depths[1]);
@@ -96,7 +96,7 @@ fn an_unknown_face_is_carved_in_growing_steps_and_a_known_one_stays() {
     let truth = push(&mut known, 1000, 0.0);
     let footprint = known.footprint();
     let inside = truth.position + Vec2::new(-HALF + 2e-3, 0.0);
-    known.carve(inside, Face::West);
+    known.retract_face(inside, Face::West);
     assert_eq!(known.footprint(), footprint);
     assert!(
         known.pose().position.x > truth.position.x + 2e-3,
@@ -126,7 +126,7 @@ fn a_box_that_is_let_go_coasts_as_far_as_friction_allows() {
         "{coasted} of {most}"
     );
     assert_eq!(observer.twist(), Twist::default());
-    assert!(observer.touching().is_none());
+    assert!(observer.contact().is_none());
 }
 
 #[test]
@@ -151,9 +151,9 @@ fn turn(observer: &mut PoseObserver, resistance: f64, seconds: u32) -> (f64, f64
         let along = Vec2::new(-inward.y, inward.x);
         let surface = truth.position - inward * HALF - along * lever;
         let force = inward * (params.c() + params.b() * speed);
-        let drag = resistance * crate::square::drag(&params, 2.0 * HALF, speed, omega);
+        let drag = resistance * crate::square_friction::drag(&params, 2.0 * HALF, speed, omega);
         let moment = cross(surface - truth.position, force);
-        omega = crate::square::turned(params.inertia(), drag, omega, moment);
+        omega = crate::square_friction::turned(params.inertia(), drag, omega, moment);
         let now = Time::ZERO + TICK * n;
         let tool = surface + force / COUPLING.stiffness_n_per_m;
         observer.step(now, tool, force, true, &params);
@@ -221,8 +221,8 @@ fn a_disc_is_known_by_its_tangent_and_its_centre_by_vision() {
     let rate = -0.4;
     let (centre, normal) = push_disc(&mut observer, -0.15, rate, 1500);
     let pose = observer.pose();
-    let inward = observer.touching().unwrap().inward;
-    let west = observer.touching().unwrap().face;
+    let inward = observer.contact().unwrap().inward;
+    let west = observer.contact().unwrap().face;
     assert_eq!(west, Face::West);
     assert!(wrap_angle(pose.angle - normal).abs() < 5e-3, "{pose:?}");
     assert!((inward - rotate(normal, Vec2::new(1.0, 0.0))).norm() < 5e-3);
@@ -237,7 +237,7 @@ fn a_disc_is_known_by_its_tangent_and_its_centre_by_vision() {
         "{}",
         observer.body_rate()
     );
-    // told to a model that does not turn: ahead by what the tangent turns in a time constant
+    // for a model that does not turn: ahead by what the tangent turns in a time constant
     let ahead = observer.pose_ahead(0.0, 0.3);
     assert!((ahead.angle - pose.angle - rate * 0.3).abs() < 0.01);
     let face = |pose: &Pose, point: Vec2| {
@@ -245,13 +245,13 @@ fn a_disc_is_known_by_its_tangent_and_its_centre_by_vision() {
             .footprint()
             .distance(west, pose.point_to_object(point))
     };
-    let surface = observer.touching().unwrap().surface;
+    let surface = observer.contact().unwrap().surface;
     assert!((face(&ahead, surface) - face(&pose, surface)).abs() < 1e-9);
     assert_eq!(observer.pose_ahead(rate, 0.0), pose);
 }
 
 #[test]
-fn a_box_stays_a_box_after_two_bad_images_and_is_told_where_it_is() {
+fn a_box_stays_a_box_after_two_bad_images() {
     let mut observer = observer(true);
     let truth = push(&mut observer, 100, 0.0);
     for _ in 0..2 {

@@ -2,12 +2,12 @@
 //!
 //! The direction of the force shows theta, but is too noisy for omega to be had from it soon; the moment is
 //! known at once. What resists is learned as a multiple of what a square of this m, b and c would resist.
-//! It must never be believed before the parameters have been learned: until then it says nothing.
+//! It must never be used before the parameters have been learned.
 
 use mmt_shared::model::params::{ModelParams, friction_torque_of_square};
 use mmt_shared::time::TICK_S;
 
-use crate::square;
+use crate::square_friction as square;
 
 /// Speed of the centre from which the box slides for certain, m/s: the gate of the estimator.
 const SLIDES_M_PER_S: f64 = 0.020;
@@ -46,25 +46,28 @@ pub(super) struct Turning {
     /// Sums of squares of the square's torque and of its products with the real one, (N m)².
     squares: f64,
     products: f64,
-    arm: f64,
+    /// e/(c l) with which the local model turns as the box does.
+    radius_ratio: f64,
 }
 
-impl Turning {
+impl Default for Turning {
     /// Nothing is known: e is (9).
-    pub(super) fn new() -> Self {
+    fn default() -> Self {
         Self {
             slid: 0,
             before: None,
             squares: 0.0,
             products: 0.0,
             // (9)
-            arm: friction_torque_of_square(1.0, 1.0),
+            radius_ratio: friction_torque_of_square(1.0, 1.0),
         }
     }
+}
 
+impl Turning {
     /// e/(c l) with which the local model turns as the box does.
-    pub(super) fn arm(&self) -> f64 {
-        self.arm
+    pub(super) fn radius_ratio(&self) -> f64 {
+        self.radius_ratio
     }
 
     /// omega (rad/s) after this tick's push, if it can be reckoned.
@@ -116,6 +119,6 @@ impl Turning {
         let excess = self.resistance() - 1.0;
         let clear = (excess.abs() - SQUARE_ERROR).max(0.0).copysign(excess);
         let radius = square::friction_radius(c, drag * (1.0 + clear), push.speed, push.omega);
-        self.arm += (radius / push.side - self.arm) * (TICK_S / RADIUS_S);
+        self.radius_ratio += (radius / push.side - self.radius_ratio) * (TICK_S / RADIUS_S);
     }
 }

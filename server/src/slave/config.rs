@@ -3,15 +3,16 @@
 use mmt_shared::channel::rate_control::StretchMax;
 use mmt_shared::model::params::ParamsError;
 use mmt_shared::model::settings::Mode;
+use mmt_shared::range::OutOfRange;
 use serde::{Deserialize, Serialize};
 
 use crate::environment::{EnvironmentConfig, EnvironmentError};
-use crate::estimator::{EstimatorConfig, SettingOutOfRange};
+use crate::estimator::EstimatorConfig;
 use crate::link::Repeats;
-use crate::playout::{PlayoutConfig, PlayoutError};
+use crate::playout::PlayoutConfig;
 use crate::sensing::{SensingConfig, SensingError};
 use crate::shadow::TriggerReference;
-use crate::tool_force::{TOOL_FORCE_MAX_N, ToolForceError};
+use crate::tool_force::TOOL_FORCE_MAX_N;
 use crate::trigger::TriggerConfig;
 
 /// What the local model starts from before anything is known of the object.
@@ -64,14 +65,14 @@ pub struct SlaveConfig {
     pub trigger_reference: TriggerReference,
     /// What the local model starts from.
     pub start: StartModel,
-    /// When an update is said again.
+    /// When an update is sent again.
     pub repeats_ms: Repeats,
     /// By how much congestion may stretch the trigger's thresholds and times; 1: not at all.
     pub stretch_max: StretchMax,
 }
 
 impl SlaveConfig {
-    /// The default of a mode: the default scenario, with the mode's update scheme. Only recommended mode says
+    /// The default of a mode: the default scenario, with the mode's update scheme. Only recommended mode sends
     /// updates again and answers congestion.
     #[must_use]
     pub fn of_mode(mode: Mode) -> Self {
@@ -111,15 +112,9 @@ pub enum SlaveError {
     /// The sensors' numbers are wrong.
     #[error(transparent)]
     Sensing(#[from] SensingError),
-    /// The play-out buffer's numbers are wrong.
+    /// A number of play-out, of the estimator or of the tool's force is wrong.
     #[error(transparent)]
-    Playout(#[from] PlayoutError),
-    /// The limit of the tool's force is wrong.
-    #[error(transparent)]
-    ToolForce(#[from] ToolForceError),
-    /// The estimator's settings are wrong.
-    #[error("estimator: {0}")]
-    Estimator(#[from] SettingOutOfRange),
+    OutOfRange(#[from] OutOfRange),
     /// The start model's numbers are not accepted.
     #[error("start model: {0}")]
     Start(#[from] ParamsError),

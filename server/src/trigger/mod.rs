@@ -2,7 +2,7 @@
 //!
 //! Pure, and only of what it is given. Rules that the paper leaves open: (12) is evaluated while both
 //! sides are in contact, with the force divided by no less than a floor; a contact that only one side has
-//! counts after a debounce and is told again at intervals, not at every sample; a lost contact is told
+//! counts after a debounce and is sent again at intervals, not at every sample; a lost contact is sent
 //! once. Every update, whatever its cause, resets the timer.
 
 mod contact;
@@ -41,8 +41,8 @@ pub struct TriggerConfig {
     pub metric: MismatchMetric,
     /// Whether the timer of `hybrid` runs in free space as well; that of `useful` never does.
     pub timer_in_free_space: bool,
-    /// Whether an update that only the timer asked for says where the object is. If not, it says the
-    /// pose and the velocity that the shadow has, and renews the parameters alone.
+    /// Whether an update that only the timer asked for carries the object's pose. If not, it carries the
+    /// pose and the velocity of the shadow, and renews the parameters alone.
     pub timer_carries_pose: bool,
     /// Least force that (12) divides by, N.
     pub force_floor_n: f64,
@@ -50,7 +50,7 @@ pub struct TriggerConfig {
     pub judge_sticking: bool,
     /// How long only one side must be in contact before it counts.
     pub mismatch_debounce: Duration,
-    /// How often a contact mismatch that lasts is told again.
+    /// How often a contact mismatch that lasts is sent again.
     pub mismatch_repeat: Duration,
     /// Thresholds of contact.
     pub contact: ContactConfig,
@@ -86,7 +86,7 @@ impl Default for TriggerConfig {
     }
 }
 
-/// What the trigger is told every sample period.
+/// The trigger's input in a sample period.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TriggerInput {
     /// f_s as measured, raw, N.
@@ -105,7 +105,7 @@ pub struct TriggerInput {
     pub acceleration: f64,
     /// Standard deviation of the force that the estimate predicts in the present motion, N.
     pub force_deviation: f64,
-    /// The parameters that an update would say now.
+    /// The parameters that an update would carry now.
     pub params: ModelParams,
     /// By how much it would shift the shadow, m.
     pub shift: Vec2,
@@ -124,7 +124,7 @@ impl TriggerInput {
 struct Mismatch {
     cause: Cause,
     since: Time,
-    told: Option<Time>,
+    sent: Option<Time>,
 }
 
 /// Decides, sample by sample.
@@ -133,13 +133,13 @@ pub struct Trigger {
     config: TriggerConfig,
     /// The configured scheme, stretched.
     scheme: Scheme,
-    /// When the last update went out and what it said.
+    /// When the last update went out, and its parameters.
     last: Option<(Time, ModelParams)>,
     began: Option<Time>,
     was_in_contact: bool,
     mismatch: Option<Mismatch>,
-    /// What the last update left unsaid, summed over contact: relative force error times s.
-    unsaid: f64,
+    /// The error that the last update left, summed over contact: relative force error times s.
+    accumulated_error: f64,
     /// Cause of the last update, if that was lost.
     repeat: Option<Cause>,
 }
@@ -155,13 +155,12 @@ impl Trigger {
             began: None,
             was_in_contact: false,
             mismatch: None,
-            unsaid: 0.0,
+            accumulated_error: 0.0,
             repeat: None,
         }
     }
 
-    /// The last update, which had this cause, did not arrive: what is known now is said instead, at once
-    /// and under every scheme.
+    /// The last update, which had this cause, did not arrive: a new one is sent instead, at once and under every scheme.
     pub fn repeat(&mut self, cause: Cause) {
         self.repeat = Some(cause);
     }
@@ -181,7 +180,7 @@ impl Trigger {
     pub fn decide(&mut self, now: Time, input: &TriggerInput) -> Option<Cause> {
         self.began.get_or_insert(now);
         if input.both_in_contact() {
-            self.unsaid += self.news(input) * TICK_S;
+            self.accumulated_error += self.expected_correction(input) * TICK_S;
         }
         let cause = self
             .geometry(now, input)
@@ -189,7 +188,7 @@ impl Trigger {
             .or(self.repeat);
         if cause.is_some() {
             self.last = Some((now, input.params));
-            self.unsaid = 0.0;
+            self.accumulated_error = 0.0;
             self.repeat = None;
         }
         cause
@@ -211,18 +210,18 @@ impl Trigger {
         let fresh = Mismatch {
             cause,
             since: now,
-            told: None,
+            sent: None,
         };
         let mismatch = self
             .mismatch
             .filter(|old| old.cause == cause)
             .unwrap_or(fresh);
-        let due = match mismatch.told {
+        let due = match mismatch.sent {
             None => now >= mismatch.since + self.config.mismatch_debounce,
-            Some(told) => now >= told + self.config.mismatch_repeat,
+            Some(sent) => now >= sent + self.config.mismatch_repeat,
         };
-        let told = if due { Some(now) } else { mismatch.told };
-        self.mismatch = Some(Mismatch { told, ..mismatch });
+        let sent = if due { Some(now) } else { mismatch.sent };
+        self.mismatch = Some(Mismatch { sent, ..mismatch });
         if due {
             Some(cause)
         } else {
@@ -250,11 +249,11 @@ impl Trigger {
                     .or_else(|| self.timed(now, heartbeat))
             }
             Scheme::Adaptive { delta, horizon } => {
-                let due = self.unsaid > delta * horizon.as_secs_f64();
+                let due = self.accumulated_error > delta * horizon.as_secs_f64();
                 let timed = due.then_some(Cause::Timer);
                 self.violated(input, delta)
                     .or(timed)
-                    .filter(|_| self.useful(now, input, delta))
+                    .filter(|_| self.is_perceptible(now, input, delta))
             }
             Scheme::Useful { delta, t_update } => {
                 let timed = || {
@@ -263,7 +262,7 @@ impl Trigger {
                 };
                 self.violated(input, delta)
                     .or_else(timed)
-                    .filter(|_| self.useful(now, input, delta))
+                    .filter(|_| self.is_perceptible(now, input, delta))
             }
         }
     }
@@ -298,7 +297,7 @@ impl Trigger {
 
     /// What an update would correct now, as a relative force error: the change of the force beyond the
     /// estimate's own deviation, the turn of its direction, and the error of a face that is held wrongly.
-    fn news(&self, input: &TriggerInput) -> f64 {
+    fn expected_correction(&self, input: &TriggerInput) -> f64 {
         let (Scheme::Adaptive { delta, .. }, Some((_, sent))) = (self.scheme, &self.last) else {
             return 0.0;
         };
@@ -311,9 +310,9 @@ impl Trigger {
         (change + held) / input.f_s.norm().max(USEFUL_FLOOR_N) + input.turn.abs()
     }
 
-    /// Whether the hand would feel what an update says: by the force that the changed parameters would
+    /// Whether the hand would feel what an update corrects: by the force that the changed parameters would
     /// give in the present motion, by the direction of the face, or by its place while the object is held.
-    fn useful(&self, now: Time, input: &TriggerInput, delta: f64) -> bool {
+    fn is_perceptible(&self, now: Time, input: &TriggerInput, delta: f64) -> bool {
         let Some((time, sent)) = self.last else {
             return true;
         };

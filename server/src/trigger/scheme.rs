@@ -43,12 +43,12 @@ pub enum Scheme {
         /// T_update.
         t_update: Duration,
     },
-    /// (12), or when what the last update leaves unsaid has added up, in contact, to Delta for as long as
+    /// (12), or when the error that the last update left has added up, in contact, to Delta for as long as
     /// `horizon`: T_update is short while the model changes and endless while it does not.
     Adaptive {
         /// Delta, relative force error.
         delta: f64,
-        /// How long an error of Delta may go unsaid.
+        /// How long an error of Delta may last without an update.
         horizon: Duration,
     },
 }
@@ -64,10 +64,7 @@ const THRESHOLD_N: (f64, f64) = (0.001, 100.0);
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SchemeError {
     /// The first word is not a scheme.
-    #[error(
-        "unknown update scheme '{word}'; use one of 'deadband 10%', 'hybrid 10% 150ms', \
-         'timer 150ms', 'every-sample', 'dis 0.3N 1s', 'useful 10% 150ms', 'adaptive 10% 50ms'"
-    )]
+    #[error("unknown update scheme '{word}'; use one of {}", known())]
     Unknown {
         /// The word.
         word: String,
@@ -78,7 +75,7 @@ pub enum SchemeError {
         /// The scheme.
         scheme: &'static str,
         /// How it is written.
-        usage: &'static str,
+        usage: String,
         /// What was written.
         text: String,
     },
@@ -98,58 +95,97 @@ pub enum SchemeError {
     },
 }
 
-impl Scheme {
-    /// The name used in files and on screens.
-    #[must_use]
-    pub fn name(&self) -> &'static str {
-        match self {
-            Self::Deadband { .. } => "deadband",
-            Self::Hybrid { .. } => "hybrid",
-            Self::Timer { .. } => "timer",
-            Self::EverySample => "every-sample",
-            Self::Dis { .. } => "dis",
-            Self::Useful { .. } => "useful",
-            Self::Adaptive { .. } => "adaptive",
-        }
-    }
+/// What a scheme's threshold is measured in.
+enum Threshold<'a> {
+    /// Delta, relative force error.
+    Share(&'a mut f64),
+    /// Force error, N.
+    Newtons(&'a mut f64),
+}
 
-    /// The same with thresholds and times `by` as large, as congestion asks for; Delta stays at most 1. A factor of
-    /// 1 or less changes nothing, and nothing changes `every-sample`, which knows neither.
-    #[must_use]
-    pub fn stretched(self, by: f64) -> Self {
-        if by <= 1.0 || !by.is_finite() {
-            return self;
-        }
-        let wider = |delta: f64| (delta * by).min(DELTA.1);
-        let longer = |time: Duration| time.mul_f64(by);
+impl Threshold<'_> {
+    fn read(self, word: &str) -> Result<(), SchemeError> {
         match self {
-            Self::Deadband { delta } => Self::Deadband {
-                delta: wider(delta),
-            },
-            Self::Hybrid { delta, t_update } => Self::Hybrid {
-                delta: wider(delta),
-                t_update: longer(t_update),
-            },
-            Self::Timer { t_update } => Self::Timer {
-                t_update: longer(t_update),
-            },
-            Self::EverySample => Self::EverySample,
+            Self::Share(delta) => {
+                let range = (DELTA.0 * 100.0, DELTA.1 * 100.0);
+                let percent = number(word, digits(word, "%"), "deadband", range, "%")?;
+                *delta = percent / 100.0;
+            }
+            Self::Newtons(force) => {
+                *force = number(word, digits(word, "N"), "force", THRESHOLD_N, "N")?;
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Scheme {
+    /// One of each, with the numbers that messages use as examples.
+    const EXAMPLES: [Self; 7] = [
+        Self::Deadband { delta: 0.1 },
+        Self::Hybrid {
+            delta: 0.1,
+            t_update: Duration::from_millis(150),
+        },
+        Self::Timer {
+            t_update: Duration::from_millis(150),
+        },
+        Self::EverySample,
+        Self::Dis {
+            threshold_n: 0.3,
+            heartbeat: Duration::from_secs(1),
+        },
+        Self::Useful {
+            delta: 0.1,
+            t_update: Duration::from_millis(150),
+        },
+        Self::Adaptive {
+            delta: 0.1,
+            horizon: Duration::from_millis(50),
+        },
+    ];
+
+    /// Name, threshold and time, in the order in which they are written.
+    fn terms(&mut self) -> (&'static str, Option<Threshold<'_>>, Option<&mut Duration>) {
+        use Threshold::{Newtons, Share};
+        match self {
+            Self::Deadband { delta } => ("deadband", Some(Share(delta)), None),
+            Self::Hybrid { delta, t_update } => ("hybrid", Some(Share(delta)), Some(t_update)),
+            Self::Timer { t_update } => ("timer", None, Some(t_update)),
+            Self::EverySample => ("every-sample", None, None),
             Self::Dis {
                 threshold_n,
                 heartbeat,
-            } => Self::Dis {
-                threshold_n: threshold_n * by,
-                heartbeat: longer(heartbeat),
-            },
-            Self::Useful { delta, t_update } => Self::Useful {
-                delta: wider(delta),
-                t_update: longer(t_update),
-            },
-            Self::Adaptive { delta, horizon } => Self::Adaptive {
-                delta: wider(delta),
-                horizon: longer(horizon),
-            },
+            } => ("dis", Some(Newtons(threshold_n)), Some(heartbeat)),
+            Self::Useful { delta, t_update } => ("useful", Some(Share(delta)), Some(t_update)),
+            Self::Adaptive { delta, horizon } => ("adaptive", Some(Share(delta)), Some(horizon)),
         }
+    }
+
+    /// The name used in files and on screens.
+    #[must_use]
+    pub fn name(&self) -> &'static str {
+        let mut copy = *self;
+        copy.terms().0
+    }
+
+    /// The same with thresholds and times `by` as large, as congestion asks for; Delta stays at most 1. A factor of
+    /// 1 or less changes nothing, and nothing changes `every-sample`, which has neither.
+    #[must_use]
+    pub fn stretched(mut self, by: f64) -> Self {
+        if by <= 1.0 || !by.is_finite() {
+            return self;
+        }
+        let (_, threshold, time) = self.terms();
+        match threshold {
+            Some(Threshold::Share(delta)) => *delta = (*delta * by).min(DELTA.1),
+            Some(Threshold::Newtons(force)) => *force *= by,
+            None => {}
+        }
+        if let Some(time) = time {
+            *time = time.mul_f64(by);
+        }
+        self
     }
 }
 
@@ -169,94 +205,70 @@ impl From<Scheme> for String {
 
 impl fmt::Display for Scheme {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let ms = |t: &Duration| t.as_secs_f64() * 1e3;
-        match self {
-            Self::Deadband { delta } => write!(f, "deadband {}%", percent(*delta)),
-            Self::Hybrid { delta, t_update } => {
-                write!(f, "hybrid {}% {}ms", percent(*delta), ms(t_update))
-            }
-            Self::Timer { t_update } => write!(f, "timer {}ms", ms(t_update)),
-            Self::EverySample => f.write_str("every-sample"),
-            Self::Dis {
-                threshold_n,
-                heartbeat,
-            } => {
-                write!(f, "dis {threshold_n}N {}ms", ms(heartbeat))
-            }
-            Self::Useful { delta, t_update } => {
-                write!(f, "useful {}% {}ms", percent(*delta), ms(t_update))
-            }
-            Self::Adaptive { delta, horizon } => {
-                write!(f, "adaptive {}% {}ms", percent(*delta), ms(horizon))
-            }
+        let mut copy = *self;
+        let (name, threshold, time) = copy.terms();
+        f.write_str(name)?;
+        match threshold {
+            // six digits are more than anybody writes, and hide the rounding of binary fractions
+            Some(Threshold::Share(delta)) => write!(f, " {}%", libm::round(*delta * 1e8) / 1e6)?,
+            Some(Threshold::Newtons(force)) => write!(f, " {force}N")?,
+            None => {}
         }
+        time.map_or(Ok(()), |time| write!(f, " {}ms", time.as_secs_f64() * 1e3))
     }
-}
-
-/// Per cent without the dust of binary fractions: six digits are more than anybody writes.
-fn percent(share: f64) -> f64 {
-    libm::round(share * 1e8) / 1e6
 }
 
 impl FromStr for Scheme {
     type Err = SchemeError;
 
     fn from_str(text: &str) -> Result<Self, SchemeError> {
-        let words: Vec<&str> = text.split_whitespace().collect();
-        let wrong = |scheme, usage| SchemeError::Words {
-            scheme,
-            usage,
-            text: text.to_owned(),
-        };
-        match words.as_slice() {
-            ["deadband", delta] => Ok(Self::Deadband {
-                delta: share(delta)?,
-            }),
-            ["hybrid", delta, t] => Ok(Self::Hybrid {
-                delta: share(delta)?,
-                t_update: period(t)?,
-            }),
-            ["timer", t] => Ok(Self::Timer {
-                t_update: period(t)?,
-            }),
-            ["every-sample"] => Ok(Self::EverySample),
-            ["dis", threshold, t] => Ok(Self::Dis {
-                threshold_n: newtons(threshold)?,
-                heartbeat: period(t)?,
-            }),
-            ["useful", delta, t] => Ok(Self::Useful {
-                delta: share(delta)?,
-                t_update: period(t)?,
-            }),
-            ["adaptive", delta, t] => Ok(Self::Adaptive {
-                delta: share(delta)?,
-                horizon: period(t)?,
-            }),
-            ["deadband", ..] => Err(wrong("deadband", "deadband 10%")),
-            ["hybrid", ..] => Err(wrong("hybrid", "hybrid 10% 150ms")),
-            ["timer", ..] => Err(wrong("timer", "timer 150ms")),
-            ["every-sample", ..] => Err(wrong("every-sample", "every-sample")),
-            ["dis", ..] => Err(wrong("dis", "dis 0.3N 1s")),
-            ["useful", ..] => Err(wrong("useful", "useful 10% 150ms")),
-            ["adaptive", ..] => Err(wrong("adaptive", "adaptive 10% 50ms")),
-            _ => Err(SchemeError::Unknown {
-                word: words.first().copied().unwrap_or_default().to_owned(),
-            }),
+        let mut words = text.split_whitespace();
+        let word = words.next().unwrap_or_default();
+        let example = Self::EXAMPLES.into_iter().find(|s| s.name() == word);
+        let mut scheme = example.ok_or_else(|| SchemeError::Unknown {
+            word: word.to_owned(),
+        })?;
+        let usage = scheme.to_string();
+        let words: Vec<&str> = words.collect();
+        match (scheme.terms(), words.as_slice()) {
+            ((_, None, None), []) => {}
+            ((_, Some(threshold), None), [word]) => threshold.read(word)?,
+            ((_, None, Some(time)), [word]) => *time = period(word)?,
+            ((_, Some(threshold), Some(time)), [word, late]) => {
+                threshold.read(word)?;
+                *time = period(late)?;
+            }
+            ((scheme, ..), _) => {
+                return Err(SchemeError::Words {
+                    scheme,
+                    usage,
+                    text: text.to_owned(),
+                });
+            }
         }
+        Ok(scheme)
     }
+}
+
+/// All schemes as they are written.
+fn known() -> String {
+    Scheme::EXAMPLES
+        .map(|scheme| format!("'{scheme}'"))
+        .join(", ")
+}
+
+/// The number before a unit.
+fn digits(word: &str, unit: &str) -> Option<f64> {
+    word.strip_suffix(unit)?.parse().ok()
 }
 
 fn number(
     word: &str,
-    digits: Option<&str>,
-    factor: f64,
+    value: Option<f64>,
     what: &'static str,
     (min, max): (f64, f64),
     unit: &'static str,
 ) -> Result<f64, SchemeError> {
-    let value = digits
-        .and_then(|digits| digits.parse::<f64>().ok())
-        .map(|value| value * factor);
     value
         .filter(|value| (min..=max).contains(value))
         .ok_or_else(|| SchemeError::Number {
@@ -268,31 +280,10 @@ fn number(
         })
 }
 
-fn share(word: &str) -> Result<f64, SchemeError> {
-    let (min, max) = (DELTA.0 * 100.0, DELTA.1 * 100.0);
-    number(
-        word,
-        word.strip_suffix('%'),
-        1.0,
-        "deadband",
-        (min, max),
-        "%",
-    )
-    .map(|p| p / 100.0)
-}
-
 fn period(word: &str) -> Result<Duration, SchemeError> {
-    let (digits, factor) = match (word.strip_suffix("ms"), word.strip_suffix('s')) {
-        (Some(digits), _) => (Some(digits), 1.0),
-        (None, Some(digits)) => (Some(digits), 1e3),
-        (None, None) => (None, 1.0),
-    };
-    let ms = number(word, digits, factor, "time", PERIOD_MS, "ms")?;
+    let ms = digits(word, "ms").or_else(|| Some(digits(word, "s")? * 1e3));
+    let ms = number(word, ms, "time", PERIOD_MS, "ms")?;
     Ok(Duration::from_nanos(libm::round(ms * 1e6) as u64))
-}
-
-fn newtons(word: &str) -> Result<f64, SchemeError> {
-    number(word, word.strip_suffix('N'), 1.0, "force", THRESHOLD_N, "N")
 }
 
 #[cfg(test)]

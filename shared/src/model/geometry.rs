@@ -150,6 +150,49 @@ impl Face {
     }
 }
 
+/// One value for each face.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct PerFace<T> {
+    east: T,
+    north: T,
+    west: T,
+    south: T,
+}
+
+impl<T: Copy> PerFace<T> {
+    /// The same value for all four.
+    #[must_use]
+    pub fn all(value: T) -> Self {
+        Self {
+            east: value,
+            north: value,
+            west: value,
+            south: value,
+        }
+    }
+
+    /// The value of a face.
+    #[must_use]
+    pub fn get(&self, face: Face) -> T {
+        match face {
+            Face::East => self.east,
+            Face::North => self.north,
+            Face::West => self.west,
+            Face::South => self.south,
+        }
+    }
+
+    /// The value of a face, to be changed.
+    pub fn get_mut(&mut self, face: Face) -> &mut T {
+        match face {
+            Face::East => &mut self.east,
+            Face::North => &mut self.north,
+            Face::West => &mut self.west,
+            Face::South => &mut self.south,
+        }
+    }
+}
+
 /// The rectangle that stands for the object: one distance from the reference point to each face.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct BoxFootprint {

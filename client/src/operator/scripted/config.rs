@@ -1,5 +1,6 @@
 //! What the scripted operator does, in numbers, and the ranges in which a hand can follow them.
 
+use mmt_shared::range::{OutOfRange, all_in_range};
 use serde::{Deserialize, Serialize};
 
 use crate::operator::hand::HandConfig;
@@ -91,70 +92,43 @@ impl Default for ScriptedConfig {
     }
 }
 
-/// A number of the configuration that no hand could follow.
-#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-#[error("operator.{name} = {value} is outside the accepted range {min} to {max}; change it")]
-pub struct ScriptedError {
-    /// Name of the key.
-    pub name: &'static str,
-    /// What it was.
-    pub value: f64,
-    /// Least accepted value.
-    pub min: f64,
-    /// Greatest accepted value.
-    pub max: f64,
-}
-
 impl ScriptedConfig {
-    /// Checks every number; a number that is not finite is outside every range.
-    pub(super) fn checked(&self) -> Result<(), ScriptedError> {
+    /// Checks every number against what a hand can follow.
+    pub(super) fn checked(&self) -> Result<(), OutOfRange> {
         let hand = &self.hand;
         let (slowest, fastest) = self.push_speed_m_per_s;
+        let (travel, approach) = (self.travel_m_per_s, self.approach_m_per_s);
+        let (slow, fast) = (self.slow_hz, self.fast_hz);
+        let (acceleration, home) = (self.acceleration_m_per_s2, self.home_radius_m);
         let speeds = (0.01, 0.4);
-        for (name, value, (min, max)) in [
-            ("lateral_max_m", self.lateral_max_m, (0.0, 0.15)),
-            ("travel_m_per_s", self.travel_m_per_s, speeds),
-            ("stand_off_m", self.stand_off_m, (CLOSE_M, 0.5)),
-            ("approach_m_per_s", self.approach_m_per_s, (0.01, 0.1)),
-            ("dwell_s", self.dwell_s, (0.0, 60.0)),
-            ("nudge_m", self.nudge_m, (0.01, 0.2)),
-            ("push_m", self.push_m, (0.01, 1.0)),
-            ("push_speed_m_per_s.0", slowest, speeds),
-            ("push_speed_m_per_s.1", fastest, (slowest, 0.3)),
-            ("slow_share", self.slow_share, (0.0, 0.5)),
-            ("slow_hz.0", self.slow_hz.0, (0.0, 5.0)),
-            ("slow_hz.1", self.slow_hz.1, (self.slow_hz.0, 5.0)),
-            ("fast_share", self.fast_share, (0.0, 0.4)),
-            ("fast_hz.0", self.fast_hz.0, (0.0, 5.0)),
-            ("fast_hz.1", self.fast_hz.1, (self.fast_hz.0, 5.0)),
-            ("hold_s", self.hold_s, (0.0, 60.0)),
-            ("retract_m", self.retract_m, (CLOSE_M + 0.02, 0.5)),
-            (
-                "acceleration_m_per_s2",
-                self.acceleration_m_per_s2,
-                (0.5, 3.0),
-            ),
-            ("press_max_n", self.press_max_n, (1.0, 20.0)),
-            ("home_radius_m", self.home_radius_m, (0.5, 3.0)),
-            ("hand.mass_kg", hand.mass_kg, (0.1, 5.0)),
-            (
-                "hand.stiffness_n_per_m",
-                hand.stiffness_n_per_m,
-                (50.0, 2000.0),
-            ),
-            ("hand.damping_ns_per_m", hand.damping_ns_per_m, (1.0, 100.0)),
-            ("hand.tremor_hz", hand.tremor_hz, (0.0, 20.0)),
-            ("hand.tremor_m", hand.tremor_m, (0.0, 5e-3)),
-        ] {
-            if !(min..=max).contains(&value) {
-                return Err(ScriptedError {
-                    name,
-                    value,
-                    min,
-                    max,
-                });
-            }
-        }
-        Ok(())
+        #[rustfmt::skip]
+        let checks = [
+            ("operator.lateral_max_m", "m", self.lateral_max_m, (0.0, 0.15)),
+            ("operator.travel_m_per_s", "m/s", travel, speeds),
+            ("operator.stand_off_m", "m", self.stand_off_m, (CLOSE_M, 0.5)),
+            ("operator.approach_m_per_s", "m/s", approach, (0.01, 0.1)),
+            ("operator.dwell_s", "s", self.dwell_s, (0.0, 60.0)),
+            ("operator.nudge_m", "m", self.nudge_m, (0.01, 0.2)),
+            ("operator.push_m", "m", self.push_m, (0.01, 1.0)),
+            ("operator.push_speed_m_per_s.0", "m/s", slowest, speeds),
+            ("operator.push_speed_m_per_s.1", "m/s", fastest, (slowest, 0.3)),
+            ("operator.slow_share", "", self.slow_share, (0.0, 0.5)),
+            ("operator.slow_hz.0", "Hz", slow.0, (0.0, 5.0)),
+            ("operator.slow_hz.1", "Hz", slow.1, (slow.0, 5.0)),
+            ("operator.fast_share", "", self.fast_share, (0.0, 0.4)),
+            ("operator.fast_hz.0", "Hz", fast.0, (0.0, 5.0)),
+            ("operator.fast_hz.1", "Hz", fast.1, (fast.0, 5.0)),
+            ("operator.hold_s", "s", self.hold_s, (0.0, 60.0)),
+            ("operator.retract_m", "m", self.retract_m, (CLOSE_M + 0.02, 0.5)),
+            ("operator.acceleration_m_per_s2", "m/s^2", acceleration, (0.5, 3.0)),
+            ("operator.press_max_n", "N", self.press_max_n, (1.0, 20.0)),
+            ("operator.home_radius_m", "m", home, (0.5, 3.0)),
+            ("operator.hand.mass_kg", "kg", hand.mass_kg, (0.1, 5.0)),
+            ("operator.hand.stiffness_n_per_m", "N/m", hand.stiffness_n_per_m, (50.0, 2000.0)),
+            ("operator.hand.damping_ns_per_m", "N s/m", hand.damping_ns_per_m, (1.0, 100.0)),
+            ("operator.hand.tremor_hz", "Hz", hand.tremor_hz, (0.0, 20.0)),
+            ("operator.hand.tremor_m", "m", hand.tremor_m, (0.0, 5e-3)),
+        ];
+        all_in_range(checks)
     }
 }

@@ -2,7 +2,7 @@
 
 use super::*;
 use mmt_shared::model::contact::{Coupling, GodObject, contact_force};
-use mmt_shared::model::geometry::{Twist, cross};
+use mmt_shared::model::geometry::{BoxFootprint, Pose, Twist, cross};
 
 /// A box that slides when pushed harder than `friction_n`, slowly enough to have no inertia.
 struct Slab {
@@ -101,7 +101,7 @@ fn run(config: ScriptedConfig, friction_n: f64, seconds: u32) -> Run {
         if operator.phase() == Phase::Push && operator.seconds_in_phase() > 0.5 {
             let at = slab.pose.point_to_object(hip);
             let lateral = route::left_of(operator.face()).dot(&at);
-            run.off_line = run.off_line.max((lateral - operator.stroke.lateral).abs());
+            run.off_line = run.off_line.max((lateral - operator.profile.lateral).abs());
         }
         (last, last_velocity) = (hip, velocity);
         slab.step(hip);
@@ -270,7 +270,7 @@ fn a_number_outside_its_range_is_named_with_the_range() {
     assert_eq!(with(0.15), Ok(()));
     assert_eq!(
         with(0.5).unwrap_err().to_string(),
-        "operator.lateral_max_m = 0.5 is outside the accepted range 0 to 0.15; change it"
+        "operator.lateral_max_m 0.5 is outside the accepted range 0 to 0.15 m"
     );
     assert!(with(f64::NAN).is_err());
 }

@@ -9,7 +9,7 @@ use mmt_shared::rng::Substream;
 use mmt_shared::time::TICK_S;
 use std::f64::consts::TAU;
 
-use super::Measured;
+use crate::estimator::Measured;
 
 pub(super) const COUPLING: Coupling = Coupling {
     stiffness_n_per_m: 1000.0,
@@ -27,7 +27,7 @@ pub(super) struct Motion {
 }
 
 impl Motion {
-    /// The operator of the model notes, section 7.
+    /// The scripted operator of `docs/model.md`.
     pub(super) fn of_operator(seed: u64, push: u64) -> Self {
         let mut random = Substream::new(seed, "operator", push);
         Self {

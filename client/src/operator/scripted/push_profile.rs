@@ -4,11 +4,11 @@ use std::f64::consts::TAU;
 
 use mmt_shared::rng::Substream;
 
-use super::scripted::ScriptedConfig;
+use super::config::ScriptedConfig;
 
 /// The drawn numbers of push `index` of a seed: a pure function of both.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Stroke {
+pub(super) struct PushProfile {
     /// Where on the face, m.
     pub(super) lateral: f64,
     mean_speed: f64,
@@ -38,7 +38,7 @@ impl Wave {
     }
 }
 
-impl Stroke {
+impl PushProfile {
     pub(super) fn draw(config: &ScriptedConfig, index: u64) -> Self {
         let mut stream = Substream::new(config.seed, "operator/push", index);
         let (slowest, fastest) = config.push_speed_m_per_s;
@@ -63,9 +63,9 @@ mod tests {
     #[test]
     fn every_drawn_number_stays_in_its_range_and_fills_it() {
         let config = ScriptedConfig::default();
-        let strokes: Vec<Stroke> = (0..400).map(|k| Stroke::draw(&config, k)).collect();
-        let spread = |of: fn(&Stroke) -> f64| {
-            let of = strokes.iter().map(of);
+        let profiles: Vec<PushProfile> = (0..400).map(|k| PushProfile::draw(&config, k)).collect();
+        let spread = |of: fn(&PushProfile) -> f64| {
+            let of = profiles.iter().map(of);
             of.fold((f64::MAX, f64::MIN), |(a, b), x| (a.min(x), b.max(x)))
         };
         for (got, (low, high)) in [
@@ -83,9 +83,9 @@ mod tests {
 
     #[test]
     fn the_speed_is_modulated_about_its_mean_by_42_percent_at_most() {
-        let stroke = Stroke::draw(&ScriptedConfig::default(), 3);
+        let profile = PushProfile::draw(&ScriptedConfig::default(), 3);
         let speeds: Vec<f64> = (0..60_000)
-            .map(|k| stroke.speed(f64::from(k) * 1e-3) / stroke.mean_speed)
+            .map(|k| profile.speed(f64::from(k) * 1e-3) / profile.mean_speed)
             .collect();
         let mean = speeds.iter().sum::<f64>() / speeds.len() as f64;
         let largest = speeds.iter().fold(0.0_f64, |a, x| a.max((x - 1.0).abs()));

@@ -1,4 +1,4 @@
-//! Block least squares: (3) over a sliding window, for (2) in the plane.
+//! Windowed ("block") least squares: (3) over a sliding window, for (2) in the plane.
 //!
 //! The paper writes (1)–(3) for one direction and measures in the plane, and does not say how. Two readings:
 //! along the force, one row a tick, which is what (1) says where the tool does not slide on the object; or
@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 
 use super::quadratic::{condition, inverse_of_gram};
 
-/// Above this condition number the block says nothing and the last value is kept.
+/// Above this condition number there is no solution and the last value is kept.
 ///
 /// At 10⁴ a force error of 1 mN is worth 10 N of some combination of m a, b v and c.
 const CONDITION_MAX: f64 = 1e4;
@@ -66,9 +66,9 @@ impl Sums {
     }
 }
 
-/// What a block says.
+/// The solution of a full window.
 #[derive(Clone, Copy, Debug)]
-pub struct Solution {
+pub(super) struct Solution {
     /// m (kg), b (N s/m), c (N), whatever their sign.
     pub estimate: Vector3<f64>,
     /// Their covariance, as if the errors of the rows were independent.
@@ -77,7 +77,7 @@ pub struct Solution {
 
 /// The window: a ring of rows and their sums.
 #[derive(Clone, Debug)]
-pub struct Block {
+pub(super) struct WindowedLeastSquares {
     rows: Rows,
     ring: Box<[PlanarRow]>,
     next: usize,
@@ -88,10 +88,10 @@ pub struct Block {
     fresh: Sums,
 }
 
-impl Block {
+impl WindowedLeastSquares {
     /// A window of `ticks` rows (at least 2). Allocates here and never again.
     #[must_use]
-    pub fn new(ticks: usize, rows: Rows) -> Self {
+    pub(super) fn new(ticks: usize, rows: Rows) -> Self {
         let empty = PlanarRow {
             regressor: Matrix3x2::zeros(),
             force: Vec2::zeros(),
@@ -107,13 +107,13 @@ impl Block {
     }
 
     /// Contact was lost: the window starts anew.
-    pub fn clear(&mut self) {
+    pub(super) fn clear(&mut self) {
         (self.next, self.filled) = (0, false);
         (self.sums, self.fresh) = (Sums::ZERO, Sums::ZERO);
     }
 
     /// Takes one tick: acceleration (m/s²), velocity (m/s), force on the object (N).
-    pub fn push(&mut self, a: Vec2, v: Vec2, force: Vec2) {
+    pub(super) fn push(&mut self, a: Vec2, v: Vec2, force: Vec2) {
         let row = match self.rows {
             Rows::AlongForce => along_force(a, v, force),
             Rows::Stacked => stacked(a, v, force),
@@ -134,9 +134,9 @@ impl Block {
         }
     }
 
-    /// The condition number of the window and, if the window is full and can be solved, what it says.
+    /// The condition number of the window and, if the window is full and can be solved, the solution.
     #[must_use]
-    pub fn solve(&self) -> (f64, Option<Solution>) {
+    pub(super) fn solve(&self) -> (f64, Option<Solution>) {
         let inverse = inverse_of_gram(&self.sums.gram);
         let condition = condition(&self.sums.gram, inverse.as_ref());
         let solvable = self.filled && condition < CONDITION_MAX;
@@ -211,12 +211,12 @@ mod tests {
     #[test]
     fn exact_data_of_1_give_the_parameters_by_3() {
         for rows in [Rows::AlongForce, Rows::Stacked] {
-            let mut block = Block::new(200, rows);
+            let mut window = WindowedLeastSquares::new(200, rows);
             for k in 0..2000 {
                 let (a, v, f) = exact(k);
-                block.push(a, v, f);
+                window.push(a, v, f);
                 if k > 200 {
-                    let (_, solution) = block.solve();
+                    let (_, solution) = window.solve();
                     assert!((solution.unwrap().estimate - TRUTH).norm() < 1e-8);
                 }
             }
@@ -225,42 +225,42 @@ mod tests {
 
     #[test]
     fn an_outlier_is_forgotten_without_a_trace_after_two_windows() {
-        let mut block = Block::new(200, Rows::AlongForce);
+        let mut window = WindowedLeastSquares::new(200, Rows::AlongForce);
         for k in 0..1000 {
             let (a, v, f) = exact(k);
-            block.push(a, v, if k == 300 { f * 1e9 } else { f });
+            window.push(a, v, if k == 300 { f * 1e9 } else { f });
         }
-        let (_, solution) = block.solve();
+        let (_, solution) = window.solve();
         assert!((solution.unwrap().estimate - TRUTH).norm() < 1e-8);
     }
 
     #[test]
-    fn a_window_that_is_not_full_or_is_singular_says_nothing() {
-        let mut block = Block::new(200, Rows::AlongForce);
+    fn a_window_that_is_not_full_or_is_singular_gives_nothing() {
+        let mut window = WindowedLeastSquares::new(200, Rows::AlongForce);
         let (a, v, f) = exact(0);
         for k in 0..1000 {
-            assert!(block.solve().1.is_none(), "constant motion, tick {k}");
-            block.push(a, v, f);
+            assert!(window.solve().1.is_none(), "constant motion, tick {k}");
+            window.push(a, v, f);
         }
-        block.clear();
+        window.clear();
         for k in 0..200 {
-            assert!(block.solve().1.is_none(), "tick {k}");
+            assert!(window.solve().1.is_none(), "tick {k}");
             let (a, v, f) = exact(k);
-            block.push(a, v, f);
+            window.push(a, v, f);
         }
-        assert!(block.solve().1.is_some());
+        assert!(window.solve().1.is_some());
     }
 
     #[test]
     fn a_tool_that_slides_along_the_face_deceives_the_stacked_rows_only() {
         let error = |rows| {
-            let mut block = Block::new(200, rows);
+            let mut window = WindowedLeastSquares::new(200, rows);
             for k in 0..400 {
                 let (a, v, f) = exact(k);
                 let along_face = rotate(0.5, Vec2::new(0.0, 0.05));
-                block.push(a, v + along_face, f);
+                window.push(a, v + along_face, f);
             }
-            (block.solve().1.unwrap().estimate - TRUTH).norm()
+            (window.solve().1.unwrap().estimate - TRUTH).norm()
         };
         assert!(error(Rows::AlongForce) < 1e-8);
         assert!(error(Rows::Stacked) > 0.1);
