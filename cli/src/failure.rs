@@ -6,27 +6,21 @@ use std::fmt;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Exit {
     /// The run failed.
-    Failed,
+    Failed = 1,
     /// Arguments, a configuration, a pairing string or a file are wrong.
-    Usage,
+    Usage = 2,
     /// The slave refused the master, or is not the slave of the pairing string.
-    Refused,
+    Refused = 3,
     /// Nobody answered.
-    NoAnswer,
+    NoAnswer = 4,
     /// The address to listen on cannot be had.
-    Address,
+    Address = 5,
 }
 
 impl Exit {
     /// The code that the process ends with.
     pub(crate) fn code(self) -> u8 {
-        match self {
-            Self::Failed => 1,
-            Self::Usage => 2,
-            Self::Refused => 3,
-            Self::NoAnswer => 4,
-            Self::Address => 5,
-        }
+        self as u8
     }
 }
 
@@ -96,18 +90,5 @@ mod tests {
             "error: no file x\n  what to do: check the path"
         );
         assert_eq!(failure.exit().code(), 2);
-    }
-
-    #[test]
-    fn every_kind_has_a_code_of_its_own_and_none_is_success() {
-        let all = [
-            Exit::Failed,
-            Exit::Usage,
-            Exit::Refused,
-            Exit::NoAnswer,
-            Exit::Address,
-        ];
-        let codes: std::collections::BTreeSet<u8> = all.map(Exit::code).into_iter().collect();
-        assert_eq!(codes, (1..=5).collect());
     }
 }

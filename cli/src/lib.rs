@@ -62,9 +62,10 @@ fn execute(command: Command) -> Result<(), Failure> {
 fn answer(error: &clap::Error) -> ExitCode {
     // whoever closed the stream does not want to read it
     let _ = error.print();
-    match error.use_stderr() {
-        true => ExitCode::from(failure::Exit::Usage.code()),
-        false => ExitCode::SUCCESS,
+    if error.use_stderr() {
+        ExitCode::from(failure::Exit::Usage.code())
+    } else {
+        ExitCode::SUCCESS
     }
 }
 

@@ -14,7 +14,7 @@ use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::time::Duration;
 
-use clap::{Args, Parser, Subcommand, ValueEnum};
+use clap::{Args, Parser, Subcommand};
 use mmt_client::device::DeviceProfile;
 use mmt_client::link::CommandConfig;
 use mmt_lab::replay::ReplayConfig;
@@ -93,11 +93,11 @@ pub(crate) struct DemoArguments {
     #[command(flatten)]
     pub(crate) emulation: EmulationArguments,
     /// The bundle of choices
-    #[arg(long, value_enum, default_value_t = ModeName::Recommended)]
-    pub(crate) mode: ModeName,
+    #[arg(long, value_name = "NAME", default_value = "recommended", value_parser = values::mode())]
+    pub(crate) mode: Mode,
     /// Whose force the hand feels
-    #[arg(long, value_enum, default_value_t = ArchitectureName::Mmt)]
-    pub(crate) architecture: ArchitectureName,
+    #[arg(long, value_name = "NAME", default_value = "mmt", value_parser = values::architecture())]
+    pub(crate) architecture: Architecture,
     /// When updates are sent [default: the mode's]
     #[arg(long, value_name = "WORDS", value_parser = values::scheme)]
     pub(crate) scheme: Option<Scheme>,
@@ -126,8 +126,8 @@ pub(crate) struct SlaveArguments {
     #[arg(long, value_name = "ADDR:PORT", value_parser = values::listen)]
     pub(crate) listen: SocketAddr,
     /// The bundle of choices [default: the file's, else recommended]
-    #[arg(long, value_enum)]
-    pub(crate) mode: Option<ModeName>,
+    #[arg(long, value_name = "NAME", value_parser = values::mode())]
+    pub(crate) mode: Option<Mode>,
     /// When updates are sent, such as "hybrid 10% 150ms" [default: the file's, else the mode's]
     #[arg(long, value_name = "WORDS", value_parser = values::scheme)]
     pub(crate) scheme: Option<Scheme>,
@@ -189,8 +189,8 @@ pub(crate) struct MasterArguments {
     #[arg(long, value_name = "N_PER_M")]
     pub(crate) stiffness: Option<f64>,
     /// Whose force the hand feels
-    #[arg(long, value_enum, default_value_t = ArchitectureName::Mmt)]
-    pub(crate) architecture: ArchitectureName,
+    #[arg(long, value_name = "NAME", default_value = "mmt", value_parser = values::architecture())]
+    pub(crate) architecture: Architecture,
     /// Emulated network on what the master sends
     #[arg(long, value_name = "WORDS", default_value = "none", value_parser = values::netem)]
     pub(crate) netem: LinkConfig,
@@ -300,42 +300,6 @@ pub(crate) struct ReplayArguments {
     /// Print one JSON document instead of tables
     #[arg(long)]
     pub(crate) json: bool,
-}
-
-/// The bundles of choices by name.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum ModeName {
-    /// The paper to the letter
-    Paper,
-    /// What the design study found better
-    Recommended,
-}
-
-/// Whose force the hand feels, as written on the command line.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum ArchitectureName {
-    /// The local model's: model-mediated teleoperation
-    Mmt,
-    /// The tool's, across the network, with time-domain passivity control
-    Tdpa,
-}
-
-impl From<ArchitectureName> for Architecture {
-    fn from(name: ArchitectureName) -> Self {
-        match name {
-            ArchitectureName::Mmt => Self::Mmt,
-            ArchitectureName::Tdpa => Self::Tdpa,
-        }
-    }
-}
-
-impl From<ModeName> for Mode {
-    fn from(name: ModeName) -> Self {
-        match name {
-            ModeName::Paper => Self::Paper,
-            ModeName::Recommended => Self::Recommended,
-        }
-    }
 }
 
 #[cfg(test)]

@@ -29,7 +29,7 @@ fn the_demo_needs_no_argument_and_has_the_documented_defaults() {
     assert_eq!(demo.duration, Duration::from_secs(20));
     assert_eq!(demo.seed, 1);
     assert_eq!(demo.netem.to_string(), "delay 50ms 5ms loss 1%");
-    assert_eq!(Mode::from(demo.mode), Mode::Recommended);
+    assert_eq!(demo.mode, Mode::Recommended);
     assert!(demo.scheme.is_none() && !demo.json);
 }
 

@@ -7,12 +7,13 @@ use std::path::PathBuf;
 use std::str::FromStr;
 use std::time::Duration;
 
-use clap::builder::RangedI64ValueParser;
+use clap::builder::{PossibleValue, PossibleValuesParser, RangedI64ValueParser, TypedValueParser};
 use mmt_client::device::DeviceProfile;
 use mmt_netem::LinkConfig;
 use mmt_server::trigger::Scheme;
+use mmt_shared::model::settings::Mode;
 use mmt_shared::pairing::{Address, AddressError, Host};
-use mmt_shared::wire::SAMPLES_MAX;
+use mmt_shared::wire::{Architecture, SAMPLES_MAX};
 
 /// The longest duration accepted: a week.
 const DURATION_MAX: Duration = Duration::from_secs(7 * 24 * 3600);
@@ -80,9 +81,10 @@ pub(super) fn duration(text: &str) -> Result<Duration, String> {
     let number = digits.parse::<f64>().ok().filter(|_| plain);
     let (number, (_, factor)) = number.zip(factor).ok_or_else(wrong)?;
     let time = Duration::try_from_secs_f64(number * factor * 1e-3).map_err(|_| wrong())?;
-    match (DURATION_MIN..=DURATION_MAX).contains(&time) {
-        true => Ok(time),
-        false => Err(wrong()),
+    if (DURATION_MIN..=DURATION_MAX).contains(&time) {
+        Ok(time)
+    } else {
+        Err(wrong())
     }
 }
 
@@ -164,6 +166,40 @@ pub(super) fn operator(text: &str) -> Result<OperatorWords, String> {
 /// A device profile by its name.
 pub(super) fn device(name: &str) -> Result<DeviceProfile, String> {
     DeviceProfile::by_name(name).map_err(|error| error.to_string())
+}
+
+/// The bundle of choices.
+pub(super) fn mode() -> impl TypedValueParser<Value = Mode> {
+    one_of(&[
+        ("paper", "The paper to the letter", Mode::Paper),
+        ("recommended", "What works better", Mode::Recommended),
+    ])
+}
+
+/// Whose force the hand feels.
+pub(super) fn architecture() -> impl TypedValueParser<Value = Architecture> {
+    one_of(&[
+        ("mmt", "The local model's", Architecture::Mmt),
+        (
+            "tdpa",
+            "The tool's, across the network, with time-domain passivity control",
+            Architecture::Tdpa,
+        ),
+    ])
+}
+
+/// One of these words, each with its help and its value.
+fn one_of<T: Clone + Send + Sync>(
+    words: &'static [(&'static str, &'static str, T)],
+) -> impl TypedValueParser<Value = T> {
+    let shown = words.iter();
+    let shown = shown.map(|(word, help, _)| PossibleValue::new(*word).help(*help));
+    PossibleValuesParser::new(shown).try_map(|given| {
+        let known = words.iter().find(|(word, _, _)| *word == given);
+        known
+            .map(|(_, _, value)| value.clone())
+            .ok_or("no such word")
+    })
 }
 
 /// 1 to [`SAMPLES_MAX`].

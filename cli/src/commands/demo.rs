@@ -100,11 +100,11 @@ fn down(arguments: &DemoArguments) -> &LinkConfig {
 }
 
 fn architecture(arguments: &DemoArguments) -> Architecture {
-    arguments.architecture.into()
+    arguments.architecture
 }
 
 fn slave_config(arguments: &DemoArguments) -> SlaveConfig {
-    let mut config = SlaveConfig::of_mode(arguments.mode.into());
+    let mut config = SlaveConfig::of_mode(arguments.mode);
     config.seed = arguments.seed;
     // where the tool may be felt the play-out finds out by itself how long it has to wait
     if !architecture(arguments).feels_tool() {

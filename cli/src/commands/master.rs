@@ -121,7 +121,7 @@ fn options(arguments: &MasterArguments) -> Result<MasterOptions, Failure> {
         device: device.map_err(|error| Failure::usage(format!("--stiffness: {error}")))?,
         operator: operator(arguments)?,
         duration: arguments.duration,
-        architecture: arguments.architecture.into(),
+        architecture: arguments.architecture,
         scene_hz: 0,
         commands: CommandConfig {
             samples_per_command: arguments.samples_per_command,

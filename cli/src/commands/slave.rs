@@ -112,7 +112,7 @@ pub(super) fn start(
 }
 
 fn options(arguments: &SlaveArguments) -> Result<SlaveOptions, Failure> {
-    let mode = arguments.mode.map(Into::into);
+    let mode = arguments.mode;
     let mut config: SlaveConfig = slave_config(arguments.config.as_deref(), mode)?;
     if let Some(scheme) = arguments.scheme {
         config.trigger.scheme = scheme;
