@@ -1,6 +1,6 @@
 //! What the master does about a silent link: one pure function decides, the most severe action wins.
 //!
-//! Silence of *news* is normal under a deadband; what is watched here is the link itself, which carries
+//! Without *updates* a link is normal under a deadband; what is watched here is the link itself, which carries
 //! at least a heartbeat every 50 ms. The frozen local model is passive, so that it is rendered on; only
 //! when the link must be taken for dead is the hand released.
 
@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 
 /// Two heartbeats missed and some jitter: shown, nothing else.
 pub const LATE: Duration = Duration::from_millis(120);
-/// Five heartbeats missed: what the model was told may be old by now.
+/// Five heartbeats missed: the model may be out of date.
 pub const STALE: Duration = Duration::from_millis(250);
 /// Twenty heartbeats missed: the slave has to be taken for gone.
 pub const RELEASE: Duration = Duration::from_secs(1);
@@ -38,7 +38,7 @@ pub enum LinkState {
 }
 
 impl LinkState {
-    /// The state for the time since the slave was last heard.
+    /// The state for the time since something last came from the slave.
     #[must_use]
     pub fn of_silence(silence: Duration) -> Self {
         if silence >= RELEASE {

@@ -18,7 +18,6 @@
     )
 )]
 
-pub mod bilateral;
 pub mod device;
 pub mod failsafe;
 pub mod limiter;

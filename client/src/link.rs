@@ -11,7 +11,9 @@ use mmt_shared::model::sample::HipSample;
 use mmt_shared::model::tool::{HandPort, Scene, Tool};
 use mmt_shared::model::update::Update;
 use mmt_shared::time::Time;
-use mmt_shared::wire::{Architecture, Command, Matter, SAMPLES_MAX, SampleBlock, Side, UpdateDrops};
+use mmt_shared::wire::{
+    Architecture, Command, Matter, SAMPLES_MAX, SampleBlock, Side, UpdateDrops,
+};
 use serde::{Deserialize, Serialize};
 
 /// Most ticks from one packed sample to the next: play-out takes its velocity from samples of 5 ms.

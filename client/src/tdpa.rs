@@ -3,9 +3,9 @@
 //! The ledger holds what the hand gets to what went in at the tool (`docs/baselines.md`). Pure: it never waits or
 //! allocates, and what it returns goes through the limiter.
 
-use mmt_shared::bilateral::passivity::{PortEnergy, RESERVE_J, impedance_controller};
 use mmt_shared::model::geometry::Vec2;
 use mmt_shared::model::tool::{HandPort, Tool};
+use mmt_shared::passivity::{PortEnergy, RESERVE_J, impedance_controller};
 use mmt_shared::time::{TICK_S, Time};
 
 /// Time constant of the round trip, s: a single late packet is no path.
@@ -159,6 +159,10 @@ mod tests {
             hand.displayed(-force);
         }
         // 1 N over 0.1 m
-        assert!((hand.port().in_j - 0.1).abs() < 1e-3, "{}", hand.port().in_j);
+        assert!(
+            (hand.port().in_j - 0.1).abs() < 1e-3,
+            "{}",
+            hand.port().in_j
+        );
     }
 }

@@ -11,12 +11,12 @@ pub use felt::{FeltMass, FeltMasses};
 
 use std::time::Duration;
 
+use crate::baselines::Baseline;
+use crate::baselines::message::OVERHEAD_BYTES;
 use mmt_client::device::DeviceProfile;
 use mmt_client::operator::Operator;
 use mmt_client::operator::scripted::{Phase, Picture};
 use mmt_server::playout::PlayoutBuffer;
-use mmt_shared::bilateral::Baseline;
-use mmt_shared::bilateral::message::OVERHEAD_BYTES;
 use mmt_shared::model::settings::{ModelSettings, PoseCorrection};
 use serde::Serialize;
 

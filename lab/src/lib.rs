@@ -17,6 +17,7 @@
 )]
 
 pub mod architecture;
+pub mod baselines;
 mod digest;
 pub mod figure;
 #[cfg(feature = "io")]

@@ -6,6 +6,7 @@
 use std::collections::VecDeque;
 use std::time::Duration;
 
+use crate::baselines::message::OVERHEAD_BYTES;
 use mmt_client::device::DeviceProfile;
 use mmt_client::limiter::ForceLimiter;
 use mmt_client::link::{FromSlave, MasterLink};
@@ -19,7 +20,6 @@ use mmt_netem::pipe::SimPath;
 use mmt_server::environment::Environment;
 use mmt_server::link::SlaveLink;
 use mmt_server::slave::{Slave, SlaveTick};
-use mmt_shared::bilateral::message::OVERHEAD_BYTES;
 use mmt_shared::metrics::{
     AgeOfInformation, ContactBreaks, ForcePeak, ForceSummary, PoseError, Staleness, UpdateCounts,
 };

@@ -85,7 +85,7 @@ fn trigger(criterion: &mut Criterion) {
         criterion.bench_function(&format!("trigger/{text}"), |bencher| {
             bencher.iter(|| {
                 ms += 1;
-                trigger.decide(Time::from_millis(ms), black_box(&input))
+                trigger.step(Time::from_millis(ms), black_box(&input))
             });
         });
     }

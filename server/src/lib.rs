@@ -19,7 +19,7 @@
     )
 )]
 
-pub mod bilateral;
+pub mod contact;
 pub mod environment;
 pub mod estimator;
 pub mod link;
@@ -29,7 +29,7 @@ pub mod sensing;
 pub mod shadow;
 pub mod slave;
 pub mod square_friction;
-pub mod tool_force;
+pub mod tool;
 pub mod trigger;
 
 #[cfg(feature = "io")]

@@ -12,6 +12,7 @@ mod past;
 mod tangent_tracker;
 mod tracker;
 mod turning;
+mod vision;
 
 use mmt_shared::model::contact::Coupling;
 use mmt_shared::model::dynamics::Motion;
@@ -22,11 +23,9 @@ use mmt_shared::model::params::{ModelParams, friction_torque_of_square};
 use mmt_shared::model::settings::FrictionLaw;
 use mmt_shared::time::{TICK_S, Time};
 
-use crate::sensing::VisionSample;
 use angle_filter::AngleFilter;
 use face_map::FaceMap;
 use past::{Past, PastPoses};
-use tangent_tracker::TangentTracker;
 use tracker::{BoxTracker, Tracker};
 use turning::Push;
 
@@ -314,70 +313,6 @@ impl PoseObserver {
         self.slide_var += REST_DRIFT_M * REST_DRIFT_M * TICK_S;
         let law = FrictionLaw::LimitSurface;
         self.motion = self.motion.step(law, params, Vec2::zeros(), Vec2::zeros());
-    }
-
-    /// Takes in an image that was taken some time ago, if this mode uses it.
-    pub fn see(&mut self, vision: &VisionSample) {
-        let then = self.past.at(vision.taken);
-        let Some(then) = then.filter(|_| self.config.learn) else {
-            return;
-        };
-        let error = vision.pose.position - then.pose.position;
-        if !self.see_angle(vision, &then) {
-            self.become_tangent(error);
-            return;
-        }
-        let variance = self.config.vision_noise_m.powi(2);
-        let gain = if variance > 0.0 {
-            self.slide_var / (self.slide_var + variance)
-        } else {
-            1.0
-        };
-        self.slide_var *= 1.0 - gain;
-        match (then.contact, self.contact) {
-            (Some(was), Some(is)) if was.face == is.face => {
-                let along = error - is.inward * is.inward.dot(&error);
-                self.motion.pose.position += along * gain;
-                let known = self.faces.footprint.offset(is.face);
-                let seen = was.inward.dot(&(vision.pose.position - was.surface));
-                self.faces.learn(&mut self.tracker, was.face, seen);
-                // the face stays where it is touched: that the centre lies elsewhere is no motion
-                let shift = self.faces.footprint.offset(is.face) - known;
-                self.motion.pose.position += is.inward * shift;
-            }
-            (None, None) => self.motion.pose.position += error * gain,
-            _ => {}
-        }
-    }
-
-    /// Takes the angle of an image. False if the image shows that the body that was taken for a box is none.
-    fn see_angle(&mut self, vision: &VisionSample, then: &Past) -> bool {
-        let seen = vision.pose.angle + self.tracker.turned();
-        let turn = wrap_angle(seen - then.pose.angle);
-        let noise = self.config.vision_noise_rad;
-        let touched = then.contact.is_some();
-        match &mut self.tracker {
-            Tracker::Tangent(tangent) if touched => {
-                tangent.see(vision.taken, turn);
-                return true;
-            }
-            Tracker::Box(tracker) => {
-                let refuted = touched && tracker.is_refuted(turn, noise);
-                if refuted {
-                    self.tracker = Tracker::Tangent(TangentTracker::new(-turn));
-                    return false;
-                }
-            }
-            Tracker::Tangent(_) => {}
-        }
-        self.angle.measure(&mut self.motion, turn, noise * noise);
-        true
-    }
-
-    /// The body is no box: the centre is where vision sees it, `error` m away.
-    fn become_tangent(&mut self, error: Vec2) {
-        self.motion.pose.position += error;
-        self.slide_var = self.config.vision_noise_m.powi(2);
     }
 
     /// Section III-A, case 1: the tool is inside the model and touches nothing. A face that has never

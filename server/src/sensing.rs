@@ -1,9 +1,9 @@
 //! Sensing: the tool's position, the contact force and the object's pose as the slave measures them.
 //!
-//! Adds seeded Gaussian noise to position and force at 1 kHz, and looks at the object through "vision":
+//! Adds seeded Gaussian noise to position and force at 1 kHz, and sees the object through "vision":
 //! a slow, noisy, delayed camera. Every tick takes the same number of draws whatever the settings, and
 //! vision's image k has noise of its own number, so that changing one setting leaves every other noise
-//! alone. It must never look at anything but its arguments.
+//! alone. It must never use anything but its arguments.
 
 use std::collections::VecDeque;
 

@@ -2,7 +2,7 @@
 //!
 //! One has every update applied when it is sent: it is ahead of the master by a round trip, and the
 //! trigger judges it, because what has been sent need not be sent again. The other applies an update when
-//! the master says that it has it: it is what the master really is. When an update turns out to be lost,
+//! the master acknowledges it: it is what the master really is. When an update turns out to be lost,
 //! the first is made anew from the second. It must never take for received what was not acknowledged.
 
 use std::collections::VecDeque;
@@ -28,7 +28,7 @@ const LOOPS: usize = 8;
 const OVERDUE: Duration = Duration::from_millis(100);
 /// The loop's delay before anything has been acknowledged: beyond any that the history can replay.
 const LOOP_UNKNOWN: Duration = Duration::from_secs(4);
-/// Time without news after which both copies are the same but for rounding, and are made so.
+/// Time without updates after which both copies are the same but for rounding, and are made so.
 const SETTLED: Duration = Duration::from_secs(1);
 /// Most samples that the copies catch up with in a tick: after a longer gap they begin anew from there.
 const CATCH_UP: u32 = 16;
@@ -53,7 +53,7 @@ pub struct Shadow {
     confirmed: LocalModel,
     /// Sent and not acknowledged, in the order of their numbers.
     sent: VecDeque<Update>,
-    /// Newest update acknowledged, and the stamp of the first sample that said so; in the order of both.
+    /// Newest update acknowledged, and the stamp of the first sample that did; in the order of both.
     acknowledged: VecDeque<(u32, Time)>,
     /// Newest update that was applied to the confirmed copy, and when, by the samples' stamps.
     applied: (u32, Time),
@@ -90,7 +90,7 @@ impl Shadow {
         &self.ahead
     }
 
-    /// The copy with the updates that the master has said it has: equal to the master's model, but that an
+    /// The copy with the updates that the master has acknowledged: equal to the master's model, but that an
     /// update is applied up to one command's samples too early.
     #[must_use]
     pub fn confirmed(&self) -> &LocalModel {
@@ -115,7 +115,7 @@ impl Shadow {
         self.sent.back().is_none_or(|u| u.sequence <= self.given_up)
     }
 
-    /// Takes in what a sample says: the newest update that the master had by the end of its command.
+    /// Takes in the newest update that the master had by the end of the command of a sample.
     pub fn acknowledge(&mut self, sample: &HipSample, newest_update: u32) {
         if newest_update <= self.applied.0 {
             return;
@@ -147,7 +147,7 @@ impl Shadow {
         self.ahead.apply(update);
     }
 
-    /// Takes the HIP samples up to `until`, the stamp that is played now; `hip_at` says where the HIP was.
+    /// Takes the HIP samples up to `until`, the stamp that is played now; `hip_at` gives the HIP at a stamp.
     /// The grid is that of `on_grid`, the stamp of any sample. Returns the cause of the newest update if that
     /// was found to be lost.
     pub fn step(
@@ -193,7 +193,7 @@ impl Shadow {
         }
     }
 
-    /// The master has update `number`. Those before it that it never said it had were lost or overtaken;
+    /// The master has update `number`. Those before it that it never acknowledged were lost or overtaken;
     /// either way the newer one took their place.
     fn confirm(&mut self, number: u32, stamp: Time) {
         let mut found = None;

@@ -20,13 +20,13 @@
     )
 )]
 
-pub mod bilateral;
 pub mod channel;
 #[cfg(feature = "io")]
 pub mod io;
 pub mod metrics;
 pub mod model;
 pub mod pairing;
+pub mod passivity;
 pub mod range;
 pub mod recording;
 pub mod report;

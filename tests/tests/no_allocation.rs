@@ -217,7 +217,9 @@ impl Loop {
         let link = &mut self.slave_link;
         let down = update
             .and_then(|update| Packet::of(|out| link.send_update(now, &update, out).ok()))
-            .or_else(|| tool.and_then(|tool| Packet::of(|out| link.send_tool(now, &tool, out).ok())))
+            .or_else(|| {
+                tool.and_then(|tool| Packet::of(|out| link.send_tool(now, &tool, out).ok()))
+            })
             .or_else(|| Packet::of(|out| link.repeat(now, out).unwrap()))
             .or_else(|| Packet::of(|out| link.heartbeat(now, out).unwrap()));
         Slaved {
@@ -326,7 +328,7 @@ impl Parts {
             shift: Vec2::zeros(),
             turn: 0.0,
         };
-        self.decided += u64::from(self.trigger.decide(now, &input).is_some());
+        self.decided += u64::from(self.trigger.step(now, &input).is_some());
         let link = &mut self.link;
         let Some(update) = met.update else {
             return Packet::of(|out| link.repeat(now, out).unwrap());

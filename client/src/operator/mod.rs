@@ -42,7 +42,7 @@ impl Operator {
         }
     }
 
-    /// Pushes that went over their whole length; none for a path, which does not say what a push is.
+    /// Pushes that went over their whole length; none for a path, in which no push is marked.
     #[must_use]
     pub fn pushes_completed(&self) -> Option<u64> {
         match self {

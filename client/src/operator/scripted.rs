@@ -1,4 +1,4 @@
-//! The scripted operator: goes round the box and pushes its faces, as a person would who looks at it.
+//! The scripted operator: goes round the box and pushes its faces, as a person would who sees it.
 //!
 //! It plans on the box as it sees it (the local model, unless somebody wants to show why not), so it
 //! follows what it pushes. Between its wish and the HIP is a hand, so force moves the HIP. A run is a

@@ -1,6 +1,6 @@
 //! A recorded tool path as an operator: where the HIP is at each moment, whatever it feels.
 //!
-//! A path comes from plain CSV or from a file of recorded pushes. It never looks at a clock and never
+//! A path comes from plain CSV or from a file of recorded pushes. It never reads a clock and never
 //! extrapolates: before its first sample and after its last it holds them. Between samples it is linear.
 //!
 //! A recorded path was made around another object, elsewhere. [`Trace::starting_at`] carries it to where

@@ -7,7 +7,10 @@
 use std::collections::VecDeque;
 use std::time::Duration;
 
-use mmt_client::bilateral::BilateralMaster;
+use crate::baselines::Baseline;
+use crate::baselines::master::BilateralMaster;
+use crate::baselines::message::{ToMaster, ToSlave, wire_bytes};
+use crate::baselines::slave::{BilateralSlave, BilateralSlaveTick};
 use mmt_client::device::DeviceProfile;
 use mmt_client::limiter::ForceLimiter;
 use mmt_client::master::PortObserver;
@@ -17,11 +20,8 @@ use mmt_netem::config::{LinkConfig, Loss};
 use mmt_netem::counters::Tally;
 use mmt_netem::link::{Direction, LinkId};
 use mmt_netem::pipe::SimPath;
-use mmt_server::bilateral::{BilateralSlave, BilateralSlaveTick};
 use mmt_server::environment::Environment;
 use mmt_server::slave::SlaveError;
-use mmt_shared::bilateral::Baseline;
-use mmt_shared::bilateral::message::{ToMaster, ToSlave, wire_bytes};
 use mmt_shared::metrics::{ContactBreaks, ForcePeak, ForceSummary};
 use mmt_shared::model::geometry::Vec2;
 use mmt_shared::time::{TICK, Time};

@@ -288,7 +288,9 @@ fn the_live_master_feels_the_tool_from_the_first_sample_and_makes_no_energy() {
         let outcome = world.outcome();
         let least_mj = outcome.observer_min_j * 1e3;
         let ticks = 20_000 - outcome.forces;
-        println!("{words}: touch at {touched_ms:?}, felt at {felt_ms:?}, hand {least_mj:.3} mJ, {ticks} ticks without a force");
+        println!(
+            "{words}: touch at {touched_ms:?}, felt at {felt_ms:?}, hand {least_mj:.3} mJ, {ticks} ticks without a force"
+        );
         assert!(ticks < 200, "each tick of the tool sends its force");
         let late_ms = felt_ms.unwrap() - touched_ms.unwrap();
         assert!(late_ms < 100, "{late_ms} ms");

@@ -1,7 +1,7 @@
 //! Whether an object creeps: slides too slowly for its speed to be seen above the noise of a short filter.
 //!
 //! Two averages of the speed, of 50 and 200 ms. It creeps while the short one is clearly above its noise and
-//! the long one agrees. An object that comes to rest is told within 40 ms, and the filter that force and
+//! the long one agrees. An object that comes to rest is found within 40 ms, and the filter that force and
 //! motion share delays by 25. It must never take an object for creeping that sticks.
 
 use super::filter::stage_weight;
@@ -37,7 +37,7 @@ impl Creep {
         }
     }
 
-    /// Takes the raw speed of one tick along the normal, m/s, and says whether the object creeps forwards.
+    /// Takes the raw speed of one tick along the normal, m/s, and returns whether the object creeps forwards.
     pub(super) fn step(&mut self, speed: f64) -> bool {
         for (average, weight) in self.averages.iter_mut().zip(self.weights) {
             *average += (speed - *average) * weight;

@@ -150,7 +150,7 @@ impl RecommendedEstimator {
     }
 
     /// Whether something beyond friction holds the object against this force, N. Before friction has been
-    /// seen for a while, nobody can say.
+    /// seen for a while, nothing is an obstacle.
     fn stand(&mut self, force: f64, slides_on: bool) {
         let [older, _] = self.copies;
         if older.samples == 0 {

@@ -195,7 +195,7 @@ impl RecursiveLeastSquares {
         self.solve(row);
     }
 
-    /// c has jumped to an unknown value: what the rows so far say of m and b without it, less trusted.
+    /// c has jumped to an unknown value: m and b by the rows so far without it, less trusted.
     fn drop_friction(&mut self) {
         self.hold();
         self.settled = false;

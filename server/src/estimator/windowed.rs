@@ -1,7 +1,7 @@
 //! Windowed ("block") least squares: (3) over a sliding window, for (2) in the plane.
 //!
-//! The paper writes (1)–(3) for one direction and measures in the plane, and does not say how. Two readings:
-//! along the force, one row a tick, which is what (1) says where the tool does not slide on the object; or
+//! The paper writes (1)–(3) for one direction and measures in the plane, and does not state how. Two readings:
+//! along the force, one row a tick, which is (1) where the tool does not slide on the object; or
 //! stacked, two rows a tick, x and y, in which c·sign(v) becomes c·v/|v|. (The sign of each axis by itself
 //! would make friction √2 c at 45°.) The result is the plain minimum, bounded by nothing.
 

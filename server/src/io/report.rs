@@ -28,7 +28,7 @@ use super::session::Lost;
 use super::worker::Finished;
 use crate::link::SlaveLink;
 use crate::slave::{Slave, SlaveConfig};
-use crate::tool_force::ToolForce;
+use crate::tool::force::ToolForce;
 
 /// IP and UDP headers of a datagram, bytes.
 const HEADERS_IPV4: u64 = 28;

@@ -26,7 +26,7 @@ pub struct PlayoutConfig {
     /// be a link that stands. At or below `delay_ms` the delay is fixed.
     pub delay_max_ms: f64,
     /// How long an underrun is bridged at constant velocity, ms. Default 30: the slave never moves on
-    /// older news.
+    /// older samples.
     pub extrapolation_ms: f64,
     /// Greatest speed of the played HIP, m/s. Default 0.6: after an outage the HIP does not jump, and the
     /// scripted operator stays below 0.4.
@@ -66,10 +66,11 @@ impl PlayoutConfig {
             return self;
         }
         let delay = |samples| Self::for_packing_and_jitter(samples, Duration::ZERO).delay_ms;
-        let delay_ms = match architecture.feels_tool() {
-            true => 0.0,
+        let delay_ms = if architecture.feels_tool() {
+            0.0
+        } else {
             // the default is made for ten samples
-            false => default.delay_ms + delay(samples_per_command) - delay(10),
+            default.delay_ms + delay(samples_per_command) - delay(10)
         };
         Self { delay_ms, ..self }
     }

@@ -15,7 +15,7 @@ const BINS: usize = 256;
 const SLICE_NS: u64 = 1_000_000_000;
 /// Parts of the window: it forgets a spell of jitter after five seconds.
 const SLICES: usize = 5;
-/// Samples that the quantile wants before it says anything: half a second of them.
+/// Samples from which on there is a quantile: half a second of them.
 const SAMPLES_MIN: u32 = 500;
 /// One sample in this many may be too late.
 const LATE_ONE_IN: u32 = 100;

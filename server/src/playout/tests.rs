@@ -334,13 +334,16 @@ fn hostile_stamps_neither_panic_nor_block_the_buffer() {
 #[test]
 fn a_slave_that_does_not_tick_keeps_the_newest_half_second() {
     let mut buffer = PlayoutBuffer::try_new(PlayoutConfig::default()).unwrap();
-    let capacity = buffer.samples.capacity();
+    let capacity = buffer.buffer.samples().capacity();
     for k in 0..2_000 {
         buffer.push(Time::from_millis(50 + k), &sample(k));
     }
-    assert_eq!(buffer.counts().overflow, 2_000 - SAMPLES_MAX as u64);
-    assert_eq!(buffer.samples.back().unwrap().stamp, stamp(1_999));
-    assert_eq!(buffer.samples.capacity(), capacity, "it allocated");
+    assert_eq!(
+        buffer.counts().overflow,
+        2_000 - jitter_buffer::SAMPLES_MAX as u64
+    );
+    assert_eq!(buffer.buffer.samples().back().unwrap().stamp, stamp(1_999));
+    assert_eq!(buffer.buffer.samples().capacity(), capacity, "it allocated");
 }
 
 #[test]

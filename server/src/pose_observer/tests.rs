@@ -1,6 +1,7 @@
 //! What the pose observer promises.
 
 use super::*;
+use crate::sensing::VisionSample;
 use mmt_shared::model::params::friction_torque_of_square;
 use mmt_shared::time::TICK;
 

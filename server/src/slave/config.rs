@@ -12,7 +12,7 @@ use crate::link::Repeats;
 use crate::playout::PlayoutConfig;
 use crate::sensing::{SensingConfig, SensingError};
 use crate::shadow::TriggerReference;
-use crate::tool_force::TOOL_FORCE_MAX_N;
+use crate::tool::force::TOOL_FORCE_MAX_N;
 use crate::trigger::TriggerConfig;
 
 /// What the local model starts from before anything is known of the object.

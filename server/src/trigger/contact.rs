@@ -45,18 +45,18 @@ impl ContactDetector {
 
     /// One sample of |f_s| (N); returns whether the slave is in contact.
     pub fn step(&mut self, force: f64) -> bool {
-        let says = if self.in_contact {
+        let touches = if self.in_contact {
             force >= self.config.off_n
         } else {
             force >= self.config.on_n
         };
-        self.against = if says == self.in_contact {
+        self.against = if touches == self.in_contact {
             0
         } else {
             self.against + 1
         };
         if self.against >= self.config.samples.max(1) {
-            self.in_contact = says;
+            self.in_contact = touches;
             self.against = 0;
         }
         self.in_contact

@@ -117,6 +117,11 @@ impl TriggerInput {
     fn both_in_contact(&self) -> bool {
         self.slave_in_contact && self.shadow_in_contact
     }
+
+    /// |f_s − f_m|, N.
+    fn force_error(&self) -> f64 {
+        (self.f_s - self.f_m).norm()
+    }
 }
 
 /// Only one side is in contact.
@@ -177,7 +182,7 @@ impl Trigger {
     }
 
     /// Whether an update is to be sent now, and why. An answer counts as sent.
-    pub fn decide(&mut self, now: Time, input: &TriggerInput) -> Option<Cause> {
+    pub fn step(&mut self, now: Time, input: &TriggerInput) -> Option<Cause> {
         self.began.get_or_insert(now);
         if input.both_in_contact() {
             self.accumulated_error += self.expected_correction(input) * TICK_S;
@@ -243,7 +248,7 @@ impl Trigger {
                 threshold_n,
                 heartbeat,
             } => {
-                let beyond = self.judged(input) && (input.f_s - input.f_m).norm() > threshold_n;
+                let beyond = self.judged(input) && input.force_error() > threshold_n;
                 beyond
                     .then_some(Cause::Deadband)
                     .or_else(|| self.timed(now, heartbeat))
@@ -269,17 +274,17 @@ impl Trigger {
 
     /// Whether the forces can be compared at all.
     fn judged(&self, input: &TriggerInput) -> bool {
-        let both = input.slave_in_contact && input.shadow_in_contact;
-        both && (self.config.judge_sticking || !input.sticking)
+        input.both_in_contact() && (self.config.judge_sticking || !input.sticking)
+    }
+
+    /// (12), multiplied out.
+    fn is_beyond(&self, input: &TriggerInput, delta: f64) -> bool {
+        input.force_error() > delta * input.f_s.norm().max(self.config.force_floor_n)
     }
 
     fn violated(&self, input: &TriggerInput, delta: f64) -> Option<Cause> {
         let beyond = match self.config.metric {
-            MismatchMetric::Force => {
-                let scale = input.f_s.norm().max(self.config.force_floor_n);
-                // (12), multiplied out
-                self.judged(input) && (input.f_s - input.f_m).norm() > delta * scale
-            }
+            MismatchMetric::Force => self.judged(input) && self.is_beyond(input, delta),
             MismatchMetric::Parameters => self
                 .last
                 .is_none_or(|(_, sent)| metric::parameters(&input.params, &sent) > delta),
@@ -303,7 +308,7 @@ impl Trigger {
         };
         let change = (force_change(input, sent) - input.force_deviation).max(0.0);
         let held = if self.is_held_wrongly(input, delta) {
-            (input.f_s - input.f_m).norm()
+            input.force_error()
         } else {
             0.0
         };
@@ -326,11 +331,9 @@ impl Trigger {
     }
 
     /// What friction holds is pushed back by the depth of the HIP alone: a force that is off by more than Delta
-    /// says that the face is not where the model has it.
+    /// means that the face is not where the model has it.
     fn is_held_wrongly(&self, input: &TriggerInput, delta: f64) -> bool {
-        let scale = input.f_s.norm().max(self.config.force_floor_n);
-        let beyond = (input.f_s - input.f_m).norm() > delta * scale;
-        input.sticking && input.both_in_contact() && beyond
+        input.sticking && input.both_in_contact() && self.is_beyond(input, delta)
     }
 }
 

@@ -46,7 +46,7 @@ fn run(scheme: &str) -> Vec<(u64, Cause)> {
         };
         sent.extend(
             trigger
-                .decide(Time::from_millis(n), &sample)
+                .step(Time::from_millis(n), &sample)
                 .map(|cause| (n, cause)),
         );
     }
@@ -57,10 +57,10 @@ fn run(scheme: &str) -> Vec<(u64, Cause)> {
 fn a_violation_exactly_at_delta_does_not_fire_and_the_next_number_does() {
     // 0.25 and 2 are exact in binary
     let mut trigger = trigger("deadband 25%", Mode::Paper);
-    assert_eq!(trigger.decide(Time::ZERO, &input(2.0, 2.5)), None);
+    assert_eq!(trigger.step(Time::ZERO, &input(2.0, 2.5)), None);
     let above = f64::from_bits(2.5f64.to_bits() + 1);
     assert_eq!(
-        trigger.decide(Time::ZERO, &input(2.0, above)),
+        trigger.step(Time::ZERO, &input(2.0, above)),
         Some(Cause::Deadband)
     );
 }
@@ -69,12 +69,12 @@ fn a_violation_exactly_at_delta_does_not_fire_and_the_next_number_does() {
 fn small_forces_are_divided_by_the_floor() {
     // |f_s − f_m| = 0.008 of a floor of 0.04 is 20 %; of |f_s| = 0.01 it would be 80 %
     assert_eq!(
-        trigger("deadband 25%", Mode::Paper).decide(Time::ZERO, &input(0.01, 0.018)),
+        trigger("deadband 25%", Mode::Paper).step(Time::ZERO, &input(0.01, 0.018)),
         None
     );
     let mut narrow = trigger("deadband 15%", Mode::Paper);
     assert_eq!(
-        narrow.decide(Time::ZERO, &input(0.01, 0.018)),
+        narrow.step(Time::ZERO, &input(0.01, 0.018)),
         Some(Cause::Deadband)
     );
 }
@@ -104,13 +104,13 @@ fn the_timer_sends_exactly_every_t_update() {
 fn every_update_resets_the_timer() {
     let mut trigger = trigger("hybrid 10% 50ms", Mode::Paper);
     let at = |n| Time::from_millis(n);
-    assert_eq!(trigger.decide(at(0), &input(2.0, 2.0)), None);
+    assert_eq!(trigger.step(at(0), &input(2.0, 2.0)), None);
     assert_eq!(
-        trigger.decide(at(30), &input(2.0, 3.0)),
+        trigger.step(at(30), &input(2.0, 3.0)),
         Some(Cause::Deadband)
     );
-    assert_eq!(trigger.decide(at(79), &input(2.0, 2.0)), None);
-    assert_eq!(trigger.decide(at(80), &input(2.0, 2.0)), Some(Cause::Timer));
+    assert_eq!(trigger.step(at(79), &input(2.0, 2.0)), None);
+    assert_eq!(trigger.step(at(80), &input(2.0, 2.0)), Some(Cause::Timer));
 }
 
 #[test]
@@ -123,7 +123,7 @@ fn noise_in_free_space_never_fires() {
             shadow_in_contact: false,
             ..input(0.01 * random.normal(), 0.0)
         };
-        assert_eq!(trigger.decide(Time::from_millis(n), &free), None);
+        assert_eq!(trigger.step(Time::from_millis(n), &free), None);
     }
 }
 
@@ -140,7 +140,7 @@ fn a_contact_of_one_side_counts_after_the_debounce_and_is_told_again_at_interval
             ..input(2.0, 0.0)
         };
         let told: Vec<u64> = (0..115)
-            .filter(|n| trigger.decide(Time::from_millis(*n), &one) == Some(cause))
+            .filter(|n| trigger.step(Time::from_millis(*n), &one) == Some(cause))
             .collect();
         assert_eq!(told, [10, 60, 110]);
     }
@@ -154,12 +154,12 @@ fn a_lost_contact_is_told_once() {
         shadow_in_contact: false,
         ..input(0.0, 0.0)
     };
-    assert_eq!(trigger.decide(Time::ZERO, &input(2.0, 2.0)), None);
+    assert_eq!(trigger.step(Time::ZERO, &input(2.0, 2.0)), None);
     assert_eq!(
-        trigger.decide(Time::from_millis(1), &free),
+        trigger.step(Time::from_millis(1), &free),
         Some(Cause::ContactLost)
     );
-    assert_eq!(trigger.decide(Time::from_millis(2), &free), None);
+    assert_eq!(trigger.step(Time::from_millis(2), &free), None);
 }
 
 #[test]
@@ -168,7 +168,7 @@ fn a_sticking_box_is_no_mismatch_in_recommended_mode() {
         sticking: true,
         ..input(1.0, 2.0)
     };
-    let decide = |mode| trigger("deadband 10%", mode).decide(Time::ZERO, &sticking);
+    let decide = |mode| trigger("deadband 10%", mode).step(Time::ZERO, &sticking);
     assert_eq!(decide(Mode::Paper), Some(Cause::Deadband));
     assert_eq!(decide(Mode::Recommended), None);
 }
@@ -179,12 +179,12 @@ fn useful_sends_only_what_would_be_felt_and_not_twice_within_ten_milliseconds() 
     let at = |n| Time::from_millis(n);
     let violating = input(2.0, 3.0);
     assert_eq!(
-        trigger.decide(at(0), &violating),
+        trigger.step(at(0), &violating),
         Some(Cause::Deadband),
         "the first is news"
     );
     assert_eq!(
-        trigger.decide(at(20), &violating),
+        trigger.step(at(20), &violating),
         None,
         "it would say the same again"
     );
@@ -192,20 +192,20 @@ fn useful_sends_only_what_would_be_felt_and_not_twice_within_ten_milliseconds() 
         params: params(0.7, 2.2),
         ..violating
     };
-    assert_eq!(trigger.decide(at(21), &changed), Some(Cause::Deadband));
+    assert_eq!(trigger.step(at(21), &changed), Some(Cause::Deadband));
     let again = TriggerInput {
         params: params(0.7, 2.4),
         ..violating
     };
-    assert_eq!(trigger.decide(at(30), &again), None);
-    assert_eq!(trigger.decide(at(31), &again), Some(Cause::Deadband));
+    assert_eq!(trigger.step(at(30), &again), None);
+    assert_eq!(trigger.step(at(31), &again), Some(Cause::Deadband));
     let turned = TriggerInput {
         params: params(0.7, 2.4),
         turn: 0.011,
         ..input(2.0, 2.0)
     };
-    assert_eq!(trigger.decide(at(180), &turned), None);
-    assert_eq!(trigger.decide(at(181), &turned), Some(Cause::Timer));
+    assert_eq!(trigger.step(at(180), &turned), None);
+    assert_eq!(trigger.step(at(181), &turned), Some(Cause::Timer));
 }
 
 #[test]
@@ -216,13 +216,13 @@ fn every_sample_means_every_sample() {
 #[test]
 fn dis_fires_beyond_an_absolute_error_or_at_its_heartbeat() {
     let mut trigger = trigger("dis 0.25N 1s", Mode::Paper);
-    assert_eq!(trigger.decide(Time::ZERO, &input(2.0, 2.25)), None);
+    assert_eq!(trigger.step(Time::ZERO, &input(2.0, 2.25)), None);
     assert_eq!(
-        trigger.decide(Time::ZERO, &input(2.0, 2.26)),
+        trigger.step(Time::ZERO, &input(2.0, 2.26)),
         Some(Cause::Deadband)
     );
     assert_eq!(
-        trigger.decide(Time::from_millis(1000), &input(2.0, 2.0)),
+        trigger.step(Time::from_millis(1000), &input(2.0, 2.0)),
         Some(Cause::Timer)
     );
 }
@@ -255,9 +255,9 @@ fn each_metric_sees_its_own_mismatch_and_no_other() {
                 ..TriggerConfig::of_mode(Mode::Paper)
             });
             // what the master starts from has not been sent, so parameters fire once
-            let _ = trigger.decide(Time::ZERO, &quiet);
-            assert_eq!(trigger.decide(Time::from_millis(1), &quiet), None);
-            let fired = trigger.decide(Time::from_millis(2), mismatched);
+            let _ = trigger.step(Time::ZERO, &quiet);
+            assert_eq!(trigger.step(Time::from_millis(1), &quiet), None);
+            let fired = trigger.step(Time::from_millis(2), mismatched);
             let expected = (metric == other).then_some(Cause::Deadband);
             assert_eq!(fired, expected, "{metric:?} on a mismatch of {other:?}");
         }
@@ -277,10 +277,10 @@ fn a_timer_that_rests_in_free_space_counts_on_and_fires_at_the_touch() {
         ..input(0.0, 0.0)
     };
     for n in 0..1000 {
-        assert_eq!(trigger.decide(Time::from_millis(n), &free), None);
+        assert_eq!(trigger.step(Time::from_millis(n), &free), None);
     }
     assert_eq!(
-        trigger.decide(Time::from_millis(1000), &input(2.0, 2.0)),
+        trigger.step(Time::from_millis(1000), &input(2.0, 2.0)),
         Some(Cause::Timer)
     );
 }
@@ -295,12 +295,12 @@ fn adaptive_sends_sooner_the_more_there_is_to_say_and_never_when_there_is_nothin
             f_m: Vec2::new(3.0, 0.0),
             ..start
         };
-        assert_eq!(trigger.decide(Time::ZERO, &away), Some(Cause::Deadband));
+        assert_eq!(trigger.step(Time::ZERO, &away), Some(Cause::Deadband));
         let changed = TriggerInput {
             params: params(0.7, 2.06 + change_n),
             ..start
         };
-        (1..5000).find(|n| trigger.decide(Time::from_millis(*n), &changed).is_some())
+        (1..5000).find(|n| trigger.step(Time::from_millis(*n), &changed).is_some())
     };
     // 10 % for 50 ms: 5e-3 s
     for (change_n, ticks) in [(0.04, 250), (0.08, 125), (0.16, 63)] {
@@ -317,14 +317,14 @@ fn adaptive_sends_sooner_the_more_there_is_to_say_and_never_when_there_is_nothin
 fn adaptive_does_not_send_what_the_estimate_does_not_know() {
     let mut trigger = trigger("adaptive 10% 50ms", Mode::Recommended);
     let start = input(2.0, 3.0);
-    assert_eq!(trigger.decide(Time::ZERO, &start), Some(Cause::Deadband));
+    assert_eq!(trigger.step(Time::ZERO, &start), Some(Cause::Deadband));
     let unsure = TriggerInput {
         params: params(0.7, 2.16),
         force_deviation: 0.12,
         ..input(2.0, 2.0)
     };
     for n in 1..5000 {
-        assert_eq!(trigger.decide(Time::from_millis(n), &unsure), None);
+        assert_eq!(trigger.step(Time::from_millis(n), &unsure), None);
     }
 }
 
@@ -332,14 +332,14 @@ fn adaptive_does_not_send_what_the_estimate_does_not_know() {
 fn adaptive_says_where_a_held_face_is_the_sooner_the_more_the_force_is_wrong() {
     let first_after = |f_m: f64| {
         let mut trigger = trigger("adaptive 10% 50ms", Mode::Recommended);
-        assert!(trigger.decide(Time::ZERO, &input(1.0, 2.0)).is_some());
+        assert!(trigger.step(Time::ZERO, &input(1.0, 2.0)).is_some());
         let held = TriggerInput {
             sticking: true,
             speed: 0.0,
             acceleration: 0.0,
             ..input(1.0, f_m)
         };
-        (1..5000).find(|n| trigger.decide(Time::from_millis(*n), &held).is_some())
+        (1..5000).find(|n| trigger.step(Time::from_millis(*n), &held).is_some())
     };
     // 10 % for 50 ms, 5e-3 s, at 25 and 50 %; never within 10 ms of the last
     for (f_m, ticks) in [(1.25, 20), (1.5, 10)] {
@@ -366,15 +366,11 @@ fn what_was_lost_is_said_again_once_at_once_and_under_every_scheme() {
         "timer 10s",
     ] {
         let mut trigger = trigger(scheme, Mode::Recommended);
-        assert_eq!(trigger.decide(Time::from_millis(1), &free), None);
+        assert_eq!(trigger.step(Time::from_millis(1), &free), None);
         trigger.repeat(Cause::ContactLost);
-        let said = trigger.decide(Time::from_millis(2), &free);
+        let said = trigger.step(Time::from_millis(2), &free);
         assert_eq!(said, Some(Cause::ContactLost), "{scheme}");
-        assert_eq!(
-            trigger.decide(Time::from_millis(3), &free),
-            None,
-            "{scheme}"
-        );
+        assert_eq!(trigger.step(Time::from_millis(3), &free), None, "{scheme}");
     }
 }
 
@@ -387,10 +383,10 @@ fn useful_says_where_a_held_face_is_once_a_period_while_the_force_is_wrong() {
         acceleration: 0.0,
         ..input(1.0, f_m)
     };
-    let first = trigger.decide(Time::ZERO, &input(1.0, 2.0));
+    let first = trigger.step(Time::ZERO, &input(1.0, 2.0));
     assert_eq!(first, Some(Cause::Deadband));
     let sent = |trigger: &mut Trigger, f_m: f64, from: u64, to: u64| -> Vec<u64> {
-        let fires = |n: &u64| trigger.decide(Time::from_millis(*n), &held(f_m)).is_some();
+        let fires = |n: &u64| trigger.step(Time::from_millis(*n), &held(f_m)).is_some();
         (from..to).filter(fires).collect()
     };
     assert_eq!(sent(&mut trigger, 0.8, 1, 500), [150, 300, 450]);

@@ -75,7 +75,7 @@ impl GodObject {
         self.touched
     }
 
-    /// Follows the HIP and says what it touches.
+    /// Follows the HIP and returns what it touches.
     ///
     /// The face entered by is kept until the HIP leaves its half-plane or passes its end.
     pub fn follow(&mut self, footprint: &BoxFootprint, pose: &Pose, hip: Vec2) -> Option<Touch> {

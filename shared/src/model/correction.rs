@@ -1,4 +1,4 @@
-//! How the local model's pose is brought to what the slave says, without a jolt and without free energy.
+//! How the local model's pose is brought to the received one, without a jolt and without free energy.
 //!
 //! A received pose is never set: the difference is bled in at bounded rates. Turning about the contact
 //! point and shifting along the face do no work on a frictionless contact and are free, so is motion away
@@ -64,7 +64,7 @@ impl Tank {
         self.level = (self.level + dissipated_j.max(0.0)).min(TANK_MAX_J);
     }
 
-    /// Takes out `energy_j` if it is there and says whether it was.
+    /// Takes out `energy_j` if it is there, and returns whether it was.
     pub fn pay(&mut self, energy_j: f64) -> bool {
         if energy_j > self.level {
             return false;
@@ -192,9 +192,9 @@ impl Correction {
 }
 
 fn turn_about(pose: &Pose, pivot: Vec2, turn: f64) -> PoseChange {
-    let arm = pose.position - pivot;
+    let lever = pose.position - pivot;
     PoseChange {
-        shift: rotate(turn, arm) - arm,
+        shift: rotate(turn, lever) - lever,
         turn,
     }
 }
@@ -297,7 +297,7 @@ mod tests {
         correction.aim(&said, &own, &then);
         let mut pose = own;
         correction.snap(&mut pose);
-        // a second answer to the same old sample says the same thing again
+        // a second answer to the same old sample carries the same pose again
         correction.aim(&said, &own, &then);
         assert!(correction.remaining.shift.norm() < 1e-15);
         assert!(correction.remaining.turn.abs() < 1e-15);

@@ -1,6 +1,6 @@
 //! The ring of what the local model was at each HIP sample.
 //!
-//! Delay needs it: an update answers a sample of the past, so what it says must be held against what the
+//! Delay needs it: an update answers a sample of the past, so its pose must be compared with what the
 //! model was *then*. Entries are found by stamp, by search, never by index arithmetic, because ticks may
 //! have been skipped. It allocates once, when made.
 

@@ -155,7 +155,7 @@ impl LocalModel {
     }
 
     /// The paper's way. Cases 1 and 2 of III-A and a lost contact set position and orientation, a force
-    /// mismatch or the timer the orientation alone (a timer packet may say the model's own).
+    /// mismatch or the timer the orientation alone (a timer packet may carry the model's own).
     fn snap(&mut self, update: &Update) {
         self.aim(update);
         let state = &mut self.body.state;
@@ -175,8 +175,8 @@ impl LocalModel {
 
     /// Compares at the stamp that the update answers; the ticks bleed the difference in.
     fn match_stamps(&mut self, update: &Update) {
-        let carved = !update.slave_in_contact;
-        let shift = self.take_footprint(update, carved);
+        let retracted = !update.slave_in_contact;
+        let shift = self.take_footprint(update, retracted);
         self.correction.count(shift);
         self.aim(update);
     }
@@ -199,8 +199,8 @@ impl LocalModel {
 
     /// Takes over the face offsets. The face that the HIP touches, or is in front of, stays where it is:
     /// the centre moves instead (which no force notices), and the bleed brings the plane to its place.
-    /// Only where it is to be `carved` does a face that recedes do so at once. Returns the centre's shift.
-    fn take_footprint(&mut self, update: &Update, carved: bool) -> Vec2 {
+    /// Only where it is `retracted` does a face that recedes do so at once. Returns the centre's shift.
+    fn take_footprint(&mut self, update: &Update, retracted: bool) -> Vec2 {
         let received = update.state.footprint;
         let Some((_, hip)) = self.previous else {
             self.body.state.footprint = received;
@@ -211,7 +211,7 @@ impl LocalModel {
         let state = &mut self.body.state;
         let growth = received.offset(face) - state.footprint.offset(face);
         state.footprint = received;
-        if growth <= 0.0 && carved {
+        if growth <= 0.0 && retracted {
             return Vec2::zeros();
         }
         let shift = -rotate(state.pose.angle, face.outward()) * growth;
@@ -318,7 +318,7 @@ impl LocalModel {
         });
     }
 
-    /// Brings the replay on; what remains to be corrected is what it is away from the box that is felt.
+    /// One tick of the replay. What remains to be corrected is the way from the box that is felt to the replayed one.
     fn go_on_replaying(&mut self) {
         if self.settings.correction != PoseCorrection::Replay {
             return;

@@ -108,8 +108,8 @@ pub enum Mode {
 impl Mode {
     /// The local model's settings of this mode under a coupling, for a link with delay.
     ///
-    /// Smoothing: lambda = 0.5 is the paper's (section II-A); tau = 20 ms is a study's choice: short
-    /// against a push, long against a tick.
+    /// Smoothing: lambda = 0.5 is the paper's (section II-A); tau = 20 ms is short against a push and
+    /// long against a tick.
     #[must_use]
     pub fn model_settings(self, coupling: Coupling) -> ModelSettings {
         match self {

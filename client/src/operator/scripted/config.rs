@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use crate::operator::hand::HandConfig;
 use crate::operator::route::CLOSE_M;
 
-/// What the scripted operator looks at.
+/// What the scripted operator sees.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Picture {
@@ -59,7 +59,7 @@ pub struct ScriptedConfig {
     pub press_max_n: f64,
     /// Beyond this distance from where it began the box is pushed back, m. Default 1 (a choice).
     pub home_radius_m: f64,
-    /// What it looks at. Default the model.
+    /// What it sees. Default the model.
     pub view: Picture,
     /// The hand.
     pub hand: HandConfig,

@@ -74,7 +74,7 @@ mod tests {
         policy.touch(Vec2::zeros());
         policy.touch(Vec2::new(0.03, 0.0));
         assert!(!policy.is_nudged(0.029) && policy.is_nudged(0.03));
-        // the answer says that it was never touched: it stands where it stood
+        // the answer shows that it was never touched: it stands where it stood
         policy.rested(Face::West, Vec2::new(0.001, 0.0), 0.03);
         assert!(policy.nudges(Face::West));
         assert!(!policy.is_nudged(0.059) && policy.is_nudged(0.06));

@@ -3,7 +3,7 @@
 //! Short delays in narrow steps for the two; the rest of the sweep is too coarse there. What is said of
 //! the crossing is read off these runs and must never be written down from elsewhere.
 
-use mmt_shared::bilateral::Baseline;
+use crate::baselines::Baseline;
 use mmt_shared::model::settings::PoseCorrection;
 
 use super::{Group, Place, mean, run};

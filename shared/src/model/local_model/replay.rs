@@ -1,6 +1,6 @@
 //! The box as it should be: restarted where the slave saw it, then taken through the HIP samples since.
 //!
-//! An update says where the object was at one HIP sample of the past. From there the stored samples are
+//! An update carries the pose of the object at one HIP sample of the past. From there the stored samples are
 //! replayed with the received parameters, a bounded number per tick, until the replay has caught up; from
 //! then on it takes each new sample as well. What it is away from the box that is felt is what remains to
 //! be corrected. It must never touch the box that is felt, and never take longer in a tick than its share.
@@ -50,7 +50,7 @@ impl Replay {
         matches!(self.progress, Progress::Behind(_))
     }
 
-    /// Whether what it says is of the newest sample.
+    /// Whether its pose is that at the newest sample.
     pub(super) fn is_live(&self) -> bool {
         matches!(self.progress, Progress::Live(_))
     }

@@ -1,13 +1,14 @@
 //! Bilateral control, in which force itself crosses the network: the architectures that mmt is compared with.
 //!
-//! Here are the laws that both sides share; the cores of the two sides are `client::bilateral` and
-//! `server::bilateral`. Pure. Nothing here may be used by model-mediated teleoperation: no force that crosses the
-//! network is obeyed there. Where each law comes from: `docs/baselines.md`.
+//! Here are the cores of both sides and the laws that they share; time-domain passivity control, which a session can
+//! use as well, is `mmt_shared::passivity`. Pure. Where each law comes from: `docs/baselines.md`.
 
-pub mod deadband;
+mod arm;
+mod deadband;
+pub mod master;
 pub mod message;
-pub mod passivity;
-pub mod wave;
+pub mod slave;
+mod wave;
 
 use serde::{Deserialize, Serialize};
 

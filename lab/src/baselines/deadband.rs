@@ -7,19 +7,19 @@
 
 use std::time::Duration;
 
-use crate::metrics::F_MIN_N;
-use crate::model::geometry::Vec2;
-use crate::time::Time;
+use mmt_shared::metrics::F_MIN_N;
+use mmt_shared::model::geometry::Vec2;
+use mmt_shared::time::Time;
 
 /// Delta: a change smaller than this share of the last force is not felt (Weber's law), the upper end of the
 /// just noticeable difference.
-pub const DELTA: f64 = 0.10;
+pub(super) const DELTA: f64 = 0.10;
 /// The last force is sent again after this long: half of what a hand needs to react to a touch.
-pub const REPEAT: Duration = Duration::from_millis(100);
+pub(super) const REPEAT: Duration = Duration::from_millis(100);
 
 /// Decides which forces are sent.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct PerceptualDeadband {
+pub(super) struct PerceptualDeadband {
     sent: Option<(Time, Vec2)>,
 }
 
@@ -28,7 +28,7 @@ impl PerceptualDeadband {
     ///
     /// Sent are the first force, one with |f − f_sent| > max(Delta |f_sent|, F_min), and a repeat when
     /// [`REPEAT`] has passed.
-    pub fn offer(&mut self, now: Time, f: Vec2) -> bool {
+    pub(super) fn offer(&mut self, now: Time, f: Vec2) -> bool {
         let sends = self.sent.is_none_or(|(then, sent)| {
             let threshold = (DELTA * sent.norm()).max(F_MIN_N);
             (f - sent).norm() > threshold || now.saturating_since(then) >= REPEAT

@@ -1,20 +1,23 @@
 //! Drives the tool: to the played HIP, or as far towards it as energy, force and speed allow.
 //!
-//! It must never move the tool faster than the limit of play-out, and never say that the tool is at the HIP where it is not.
+//! It must never move the tool faster than the limit of play-out, and never pass on f_m of a HIP that the tool is not at.
+
+pub mod force;
+pub mod port;
 
 use mmt_shared::model::geometry::Vec2;
 use mmt_shared::time::TICK_S;
 
-use crate::bilateral::ToolPort;
 use crate::playout::Played;
-use crate::tool_force::ToolForce;
+use force::ToolForce;
+use port::ToolPort;
 
 /// A tool that is further from the played HIP is behind it, m: 0.1 N at 1000 N/m.
 const BEHIND_M: f64 = 1e-4;
 
 /// The tool between play-out and the object.
 #[derive(Clone, Debug)]
-pub(super) struct ToolDrive {
+pub(crate) struct ToolDrive {
     /// Where it is while it is not at the played HIP, m.
     own: Option<Vec2>,
     /// Whether it goes only as far as the energy allows.
@@ -26,7 +29,7 @@ pub(super) struct ToolDrive {
 }
 
 impl ToolDrive {
-    pub(super) fn new(port: ToolPort, force: ToolForce) -> Self {
+    pub(crate) fn new(port: ToolPort, force: ToolForce) -> Self {
         Self {
             own: None,
             passive: false,
@@ -36,27 +39,27 @@ impl ToolDrive {
         }
     }
 
-    pub(super) fn port(&self) -> &ToolPort {
+    pub(crate) fn port(&self) -> &ToolPort {
         &self.port
     }
 
-    pub(super) fn force(&self) -> &ToolForce {
+    pub(crate) fn force(&self) -> &ToolForce {
         &self.force
     }
 
     /// Whether the tool goes only as far as the energy allows.
-    pub(super) fn is_passive(&self) -> bool {
+    pub(crate) fn is_passive(&self) -> bool {
         self.passive
     }
 
     /// Whether the limit of the force keeps the tool from the HIP.
-    pub(super) fn is_held_back(&self) -> bool {
+    pub(crate) fn is_held_back(&self) -> bool {
         self.held_back
     }
 
     /// Takes in E_in of the master's port, J: from now on the tool goes only as far as that pays for. `hip` is the HIP
     /// that was played last, m.
-    pub(super) fn credit(&mut self, other_in_j: f64, hip: Option<Vec2>) {
+    pub(crate) fn credit(&mut self, other_in_j: f64, hip: Option<Vec2>) {
         self.port.receive(other_in_j);
         self.own = self.own.or(hip);
         self.passive = true;
@@ -65,16 +68,18 @@ impl ToolDrive {
     /// One tick: the tool follows the played HIP from `before` (the one played last, m), or goes towards it. When it may
     /// follow again it catches up within the speed limit. The force of the master is that of the HIP, not of a tool that
     /// is held back.
-    pub(super) fn lead(&mut self, before: Option<Vec2>, played: Played) -> Played {
+    pub(crate) fn step(&mut self, before: Option<Vec2>, played: Played) -> Played {
         let Some(tool) = self.own.or(before) else {
             return played;
         };
         let wanted = played.hip - tool;
         let follows = self.own.is_none() && !self.passive;
-        let free = match (follows, self.passive) {
-            (true, _) => wanted,
-            (_, true) => self.port.allowed(wanted),
-            (_, false) => self.port.within_speed(wanted),
+        let free = if follows {
+            wanted
+        } else if self.passive {
+            self.port.allowed(wanted)
+        } else {
+            self.port.within_speed(wanted)
         };
         let period_s = if follows {
             period_s(&wanted, &played)
@@ -87,9 +92,10 @@ impl ToolDrive {
             self.force.moved(played.velocity, false);
             return played;
         }
-        let way = match held {
-            true => self.port.within_speed(allowed),
-            false => free,
+        let way = if held {
+            self.port.within_speed(allowed)
+        } else {
+            free
         };
         let velocity = way / period_s;
         self.port.moved(way);
@@ -107,7 +113,7 @@ impl ToolDrive {
     }
 
     /// Takes the force that is measured where the tool is, N.
-    pub(super) fn measured(&mut self, force: Vec2) {
+    pub(crate) fn measured(&mut self, force: Vec2) {
         self.port.measured(force);
         self.force.measured(force);
     }

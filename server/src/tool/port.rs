@@ -1,10 +1,10 @@
 //! The tool's port: what force the tool holds, what energy passed it, and how far it may go for that.
 //!
 //! The same for a slave whose forces cross the network all the time and for one that does so for a while. It must never
-//! look at the true force: the sensor's is what it has.
+//! use the true force: the sensor's is what it has.
 
-use mmt_shared::bilateral::passivity::{PortEnergy, admittance_controller};
 use mmt_shared::model::geometry::Vec2;
+use mmt_shared::passivity::{PortEnergy, admittance_controller};
 use mmt_shared::time::TICK_S;
 
 /// A force below this many times the sensor's noise per axis is taken for none: three ticks in ten thousand in free
@@ -48,7 +48,7 @@ impl ToolPort {
         self.held
     }
 
-    /// Takes in E_in of the master's port, J; it only grows, so older news changes nothing.
+    /// Takes in E_in of the master's port, J; it only grows, so an older one changes nothing.
     pub fn receive(&mut self, other_in_j: f64) {
         self.other_in_j = self.other_in_j.max(other_in_j);
     }

@@ -4,15 +4,15 @@
 //! turn the hand's velocity and the wave that came back into a force. It must never wait, allocate or read a clock,
 //! and force leaves it through the limiter only.
 
-use mmt_shared::bilateral::Baseline;
-use mmt_shared::bilateral::message::{ToMaster, ToSlave};
-use mmt_shared::bilateral::passivity::{PortEnergy, RESERVE_J, impedance_controller};
-use mmt_shared::bilateral::wave::{WaveImpedance, WaveReceiver, WaveSender, WaveSum};
+use mmt_client::limiter::ForceLimiter;
 use mmt_shared::model::geometry::Vec2;
 use mmt_shared::model::sample::{ForceCounts, HipCounts, HipSample};
+use mmt_shared::passivity::{PortEnergy, RESERVE_J, impedance_controller};
 use mmt_shared::time::{TICK_S, Time};
 
-use crate::limiter::ForceLimiter;
+use super::Baseline;
+use super::message::{ToMaster, ToSlave};
+use super::wave::{WaveImpedance, WaveReceiver, WaveSender, WaveSum};
 
 /// What one haptic tick gave.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -47,7 +47,7 @@ pub struct BilateralMaster {
 }
 
 impl BilateralMaster {
-    /// A master that has heard nothing yet. `smoothing_ticks` is the waves' smoothing time.
+    /// A master that has received nothing yet. `smoothing_ticks` is the waves' smoothing time.
     #[must_use]
     pub fn new(baseline: Baseline, smoothing_ticks: u16, mut limiter: ForceLimiter) -> Self {
         limiter.engage();
@@ -146,7 +146,7 @@ impl BilateralMaster {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::limiter::{Limits, RAMP_TICKS};
+    use mmt_client::limiter::{Limits, RAMP_TICKS};
 
     fn master(baseline: Baseline) -> BilateralMaster {
         let limiter = ForceLimiter::try_new(Limits::default()).unwrap();

@@ -1,13 +1,13 @@
-//! What the two sides of a bilateral architecture say to each other, and how many bytes that is.
+//! The messages between the two sides of a bilateral architecture, and their length in bytes.
 //!
 //! Typed messages for virtual time: they never meet a socket, so there is a size and no encoding. A message must
 //! never carry what its architecture does not use: sizes are compared.
 
 use super::Baseline;
 use super::wave::WaveSum;
-use crate::model::sample::{ForceCounts, HipSample};
-use crate::time::Time;
-use crate::wire::HEADER_BYTES;
+use mmt_shared::model::sample::{ForceCounts, HipSample};
+use mmt_shared::time::Time;
+use mmt_shared::wire::HEADER_BYTES;
 
 /// Bytes around the payload of one datagram over IPv4: IP 20 (RFC 791), UDP 8 (RFC 768), QUIC's short header 11
 /// (flags 1, connection ID 8, packet number 2: RFC 9000, 17.3.1), type and length of the DATAGRAM frame 3 (RFC 9221, 4),

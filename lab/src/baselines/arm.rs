@@ -4,13 +4,13 @@
 //! matched to the waves (B = b) so that they are not reflected. The controller's f, not the measured force, goes back.
 //! It must never move faster than the tool may.
 
-use mmt_shared::bilateral::wave::WaveImpedance;
+use super::wave::WaveImpedance;
 use mmt_shared::model::geometry::Vec2;
 use mmt_shared::time::TICK_S;
 
 /// Mass of the tool, kg: light against a hand (0.5 kg) and the box (0.7 kg), heavy enough for 1 kHz
 /// ((k_p + K) T² / m = 0.01 at 1000 N/m each).
-pub const TOOL_MASS_KG: f64 = 0.2;
+const TOOL_MASS_KG: f64 = 0.2;
 
 /// The arm.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -7,15 +7,15 @@
 //! `u = (b v + f)/√(2b)` goes to the slave, `w = (b v − f)/√(2b)` comes back, and f·v = (|u|² − |w|²)/2.
 //! A wave must never leave a side, or be taken in by one, without the energy for it.
 
-use crate::model::geometry::Vec2;
-use crate::time::TICK_S;
+use mmt_shared::model::geometry::Vec2;
+use mmt_shared::time::TICK_S;
 
 /// Credit of each sending side, J: covers what sampling shifts by a tick (F v T = 0.4 mJ at 2.5 N and 0.15 m/s).
-pub const CREDIT_J: f64 = 4e-4;
+pub(super) const CREDIT_J: f64 = 4e-4;
 
 /// The wave impedance b.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct WaveImpedance {
+pub(super) struct WaveImpedance {
     b: f64,
     root_2b: f64,
 }
@@ -34,40 +34,40 @@ impl Default for WaveImpedance {
 impl WaveImpedance {
     /// b, N s/m.
     #[must_use]
-    pub fn damping_ns_per_m(&self) -> f64 {
+    pub(super) fn damping_ns_per_m(&self) -> f64 {
         self.b
     }
 
     /// The master's force on the object, N, for the hand's velocity v (m/s) and the wave w that came back.
     #[must_use]
-    pub fn master_force(&self, v: Vec2, w: Vec2) -> Vec2 {
+    pub(super) fn master_force(&self, v: Vec2, w: Vec2) -> Vec2 {
         // f = b v − √(2b) w
         v * self.b - w * self.root_2b
     }
 
     /// The master's wave to the slave, √W.
     #[must_use]
-    pub fn master_wave(&self, v: Vec2, w: Vec2) -> Vec2 {
+    pub(super) fn master_wave(&self, v: Vec2, w: Vec2) -> Vec2 {
         // u = √(2b) v − w
         v * self.root_2b - w
     }
 
     /// The velocity (m/s) that the slave's controller aims at, when that controller is f = `force` + b (v_d − `v`).
     #[must_use]
-    pub fn slave_velocity(&self, u: Vec2, force: Vec2, v: Vec2) -> Vec2 {
+    pub(super) fn slave_velocity(&self, u: Vec2, force: Vec2, v: Vec2) -> Vec2 {
         // b v_d + f = √(2b) u, solved for v_d with the controller's own f: no algebraic loop is left
         (u * self.root_2b - force + v * self.b) / (2.0 * self.b)
     }
 
     /// The slave's wave to the master, √W, for the force f (N) of its controller.
     #[must_use]
-    pub fn slave_wave(&self, u: Vec2, f: Vec2) -> Vec2 {
+    pub(super) fn slave_wave(&self, u: Vec2, f: Vec2) -> Vec2 {
         // w = u − √(2/b) f
         u - f * (2.0 / self.root_2b)
     }
 }
 
-/// What a packet says of all waves so far: a lost packet takes nothing away with it.
+/// The sum of all waves so far, which a packet carries: a lost packet takes nothing away with it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct WaveSum {
     /// ∫u dt, √W s.
@@ -80,21 +80,21 @@ pub struct WaveSum {
 ///
 /// What is missing is made up for over a smoothing time. At one tick the wave is the other one itself as long as nothing
 /// is lost. On a path that loses packets a longer time keeps energy in hand for catching up: what was sent evenly over
-/// ten ticks costs ten times as much in one. Without news the wave fades to nothing; with it positions meet again.
+/// ten ticks costs ten times as much in one. Without packets the wave fades to nothing; with them positions meet again.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct BoundedWave {
+pub(super) struct BoundedWave {
     sum: WaveSum,
 }
 
 impl BoundedWave {
     /// What has been let out so far.
     #[must_use]
-    pub fn sum(&self) -> WaveSum {
+    pub(super) fn sum(&self) -> WaveSum {
         self.sum
     }
 
     /// The wave of this tick, √W: towards `integral` (√W s) within `ticks`, its energy so far at most `energy_j`.
-    pub fn follow(&mut self, integral: Vec2, energy_j: f64, ticks: f64) -> Vec2 {
+    pub(super) fn follow(&mut self, integral: Vec2, energy_j: f64, ticks: f64) -> Vec2 {
         let wanted = (integral - self.sum.integral) / (TICK_S * ticks);
         let costs_j = 0.5 * wanted.norm_squared() * TICK_S;
         let margin_j = (energy_j - self.sum.energy_j).max(0.0);
@@ -111,14 +111,14 @@ impl BoundedWave {
 
 /// Sends a side's own waves within what the side took in.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct WaveSender {
+pub(super) struct WaveSender {
     wanted: Vec2,
     sent: BoundedWave,
 }
 
 impl WaveSender {
     /// Sends a wave (√W); `taken_in_j` is all the energy that this side has taken in, by waves and through its port, J.
-    pub fn send(&mut self, wave: Vec2, taken_in_j: f64) -> WaveSum {
+    pub(super) fn send(&mut self, wave: Vec2, taken_in_j: f64) -> WaveSum {
         self.wanted += wave * TICK_S;
         self.sent.follow(self.wanted, taken_in_j + CREDIT_J, 1.0);
         self.sent.sum()
@@ -127,7 +127,7 @@ impl WaveSender {
 
 /// Receives the other side's waves in any order.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct WaveReceiver {
+pub(super) struct WaveReceiver {
     ticks: f64,
     received: WaveSum,
     taken: BoundedWave,
@@ -136,7 +136,7 @@ pub struct WaveReceiver {
 impl WaveReceiver {
     /// Nothing received yet; `ticks` is the smoothing time, at least one tick.
     #[must_use]
-    pub fn new(ticks: u16) -> Self {
+    pub(super) fn new(ticks: u16) -> Self {
         Self {
             ticks: f64::from(ticks.max(1)),
             received: WaveSum::default(),
@@ -144,22 +144,22 @@ impl WaveReceiver {
         }
     }
 
-    /// Takes in what a packet says; an older packet than the newest says nothing new.
-    pub fn receive(&mut self, sum: WaveSum) {
+    /// Takes in the sum of a packet; one that is older than the newest changes nothing.
+    pub(super) fn receive(&mut self, sum: WaveSum) {
         if sum.energy_j > self.received.energy_j {
             self.received = sum;
         }
     }
 
     /// The wave of this tick, √W.
-    pub fn take(&mut self) -> Vec2 {
+    pub(super) fn take(&mut self) -> Vec2 {
         self.taken
             .follow(self.received.integral, self.received.energy_j, self.ticks)
     }
 
     /// Energy taken in so far, J.
     #[must_use]
-    pub fn energy_j(&self) -> f64 {
+    pub(super) fn energy_j(&self) -> f64 {
         self.taken.sum().energy_j
     }
 }
@@ -167,7 +167,7 @@ impl WaveReceiver {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::rng::Substream;
+    use mmt_shared::rng::Substream;
 
     fn random(stream: &mut Substream) -> Vec2 {
         Vec2::new(stream.normal(), stream.normal())

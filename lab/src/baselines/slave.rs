@@ -3,31 +3,28 @@
 //! Play-out, environment and sensing are those of the slave of model-mediated teleoperation. The tool goes to the
 //! played HIP (position–force), as far along it as the energy allows (TDPA), or where the waves lead the arm. A force
 //! that may be the sensor's noise goes out as none. Pure: time is an argument, the seed comes with the configuration. It must
-//! never look at the truth for anything but reports.
+//! never use the truth for anything but reports.
 
-mod arm;
-mod port;
-
-pub use arm::TOOL_MASS_KG;
-pub use port::ToolPort;
-
-use mmt_shared::bilateral::Baseline;
-use mmt_shared::bilateral::deadband::PerceptualDeadband;
-use mmt_shared::bilateral::message::{ToMaster, ToSlave};
-use mmt_shared::bilateral::passivity::PortEnergy;
-use mmt_shared::bilateral::wave::{WaveReceiver, WaveSender, WaveSum};
 use mmt_shared::metrics::ForceMetrics;
 use mmt_shared::model::contact::Coupling;
 use mmt_shared::model::geometry::{Pose, Vec2};
 use mmt_shared::model::sample::ForceCounts;
+use mmt_shared::passivity::PortEnergy;
 use mmt_shared::time::{TICK_S, Time};
 
-use crate::environment::{Environment, EnvironmentConfig};
-use crate::playout::{Played, PlayoutBuffer};
-use crate::sensing::Sensing;
-use crate::slave::{SlaveConfig, SlaveError};
-use crate::trigger::ContactDetector;
-use arm::Arm;
+use mmt_server::contact::ContactStage;
+use mmt_server::environment::{Environment, EnvironmentConfig};
+use mmt_server::playout::{Played, PlayoutBuffer};
+use mmt_server::sensing::Sensing;
+use mmt_server::slave::{SlaveConfig, SlaveError};
+use mmt_server::tool::port::ToolPort;
+use mmt_server::trigger::ContactDetector;
+
+use super::Baseline;
+use super::arm::Arm;
+use super::deadband::PerceptualDeadband;
+use super::message::{ToMaster, ToSlave};
+use super::wave::{WaveReceiver, WaveSender, WaveSum};
 
 /// What one tick of the slave gave.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -52,9 +49,7 @@ pub struct BilateralSlaveTick {
 pub struct BilateralSlave {
     baseline: Baseline,
     playout: PlayoutBuffer,
-    environment: Environment,
-    sensing: Sensing,
-    contact: ContactDetector,
+    contact: ContactStage,
     tool: Vec2,
     port: ToolPort,
     /// All the work that the tool did, J.
@@ -84,13 +79,13 @@ impl BilateralSlave {
             coupling,
             ..config.environment
         })?;
+        let sensing = Sensing::try_new(config.sensing, config.seed)?;
+        let detector = ContactDetector::new(config.trigger.contact);
         let speed_max_m_per_s = config.playout.speed_max_m_per_s;
         Ok(Self {
             baseline,
             playout,
-            environment,
-            sensing: Sensing::try_new(config.sensing, config.seed)?,
-            contact: ContactDetector::new(config.trigger.contact),
+            contact: ContactStage::new(environment, sensing, detector),
             tool: hip,
             port: ToolPort::new(config.sensing.force_noise_n, speed_max_m_per_s),
             put_out_j: 0.0,
@@ -102,10 +97,10 @@ impl BilateralSlave {
         })
     }
 
-    /// The real object. What it says is the truth: for reports and pictures only.
+    /// The real object: the truth, for reports and pictures only.
     #[must_use]
     pub fn environment(&self) -> &Environment {
-        &self.environment
+        self.contact.environment()
     }
 
     /// The play-out buffer.
@@ -139,20 +134,18 @@ impl BilateralSlave {
         let (way, wave) = self.way(&played);
         self.tool += way;
         self.put_out_j += self.port.moved(way);
-        let truth = self.environment.pose();
-        let contact = self.environment.step(self.tool, way / TICK_S);
-        let sensed = self.sensing.sense(now, self.tool, contact.force, &truth);
+        let contact = self.contact.step(now, self.tool, way / TICK_S);
         if let Some(f_m) = played.force {
-            self.force.push(sensed.force, f_m);
+            self.force.push(contact.force, f_m);
         }
-        self.port.measured(sensed.force);
+        self.port.measured(contact.force);
         Some(BilateralSlaveTick {
             stamp: played.stamp,
             tool: self.tool,
-            f_s: sensed.force,
-            true_force: contact.force,
-            in_contact: self.contact.step(sensed.force.norm()),
-            truth,
+            f_s: contact.force,
+            true_force: contact.true_force,
+            in_contact: contact.in_contact,
+            truth: contact.truth,
             message: self.message(now, wave),
         })
     }

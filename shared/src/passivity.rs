@@ -4,7 +4,7 @@
 //! 2002 (observer, series and parallel controller); Ryu, Artigas and Preusche, "A passive bilateral control scheme
 //! for a teleoperator with time-varying communication delay", Mechatronics 20(7), 2010 (energy split per port and sent
 //! along). The law: what leaves the network at one port never exceeds what came in at the other as far as is known
-//! here, `E_out(k) <= E_in_other(k − delay)`. E_in never falls, so old news is safe news, at any delay, jitter or loss.
+//! here, `E_out(k) <= E_in_other(k − delay)`. E_in never falls, so an old value is a safe one, at any delay, jitter or loss.
 //! It must never take in a credit twice.
 
 use crate::model::geometry::Vec2;

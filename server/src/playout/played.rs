@@ -1,0 +1,74 @@
+//! What play-out gives in a tick, and the counts of what happened to the samples.
+
+use mmt_shared::model::geometry::Vec2;
+use mmt_shared::time::Time;
+use serde::{Deserialize, Serialize};
+
+/// Where a played HIP comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Status {
+    /// From samples: one, or two neighbours.
+    Interpolated,
+    /// Ahead of all samples, at constant velocity.
+    Extrapolated,
+    /// Samples ran out longer ago than is extrapolated: ramping to a stop, or stopped.
+    Stopped,
+}
+
+/// What the slave's tool follows in one tick.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Played {
+    /// The point of the master's clock that is played, at most a second after the newest sample. Never decreases, unless
+    /// the master's clock had to be learned anew and went back by more than a second.
+    pub stamp: Time,
+    /// HIP, world frame, m.
+    pub hip: Vec2,
+    /// Its velocity over the last tick, world frame, m/s.
+    pub velocity: Vec2,
+    /// `f_m` that the master rendered for this HIP, N; none where the HIP is not the master's: extrapolated,
+    /// stopped or held back by the speed limit.
+    pub force: Option<Vec2>,
+    /// Where it comes from.
+    pub status: Status,
+    /// Whether the speed limit holds the HIP back.
+    pub limited: bool,
+}
+
+/// What happened to samples that were not played, and how often play-out was not nominal.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct PlayoutCounts {
+    /// Samples pushed.
+    pub pushed: u64,
+    /// Came after their time; the newest of them still guides the extrapolation.
+    pub late: u64,
+    /// Copies of a sample that was there.
+    pub duplicate: u64,
+    /// Oldest samples that made room, because the slave did not tick.
+    pub overflow: u64,
+    /// Stamps from more than a second in the future.
+    pub implausible: u64,
+    /// Times the sender's clock was learned anew.
+    pub relearned: u64,
+    /// Ticks played from samples.
+    pub interpolated: u64,
+    /// Ticks extrapolated.
+    pub extrapolated: u64,
+    /// Ticks stopping or stopped.
+    pub stopped: u64,
+    /// Ticks in which the speed limit held the HIP back.
+    pub limited: u64,
+}
+
+impl PlayoutCounts {
+    /// Counts a tick.
+    pub(super) fn note(&mut self, played: &Played) {
+        let counter = match played.status {
+            Status::Interpolated => &mut self.interpolated,
+            Status::Extrapolated => &mut self.extrapolated,
+            Status::Stopped => &mut self.stopped,
+        };
+        *counter += 1;
+        self.limited += u64::from(played.limited);
+    }
+}

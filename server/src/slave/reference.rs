@@ -1,0 +1,94 @@
+//! What the trigger compares the measured force with, and all that it is given in a tick.
+
+use mmt_shared::model::geometry::{Vec2, wrap_angle};
+use mmt_shared::model::local_model::LocalModel;
+
+use super::object::ObjectEstimate;
+use crate::contact::Contact;
+use crate::shadow::{Shadow, TriggerReference};
+use crate::trigger::TriggerInput;
+
+/// One of the three references.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct ForceReference {
+    kind: TriggerReference,
+    /// f_m of the newest sample that was played, N.
+    echo: Vec2,
+    /// f_s at the last update, N.
+    at_update: Vec2,
+}
+
+impl ForceReference {
+    pub(super) fn new(kind: TriggerReference) -> Self {
+        Self {
+            kind,
+            echo: Vec2::zeros(),
+            at_update: Vec2::zeros(),
+        }
+    }
+
+    /// Takes f_m of the sample that is played, N; none where the HIP is not the master's.
+    pub(super) fn take_echo(&mut self, f_m: Option<Vec2>) {
+        self.echo = f_m.unwrap_or(self.echo);
+    }
+
+    /// Takes f_s at an update, N.
+    pub(super) fn take_update(&mut self, f_s: Vec2) {
+        self.at_update = f_s;
+    }
+
+    /// The copy of the master's model that a contact of the master alone is judged by.
+    pub(super) fn model<'a>(&self, shadow: &'a Shadow) -> &'a LocalModel {
+        match self.kind {
+            TriggerReference::Echo => shadow.confirmed(),
+            TriggerReference::Shadow | TriggerReference::None => shadow.ahead(),
+        }
+    }
+
+    /// The trigger's input. `held_back` says whether the limit of the tool's force keeps the tool from the HIP.
+    pub(super) fn input(
+        &self,
+        contact: &Contact,
+        object: &ObjectEstimate,
+        shadow: &Shadow,
+        held_back: bool,
+    ) -> TriggerInput {
+        let (f_m, shadow_in_contact) = self.model_force(contact, shadow, held_back);
+        let estimate = object.estimator.estimate();
+        let (pose, model) = (object.observer.pose(), shadow.ahead().state());
+        TriggerInput {
+            f_s: contact.force,
+            f_m,
+            slave_in_contact: contact.in_contact,
+            shadow_in_contact,
+            // a model that does not stand where the object does is a mismatch although the object sticks
+            sticking: estimate.sticking
+                && estimate.holding.is_none_or(|c| model.params.c() > 0.5 * c),
+            speed: estimate.speed,
+            acceleration: estimate.acceleration,
+            force_deviation: estimate.force_deviation(),
+            params: object.params,
+            shift: pose.position - model.pose.position,
+            turn: wrap_angle(pose.angle - model.pose.angle),
+        }
+    }
+
+    /// f_m (N), and whether the model is in contact.
+    ///
+    /// Where the tool is held back, tool and model are at different places. A larger force of the model at the HIP is
+    /// then no error, nor is none at all; a smaller one is.
+    fn model_force(&self, contact: &Contact, shadow: &Shadow, held_back: bool) -> (Vec2, bool) {
+        let rendered = shadow.rendered();
+        let (f_m, in_contact) = match self.kind {
+            TriggerReference::Shadow => (rendered.force, rendered.in_contact()),
+            TriggerReference::Echo => (self.echo, self.echo != Vec2::zeros()),
+            TriggerReference::None => (self.at_update, contact.in_contact),
+        };
+        if !held_back {
+            return (f_m, in_contact);
+        }
+        let f_s = contact.force;
+        let smaller = in_contact && f_m.dot(&f_s) < f_s.norm_squared();
+        (if smaller { f_m } else { f_s }, contact.in_contact)
+    }
+}
