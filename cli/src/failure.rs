@@ -27,7 +27,7 @@ impl Exit {
 /// The code after a second Ctrl-C: 128 + SIGINT.
 pub(crate) const INTERRUPTED_TWICE: i32 = 130;
 
-/// A failure as it is told to a person.
+/// A failure as a person reads it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Failure {
     exit: Exit,
@@ -36,7 +36,7 @@ pub(crate) struct Failure {
 }
 
 impl Failure {
-    /// A failure of this kind; `what` says what is wrong and where.
+    /// A failure of this kind; `what` names what is wrong and where.
     pub(crate) fn new(exit: Exit, what: impl fmt::Display) -> Self {
         Self {
             exit,
@@ -83,7 +83,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_failure_says_what_and_what_to_do() {
+    fn a_failure_names_what_is_wrong_and_what_to_do() {
         let failure = Failure::usage("no file x").remedy("check the path");
         assert_eq!(
             failure.to_string(),

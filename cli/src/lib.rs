@@ -1,7 +1,7 @@
 //! The command `mmt`: arguments become a configuration, the configuration becomes a run.
 //!
 //! Thin: nothing is computed here that a core or a host could compute. Data goes to stdout, messages go to
-//! stderr; what is wrong is told with what, where and what to do, and an exit code (`docs/commands.md`).
+//! stderr; an error names what is wrong, where, and what to do, and has an exit code (`docs/commands.md`).
 
 #![allow(
     clippy::disallowed_methods,
@@ -69,7 +69,7 @@ fn answer(error: &clap::Error) -> ExitCode {
     }
 }
 
-/// A panic is a bug and is told as one, but on a terminal that can be read.
+/// A panic is a bug and is reported as one, but on a terminal that can be read.
 fn restore_terminal_on_panic() {
     let tell = std::panic::take_hook();
     std::panic::set_hook(Box::new(move |panic| {

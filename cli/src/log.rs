@@ -12,7 +12,7 @@ use crate::output::note;
 
 /// The environment variable that chooses what is logged.
 pub(crate) const VARIABLE: &str = "MMT_LOG";
-/// What is logged without it: our own news and everybody's warnings.
+/// What is logged without it: our own messages and everybody's warnings.
 const DEFAULT: &str = "warn,mmt_cli=info,mmt_client=info,mmt_server=info,mmt_netem=info";
 /// Messages kept while the live view is shown; older ones are dropped.
 const KEPT_MAX: usize = 100;

@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use crate::failure::Failure;
 
-/// Writes a message and a line end to stderr; if nobody can read it there is nobody to tell.
+/// Writes a message and a line end to stderr; it is dropped if nobody can read it.
 pub(crate) fn note(message: impl Display) {
     let _ = writeln!(io::stderr().lock(), "{message}");
 }

@@ -2,7 +2,7 @@
 //! real sockets with real clocks.
 //!
 //! A live run is compared with the median over seeds of virtual time, and repeated if it does not agree. A host that is
-//! too busy for 1 kHz says so by its own loops: if no run kept its time the tolerances are doubled and that is said loudly.
+//! too busy for 1 kHz shows it by its own loops: if no run kept its time the tolerances are doubled and a loud line tells so.
 
 #![allow(
     clippy::disallowed_methods,
@@ -14,7 +14,7 @@
 use std::time::Duration;
 
 use crate::harness::hosts::{Hosts, HostsError};
-use crate::harness::process::{Running, did_not_run, number, say_loudly};
+use crate::harness::process::{Running, did_not_run, number, warn_loudly};
 use mmt_lab::statistics::median;
 use mmt_lab::world::{World, WorldConfig};
 use mmt_netem::LinkConfig;
@@ -170,7 +170,7 @@ fn agree(name: &str, playout: PlayoutConfig, live: impl Fn(u64) -> (Value, Value
     let best = best.unwrap();
     let room = if best.kept_its_time() { 1.0 } else { 2.0 };
     if !best.kept_its_time() {
-        say_loudly(&format!(
+        warn_loudly(&format!(
             "DEGRADED: {name}: this host skipped {:.1} % of the periods; tolerances are doubled",
             100.0 * best.skipped
         ));

@@ -1,4 +1,4 @@
-//! The values of arguments: what is wrong with one is told with the place and what would be right.
+//! The values of arguments. An error names the place and what would be right.
 
 use std::convert::Infallible;
 use std::fmt;

@@ -1,5 +1,5 @@
 //! Looking at a run: a dashboard on a terminal, plain lines elsewhere. Shows snapshots; computes nothing
-//! that a report would tell.
+//! that a report would hold.
 
 mod dashboard;
 mod history;

@@ -27,14 +27,14 @@ pub(crate) enum HostsError {
     #[error(transparent)]
     Process(#[from] ProcessError),
     /// A process ended with another code than 0.
-    #[error("exit code {code:?}: {said}")]
+    #[error("exit code {code:?}: {printed}")]
     Ended {
         /// Its exit code; none after a signal.
         code: Option<i32>,
         /// Its standard error.
-        said: String,
+        printed: String,
     },
-    /// Something else was said or counted than should have been.
+    /// Something else was printed or counted than should have been.
     #[error("unexpected: {0}")]
     Unexpected(String),
 }
@@ -47,9 +47,9 @@ fn ip(words: &str) -> Result<(), HostsError> {
     if output.status.success() {
         return Ok(());
     }
-    let said = String::from_utf8_lossy(&output.stderr);
-    let said = format!("`ip {words}`: {}", said.trim());
-    Err(HostsError::Unavailable(said))
+    let printed = String::from_utf8_lossy(&output.stderr);
+    let printed = format!("`ip {words}`: {}", printed.trim());
+    Err(HostsError::Unavailable(printed))
 }
 
 /// The three hosts; gone when dropped, with the cables between them.
@@ -217,7 +217,7 @@ fn well(ended: Ended) -> Result<Ended, HostsError> {
         Some(0) => Ok(ended),
         code => Err(HostsError::Ended {
             code,
-            said: ended.err,
+            printed: ended.err,
         }),
     }
 }

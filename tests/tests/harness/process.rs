@@ -23,26 +23,26 @@ pub(crate) enum ProcessError {
     System {
         /// What was tried.
         what: String,
-        /// What the system said.
+        /// The system's error.
         source: std::io::Error,
     },
     /// It printed or ended nothing in time.
-    #[error("{what} within {seconds} s; so far it said:\n{said}")]
+    #[error("{what} within {seconds} s; so far it printed:\n{printed}")]
     Late {
         /// What was waited for.
         what: String,
         /// For how long.
         seconds: f64,
         /// Its standard output and error.
-        said: String,
+        printed: String,
     },
     /// It ended with another document than one of JSON.
-    #[error("no JSON document ({source}) in:\n{said}")]
+    #[error("no JSON document ({source}) in:\n{printed}")]
     Document {
         /// Why.
         source: serde_json::Error,
         /// Its standard output and error.
-        said: String,
+        printed: String,
     },
 }
 
@@ -85,7 +85,7 @@ impl Ended {
         let lines: Vec<_> = self.out.iter().skip(skip).map(String::as_str).collect();
         serde_json::from_str(&lines.join("\n")).map_err(|source| ProcessError::Document {
             source,
-            said: format!("{}\n{}", self.out.join("\n"), self.err),
+            printed: format!("{}\n{}", self.out.join("\n"), self.err),
         })
     }
 }
@@ -103,11 +103,11 @@ impl Running {
             .stderr(Stdio::piped())
             .spawn()
             .map_err(|source| system(format!("starting {name}"), source))?;
-        let (say, lines) = channel();
+        let (send, lines) = channel();
         let (out, err) = (child.stdout.take(), child.stderr.take());
-        let say_err = say.clone();
-        thread::spawn(move || read(out, |line| say.send(Line::Out(line)).is_ok()));
-        thread::spawn(move || read(err, |line| say_err.send(Line::Err(line)).is_ok()));
+        let send_err = send.clone();
+        thread::spawn(move || read(out, |line| send.send(Line::Out(line)).is_ok()));
+        thread::spawn(move || read(err, |line| send_err.send(Line::Err(line)).is_ok()));
         Ok(Self {
             name,
             child,
@@ -136,8 +136,8 @@ impl Running {
         within: Duration,
         wanted: impl Fn(&str) -> bool,
     ) -> Result<String, ProcessError> {
-        let said = self.out.iter().chain(&self.err);
-        if let Some(line) = said.into_iter().find(|line| wanted(line)) {
+        let printed = self.out.iter().chain(&self.err);
+        if let Some(line) = printed.into_iter().find(|line| wanted(line)) {
             return Ok(line.clone());
         }
         let end = Instant::now() + within;
@@ -145,7 +145,7 @@ impl Running {
             let left = end.saturating_duration_since(Instant::now());
             let line = self
                 .take_line(left)
-                .map_err(|_| self.late("did not say", within))?;
+                .map_err(|_| self.late("did not print", within))?;
             if wanted(&line) {
                 return Ok(line);
             }
@@ -220,7 +220,7 @@ impl Running {
         ProcessError::Late {
             what: format!("{} {what} what it should", self.name),
             seconds: within.as_secs_f64(),
-            said: [&self.out[..], &self.err[..]].concat().join("\n"),
+            printed: [&self.out[..], &self.err[..]].concat().join("\n"),
         }
     }
 }
@@ -238,10 +238,10 @@ fn system(what: String, source: std::io::Error) -> ProcessError {
 }
 
 /// Hands over line by line until the end or until nobody listens.
-fn read(from: Option<impl Read>, say: impl Fn(String) -> bool) {
+fn read(from: Option<impl Read>, send: impl Fn(String) -> bool) {
     let lines = from.map(|from| BufReader::new(from).lines());
     let mut lines = lines.into_iter().flatten().map_while(Result::ok);
-    let _ = lines.all(say);
+    let _ = lines.all(send);
 }
 
 /// The number at a path of keys such as `/link/rtt_ms/p50`; none if it is null or not there.
@@ -250,7 +250,7 @@ pub(crate) fn number(document: &Value, path: &str) -> Option<f64> {
     document.pointer(path).and_then(Value::as_f64)
 }
 
-/// Says so loudly when a test cannot run here, and fails it where everything must run: where the
+/// Prints a loud warning when a test cannot run here, and fails it where everything must run: where the
 /// environment variable `CI` is set.
 ///
 /// # Panics
@@ -258,11 +258,11 @@ pub(crate) fn number(document: &Value, path: &str) -> Option<f64> {
 pub(crate) fn did_not_run(test: &str, why: &str) {
     let ci = std::env::var_os("CI").is_some();
     assert!(!ci, "{test} did not run, and CI must run it: {why}");
-    say_loudly(&format!("NOT RUN: {test}: {why}"));
+    warn_loudly(&format!("NOT RUN: {test}: {why}"));
 }
 
-/// Says what must not be overlooked although the test passes.
-pub(crate) fn say_loudly(what: &str) {
+/// Prints what must not be overlooked although the test passes.
+pub(crate) fn warn_loudly(what: &str) {
     // not eprintln: the harness keeps that to itself when a test passes
     let _ = writeln!(std::io::stderr(), "\n**** {what} ****\n");
 }

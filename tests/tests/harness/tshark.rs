@@ -20,7 +20,7 @@ pub(crate) const STREAM_PORT: u16 = 4002;
 /// Link type of packets that begin with their IP header (`LINKTYPE_RAW`, tcpdump.org).
 const RAW_IP: u32 = 101;
 
-/// Why tshark said nothing.
+/// Why tshark printed nothing.
 #[derive(Debug, Error)]
 pub(crate) enum TsharkError {
     /// It is not installed.
@@ -31,7 +31,7 @@ pub(crate) enum TsharkError {
     File {
         /// Which.
         path: PathBuf,
-        /// What the system said.
+        /// The system's error.
         source: std::io::Error,
     },
     /// It failed, or the dissector did.
@@ -132,10 +132,10 @@ pub(crate) fn tshark(capture: &Path, options: &[String]) -> Result<String, Tshar
         .output()
         .map_err(TsharkError::Missing)?;
     let text = String::from_utf8_lossy(&output.stdout).into_owned();
-    let said = String::from_utf8_lossy(&output.stderr);
+    let printed = String::from_utf8_lossy(&output.stderr);
     let fault = ["Lua Error", "Lua:", "lua_script"];
-    if !output.status.success() || fault.iter().any(|f| text.contains(f) || said.contains(f)) {
-        return Err(TsharkError::Failed(format!("{said}\n{text}")));
+    if !output.status.success() || fault.iter().any(|f| text.contains(f) || printed.contains(f)) {
+        return Err(TsharkError::Failed(format!("{printed}\n{text}")));
     }
     Ok(text)
 }
