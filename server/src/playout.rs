@@ -19,10 +19,10 @@ pub use played::{Played, PlayoutCounts, Status};
 
 use std::time::Duration;
 
-use mmt_shared::channel::peer::Histogram;
 use mmt_shared::model::geometry::Vec2;
 use mmt_shared::model::sample::HipSample;
 use mmt_shared::range::OutOfRange;
+use mmt_shared::stats::histogram::Histogram;
 use mmt_shared::time::Time;
 
 use interpolator::{Aim, Interpolator, around};
@@ -82,7 +82,7 @@ impl PlayoutBuffer {
             limited: step.limited,
         };
         self.counts.note(&played);
-        self.delays.note(self.delay());
+        self.delays.record(self.delay());
         Some(played)
     }
 

@@ -31,5 +31,6 @@ pub mod range;
 pub mod recording;
 pub mod report;
 pub mod rng;
+pub mod stats;
 pub mod time;
 pub mod wire;

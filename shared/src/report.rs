@@ -10,10 +10,10 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use crate::channel::peer::Histogram;
 use crate::metrics::{
     AgeOfInformation, ContactBreaks, ForcePeak, ForceSummary, PoseError, UpdateCounts,
 };
+use crate::stats::histogram::Histogram;
 use crate::wire::KindCounts;
 use crate::wire::message::{Architecture, Ending};
 

@@ -37,7 +37,6 @@ from decode import Refused, decode  # noqa: E402
 from push import COUPLING, START, Push  # noqa: E402
 
 ALPN = "mmt/2"
-VERSION_PROTOCOL = "mmt/version"
 OTHER_VERSION = 1  # code of the close
 NO_APPLICATION_PROTOCOL = 0x178  # TLS alert 120 as an error of QUIC (RFC 9001, section 4.8)
 DATAGRAM_MAX, STREAM_MAX = 1024, 4096
@@ -296,15 +295,12 @@ class Session:
                 "last_state": states[-1] if states else None, "slave_farewell": theirs}
 
 
-async def session(master, offers, token, pin):
-    handshake = await master.hear()
+async def session(master, token, pin):
+    await master.hear()  # the handshake
     offered = master.peer_pin()
     if offered != pin:
         # before the hello: the token is for the pinned slave only
         raise Over(4, outcome="wrong_pin", offered=offered.hex())
-    if handshake.alpn_protocol == VERSION_PROTOCOL:
-        master.say(offers[0].encode())
-        await master.hear()  # the slave says in its close what it speaks
     master.say(messages.hello(token, COUPLING, SAMPLES_PER_COMMAND, START, "independent client"))
     kind, fields = await master.hear_message()
     if kind == "refused":
@@ -338,7 +334,7 @@ async def run(arguments, files):
     await loop.create_datagram_endpoint(lambda: master, local_addr=("0.0.0.0", 0))
     try:
         master.connect((host, port))
-        return await session(master, offers, token, pin)
+        return await session(master, token, pin)
     finally:
         master.close(error_code=0, reason_phrase="the session is over")
         await asyncio.wait_for(master.wait_closed(), WAIT_S)

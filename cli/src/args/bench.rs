@@ -2,7 +2,8 @@
 
 use std::time::Duration;
 
-use clap::{Args, Subcommand, ValueEnum};
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+use clap::{Args, Subcommand};
 use mmt_lab::io::transport_bench::{BYTES_MAX, BYTES_MIN, Cores, RATE_MAX};
 
 use super::values;
@@ -35,27 +36,22 @@ pub(crate) struct TransportBenchArguments {
     #[arg(long, value_name = "BYTES", default_value_t = 100, value_parser = clap::value_parser!(u16).range(BYTES_MIN as i64..=BYTES_MAX as i64))]
     pub(crate) size: u16,
     /// Where the two ends run
-    #[arg(long, value_enum, default_value_t = CoresName::Own)]
-    pub(crate) cores: CoresName,
+    #[arg(long, default_value = "own", value_parser = cores())]
+    pub(crate) cores: Cores,
     /// Print one JSON document instead of tables
     #[arg(long)]
     pub(crate) json: bool,
 }
 
-/// Where the two ends run.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum CoresName {
-    /// Each on a core of its own that stays awake, as on two hosts set up for low latency
-    Own,
-    /// Where the kernel puts them, often both on one core
-    Any,
-}
-
-impl From<CoresName> for Cores {
-    fn from(name: CoresName) -> Self {
-        match name {
-            CoresName::Own => Self::Own,
-            CoresName::Any => Self::Any,
+fn cores() -> impl TypedValueParser<Value = Cores> {
+    let own = PossibleValue::new("own")
+        .help("Each on a core of its own that stays awake, as on two hosts set up for low latency");
+    let any = PossibleValue::new("any").help("Where the kernel puts them, often both on one core");
+    PossibleValuesParser::new([own, any]).map(|name| {
+        if name == "any" {
+            Cores::Any
+        } else {
+            Cores::Own
         }
-    }
+    })
 }

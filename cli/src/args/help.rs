@@ -128,5 +128,4 @@ Examples:
   mmt bench transport --cores any
   mmt bench transport --duration 5min --json > transport.json
 
-Bare sockets, raw UDP, QUIC on the single-thread runtime and QUIC on tokio take turns. Real time: repeat it,
-and compare within one run only.";
+Bare sockets, raw UDP and QUIC take turns. Real time: repeat it, and compare within one run only.";

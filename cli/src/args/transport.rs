@@ -8,7 +8,7 @@ use crate::failure::Failure;
 /// Arguments of every command with a session.
 #[derive(Clone, Copy, Debug, Args)]
 pub(crate) struct TransportArguments {
-    /// What carries the session, the same on both sides; udp is for measurement: nothing is encrypted, nobody proven
+    /// What carries the session's datagrams, the same on both sides; udp is for measurement: they are neither encrypted nor proven
     #[arg(long, value_enum, default_value_t = TransportName::Quic)]
     transport: TransportName,
     /// Let --transport udp leave this host, where whoever sees a packet can operate the slave
@@ -21,7 +21,7 @@ pub(crate) struct TransportArguments {
 enum TransportName {
     /// Encrypted, both sides proven
     Quic,
-    /// Raw UDP, on loopback only
+    /// Raw UDP beside the connection, on loopback only
     Udp,
 }
 
@@ -46,12 +46,12 @@ impl TransportArguments {
         match (self.transport, self.insecure) {
             (TransportName::Quic, _) => None,
             (TransportName::Udp, false) => Some(
-                "warning: --transport udp has no encryption, no authentication and no congestion control: for \
-                 measurement on this host only",
+                "warning: --transport udp: commands and updates have no encryption, no authentication and no congestion \
+                 control: for measurement on this host only",
             ),
             (TransportName::Udp, true) => Some(
-                "warning: --transport udp --insecure: the token crosses the network in the clear, whoever sees a packet \
-                 can operate the slave, and nothing yields to other traffic: for measurement only",
+                "warning: --transport udp --insecure: commands and updates cross the network in the clear, whoever sees a \
+                 packet can operate the slave, and nothing yields to other traffic: for measurement only",
             ),
         }
     }

@@ -33,7 +33,7 @@ fn transport(arguments: &TransportBenchArguments) -> Result<(), Failure> {
         rate_hz: arguments.rate,
         duration: arguments.duration,
         bytes: usize::from(arguments.size),
-        cores: arguments.cores.into(),
+        cores: arguments.cores,
     };
     let stop = Stop::on_signals()?;
     note(format_args!(
@@ -43,13 +43,13 @@ fn transport(arguments: &TransportBenchArguments) -> Result<(), Failure> {
     let report = transport_bench::run(&config, || stop.asked());
     let report =
         report.map_err(|error| Failure::failed(format!("mmt bench transport: {error}")))?;
-    match arguments.json {
-        true => print_json(&Document {
-            version: env!("CARGO_PKG_VERSION"),
-            command: "bench transport",
-            duration_s: arguments.duration.as_secs_f64(),
-            report: &report,
-        }),
-        false => print(&report),
+    if !arguments.json {
+        return print(&report);
     }
+    print_json(&Document {
+        version: env!("CARGO_PKG_VERSION"),
+        command: "bench transport",
+        duration_s: arguments.duration.as_secs_f64(),
+        report: &report,
+    })
 }

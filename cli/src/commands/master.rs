@@ -213,8 +213,8 @@ fn host_failure(error: &MasterHostError) -> Failure {
         }
         E::Connect(
             ConnectError::WrongKey { .. }
-            | ConnectError::OtherVersion { .. }
             | ConnectError::OtherProtocol { .. }
+            | ConnectError::OtherTransport { .. }
             | ConnectError::Crowded { .. },
         )
         | E::Busy { .. }

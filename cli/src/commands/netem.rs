@@ -203,9 +203,7 @@ fn start_error(error: RelayError) -> Failure {
             Failure::usage(&error).remedy("give --to the address that the slave listens on")
         }
         RelayError::Config(_) => Failure::usage(&error).remedy("change --up or --down"),
-        RelayError::Histogram(_) | RelayError::Thread(_) | RelayError::Broken(_) => {
-            Failure::failed(&error)
-        }
+        RelayError::Thread(_) | RelayError::Broken(_) => Failure::failed(&error),
     }
 }
 

@@ -7,9 +7,9 @@ use std::time::Duration;
 use mmt_netem::io::socket::WrapError;
 use mmt_shared::io::connect::ConnectError;
 use mmt_shared::io::quic::EndpointError;
-use mmt_shared::io::raw_udp::Insecure;
 use mmt_shared::io::socket::BindError;
 use mmt_shared::io::stream::{ReadFrameError, WriteFrameError};
+use mmt_shared::io::transport::Insecure;
 use mmt_shared::range::OutOfRange;
 use mmt_shared::wire::{DecodeError, EncodeError, Kind, WelcomeError};
 

@@ -10,8 +10,9 @@ use mmt_shared::io::congestion::RateCap;
 use mmt_shared::io::connect::ConnectError;
 use mmt_shared::io::quic::Traffic;
 use mmt_shared::io::socket;
-use mmt_shared::io::transport::{Connection, Endpoint, RecvStream, SendStream, WriteError};
-use mmt_shared::io::versions::CLOSE_FINISHED;
+use mmt_shared::io::transport::{
+    CLOSE_FINISHED, Connection, Endpoint, RecvStream, SendStream, WriteError,
+};
 use mmt_shared::model::geometry::Vec2;
 use mmt_shared::wire::{
     Architecture, DATAGRAM_MAX, Hello, Label, Refusal, Role, STREAM_MESSAGE_MAX, Side,

@@ -7,7 +7,6 @@ use std::time::Duration;
 
 use mmt_netem::io::lateness::Lateness;
 use mmt_netem::io::socket::SocketCounters;
-use mmt_shared::io::spread::Quantiles as Spread;
 use mmt_shared::io::transport::DatagramCounts;
 use mmt_shared::model::update::Cause;
 use mmt_shared::report::{
@@ -15,6 +14,7 @@ use mmt_shared::report::{
     MessagesReport, ModelReport, Number, PassivityReport, PoseReport, PushesReport,
     QuantilesReport, UpDown, UpdatesReport, WireReport, ending_name,
 };
+use mmt_shared::stats::histogram::Quantiles as Spread;
 use mmt_shared::wire::{
     Architecture, Farewell, Identified, LoopTotals, MasterTotals, Quantiles, SlaveTotals, Traffic,
     UpdateDrops,

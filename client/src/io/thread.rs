@@ -37,7 +37,7 @@ pub(super) fn spawn(
 fn run(mut haptic: HapticLoop, clock: Clock, granted: oneshot::Sender<RealTime>) -> Finished {
     // nobody may be listening any more: then nobody wants to know
     let _ = granted.send(realtime::request());
-    let mut ticker = Ticker::new(clock, TICK).map_err(|error| error.to_string())?;
+    let mut ticker = Ticker::new(clock, TICK);
     loop {
         let tick = ticker.wait();
         if tick.index % TIMING_TICKS == TIMING_TICKS / 2 {

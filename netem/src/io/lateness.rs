@@ -1,17 +1,15 @@
 //! How late the drivers release packets: the part of the delay that is not the link's but the host's.
 
 use std::sync::Mutex;
+use std::time::Duration;
 
-use hdrhistogram::Histogram;
 use mmt_shared::report::{EmulationReport, LateReport};
-use mmt_shared::time::{Time, duration_nanos};
+use mmt_shared::stats::histogram::Histogram;
+use mmt_shared::time::Time;
 use serde::Serialize;
 
 use super::lock;
 pub use crate::record::summary::{MAX_DEGRADED_US, P99_DEGRADED_US};
-
-/// The longest lateness told apart from a longer one, 10 s.
-const MAX_NANOS: u64 = 10_000_000_000;
 
 /// Release lateness in microseconds: from the theoretical departure to the moment of sending.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
@@ -54,48 +52,38 @@ impl Lateness {
     }
 }
 
-/// The histogram behind it: 1 % wide bins from 1 ns up.
-#[derive(Debug)]
-pub(crate) struct Recorder(Mutex<Histogram<u64>>);
+/// The histogram behind it.
+#[derive(Debug, Default)]
+pub(crate) struct Recorder(Mutex<Histogram>);
 
 impl Recorder {
-    pub(crate) fn try_new() -> Result<Self, hdrhistogram::CreationError> {
-        let histogram = Histogram::new_with_bounds(1, MAX_NANOS, 2)?;
-        Ok(Self(Mutex::new(histogram)))
-    }
-
     /// Records that a packet due at `due` left at `now`.
     pub(crate) fn record(&self, due: Time, now: Time) {
-        let late = duration_nanos(now.saturating_since(due));
-        lock(&self.0).saturating_record(late);
+        lock(&self.0).record(now.saturating_since(due));
     }
 
     pub(crate) fn summary(&self) -> Lateness {
         // Copied first, so that the releasing thread waits for a copy and not for the quantiles.
         let histogram = lock(&self.0).clone();
-        if histogram.is_empty() {
-            return Lateness::default();
-        }
-        let us = |quantile| histogram.value_at_quantile(quantile) as f64 * 1e-3;
+        let late = histogram.quantiles();
+        let us = |duration: Duration| duration.as_secs_f64() * 1e6;
         Lateness {
-            count: histogram.len(),
-            p50_us: us(0.5),
-            p99_us: us(0.99),
-            p999_us: us(0.999),
-            max_us: histogram.max() as f64 * 1e-3,
+            count: late.count,
+            p50_us: us(late.p50),
+            p99_us: us(late.p99),
+            p999_us: us(late.p999),
+            max_us: us(late.max),
         }
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use std::time::Duration;
-
     use super::*;
 
     #[test]
     fn quantiles_are_those_of_what_was_recorded_and_early_counts_as_on_time() {
-        let recorder = Recorder::try_new().unwrap();
+        let recorder = Recorder::default();
         assert_eq!(recorder.summary(), Lateness::default());
         for us in 1..=1000 {
             recorder.record(Time::ZERO, Time::ZERO + Duration::from_micros(us));

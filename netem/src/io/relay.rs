@@ -66,9 +66,6 @@ pub enum RelayError {
         /// What the system says.
         source: io::Error,
     },
-    /// The lateness histogram could not be made.
-    #[error("no histogram for the relay: {0}")]
-    Histogram(#[from] hdrhistogram::CreationError),
     /// The system gave no event descriptor or no thread.
     #[error("no thread for the relay: {0}")]
     Thread(io::Error),
@@ -192,7 +189,7 @@ impl Relay {
             stopping: AtomicBool::new(false),
             orders: Mutex::new(Orders::default()),
             board: Mutex::new(RelaySnapshot::default()),
-            lateness: Recorder::try_new()?,
+            lateness: Recorder::default(),
         });
         let log = Log::new(extras.record);
         let clients = Clients::new(to);

@@ -38,9 +38,6 @@ pub enum WrapError {
     /// The system gave no event descriptor or no thread.
     #[error("no thread for the emulated link: {0}")]
     Thread(#[from] io::Error),
-    /// The lateness histogram could not be made.
-    #[error("no histogram for the emulated link: {0}")]
-    Histogram(#[from] hdrhistogram::CreationError),
 }
 
 /// What a wrapped socket can do besides. With any of it there is a thread even while there is nothing to
@@ -94,7 +91,7 @@ impl EmulatedSocket {
         id: LinkId,
         extras: SocketExtras,
     ) -> Result<Self, WrapError> {
-        let meter = SocketMeter::try_new()?;
+        let meter = SocketMeter::default();
         config.check()?;
         let release = match config.is_transparent() && extras.is_empty() {
             true => None,

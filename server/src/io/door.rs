@@ -10,9 +10,8 @@ use std::time::Duration;
 
 use mmt_shared::io::stream::ReadFrameError;
 use mmt_shared::io::transport::{
-    Connection, ConnectionError, Handshake, Listener, RecvStream, SendStream,
+    CLOSE_FINISHED, Connection, ConnectionError, Handshake, Listener, RecvStream, SendStream,
 };
-use mmt_shared::io::versions::CLOSE_FINISHED;
 use mmt_shared::pairing::Token;
 use mmt_shared::wire::{
     DecodeError, Hello, RawHello, Refusal, STREAM_MESSAGE_MAX, Side, StreamMessage,

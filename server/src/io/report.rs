@@ -9,7 +9,6 @@ mod drops;
 use std::time::Duration;
 
 use mmt_netem::io::socket::SocketCounters;
-use mmt_shared::io::spread;
 use mmt_shared::metrics::{ForceSummary, UpdateCounts};
 use mmt_shared::report::{
     ArchitectureReport, Counts, DelayReport, EstimateReport, ForceReport, LinkReport, LoopReport,
@@ -222,7 +221,7 @@ fn force_totals(summary: &ForceSummary) -> ForceTotals {
 
 fn slave_loop(finished: &Finished) -> LoopReport {
     let us = |duration: Duration| (duration.as_secs_f64() * 1e6).into();
-    let quantiles = |spread: &spread::Quantiles| QuantilesReport {
+    let quantiles = |spread: &mmt_shared::stats::histogram::Quantiles| QuantilesReport {
         p50: us(spread.p50),
         p99: us(spread.p99),
         p999: us(spread.p999),

@@ -14,9 +14,8 @@ use mmt_netem::io::socket::SocketCounters;
 use mmt_shared::io::clock::Clock;
 use mmt_shared::io::live::LiveCell;
 use mmt_shared::io::stream::WriteFrameError;
-use mmt_shared::io::transport::{Connection, RecvStream, SendStream};
+use mmt_shared::io::transport::{CLOSE_FINISHED, Connection, RecvStream, SendStream};
 use mmt_shared::io::truth::TruthSender;
-use mmt_shared::io::versions::CLOSE_FINISHED;
 use mmt_shared::metrics::UpdateCounts;
 use mmt_shared::model::contact::Coupling;
 use mmt_shared::wire::{

@@ -93,7 +93,7 @@ impl Worker {
         slave: Slave,
         truth: Option<TruthSender>,
     ) -> io::Result<Self> {
-        let ticker = Ticker::new(clock, TICK).map_err(io::Error::other)?;
+        let ticker = Ticker::new(clock, TICK);
         Self::start_with(move |inside| {
             tell(&realtime::request());
             inside.run(ticker, slave, truth)

@@ -6,12 +6,11 @@
 
 use std::time::Duration;
 
+use mmt_shared::stats::recent::Recent;
 use mmt_shared::time::{Time, duration_nanos};
 
-/// One part of the window.
-const SLICE_NS: u64 = 1_000_000_000;
-/// Parts of the window.
-const SLICES: usize = 10;
+/// The window, seconds.
+const WINDOW_S: usize = 10;
 /// The offset in use stays while the measured one is within this, ns: half a tick. Stamps then advance by
 /// exactly one tick per tick nearly always, even while the clocks drift apart.
 const BAND_NS: u64 = 500_000;
@@ -22,17 +21,25 @@ const SLEW_DIVISOR: u64 = 100;
 const QUICKER_NS: i64 = 250_000_000;
 
 /// Offset of the receiver's clock to the sender's, the quickest transit included.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub(super) struct SenderClock {
-    slices: [Option<i64>; SLICES],
-    /// Number of the newest slice since the receiver's epoch.
-    newest: u64,
+    /// The least (arrival − stamp) of each of the last seconds, ns.
+    minima: Recent<Option<i64>, WINDOW_S>,
     /// The offset in use, ns; none before the first sample.
     offset: Option<i64>,
     moving: bool,
 }
 
 impl SenderClock {
+    /// Before the first sample.
+    pub(super) fn new() -> Self {
+        Self {
+            minima: Recent::new(None),
+            offset: None,
+            moving: false,
+        }
+    }
+
     /// How far a stamp lies in the future of the quickest sample known; zero before the first.
     pub(super) fn ahead(&self, arrived: Time, stamp: Time) -> Duration {
         let earliest = match self.least() {
@@ -44,10 +51,8 @@ impl SenderClock {
 
     /// Learns from one sample.
     pub(super) fn observe(&mut self, arrived: Time, stamp: Time) {
-        self.turn(arrived);
         let seen = arrived.signed_since(stamp);
-        let number = self.newest;
-        if let Some(slice) = self.slice(number) {
+        if let Some(slice) = self.minima.at(arrived) {
             *slice = Some(slice.map_or(seen, |least| least.min(seen)));
         }
         self.offset.get_or_insert(seen);
@@ -55,7 +60,7 @@ impl SenderClock {
 
     /// Lets `elapsed` pass. Before play-out has started the offset follows at once.
     pub(super) fn advance(&mut self, now: Time, elapsed: Duration, playing: bool) {
-        self.turn(now);
+        self.minima.advance(now);
         let (Some(target), Some(offset)) = (self.least(), self.offset) else {
             return;
         };
@@ -77,23 +82,6 @@ impl SenderClock {
     }
 
     fn least(&self) -> Option<i64> {
-        self.slices.iter().flatten().min().copied()
-    }
-
-    fn slice(&mut self, number: u64) -> Option<&mut Option<i64>> {
-        let index = usize::try_from(number % SLICES as u64).ok()?;
-        self.slices.get_mut(index)
-    }
-
-    /// Clears the slices that `now` begins.
-    fn turn(&mut self, now: Time) {
-        let number = now.as_nanos() / SLICE_NS;
-        let begun = number.saturating_sub(self.newest).min(SLICES as u64);
-        for passed in 0..begun {
-            if let Some(slice) = self.slice(number - passed) {
-                *slice = None;
-            }
-        }
-        self.newest = self.newest.max(number);
+        self.minima.iter().flatten().min().copied()
     }
 }

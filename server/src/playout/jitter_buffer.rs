@@ -54,7 +54,7 @@ impl JitterBuffer {
     pub(super) fn new(config: &PlayoutConfig) -> Self {
         Self {
             delay: AdaptiveDelay::new(config),
-            clock: SenderClock::default(),
+            clock: SenderClock::new(),
             samples: VecDeque::with_capacity(SAMPLES_MAX),
             last: None,
             useless_since: None,
@@ -149,7 +149,7 @@ impl JitterBuffer {
         self.useless_since = None;
         self.samples.clear();
         self.samples.push_back(*sample);
-        self.clock = SenderClock::default();
+        self.clock = SenderClock::new();
         self.clock.observe(arrived, sample.stamp);
         if let Some(last) = &mut self.last {
             last.stamp = last.reported;

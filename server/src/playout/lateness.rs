@@ -5,16 +5,15 @@
 
 use std::time::Duration;
 
+use mmt_shared::stats::recent::Recent;
 use mmt_shared::time::{Time, duration_nanos};
 
 /// Width of a bin, ns.
 const BIN_NS: u64 = 1_000_000;
 /// Bins; the last takes all that is later.
 const BINS: usize = 256;
-/// One part of the window, ns.
-const SLICE_NS: u64 = 1_000_000_000;
-/// Parts of the window: it forgets a spell of jitter after five seconds.
-const SLICES: usize = 5;
+/// The window, seconds: it forgets a spell of jitter after five.
+const WINDOW_S: usize = 5;
 /// Samples from which on there is a quantile: half a second of them.
 const SAMPLES_MIN: u32 = 500;
 /// One sample in this many may be too late.
@@ -22,25 +21,17 @@ const LATE_ONE_IN: u32 = 100;
 
 /// Histogram of lateness over the last seconds.
 #[derive(Clone, Debug)]
-pub(super) struct Lateness {
-    slices: [[u32; BINS]; SLICES],
-    newest: u64,
-}
+pub(super) struct Lateness(Recent<[u32; BINS], WINDOW_S>);
 
 impl Lateness {
     pub(super) fn new() -> Self {
-        Self {
-            slices: [[0; BINS]; SLICES],
-            newest: 0,
-        }
+        Self(Recent::new([0; BINS]))
     }
 
     /// Takes one sample that came `late` after the quickest would have, at `now`.
     pub(super) fn observe(&mut self, now: Time, late: Duration) {
-        self.turn(now);
-        let bin = usize::try_from(duration_nanos(late) / BIN_NS).map_or(BINS - 1, |bin| bin);
-        let slice = usize::try_from(self.newest % SLICES as u64).ok();
-        let slice = slice.and_then(|index| self.slices.get_mut(index));
+        let bin = usize::try_from(duration_nanos(late) / BIN_NS).unwrap_or(BINS - 1);
+        let slice = self.0.at(now);
         if let Some(count) = slice.and_then(|slice| slice.get_mut(bin.min(BINS - 1))) {
             *count = count.saturating_add(1);
         }
@@ -49,7 +40,7 @@ impl Lateness {
     /// The lateness that 99 of 100 samples did not exceed, rounded up to whole bins; none before there
     /// have been enough of them.
     pub(super) fn p99(&self) -> Option<Duration> {
-        let in_bin = |bin: usize| -> u32 { self.slices.iter().filter_map(|s| s.get(bin)).sum() };
+        let in_bin = |bin: usize| -> u32 { self.0.iter().filter_map(|s| s.get(bin)).sum() };
         let total: u32 = (0..BINS).map(in_bin).sum();
         if total < SAMPLES_MIN {
             return None;
@@ -62,19 +53,6 @@ impl Lateness {
             }
         }
         None
-    }
-
-    /// Clears the slices that `now` begins.
-    fn turn(&mut self, now: Time) {
-        let number = now.as_nanos() / SLICE_NS;
-        let begun = number.saturating_sub(self.newest).min(SLICES as u64);
-        for passed in 0..begun {
-            let index = usize::try_from((number - passed) % SLICES as u64).ok();
-            if let Some(slice) = index.and_then(|index| self.slices.get_mut(index)) {
-                *slice = [0; BINS];
-            }
-        }
-        self.newest = self.newest.max(number);
     }
 }
 

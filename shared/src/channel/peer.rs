@@ -3,13 +3,11 @@
 //! Used by both sides on every datagram that decodes. Pure and of fixed size: time comes as an argument.
 //! Loss is counted by the application's own numbers; what the transport declares lost is not loss.
 
-mod histogram;
 mod round_trip;
 mod window;
 
 use std::time::Duration;
 
-pub use histogram::Histogram;
 pub use round_trip::RoundTrip;
 pub use window::{Freshness, SequenceWindow, WINDOW};
 

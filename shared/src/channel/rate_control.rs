@@ -9,6 +9,7 @@ use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 
+use crate::stats::queue::RoundTrips;
 use crate::time::Time;
 
 /// A round lasts at least this long.
@@ -95,17 +96,14 @@ impl fmt::Display for StretchMax {
 #[derive(Clone, Copy, Debug)]
 struct Round {
     began: Time,
-    answers: u32,
-    quickest: Duration,
-    sum: Duration,
+    round_trips: RoundTrips,
 }
 
-/// Finds congestion in round trips and says by how much to stretch.
+/// Finds congestion in round trips and reports by how much to stretch.
 ///
-/// In rounds of 100 ms the quickest round trip is compared with the least of the last seconds. What jitter does to
-/// the quickest of a few is less than it lies below their mean, so that much is taken off. A queue in two rounds in
-/// a row, or a long one in one, stretches, multiplicatively, until it falls; without a queue the stretch returns,
-/// additively in time.
+/// In rounds of 100 ms the quickest round trip is compared with the least of the last seconds ([`RoundTrips`]). A
+/// queue in two rounds in a row, or a long one in one, stretches, multiplicatively, until it falls; without a queue
+/// the stretch returns, additively in time.
 #[derive(Clone, Debug)]
 pub struct RateController {
     max: f64,
@@ -141,18 +139,13 @@ impl RateController {
         }
         let round = self.round.get_or_insert(Round {
             began: now,
-            answers: 0,
-            quickest: Duration::MAX,
-            sum: Duration::ZERO,
+            round_trips: RoundTrips::NONE,
         });
-        round.answers = round.answers.saturating_add(1);
-        round.quickest = round.quickest.min(round_trip);
-        round.sum = round.sum.saturating_add(round_trip);
-        if round.answers < ANSWERS || now.saturating_since(round.began) < ROUND {
+        round.round_trips.add(round_trip);
+        if round.round_trips.count() < ANSWERS || now.saturating_since(round.began) < ROUND {
             return;
         }
-        let jitter = (round.sum / round.answers).saturating_sub(round.quickest);
-        let queue = round.quickest.saturating_sub(least).saturating_sub(jitter);
+        let queue = round.round_trips.queue(least);
         let lasted = now.saturating_since(round.began);
         self.round = None;
         self.judge(queue, lasted);

@@ -50,28 +50,39 @@ impl ControllerFactory for RateCap {
     }
 }
 
+/// Whether the path is congested.
+#[derive(Clone, Copy, Debug)]
+enum State {
+    /// No queue stands: the window is the path's limit.
+    Open,
+    /// A queue stands, a mark came, or everything was lost.
+    Congested {
+        /// What congestion leaves of the window, bytes (RFC 5681's name).
+        cwnd: u64,
+        /// Up to here the window grows by half a round instead of by what the queue lacks, bytes.
+        ssthresh: u64,
+        /// What the window makes way with for one round, so that the shortest round trip is seen again, bytes.
+        probe_reduction: u64,
+    },
+}
+
 /// The controller of one path.
 #[derive(Clone, Debug)]
 pub struct Window {
     cap: RateCap,
     mtu: u64,
+    state: State,
     base: Base,
     round: Round,
+    silence: Silence,
     /// The quickest answer of the acknowledgement that is being processed.
-    batch: Option<Duration>,
+    quickest: Option<Duration>,
     /// The quickest of those that belong to the round, and the bytes of all of these.
-    of_round: Option<(Duration, u64)>,
+    quickest_of_round: Option<(Duration, u64)>,
     /// The queue of the last round, if it stood.
     standing: Option<Duration>,
-    /// What the window gives up for one round, so that the shortest round trip is seen again.
-    given_up: u64,
-    /// What congestion leaves of the window; none if there was none lately.
-    allowed: Option<u64>,
-    /// Up to here a shrunk window grows fast.
-    fast_until: u64,
-    /// When the window was last shrunk: what was sent before says nothing new.
-    shrunk: Option<Instant>,
-    silence: Silence,
+    /// When a mark or a loss last shrunk the window: the loss of what was sent before is the same event.
+    recovery_start: Option<Instant>,
 }
 
 impl Window {
@@ -79,79 +90,99 @@ impl Window {
         Self {
             cap,
             mtu: u64::from(mtu),
+            state: State::Open,
             base: Base::new(now),
             round: Round::new(now),
-            batch: None,
-            of_round: None,
-            standing: None,
-            given_up: 0,
-            allowed: None,
-            fast_until: 0,
-            shrunk: None,
             silence: Silence::new(now),
+            quickest: None,
+            quickest_of_round: None,
+            standing: None,
+            recovery_start: None,
         }
     }
 
-    /// The window on a path without congestion.
+    /// The window on a path without congestion: cap × (base + MARGIN) + 2 MTU, within its bounds.
     fn limit(&self) -> u64 {
-        let shortest = self.base.shortest().unwrap_or(Duration::ZERO);
-        let reach = shortest.saturating_add(MARGIN);
+        let reach = self.base_round_trip().saturating_add(MARGIN);
         let room = bytes_in(self.cap.bytes_per_s, reach).saturating_add(self.mtu.saturating_mul(2));
         room.clamp(WINDOW_MIN, WINDOW_MAX)
     }
 
-    fn congested(&self) -> u64 {
-        self.allowed.unwrap_or(u64::MAX).min(self.limit())
+    fn base_round_trip(&self) -> Duration {
+        self.base.shortest().unwrap_or(Duration::ZERO)
     }
 
-    fn answered(&mut self, now: Instant, sent: Instant, bytes: u64) {
-        let took = now.saturating_duration_since(sent);
-        self.silence.answered(sent, bytes);
-        self.batch = Some(self.batch.map_or(took, |quickest| quickest.min(took)));
-        // Under congestion a reading must show the window in force, else its change would be made twice.
-        if self.allowed.is_none() || self.round.covers(sent) {
-            let (quickest, so_far) = self.of_round.unwrap_or((took, 0));
-            self.of_round = Some((quickest.min(took), so_far.saturating_add(bytes)));
+    /// What congestion leaves of the window, and what of that makes way in this round.
+    fn cwnd(&self) -> (u64, u64) {
+        match self.state {
+            State::Open => (self.limit(), 0),
+            State::Congested {
+                cwnd,
+                probe_reduction,
+                ..
+            } => (cwnd.min(self.limit()), probe_reduction),
         }
     }
 
-    fn end_batch(&mut self, now: Instant) {
-        let (quickest, of_round) = (self.batch.take(), self.of_round.take());
-        if let Some(took) = quickest {
+    /// Takes the answer to a packet of `bytes` that was sent at `sent`.
+    fn answered(&mut self, now: Instant, sent: Instant, bytes: u64) {
+        let took = now.saturating_duration_since(sent);
+        self.silence.answered(sent, bytes);
+        self.quickest = Some(self.quickest.map_or(took, |quickest| quickest.min(took)));
+        // Under congestion a reading must show the window in force, else its change would be made twice.
+        if matches!(self.state, State::Open) || self.round.covers(sent) {
+            let (quickest, so_far) = self.quickest_of_round.unwrap_or((took, 0));
+            self.quickest_of_round = Some((quickest.min(took), so_far.saturating_add(bytes)));
+        }
+    }
+
+    /// Ends an acknowledgement, and with it perhaps a round.
+    fn end_acks(&mut self, now: Instant) {
+        let of_round = self.quickest_of_round.take();
+        if let Some(took) = self.quickest.take() {
             self.base.record(now, took);
         }
         let (Some((took, bytes)), Some(base)) = (of_round, self.base.shortest()) else {
             return;
         };
-        let acks_min = match self.allowed {
-            None => WATCHING_ACKS,
-            Some(_) => STEERING_ACKS,
+        let acks_min = match self.state {
+            State::Open => WATCHING_ACKS,
+            State::Congested { .. } => STEERING_ACKS,
         };
         if let Some(reading) = self.round.record(now, took, bytes, base, acks_min) {
-            self.steer(now, reading);
+            self.end_round(now, reading);
         }
     }
 
-    /// Begins congestion when a queue stands, and then moves the window by what the queue holds too much or too little.
-    fn steer(&mut self, now: Instant, reading: Reading) {
-        let begins = self.allowed.is_none();
-        let stands = self.stands(reading.surely());
-        match self.allowed {
-            Some(allowed) => self.allow(self.steered(allowed, reading)),
-            None if stands => {
-                self.fast_until = 0;
-                let shortest = self.base.shortest().unwrap_or(Duration::ZERO);
-                // a queue stands: what was answered is what the path can carry
-                let carried = bytes_in(reading.bytes_per_s, shortest.saturating_add(TARGET));
-                self.allow(carried.saturating_add(self.mtu.saturating_mul(2)));
+    /// Begins congestion when a queue stands, and then steers the window.
+    fn end_round(&mut self, now: Instant, reading: Reading) {
+        let stands = self.stands(reading.queue);
+        let probe = bytes_in(reading.bytes_per_s, TARGET.saturating_mul(2));
+        self.state = match self.state {
+            State::Open if !stands => State::Open,
+            State::Open => {
+                // What was answered is what the path can carry: cwnd = rate × (base + TARGET) + 2 MTU
+                let reach = self.base_round_trip().saturating_add(TARGET);
+                let carried = bytes_in(reading.bytes_per_s, reach);
+                self.congested(carried.saturating_add(self.mtu.saturating_mul(2)), 0, probe)
             }
-            None => {}
-        }
-        let look = self.allowed.is_some() && (begins || self.base.is_ageing(now));
-        self.given_up = match look {
-            true => bytes_in(reading.bytes_per_s, TARGET.saturating_mul(2)),
-            false => 0,
+            State::Congested { cwnd, ssthresh, .. } => {
+                let probe = if self.base.is_ageing(now) { probe } else { 0 };
+                self.congested(steered(cwnd, ssthresh, reading), ssthresh, probe)
+            }
         };
+    }
+
+    /// Congestion that leaves `cwnd`; none if that is as much as the path's limit.
+    fn congested(&self, cwnd: u64, ssthresh: u64, probe_reduction: u64) -> State {
+        if cwnd >= self.limit() {
+            return State::Open;
+        }
+        State::Congested {
+            cwnd: cwnd.max(WINDOW_MIN),
+            ssthresh,
+            probe_reduction,
+        }
     }
 
     /// Whether a queue is congestion: it is long for the second time and does not drain.
@@ -161,34 +192,20 @@ impl Window {
         let remains = |before| queue.saturating_add(DRAINING) > before;
         self.standing.is_some() && before.is_some_and(remains)
     }
+}
 
-    fn steered(&self, allowed: u64, reading: Reading) -> u64 {
-        let queue = reading.excess;
-        match TARGET.checked_sub(queue) {
-            Some(_) if allowed < self.fast_until => allowed.saturating_add(allowed / 2),
-            Some(lacking) => allowed.saturating_add(bytes_in(reading.bytes_per_s, lacking) / 2),
-            None => {
-                let excess = queue.saturating_sub(TARGET);
-                allowed.saturating_sub(bytes_in(reading.bytes_per_s, excess))
-            }
-        }
-    }
-
-    fn allow(&mut self, bytes: u64) {
-        self.allowed = (bytes < self.limit()).then_some(bytes.max(WINDOW_MIN));
-    }
-
-    fn shrink(&mut self, now: Instant) {
-        let shrunk = (self.congested() / 4 * 3).max(WINDOW_MIN);
-        self.allowed = Some(shrunk);
-        self.fast_until = 0;
-        self.shrunk = Some(now);
-    }
-
-    fn collapse(&mut self, now: Instant) {
-        self.fast_until = self.congested() / 2;
-        self.allowed = Some(WINDOW_MIN);
-        self.shrunk = Some(now);
+/// The window after a round under congestion; `off` is how far the queue is from its target.
+fn steered(cwnd: u64, ssthresh: u64, reading: Reading) -> u64 {
+    let off = bytes_in(reading.bytes_per_s, reading.excess.abs_diff(TARGET));
+    if reading.excess > TARGET {
+        // cwnd −= rate × (queue − TARGET)
+        cwnd.saturating_sub(off)
+    } else if cwnd < ssthresh {
+        // cwnd += cwnd / 2
+        cwnd.saturating_add(cwnd / 2)
+    } else {
+        // cwnd += rate × (TARGET − queue) / 2
+        cwnd.saturating_add(off / 2)
     }
 }
 
@@ -215,8 +232,8 @@ impl Controller for Window {
         _app_limited: bool,
         _largest_packet_num_acked: Option<u64>,
     ) {
-        self.end_batch(now);
-        if self.silence.heard(now, in_flight) {
+        self.end_acks(now);
+        if self.silence.end_acks(now, in_flight) {
             self.round = Round::new(now);
         }
     }
@@ -229,15 +246,26 @@ impl Controller for Window {
         lost_bytes: u64,
     ) {
         self.silence.lost(lost_bytes);
-        if self.silence.of_silence(sent) || self.shrunk.is_some_and(|shrunk| sent <= shrunk) {
+        let is_known = self.recovery_start.is_some_and(|start| sent <= start);
+        if self.silence.of_silence(sent) || is_known {
             return;
         }
-        // No bytes lost means a mark (ECN-CE).
-        if is_persistent_congestion {
-            self.collapse(now);
+        let (left, probe_reduction) = self.cwnd();
+        let (cwnd, ssthresh) = if is_persistent_congestion {
+            // RFC 9002, section 7.6.2: cwnd = the smallest, ssthresh = cwnd / 2
+            (WINDOW_MIN, left / 2)
         } else if lost_bytes == 0 {
-            self.shrink(now);
-        }
+            // No bytes lost means a mark (ECN-CE): cwnd = 3/4 cwnd
+            ((left / 4 * 3).max(WINDOW_MIN), 0)
+        } else {
+            return;
+        };
+        self.state = State::Congested {
+            cwnd,
+            ssthresh,
+            probe_reduction,
+        };
+        self.recovery_start = Some(now);
     }
 
     fn on_mtu_update(&mut self, new_mtu: u16) {
@@ -246,7 +274,8 @@ impl Controller for Window {
 
     fn window(&self) -> u64 {
         let room = self.mtu.saturating_mul(2);
-        let left = self.congested().saturating_sub(self.given_up);
+        let (cwnd, probe_reduction) = self.cwnd();
+        let left = cwnd.saturating_sub(probe_reduction);
         self.silence.widen(left.max(WINDOW_MIN / 2), room)
     }
 

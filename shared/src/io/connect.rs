@@ -12,7 +12,6 @@ use tokio::time::timeout;
 
 use super::quic::{Traffic, client_config};
 use super::tls::{PinVerifier, TlsError};
-use super::versions::{shares_version, version_of_slave};
 use crate::pairing::Pin;
 use crate::wire::ALPN;
 
@@ -27,7 +26,7 @@ pub enum ConnectError {
     /// Nothing there.
     #[error(
         "nothing answered at {address} for {limit:?}: is the slave running there, is the port right, \
-         does a firewall let UDP through, have both sides the same --transport?"
+         does a firewall let UDP through?"
     )]
     NoAnswer {
         /// Where.
@@ -48,20 +47,18 @@ pub enum ConnectError {
         /// The pin of the key that was offered.
         offered: Pin,
     },
-    /// Another version of this program.
+    /// QUIC, but not ours, or of another version.
     #[error(
-        "the slave at {address} speaks {theirs:?}, this program speaks {ALPN:?}: install the same \
-         version on both hosts"
+        "what answers at {address} uses QUIC, but not {ALPN:?}: is the port right, is the same version of mmt \
+         installed on both hosts?"
     )]
-    OtherVersion {
+    OtherProtocol {
         /// Where.
         address: SocketAddr,
-        /// What the slave speaks.
-        theirs: String,
     },
-    /// QUIC, but not ours.
-    #[error("what answers at {address} speaks QUIC, but not {ALPN:?}: is the port right?")]
-    OtherProtocol {
+    /// Datagrams by QUIC on one side, as raw UDP on the other.
+    #[error("the slave at {address} uses another transport: give both sides the same --transport")]
+    OtherTransport {
         /// Where.
         address: SocketAddr,
     },
@@ -79,9 +76,6 @@ pub enum ConnectError {
         /// Why.
         source: quinn::ConnectError,
     },
-    /// The system gave no random number.
-    #[error("the system has no randomness to give: wait until it has started, and try again")]
-    Randomness,
     /// TLS could not be set up.
     #[error(transparent)]
     Tls(#[from] TlsError),
@@ -90,7 +84,7 @@ pub enum ConnectError {
     Failed {
         /// Where.
         address: SocketAddr,
-        /// What QUIC said.
+        /// What QUIC reports.
         source: ConnectionError,
     },
 }
@@ -114,19 +108,14 @@ pub async fn connect(
     let Ok(handshake) = timeout(limit, connecting).await else {
         return Err(ConnectError::NoAnswer { address, limit });
     };
-    let connection = handshake.map_err(|source| match verifier.refused() {
+    handshake.map_err(|source| match verifier.refused() {
         Some(offered) => ConnectError::WrongKey {
             address,
             expected: pin,
             offered,
         },
         None => connect_error(address, limit, source),
-    })?;
-    if shares_version(&connection) {
-        return Ok(connection);
-    }
-    let theirs = version_of_slave(&connection, ALPN).await;
-    Err(ConnectError::OtherVersion { address, theirs })
+    })
 }
 
 fn connect_error(address: SocketAddr, limit: Duration, source: ConnectionError) -> ConnectError {

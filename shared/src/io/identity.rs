@@ -138,7 +138,7 @@ impl Identity {
         PrivateKeyDer::Pkcs8(self.key.clone_key())
     }
 
-    /// A key for `purpose`, the same in every process with this identity; it tells nothing about the
+    /// A key for `purpose`, the same in every process with this identity; it shows nothing of the
     /// private key that it comes from (HMAC-SHA-256, RFC 2104).
     #[must_use]
     pub fn derive(&self, purpose: &str) -> [u8; 32] {

@@ -2,10 +2,12 @@
 //! and never used once others could read it.
 
 use std::ffi::OsString;
-use std::fs::{self, DirBuilder, File, OpenOptions};
+use std::fs::{DirBuilder, File};
 use std::io::{self, Read, Write};
-use std::os::unix::fs::{DirBuilderExt, MetadataExt, OpenOptionsExt};
+use std::os::unix::fs::{DirBuilderExt, MetadataExt};
 use std::path::{Path, PathBuf};
+
+use tempfile::NamedTempFile;
 
 use super::identity::{GenerateError, Identity, ParseError};
 
@@ -23,7 +25,7 @@ pub enum IdentityError {
          give one with --identity DIR"
     )]
     NoDirectory,
-    /// The file system said no.
+    /// The file system refused.
     #[error("cannot {action} {path}: {source}; check it, or give another with --identity DIR")]
     File {
         /// What was tried.
@@ -77,7 +79,7 @@ pub fn default_directory() -> Result<PathBuf, IdentityError> {
 /// The identity kept in `directory`, created (with the directory, mode 0700) if there is none.
 ///
 /// # Errors
-/// The file cannot be read or written, others can read it, or it is no identity; the message says what to
+/// The file cannot be read or written, others can read it, or it is no identity; the message names what to
 /// do.
 pub fn load_or_create(directory: &Path) -> Result<Identity, IdentityError> {
     let path = directory.join(FILE_NAME);
@@ -109,68 +111,48 @@ fn load(path: &Path) -> Result<Option<Identity>, IdentityError> {
         .metadata()
         .map_err(|error| file_error("inspect", path, error))?;
     let (mode, bytes) = (metadata.mode() & 0o7777, metadata.len());
-    let path_buf = path.to_owned();
+    let owned = path.to_owned();
     if !metadata.is_file() {
         let error = io::Error::new(io::ErrorKind::InvalidInput, "it is not a regular file");
         return Err(file_error("use", path, error));
     }
     if mode & 0o177 != 0 {
-        return Err(IdentityError::Exposed {
-            path: path_buf,
-            mode,
-        });
+        return Err(IdentityError::Exposed { path: owned, mode });
     }
     if bytes > BYTES_MAX {
-        return Err(IdentityError::TooLong {
-            path: path_buf,
-            bytes,
-        });
+        return Err(IdentityError::TooLong { path: owned, bytes });
     }
     let mut text = String::new();
     file.take(BYTES_MAX)
         .read_to_string(&mut text)
         .map_err(|error| file_error("read", path, error))?;
-    let identity = Identity::parse(&text);
-    identity
-        .map(Some)
-        .map_err(|source| IdentityError::Malformed {
-            path: path_buf,
-            source,
-        })
+    let identity = Identity::parse(&text).map_err(|source| IdentityError::Malformed {
+        path: owned,
+        source,
+    });
+    identity.map(Some)
 }
 
-/// Writes `text` beside `path` and links it there: whole or not at all, and never over another's.
+/// Writes `text` beside `path` and renames it to there: whole or not at all, and never over another's.
 fn create(directory: &Path, path: &Path, text: &str) -> Result<(), IdentityError> {
     DirBuilder::new()
         .recursive(true)
         .mode(0o700)
         .create(directory)
         .map_err(|error| file_error("create", directory, error))?;
-    let beside = directory.join(format!(".{FILE_NAME}.{}", std::process::id()));
-    let written = write_synced(&beside, text);
-    let linked = written.and_then(|()| match fs::hard_link(&beside, path) {
+    match write(directory, path, text) {
         Err(error) if error.kind() == io::ErrorKind::AlreadyExists => Ok(()),
-        other => other,
-    });
-    let removed = fs::remove_file(&beside);
-    linked.map_err(|error| file_error("create", path, error))?;
-    removed.map_err(|error| file_error("remove", &beside, error))
+        other => other.map_err(|error| file_error("create", path, error)),
+    }
 }
 
-fn write_synced(path: &Path, text: &str) -> io::Result<()> {
-    // A leftover of a process with the same number that was killed while it wrote.
-    match fs::remove_file(path) {
-        Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(error),
-        _ => {}
-    }
-    let mut options = OpenOptions::new();
-    let mut file = options
-        .write(true)
-        .create_new(true)
-        .mode(0o600)
-        .open(path)?;
+fn write(directory: &Path, path: &Path, text: &str) -> io::Result<()> {
+    // its mode is 0600
+    let mut file = NamedTempFile::new_in(directory)?;
     file.write_all(text.as_bytes())?;
-    file.sync_all()
+    file.as_file().sync_all()?;
+    file.persist_noclobber(path)?;
+    Ok(())
 }
 
 fn file_error(action: &'static str, path: &Path, source: io::Error) -> IdentityError {
@@ -184,6 +166,7 @@ fn file_error(action: &'static str, path: &Path, source: io::Error) -> IdentityE
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
     use std::os::unix::fs::PermissionsExt;
 
     use super::*;

@@ -12,9 +12,6 @@ use quinn::{Connecting, Connection, ConnectionError, Endpoint, Incoming};
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 use tokio::time::timeout;
 
-use super::versions::{CLOSE_OTHER_VERSION, shares_version, version_of_master};
-use crate::wire::ALPN;
-
 /// Handshakes at once. More are refused: a slave has one master, and a flood must not cost it its ticks.
 const HANDSHAKES_MAX: usize = 8;
 /// With fewer places left than this, an address must prove itself first (Retry, RFC 9000, section 8.1.2), so
@@ -22,16 +19,15 @@ const HANDSHAKES_MAX: usize = 8;
 const UNPROVEN_PLACES: usize = 6;
 /// A handshake may take this long: three round trips of 2 s and the wait for a lost packet.
 const HANDSHAKE_MAX: Duration = Duration::from_secs(10);
-/// Why a slave got no connection of somebody who knocked.
+
+/// Why a slave got no connection of a master that began one.
 #[derive(Debug, thiserror::Error)]
 pub enum AcceptError {
-    /// Another version of this program.
-    #[error("the master at {address} speaks {theirs:?}, this program speaks {ALPN:?}")]
-    OtherVersion {
+    /// Datagrams by QUIC on one side, as raw UDP on the other.
+    #[error("the master at {address} uses another transport: give both sides the same --transport")]
+    OtherTransport {
         /// Where.
         address: SocketAddr,
-        /// What the master speaks.
-        theirs: String,
     },
     /// It began a handshake and went silent.
     #[error("the handshake with {address} was not over after {HANDSHAKE_MAX:?}")]
@@ -44,12 +40,12 @@ pub enum AcceptError {
     Failed {
         /// Where.
         address: SocketAddr,
-        /// What QUIC said.
+        /// What QUIC reports.
         source: ConnectionError,
     },
 }
 
-/// Masters that knock at a slave's endpoint.
+/// Takes the connections of masters at a slave's endpoint.
 #[derive(Debug)]
 pub struct Listener {
     endpoint: Endpoint,
@@ -149,42 +145,39 @@ impl Listener {
     fn enter(&self, incoming: Incoming) -> Option<Handshake> {
         let place = Arc::clone(&self.places).try_acquire_owned().ok()?;
         let address = incoming.remote_address();
-        // quinn has answered an unreadable one with the reason.
-        let Ok(connecting) = incoming.accept() else {
-            self.unreadable.fetch_add(1, Ordering::Relaxed);
-            return None;
-        };
-        Some(Handshake {
-            connecting,
-            address,
-            _place: place,
-        })
+        match incoming.accept() {
+            Ok(connecting) => Some(Handshake {
+                connecting,
+                address,
+                _place: place,
+            }),
+            // quinn has answered with the reason
+            Err(error) => {
+                self.unreadable.fetch_add(1, Ordering::Relaxed);
+                tracing::warn!("no handshake with {address}: {error}");
+                None
+            }
+        }
     }
 }
 
 impl Handshake {
-    /// Who knocks.
+    /// Who connects.
     #[must_use]
     pub fn address(&self) -> SocketAddr {
         self.address
     }
 
-    /// The connection, once the handshake is over and the versions agree. Its master is not trusted yet.
+    /// The connection, once the handshake is over. Its master is not trusted yet.
     ///
     /// # Errors
     /// See [`AcceptError`].
     pub async fn finish(self) -> Result<Connection, AcceptError> {
         let address = self.address;
-        let connection = timeout(HANDSHAKE_MAX, self.connecting)
+        timeout(HANDSHAKE_MAX, self.connecting)
             .await
             .map_err(|_| AcceptError::Slow { address })?
-            .map_err(|source| AcceptError::Failed { address, source })?;
-        if shares_version(&connection) {
-            return Ok(connection);
-        }
-        let theirs = version_of_master(&connection).await;
-        connection.close(CLOSE_OTHER_VERSION, ALPN.as_bytes());
-        Err(AcceptError::OtherVersion { address, theirs })
+            .map_err(|source| AcceptError::Failed { address, source })
     }
 }
 

@@ -4,15 +4,14 @@ use std::net::SocketAddr;
 use std::sync::Arc;
 use std::time::Duration;
 
-use quinn::{AsyncUdpSocket, Connection, Endpoint, Runtime};
+use quinn::{AsyncUdpSocket, Connection, Endpoint};
 use tokio::time::timeout;
 
 use super::congestion::RateCap;
 use super::connect::connect;
 use super::identity::Identity;
 use super::listen::{AcceptError, Listener};
-use super::quic::{Traffic, client_endpoint, server_endpoint, server_endpoint_on};
-use super::runtime::PollHandle;
+use super::quic::{Traffic, client_endpoint, server_endpoint};
 use super::socket;
 
 pub(super) const TRAFFIC: Traffic = Traffic {
@@ -42,16 +41,6 @@ pub(super) fn slave() -> Slave {
         address: endpoint.local_addr().unwrap(),
         listener: Listener::new(endpoint),
     }
-}
-
-/// A slave's endpoint on another runtime, with its identity.
-pub(super) fn slave_on(runtime: &PollHandle) -> (Endpoint, Identity) {
-    let identity = Identity::ephemeral().unwrap();
-    let socket = socket::bind("127.0.0.1:0".parse().unwrap()).unwrap();
-    let socket = runtime.wrap_udp_socket(socket).unwrap();
-    let runtime = Arc::new(runtime.clone());
-    let endpoint = server_endpoint_on(runtime, socket, &identity, TRAFFIC).unwrap();
-    (endpoint, identity)
 }
 
 impl Slave {

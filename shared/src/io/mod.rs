@@ -10,6 +10,7 @@
     reason = "the shell: clocks, files and sockets are its business"
 )]
 
+pub mod alarm;
 pub mod clock;
 pub mod congestion;
 pub mod connect;
@@ -20,17 +21,14 @@ pub mod live;
 pub mod quic;
 pub mod raw_udp;
 pub mod realtime;
-pub mod runtime;
 pub mod schedule;
 pub mod secret;
 pub mod socket;
-pub mod spread;
 pub mod stream;
 pub mod ticker;
 pub mod tls;
 pub mod transport;
 pub mod truth;
-pub mod versions;
 pub mod wake;
 
 #[cfg(test)]

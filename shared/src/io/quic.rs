@@ -34,11 +34,15 @@ const STREAM_WINDOW: u32 = 64 * 1024;
 /// The path is given up after this long without a packet. At 1 s one way a shorter time kills the handshake.
 pub const IDLE: Duration = Duration::from_secs(15);
 
-/// What a side tells QUIC about its traffic.
+/// How often a connection that carries no datagrams shows QUIC that it lives: three times within [`IDLE`].
+const KEEP_ALIVE: Duration = Duration::from_secs(5);
+
+/// What a side declares to QUIC about its traffic.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Traffic {
     /// Longest datagram that this side sends, bytes of payload. Two of these may wait for the window, so a
-    /// side whose messages differ much in length can have more of the short ones wait.
+    /// side whose messages differ much in length can have more of the short ones wait. 0: datagrams go beside QUIC,
+    /// and it takes none.
     pub datagram_max: usize,
     /// The most that this side ever sends.
     pub rate_cap: RateCap,
@@ -131,16 +135,17 @@ pub fn client_config(
     Ok(config)
 }
 
-/// The transport settings of both sides (network.md names the measurements behind them).
+/// The transport settings of both sides (docs/transport.md names the measurements behind them).
 #[must_use]
 pub fn transport(traffic: Traffic) -> TransportConfig {
+    let carries_datagrams = traffic.datagram_max > 0;
     let mut config = TransportConfig::default();
     config
         // Loss must not stop the flow, nor may the flow fill a queue.
         .congestion_controller_factory(Arc::new(traffic.rate_cap))
         // The newest message wins: no more than two wait, the oldest goes first.
         .datagram_send_buffer_size(QUEUED * (traffic.datagram_max + QUEUE_ENTRY))
-        .datagram_receive_buffer_size(Some(RECEIVE_QUEUE))
+        .datagram_receive_buffer_size(carries_datagrams.then_some(RECEIVE_QUEUE))
         // Reordering is no loss: only what is two round trips late is.
         .packet_threshold(1000)
         .time_threshold(2.0)
@@ -153,7 +158,7 @@ pub fn transport(traffic: Traffic) -> TransportConfig {
         .initial_rtt(Duration::from_millis(100))
         .max_idle_timeout(Some(idle_timeout()))
         // Heartbeats do that, and we count them.
-        .keep_alive_interval(None)
+        .keep_alive_interval((!carries_datagrams).then_some(KEEP_ALIVE))
         // The master opens the one stream.
         .max_concurrent_bidi_streams(VarInt::from_u32(1))
         .max_concurrent_uni_streams(VarInt::from_u32(0))

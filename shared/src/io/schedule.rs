@@ -1,4 +1,4 @@
-//! The deadline policy of the 1 kHz loops, as a pure function of what the clock said.
+//! The deadline policy of the 1 kHz loops, as a pure function of the times that the clock showed.
 //!
 //! Deadlines lie on a grid `first + k·period` that never moves. After an overrun the loop waits for the
 //! next deadline that is still to come; a wake that comes whole periods late takes the grid point that it

@@ -35,7 +35,7 @@ pub enum BindError {
     Other {
         /// The address asked for.
         address: SocketAddr,
-        /// What the system said.
+        /// The system's reason.
         source: io::Error,
     },
 }
@@ -43,7 +43,7 @@ pub enum BindError {
 /// A UDP socket on `address`; port 0 lets the system choose. An IPv6 wildcard takes IPv4 as well.
 ///
 /// # Errors
-/// The port is taken, the address is not this host's, or the system says no otherwise.
+/// The port is taken, the address is not this host's, or the system refuses for another reason.
 pub fn bind(address: SocketAddr) -> Result<UdpSocket, BindError> {
     open(address).map_err(|source| match source.kind() {
         io::ErrorKind::AddrInUse => BindError::InUse { address },

@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use super::clock::{Clock, thread_cpu_time};
 use super::schedule::{Schedule, Tick};
-use super::spread::{Quantiles, Spread};
+use crate::stats::histogram::{Histogram, Quantiles};
 
 /// How a loop did.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -31,27 +31,25 @@ pub struct Ticker {
     schedule: Schedule,
     ticks: u64,
     skipped: u64,
-    lateness: Spread,
-    cpu: Spread,
+    lateness: Histogram,
+    cpu: Histogram,
     /// CPU time of the thread at the last wake; none before the first.
     woken_cpu: Option<Duration>,
 }
 
 impl Ticker {
     /// A loop whose first deadline is one `period` from now.
-    ///
-    /// # Errors
-    /// As [`Spread::new`].
-    pub fn new(clock: Clock, period: Duration) -> Result<Self, hdrhistogram::CreationError> {
-        Ok(Self {
+    #[must_use]
+    pub fn new(clock: Clock, period: Duration) -> Self {
+        Self {
             schedule: Schedule::new(clock.now() + period, period),
             clock,
             ticks: 0,
             skipped: 0,
-            lateness: Spread::new()?,
-            cpu: Spread::new()?,
+            lateness: Histogram::new(),
+            cpu: Histogram::new(),
             woken_cpu: None,
-        })
+        }
     }
 
     /// Waits for the next deadline.
@@ -97,7 +95,7 @@ mod tests {
     #[test]
     fn a_loop_accounts_for_every_deadline_however_late_the_host_is() {
         let clock = Clock::start();
-        let mut ticker = Ticker::new(clock, Duration::from_millis(1)).unwrap();
+        let mut ticker = Ticker::new(clock, Duration::from_millis(1));
         let mut last: Option<Tick> = None;
         ticker.run(|tick| {
             assert!(clock.now() >= tick.deadline);
@@ -119,7 +117,7 @@ mod tests {
     #[test]
     fn an_overrun_is_counted() {
         let clock = Clock::start();
-        let mut ticker = Ticker::new(clock, Duration::from_millis(1)).unwrap();
+        let mut ticker = Ticker::new(clock, Duration::from_millis(1));
         ticker.wait();
         clock.sleep_until(clock.now() + Duration::from_millis(5));
         assert!(ticker.wait().skipped >= 4);

@@ -18,10 +18,6 @@ use super::identity::{Identity, public_key_of};
 use crate::pairing::Pin;
 use crate::wire::ALPN;
 
-/// Offered and accepted beside [`ALPN`] by every version: two programs with nothing else in common meet
-/// here, only to tell each other what they speak.
-pub const VERSION_PROTOCOL: &str = "mmt/version";
-
 /// Why a TLS configuration could not be made.
 #[derive(Debug, thiserror::Error)]
 pub enum TlsError {
@@ -33,12 +29,21 @@ pub enum TlsError {
     NoInitialSuite(#[from] NoInitialCipherSuite),
 }
 
-/// The slave's side: proves `identity`, asks no certificate of the master.
+/// The slave's side: proves `identity`, asks no certificate of the master. It refuses a master that does not offer
+/// [`ALPN`] with the TLS alert `no_application_protocol` (RFC 7301, section 3.2).
 ///
 /// # Errors
 /// The identity's key does not fit its certificate.
 pub fn server(identity: &Identity) -> Result<QuicServerConfig, TlsError> {
-    server_speaking(identity, &[ALPN, VERSION_PROTOCOL])
+    let mut config = rustls::ServerConfig::builder_with_provider(provider())
+        .with_protocol_versions(&[&version::TLS13])?
+        .with_no_client_auth()
+        .with_single_cert(vec![identity.certificate()], identity.key())?;
+    config.alpn_protocols = vec![ALPN.into()];
+    config.max_early_data_size = 0;
+    config.send_tls13_tickets = 0;
+    config.session_storage = Arc::new(NoServerSessionStorage {});
+    Ok(config.try_into()?)
 }
 
 /// The master's side: trusts the key of `verifier`'s pin and nothing else.
@@ -46,34 +51,19 @@ pub fn server(identity: &Identity) -> Result<QuicServerConfig, TlsError> {
 /// # Errors
 /// The provider has no TLS 1.3.
 pub fn client(verifier: Arc<PinVerifier>) -> Result<QuicClientConfig, TlsError> {
-    client_speaking(verifier, &[ALPN, VERSION_PROTOCOL])
+    client_as(verifier, ALPN)
 }
 
-pub(super) fn server_speaking(
-    identity: &Identity,
-    protocols: &[&str],
-) -> Result<QuicServerConfig, TlsError> {
-    let mut config = rustls::ServerConfig::builder_with_provider(provider())
-        .with_protocol_versions(&[&version::TLS13])?
-        .with_no_client_auth()
-        .with_single_cert(vec![identity.certificate()], identity.key())?;
-    config.alpn_protocols = wire_names(protocols);
-    config.max_early_data_size = 0;
-    config.send_tls13_tickets = 0;
-    config.session_storage = Arc::new(NoServerSessionStorage {});
-    Ok(config.try_into()?)
-}
-
-pub(super) fn client_speaking(
+pub(super) fn client_as(
     verifier: Arc<PinVerifier>,
-    protocols: &[&str],
+    protocol: &str,
 ) -> Result<QuicClientConfig, TlsError> {
     let mut config = rustls::ClientConfig::builder_with_provider(provider())
         .with_protocol_versions(&[&version::TLS13])?
         .dangerous()
         .with_custom_certificate_verifier(verifier)
         .with_no_client_auth();
-    config.alpn_protocols = wire_names(protocols);
+    config.alpn_protocols = vec![protocol.into()];
     config.enable_early_data = false;
     config.enable_sni = false;
     config.resumption = Resumption::disabled();
@@ -82,13 +72,6 @@ pub(super) fn client_speaking(
 
 fn provider() -> Arc<CryptoProvider> {
     Arc::new(ring::default_provider())
-}
-
-fn wire_names(protocols: &[&str]) -> Vec<Vec<u8>> {
-    protocols
-        .iter()
-        .map(|name| name.as_bytes().to_vec())
-        .collect()
 }
 
 /// Accepts a slave if and only if its key has the pin and it proves that it holds that key. Names, dates

@@ -29,7 +29,7 @@ pub fn pair() -> (TruthSender, TruthReceiver) {
 impl TruthSender {
     /// Sends the true pose (m, rad, world) that the tool met at the HIP sample of `stamp`. Never waits.
     pub fn send(&mut self, stamp: Time, truth: Pose) {
-        // a report that misses a few of a thousand poses a second says the same
+        // a report that misses a few of a thousand poses a second is the same
         let _ = self.0.push((stamp, truth));
     }
 }

@@ -1,45 +1,42 @@
-//! A wake from the loop thread to tokio: an eventfd.
+//! A wake from the loop thread to tokio: an [`Alarm`].
 //!
-//! The loop's side is one non-blocking write: it takes no lock, allocates nothing and never waits, which
-//! tokio's own notifiers do not promise. Wakes between two waits count as one: look at what there is.
+//! The loop's side takes no lock, allocates nothing and never waits, which tokio's own notifiers do not promise.
+//! Wakes between two waits count as one: look at what there is.
 
 use std::io;
-use std::os::fd::OwnedFd;
 use std::sync::Arc;
 
-use rustix::event::{EventfdFlags, eventfd};
-use rustix::io::Errno;
 use tokio::io::unix::AsyncFd;
+
+use super::alarm::Alarm;
 
 /// The loop's side. Clones wake the same waiter.
 #[derive(Clone, Debug)]
-pub struct Waker(Arc<OwnedFd>);
+pub struct Waker(Arc<Alarm>);
 
 /// Tokio's side.
 #[derive(Debug)]
-pub struct Wakeup(AsyncFd<Arc<OwnedFd>>);
+pub struct Wakeup(AsyncFd<Arc<Alarm>>);
 
 /// A connected pair. Call it inside of a tokio runtime with I/O; the waiter belongs to that runtime.
 ///
 /// # Errors
 /// The process is out of descriptors.
 pub fn pair() -> io::Result<(Waker, Wakeup)> {
-    let fd = Arc::new(eventfd(0, EventfdFlags::NONBLOCK | EventfdFlags::CLOEXEC)?);
+    let alarm = Arc::new(Alarm::try_new()?);
     #[allow(
         deprecated,
-        reason = "unsound for a type whose descriptor can change or close early; an `Arc<OwnedFd>` keeps \
+        reason = "unsound for a type whose descriptor can change or close early; an `Arc<Alarm>` keeps \
                   one descriptor open for as long as it is registered"
     )]
-    let waiter = AsyncFd::new(Arc::clone(&fd))?;
-    Ok((Waker(fd), Wakeup(waiter)))
+    let waiter = AsyncFd::new(Arc::clone(&alarm))?;
+    Ok((Waker(alarm), Wakeup(waiter)))
 }
 
 impl Waker {
     /// Wakes the waiter, or the next one to wait. One system call.
     pub fn wake(&self) {
-        // EAGAIN means that 2^64 - 2 wakes are pending: the waiter is awake. No other error can happen to
-        // an eventfd that is open.
-        let _ = rustix::io::write(&*self.0, &1u64.to_ne_bytes());
+        self.0.ring();
     }
 }
 
@@ -52,13 +49,10 @@ impl Wakeup {
     pub async fn wait(&mut self) -> io::Result<()> {
         loop {
             let mut ready = self.0.readable().await?;
-            let mut count = [0; 8];
-            match rustix::io::read(self.0.get_ref(), &mut count) {
-                Ok(_) => return Ok(()),
-                Err(Errno::AGAIN) => ready.clear_ready(),
-                Err(Errno::INTR) => {}
-                Err(error) => return Err(error.into()),
+            if self.0.get_ref().silence() {
+                return Ok(());
             }
+            ready.clear_ready();
         }
     }
 }
@@ -104,7 +98,7 @@ mod tests {
     #[tokio::test]
     async fn a_full_counter_does_not_block_the_loop() {
         let (waker, mut wakeup) = pair().unwrap();
-        rustix::io::write(&*waker.0, &(u64::MAX - 1).to_ne_bytes()).unwrap();
+        waker.0.fill();
         waker.wake();
         timeout(LATE, wakeup.wait()).await.unwrap().unwrap();
     }

@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 /// Length of pin and token, bytes.
 pub const SECRET_BYTES: usize = 32;
 
-/// Why a text is no pin and no token. Says where, never what: it could be a token.
+/// Why a text is no pin and no token. It names the place, never the text, which could be a token.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum HexError {
     /// Too short or too long.
@@ -47,7 +47,7 @@ impl Pin {
 
 impl fmt::Display for Pin {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        Hex(&self.0).fmt(f)
+        f.write_str(&hex::encode(self.0))
     }
 }
 
@@ -79,7 +79,7 @@ impl Token {
 
     /// The 64 hexadecimal digits: for the pairing string and the identity file only.
     pub fn reveal(&self) -> impl fmt::Display {
-        Hex(&self.0)
+        hex::encode(self.0)
     }
 }
 
@@ -105,30 +105,17 @@ impl FromStr for Token {
     }
 }
 
-/// Bytes as lower-case hexadecimal digits.
-struct Hex<'a>(&'a [u8; SECRET_BYTES]);
-
-impl fmt::Display for Hex<'_> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        self.0.iter().try_for_each(|byte| write!(f, "{byte:02x}"))
-    }
-}
-
 fn parse(digits: &str) -> Result<[u8; SECRET_BYTES], HexError> {
-    let mut values = [0; 2 * SECRET_BYTES];
     let found = digits.chars().count();
-    if found != values.len() {
+    if found != 2 * SECRET_BYTES {
         return Err(HexError::WrongLength { found });
     }
-    for (position, (digit, value)) in digits.chars().zip(&mut values).enumerate() {
-        let number = digit.to_digit(16).and_then(|n| u8::try_from(n).ok());
-        let position = position + 1;
-        *value = number.ok_or(HexError::NotHex { position })?;
+    if let Some(before) = digits.chars().position(|c| !c.is_ascii_hexdigit()) {
+        let position = before + 1;
+        return Err(HexError::NotHex { position });
     }
     let mut bytes = [0; SECRET_BYTES];
-    for (byte, pair) in bytes.iter_mut().zip(values.chunks_exact(2)) {
-        *byte = pair.iter().fold(0, |high, low| high << 4 | low);
-    }
+    hex::decode_to_slice(digits, &mut bytes).map_err(|_| HexError::WrongLength { found })?;
     Ok(bytes)
 }
 

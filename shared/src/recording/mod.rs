@@ -84,7 +84,7 @@ impl Recording {
     /// Reads the text of a recording.
     ///
     /// # Errors
-    /// Says where (line and column), what was being read, what was found and what is expected: a word that
+    /// Names the place (line and column), what was being read, what was found and what is expected: a word that
     /// is not a number, a number that is not finite or out of range, a count of nothing or of too much, a
     /// quaternion that is no rotation, time that does not increase, a text that is too short or too long.
     pub fn parse(text: &str) -> Result<Self, ParseError> {

@@ -80,7 +80,7 @@ fn full() -> RunReport<Value> {
         p99: 117.9.into(),
     };
     let mut delays = Histogram::new();
-    delays.note(std::time::Duration::from_millis(16));
+    delays.record(std::time::Duration::from_millis(16));
     report.link.playout_delay_ms = DelayReport::of(&delays);
     (report.link.loss_up, report.link.loss_down) = (0.01.into(), 0.012.into());
     report.emulation.up = EmulationReport {

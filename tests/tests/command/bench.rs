@@ -40,9 +40,9 @@ fn the_document_has_every_key_for_every_carrier_and_flow() {
         names.dedup();
         names
     };
-    assert_eq!(named("carrier"), ["control", "quic", "quic-tokio", "udp"]);
+    assert_eq!(named("carrier"), ["control", "quic", "udp"]);
     assert_eq!(named("flow"), ["one way", "round trip"]);
-    assert_eq!(rows.len(), 8);
+    assert_eq!(rows.len(), 6);
     for row in rows {
         for key in [
             "messages", "lost", "p50_us", "p99_us", "p999_us", "max_us", "ratio", "cpu_us",
@@ -71,7 +71,7 @@ fn the_table_has_the_targets() {
     let text = String::from_utf8(output.stdout).unwrap();
     for part in [
         "1000 messages a second of 100 bytes",
-        "quic-tokio",
+        "control",
         "Targets",
         "quiet machine",
     ] {

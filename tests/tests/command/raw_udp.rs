@@ -49,7 +49,7 @@ fn a_demo_over_raw_udp_is_a_whole_session_and_says_that_it_is_insecure() {
     for side in ["master", "slave"] {
         assert_eq!(report["configuration"][side]["transport"], "udp");
     }
-    // one packet a message and nothing else but letters and receipts: opening, hello, welcome, farewells, close
+    // one packet a message, and QUIC's own for handshake, hello, welcome, farewells, close
     for way in ["up", "down"] {
         let count = |section: &str, key: &str| report[section][way][key].as_u64().unwrap();
         let kinds = ["commands", "updates", "heartbeats", "scenes"];
@@ -59,7 +59,7 @@ fn a_demo_over_raw_udp_is_a_whole_session_and_says_that_it_is_insecure() {
             .sum();
         let datagrams = count("wire", "datagrams");
         assert!(messages > 0 && datagrams >= messages, "{way}: {report}");
-        // each letter may be repeated ten times a second while a slow host answers
+        // what a slow host answers late is repeated
         assert!(datagrams <= messages + 60, "{way}: {report}");
     }
 }
@@ -98,7 +98,7 @@ fn insecure_goes_with_raw_udp_only() {
 }
 
 #[test]
-fn who_insists_is_warned_that_the_token_is_readable() {
+fn who_insists_is_warned_that_commands_are_readable() {
     // a wildcard that is not loopback; it ends at once, because nobody may take a port twice
     let taken = std::net::UdpSocket::bind("0.0.0.0:0").unwrap();
     let listen = taken.local_addr().unwrap().to_string();
@@ -113,7 +113,7 @@ fn who_insists_is_warned_that_the_token_is_readable() {
     let text = errors(&output);
     assert_eq!(output.status.code(), Some(5), "{text}");
     assert!(
-        text.contains("the token crosses the network in the clear"),
+        text.contains("commands and updates cross the network in the clear"),
         "{text}"
     );
 }

@@ -12,8 +12,7 @@ use std::thread::{self, JoinHandle};
 use mmt_shared::io::realtime::yield_to_all;
 use rustix::thread::{CpuSet, sched_getaffinity, sched_setaffinity};
 
-use super::BenchError;
-use super::slice::{Side, Turn};
+use super::{BenchError, Failure};
 
 /// Where the two ends run.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -46,74 +45,63 @@ impl Cores {
 
 /// The cores of the two ends, kept awake until it is dropped.
 #[derive(Debug)]
-pub(super) struct Places {
-    near: Option<CpuSet>,
-    far: Option<CpuSet>,
+pub(super) struct Placement {
+    /// Those of the near and of the far end; none if the kernel chooses.
+    cores: Option<[CpuSet; 2]>,
     over: Arc<AtomicBool>,
     awake: Vec<JoinHandle<()>>,
 }
 
-impl Places {
+impl Placement {
     /// The first two cores that the calling thread may use, or none of their own.
     ///
     /// # Errors
     /// There are two, and the system does not let them be kept awake.
     pub(super) fn try_new(cores: Cores) -> Result<Self, BenchError> {
-        let mut places = Self {
-            near: None,
-            far: None,
+        let mut placement = Self {
+            cores: if cores == Cores::Own {
+                first_two()
+            } else {
+                None
+            },
             over: Arc::default(),
             awake: Vec::new(),
         };
-        if let (Cores::Own, Some((near, far))) = (cores, first_two()) {
-            (places.near, places.far) = (Some(near), Some(far));
-            for core in [near, far] {
-                let over = Arc::clone(&places.over);
-                let (tell, told) = mpsc::sync_channel(1);
-                let awake = move || keep_awake(&core, &over, &tell);
-                places.awake.push(thread::spawn(awake));
-                let is_awake = told.recv().map_err(|_| BenchError::Panicked)?;
-                is_awake.map_err(BenchError::Cores)?;
-            }
+        for core in placement.cores.into_iter().flatten() {
+            let over = Arc::clone(&placement.over);
+            let (report, reports) = mpsc::sync_channel(1);
+            let awake = move || keep_awake(&core, &over, &report);
+            placement.awake.push(thread::spawn(awake));
+            let is_awake = reports.recv().map_err(Failure::from)?;
+            is_awake.map_err(BenchError::Cores)?;
         }
-        Ok(places)
+        Ok(placement)
     }
 
     /// What they really are.
     pub(super) fn cores(&self) -> Cores {
-        match self.near {
-            Some(_) => Cores::Own,
-            None => Cores::Any,
-        }
+        self.cores.map_or(Cores::Any, |_| Cores::Own)
     }
 
-    /// Runs both ends at the same time, each in its place.
-    pub(super) fn run<N: Send, F: Send>(
+    /// Runs both ends at the same time, each on its core.
+    pub(super) fn run<T: Send>(
         &self,
-        near: impl FnOnce() -> Result<N, BenchError> + Send,
-        far: impl FnOnce() -> Result<F, BenchError> + Send,
-    ) -> Result<(N, F), BenchError> {
+        near: impl FnOnce() -> Result<T, Failure> + Send,
+        far: impl FnOnce() -> Result<T, Failure> + Send,
+    ) -> Result<(T, T), BenchError> {
+        let [near_core, far_core] = self.cores.map_or([None; 2], |cores| cores.map(Some));
         thread::scope(|scope| {
-            let near = scope.spawn(|| placed(self.near.as_ref(), near));
-            let far = scope.spawn(|| placed(self.far.as_ref(), far));
-            let near = near.join().map_err(|_| BenchError::Panicked)?;
-            let far = far.join().map_err(|_| BenchError::Panicked)?;
+            let near = scope.spawn(move || placed(near_core, near));
+            let far = scope.spawn(move || placed(far_core, far));
+            let panicked = |_| Failure::from("a thread of the measurement panicked");
+            let near = near.join().map_err(panicked)?;
+            let far = far.join().map_err(panicked)?;
             Ok((near?, far?))
         })
     }
-
-    /// A turn of both ends.
-    pub(super) fn turn(
-        &self,
-        near: impl FnOnce() -> Result<Side, BenchError> + Send,
-        far: impl FnOnce() -> Result<Side, BenchError> + Send,
-    ) -> Result<Turn, BenchError> {
-        let (near, far) = self.run(near, far)?;
-        Ok(Turn { near, far })
-    }
 }
 
-impl Drop for Places {
+impl Drop for Placement {
     fn drop(&mut self) {
         self.over.store(true, Ordering::Relaxed);
         for thread in self.awake.drain(..) {
@@ -123,7 +111,7 @@ impl Drop for Places {
     }
 }
 
-fn first_two() -> Option<(CpuSet, CpuSet)> {
+fn first_two() -> Option<[CpuSet; 2]> {
     let allowed = sched_getaffinity(None).ok()?;
     let mut usable = (0..CpuSet::MAX_CPU).filter(|core| allowed.is_set(*core));
     let only = |core| {
@@ -131,16 +119,18 @@ fn first_two() -> Option<(CpuSet, CpuSet)> {
         set.set(core);
         set
     };
-    Some((only(usable.next()?), only(usable.next()?)))
+    Some([only(usable.next()?), only(usable.next()?)])
 }
 
 /// Runs an end on its core, if it has one.
 fn placed<T>(
-    core: Option<&CpuSet>,
-    end: impl FnOnce() -> Result<T, BenchError>,
+    core: Option<CpuSet>,
+    end: impl FnOnce() -> Result<T, Failure>,
 ) -> Result<T, BenchError> {
-    core.map_or(Ok(()), stay).map_err(BenchError::Cores)?;
-    end()
+    if let Some(core) = core {
+        stay(&core).map_err(BenchError::Cores)?;
+    }
+    Ok(end()?)
 }
 
 /// Keeps the calling thread on `core`.
@@ -148,11 +138,11 @@ fn stay(core: &CpuSet) -> io::Result<()> {
     Ok(sched_setaffinity(None, core)?)
 }
 
-/// Spins on `core` while nobody else wants it, once it has told that it can give way to all others.
-fn keep_awake(core: &CpuSet, over: &AtomicBool, tell: &mpsc::SyncSender<io::Result<()>>) {
+/// Spins on `core` while nobody else wants it, once it has reported that it can give way to all others.
+fn keep_awake(core: &CpuSet, over: &AtomicBool, report: &mpsc::SyncSender<io::Result<()>>) {
     let able = stay(core).and_then(|()| yield_to_all());
     let spins = able.is_ok();
-    if tell.send(able).is_ok() && spins {
+    if report.send(able).is_ok() && spins {
         while !over.load(Ordering::Relaxed) {
             std::hint::spin_loop();
         }
@@ -164,7 +154,7 @@ mod tests {
     use super::*;
 
     /// The cores that the calling thread may use.
-    fn mine() -> Result<Vec<usize>, BenchError> {
+    fn mine() -> Result<Vec<usize>, Failure> {
         let allowed = sched_getaffinity(None).unwrap();
         Ok((0..CpuSet::MAX_CPU)
             .filter(|core| allowed.is_set(*core))
@@ -174,35 +164,38 @@ mod tests {
     #[test]
     fn each_end_has_its_core_and_the_caller_keeps_its_own() {
         let before = mine().unwrap();
-        let places = Places::try_new(Cores::Own).unwrap();
-        let (near, far) = places.run(mine, mine).unwrap();
+        let placement = Placement::try_new(Cores::Own).unwrap();
+        let (near, far) = placement.run(mine, mine).unwrap();
         match before.as_slice() {
             [first, second, ..] => {
-                assert_eq!(places.cores(), Cores::Own);
+                assert_eq!(placement.cores(), Cores::Own);
                 assert_eq!((near, far), (vec![*first], vec![*second]));
-                let awake = places.awake.iter().filter(|thread| !thread.is_finished());
+                let awake = placement
+                    .awake
+                    .iter()
+                    .filter(|thread| !thread.is_finished());
                 assert_eq!(awake.count(), 2, "they stay awake until the end");
             }
-            _ => assert_eq!(places.cores(), Cores::Any),
+            _ => assert_eq!(placement.cores(), Cores::Any),
         }
-        drop(places);
+        drop(placement);
         assert_eq!(mine().unwrap(), before);
     }
 
     #[test]
     fn left_to_the_kernel_they_may_run_anywhere() {
-        let places = Places::try_new(Cores::Any).unwrap();
-        let (near, far) = places.run(mine, mine).unwrap();
+        let placement = Placement::try_new(Cores::Any).unwrap();
+        let (near, far) = placement.run(mine, mine).unwrap();
         assert_eq!((&near, &far), (&mine().unwrap(), &mine().unwrap()));
-        assert!(places.awake.is_empty());
-        assert_eq!(places.cores(), Cores::Any);
+        assert!(placement.awake.is_empty());
+        assert_eq!(placement.cores(), Cores::Any);
     }
 
     #[test]
-    fn a_core_that_cannot_be_had_is_told_with_what_to_do() {
-        let mut places = Places::try_new(Cores::Any).unwrap();
-        places.far = Some(CpuSet::new());
-        let error = places.run(mine, mine).unwrap_err().to_string();
+    fn a_core_that_cannot_be_had_is_reported_with_what_to_do() {
+        let mut placement = Placement::try_new(Cores::Any).unwrap();
+        placement.cores = Some([CpuSet::new(); 2]);
+        let error = placement.run(mine, mine).unwrap_err().to_string();
         assert!(error.contains("--cores any"), "{error}");
     }
 }

@@ -4,10 +4,12 @@ use std::collections::BTreeMap;
 use std::fmt;
 use std::time::Duration;
 
+use mmt_shared::stats::histogram::Histogram;
 use serde::Serialize;
 
-use super::slice::{Sum, Turn};
-use super::{BenchConfig, BenchError, Carrier, Cores, Flow};
+use super::cores::Cores;
+use super::slice::{Flow, SliceResult};
+use super::{BenchConfig, Carrier};
 use crate::table::{Cell, Table};
 
 /// IPv4 and UDP headers, bytes (RFC 791, RFC 768).
@@ -38,24 +40,81 @@ const COLUMNS: [(&str, usize); 12] = [
     ("bytes", 1),
 ];
 
-/// The sums of a run under way.
-pub(super) struct Ledger(BTreeMap<(Flow, Carrier), Sum>);
+/// All slices of a carrier in a flow.
+#[derive(Debug, Default)]
+struct Summary {
+    /// Messages that set out.
+    messages: u64,
+    /// Messages that were sent by either side: an answer is one.
+    sent: u64,
+    took: Histogram,
+    cpu: Duration,
+    packets: u64,
+    bytes: u64,
+}
 
-impl Ledger {
-    pub(super) fn try_new() -> Result<Self, BenchError> {
-        let mut sums = BTreeMap::new();
-        for flow in Flow::ALL {
-            for carrier in Carrier::ALL {
-                sums.insert((flow, carrier), Sum::try_new()?);
-            }
+impl Summary {
+    fn add(&mut self, result: &SliceResult) {
+        self.messages += result.near.sent;
+        for side in [&result.near, &result.far] {
+            self.sent += side.sent;
+            side.took.iter().for_each(|took| self.took.record(*took));
+            self.cpu += side.cpu;
+            self.packets += side.packets;
+            self.bytes += side.bytes;
         }
-        Ok(Self(sums))
     }
 
-    pub(super) fn add(&mut self, carrier: Carrier, flow: Flow, turn: &Turn) {
-        if let Some(sum) = self.0.get_mut(&(flow, carrier)) {
-            sum.add(turn);
-        }
+    fn median_us(&self) -> Option<f64> {
+        self.took.quantile(0.5).map(micros)
+    }
+
+    /// A total for each message that either side sent.
+    fn per_message(&self, total: f64) -> Option<f64> {
+        (self.sent > 0).then(|| total / self.sent as f64)
+    }
+
+    fn row(&self, carrier: Carrier, flow: Flow, control_us: Option<f64>) -> [Cell; COLUMNS.len()] {
+        let took = self.took.quantiles();
+        let us = |duration| Cell::from((took.count > 0).then(|| micros(duration)));
+        let ratio = self.median_us().zip(control_us);
+        let bytes = self.bytes + HEADERS * self.packets;
+        [
+            carrier.name().into(),
+            flow.name().into(),
+            self.messages.into(),
+            self.messages.saturating_sub(took.count).into(),
+            us(took.p50),
+            us(took.p99),
+            us(took.p999),
+            us(took.max),
+            ratio.map(|(own, control)| own / control).into(),
+            self.per_message(micros(self.cpu)).into(),
+            self.per_message(self.packets as f64).into(),
+            self.per_message(bytes as f64).into(),
+        ]
+    }
+}
+
+fn micros(duration: Duration) -> f64 {
+    duration.as_secs_f64() * 1e6
+}
+
+/// A run under way: a summary for each flow and carrier.
+#[derive(Debug)]
+pub(super) struct Summaries(BTreeMap<(Flow, Carrier), Summary>);
+
+impl Summaries {
+    pub(super) fn new() -> Self {
+        let all = Flow::ALL.into_iter().flat_map(|flow| {
+            let cells = Carrier::ALL.into_iter().map(move |carrier| (flow, carrier));
+            cells.map(|cell| (cell, Summary::default()))
+        });
+        Self(all.collect())
+    }
+
+    pub(super) fn add(&mut self, carrier: Carrier, flow: Flow, result: &SliceResult) {
+        self.0.entry((flow, carrier)).or_default().add(result);
     }
 
     pub(super) fn report(&self, config: &BenchConfig, cores: Cores) -> BenchReport {
@@ -68,9 +127,9 @@ impl Ledger {
             ),
             &COLUMNS,
         );
-        for ((flow, carrier), sum) in &self.0 {
+        for ((flow, carrier), summary) in &self.0 {
             let control = self.median_us(Carrier::Control, *flow);
-            rows.push(row(*carrier, *flow, sum, control));
+            rows.push(summary.row(*carrier, *flow, control));
         }
         BenchReport {
             rate_hz: config.rate_hz,
@@ -82,17 +141,19 @@ impl Ledger {
     }
 
     fn median_us(&self, carrier: Carrier, flow: Flow) -> Option<f64> {
-        let took = self.0.get(&(flow, carrier))?.took.quantiles();
-        (took.count > 0).then(|| micros(took.p50))
+        self.0.get(&(flow, carrier))?.median_us()
     }
 
     fn targets(&self, config: &BenchConfig) -> Table {
         let quic = self.median_us(Carrier::Quic, Flow::OneWay);
         let udp = self.median_us(Carrier::RawUdp, Flow::OneWay);
         let ratio = quic.zip(udp).map(|(quic, udp)| quic / udp);
+        let promised = config.rate_hz == OWN_PACKETS_HZ;
         let own = self.0.get(&(Flow::OneWay, Carrier::Quic));
-        let own = own.filter(|_| config.rate_hz == OWN_PACKETS_HZ);
-        let own = own.and_then(|sum| per_message(sum.packets as f64, sum).map(|each| each - 1.0));
+        let own = own.filter(|_| promised).and_then(|summary| {
+            let packets = summary.per_message(summary.packets as f64);
+            packets.map(|packets| packets - 1.0)
+        });
         let mut targets = Table::new(
             "Targets, which are for a quiet machine",
             &[("target", 0), ("most", 2), ("measured", 2), ("met", 0)],
@@ -115,37 +176,6 @@ impl Ledger {
         }
         targets
     }
-}
-
-fn row(carrier: Carrier, flow: Flow, sum: &Sum, control_us: Option<f64>) -> [Cell; COLUMNS.len()] {
-    let took = sum.took.quantiles();
-    let us = |duration| Cell::from((took.count > 0).then(|| micros(duration)));
-    let ratio = control_us
-        .filter(|_| took.count > 0)
-        .map(|control| micros(took.p50) / control);
-    let bytes = sum.bytes + HEADERS * sum.packets;
-    [
-        carrier.name().into(),
-        flow.name().into(),
-        sum.sent.into(),
-        sum.sent.saturating_sub(took.count).into(),
-        us(took.p50),
-        us(took.p99),
-        us(took.p999),
-        us(took.max),
-        ratio.into(),
-        per_message(micros(sum.cpu), sum).into(),
-        per_message(sum.packets as f64, sum).into(),
-        per_message(bytes as f64, sum).into(),
-    ]
-}
-
-fn per_message(total: f64, sum: &Sum) -> Option<f64> {
-    (sum.carried > 0).then(|| total / sum.carried as f64)
-}
-
-fn micros(duration: Duration) -> f64 {
-    duration.as_secs_f64() * 1e6
 }
 
 /// What was measured.
@@ -183,28 +213,28 @@ mod tests {
     };
 
     /// 100 messages one way, each of which took so long, with so many packets.
-    fn turn(us: u64, packets: u64) -> Turn {
+    fn result(us: u64, packets: u64) -> SliceResult {
         let far = Side {
             took: vec![Duration::from_micros(us); 100],
             packets: packets - 100,
-            ..Side::new()
+            ..Side::default()
         };
         let near = Side {
             sent: 100,
             packets: 100,
             bytes: 13_000,
             cpu: Duration::from_millis(1),
-            ..Side::new()
+            ..Side::default()
         };
-        Turn { near, far }
+        SliceResult { near, far }
     }
 
-    fn report(config: &BenchConfig, quic: &Turn) -> BenchReport {
-        let mut ledger = Ledger::try_new().unwrap();
-        ledger.add(Carrier::Control, Flow::OneWay, &turn(10, 100));
-        ledger.add(Carrier::RawUdp, Flow::OneWay, &turn(16, 100));
-        ledger.add(Carrier::Quic, Flow::OneWay, quic);
-        ledger.report(config, Cores::Own)
+    fn report(config: &BenchConfig, quic: &SliceResult) -> BenchReport {
+        let mut summaries = Summaries::new();
+        summaries.add(Carrier::Control, Flow::OneWay, &result(10, 100));
+        summaries.add(Carrier::RawUdp, Flow::OneWay, &result(16, 100));
+        summaries.add(Carrier::Quic, Flow::OneWay, quic);
+        summaries.report(config, Cores::Own)
     }
 
     fn verdicts(report: &BenchReport) -> Vec<String> {
@@ -216,7 +246,7 @@ mod tests {
 
     #[test]
     fn a_row_has_quantiles_ratio_and_what_each_message_costs() {
-        let json = serde_json::to_value(report(&CONFIG, &turn(30, 110))).unwrap();
+        let json = serde_json::to_value(report(&CONFIG, &result(30, 110))).unwrap();
         let rows = json["rows"].as_array().unwrap();
         let quic = rows.iter().find(|row| row["carrier"] == "quic").unwrap();
         let near = |key: &str, value: f64| {
@@ -234,13 +264,13 @@ mod tests {
 
     #[test]
     fn the_targets_are_judged_by_what_was_measured() {
-        assert_eq!(verdicts(&report(&CONFIG, &turn(30, 110))), ["yes"; 3]);
+        assert_eq!(verdicts(&report(&CONFIG, &result(30, 110))), ["yes"; 3]);
         assert_eq!(
-            verdicts(&report(&CONFIG, &turn(36, 120))),
+            verdicts(&report(&CONFIG, &result(36, 120))),
             ["no", "yes", "no"]
         );
         assert_eq!(
-            verdicts(&report(&CONFIG, &turn(50, 110))),
+            verdicts(&report(&CONFIG, &result(50, 110))),
             ["no", "no", "yes"]
         );
         // at another rate nothing is promised
@@ -249,14 +279,14 @@ mod tests {
             ..CONFIG
         };
         assert_eq!(
-            verdicts(&report(&slower, &turn(30, 110)))[2],
+            verdicts(&report(&slower, &result(30, 110)))[2],
             "not measured"
         );
     }
 
     #[test]
     fn nothing_measured_is_absent_and_no_zero() {
-        let empty = Ledger::try_new().unwrap().report(&CONFIG, Cores::Own);
+        let empty = Summaries::new().report(&CONFIG, Cores::Own);
         assert_eq!(verdicts(&empty), ["not measured"; 3]);
         let json = serde_json::to_value(&empty).unwrap();
         assert!(json["rows"][0]["p50_us"].is_null());

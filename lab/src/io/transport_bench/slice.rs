@@ -2,31 +2,58 @@
 
 use std::time::Duration;
 
-use mmt_shared::io::spread::Spread;
 use mmt_shared::time::Time;
 
-use super::{BenchConfig, BenchError, Flow, SETTLING, SLICE};
+use super::BenchConfig;
 
 /// The shortest message, bytes: its stamp and the number of its slice.
 pub const BYTES_MIN: usize = 16;
+/// For how long messages are sent in a slice.
+const SLICE: Duration = Duration::from_millis(200);
+/// After the last message: what is still on its way, and the last acknowledgement (25 ms), belong to the slice.
+const SETTLING: Duration = Duration::from_millis(40);
+
+/// Where messages go.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Flow {
+    /// From one side to the other; nothing of the application's comes back.
+    OneWay,
+    /// To the other side and back, each.
+    RoundTrip,
+}
+
+impl Flow {
+    /// Both.
+    pub const ALL: [Self; 2] = [Self::OneWay, Self::RoundTrip];
+
+    /// As tables spell it.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::OneWay => "one way",
+            Self::RoundTrip => "round trip",
+        }
+    }
+}
 
 /// A slice as both sides know it.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Slice {
-    pub(super) number: u64,
+    round: u64,
     pub(super) flow: Flow,
     pub(super) messages: u32,
-    pub(super) bytes: usize,
+    bytes: usize,
     period: Duration,
     start: Time,
 }
 
 impl Slice {
-    pub(super) fn new(number: u64, flow: Flow, config: &BenchConfig, start: Time) -> Self {
+    /// The slice of a carrier in a flow and a round, whose first message is due at `start`.
+    pub(super) fn new(round: u64, flow: Flow, config: &BenchConfig, start: Time) -> Self {
         let period = Duration::from_secs(1) / config.rate_hz;
         let messages = SLICE.as_nanos() / period.as_nanos().max(1);
         Self {
-            number,
+            round,
             flow,
             messages: u32::try_from(messages).unwrap_or(u32::MAX).max(1),
             bytes: config.bytes,
@@ -40,16 +67,21 @@ impl Slice {
         self.start + self.period * k
     }
 
-    /// When both sides stop listening.
+    /// When both sides stop receiving.
     pub(super) fn end(&self) -> Time {
         self.due(self.messages) + SETTLING
+    }
+
+    /// What tells the slices of one carrier apart.
+    fn number(&self) -> u64 {
+        2 * self.round + self.flow as u64
     }
 
     /// A message that is sent now.
     pub(super) fn message(&self, now: Time) -> Vec<u8> {
         let mut bytes = Vec::with_capacity(self.bytes);
         bytes.extend_from_slice(&now.as_nanos().to_le_bytes());
-        bytes.extend_from_slice(&self.number.to_le_bytes());
+        bytes.extend_from_slice(&self.number().to_le_bytes());
         bytes.resize(self.bytes, 0);
         bytes
     }
@@ -58,13 +90,13 @@ impl Slice {
     pub(super) fn sent_at(&self, message: &[u8]) -> Option<Time> {
         let (stamp, rest) = message.split_first_chunk::<8>()?;
         let (number, _) = rest.split_first_chunk::<8>()?;
-        let mine = u64::from_le_bytes(*number) == self.number;
-        mine.then(|| Time::from_nanos(u64::from_le_bytes(*stamp)))
+        let is_mine = u64::from_le_bytes(*number) == self.number();
+        is_mine.then(|| Time::from_nanos(u64::from_le_bytes(*stamp)))
     }
 }
 
 /// What one side did in a slice.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(super) struct Side {
     /// Messages that it sent.
     pub(super) sent: u64,
@@ -79,57 +111,16 @@ pub(super) struct Side {
 }
 
 impl Side {
-    pub(super) fn new() -> Self {
-        Self {
-            sent: 0,
-            took: Vec::new(),
-            cpu: Duration::ZERO,
-            packets: 0,
-            bytes: 0,
-        }
+    /// Notes a message that ended here at `now`, if it is of this slice.
+    pub(super) fn note(&mut self, slice: &Slice, message: &[u8], now: Time) {
+        let sent = slice.sent_at(message);
+        self.took.extend(sent.map(|at| now.saturating_since(at)));
     }
 }
 
 /// What both sides did in a slice.
 #[derive(Debug)]
-pub(super) struct Turn {
+pub(super) struct SliceResult {
     pub(super) near: Side,
     pub(super) far: Side,
-}
-
-/// All turns of a carrier in a flow.
-#[derive(Debug)]
-pub(super) struct Sum {
-    /// Messages that set out.
-    pub(super) sent: u64,
-    /// Messages that were sent by either side: an answer is one.
-    pub(super) carried: u64,
-    pub(super) took: Spread,
-    pub(super) cpu: Duration,
-    pub(super) packets: u64,
-    pub(super) bytes: u64,
-}
-
-impl Sum {
-    pub(super) fn try_new() -> Result<Self, BenchError> {
-        Ok(Self {
-            sent: 0,
-            carried: 0,
-            took: Spread::new().map_err(|error| BenchError::Histogram(error.to_string()))?,
-            cpu: Duration::ZERO,
-            packets: 0,
-            bytes: 0,
-        })
-    }
-
-    pub(super) fn add(&mut self, turn: &Turn) {
-        self.sent += turn.near.sent;
-        for side in [&turn.near, &turn.far] {
-            self.carried += side.sent;
-            side.took.iter().for_each(|took| self.took.record(*took));
-            self.cpu += side.cpu;
-            self.packets += side.packets;
-            self.bytes += side.bytes;
-        }
-    }
 }

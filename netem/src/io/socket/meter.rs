@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use quinn::udp::{RecvMeta, Transmit};
 use serde::Serialize;
 
-use super::{WrapError, segments};
+use super::segments;
 use crate::counters::Tally;
 use crate::fate::DropCause;
 use crate::io::lateness::{Lateness, Recorder};
@@ -84,10 +84,10 @@ impl SocketDrops {
 }
 
 /// The counters of a socket, readable from any thread for as long as anybody holds them.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct SocketMeter(Arc<Counts>);
 
-#[derive(Debug)]
+#[derive(Debug, Default)]
 struct Counts {
     offered: Counter,
     sent: Counter,
@@ -112,23 +112,6 @@ pub(super) enum Unsent {
 }
 
 impl SocketMeter {
-    pub(super) fn try_new() -> Result<Self, WrapError> {
-        Ok(Self(Arc::new(Counts {
-            offered: Counter::default(),
-            sent: Counter::default(),
-            received: Counter::default(),
-            duplicated: Counter::default(),
-            loss: Counter::default(),
-            mtu: Counter::default(),
-            queue: Counter::default(),
-            limit: Counter::default(),
-            blocked: Counter::default(),
-            failed: Counter::default(),
-            abandoned: Counter::default(),
-            lateness: Recorder::try_new()?,
-        })))
-    }
-
     /// The counters now. Each is exact; together they are those of one moment up to datagrams handled
     /// while reading, and never show more sent and dropped than offered.
     #[must_use]

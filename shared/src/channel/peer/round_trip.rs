@@ -2,12 +2,12 @@
 
 use std::time::Duration;
 
-use super::histogram::Histogram;
+use crate::stats::histogram::Histogram;
+use crate::stats::recent::Recent;
 use crate::time::Time;
 
-/// Slots of the windowed minimum, one second each.
-const SLOTS: usize = 10;
-const SLOT_NS: u64 = 1_000_000_000;
+/// The windowed minimum is over this many seconds, the running one included.
+const WINDOW_S: usize = 10;
 
 /// Round-trip times without the time that the other side held the answer.
 ///
@@ -16,8 +16,8 @@ const SLOT_NS: u64 = 1_000_000_000;
 #[derive(Clone, Debug)]
 pub struct RoundTrip {
     latest: Option<Duration>,
-    /// Least of each of the last seconds, with the second's number.
-    minima: [Option<(u64, Duration)>; SLOTS],
+    /// The least of each of the last seconds.
+    minima: Recent<Option<Duration>, WINDOW_S>,
     histogram: Histogram,
 }
 
@@ -33,20 +33,16 @@ impl RoundTrip {
     pub fn new() -> Self {
         Self {
             latest: None,
-            minima: [None; SLOTS],
+            minima: Recent::new(None),
             histogram: Histogram::new(),
         }
     }
 
     pub(super) fn note(&mut self, now: Time, round_trip: Duration) {
         self.latest = Some(round_trip);
-        self.histogram.note(round_trip);
-        let second = now.as_nanos() / SLOT_NS;
-        let slot = (second % SLOTS as u64) as usize;
-        if let Some(slot) = self.minima.get_mut(slot) {
-            let same = slot.filter(|&(of, _)| of == second);
-            let least = same.map_or(round_trip, |(_, least)| least.min(round_trip));
-            *slot = Some((second, least));
+        self.histogram.record(round_trip);
+        if let Some(slice) = self.minima.at(now) {
+            *slice = Some(slice.map_or(round_trip, |least| least.min(round_trip)));
         }
     }
 
@@ -59,12 +55,7 @@ impl RoundTrip {
     /// The least of the last 9 to 10 s; none if nothing was measured in that time.
     #[must_use]
     pub fn least(&self, now: Time) -> Option<Duration> {
-        let second = now.as_nanos() / SLOT_NS;
-        let recent = self.minima.iter().flatten();
-        recent
-            .filter(|&&(of, _)| second.saturating_sub(of) < SLOTS as u64)
-            .map(|&(_, least)| least)
-            .min()
+        self.minima.iter_at(now).flatten().min().copied()
     }
 
     /// All that have been measured.

@@ -1,12 +1,14 @@
-//! What a path says about itself: its shortest round trip, its queue, its silence.
+//! What shows the state of a path: its shortest round trip, its queue, its silence.
 //!
 //! Pure: time comes as an argument. Nothing here knows the window.
 
 use std::time::{Duration, Instant};
 
+use crate::stats::queue::RoundTrips;
+
 /// A round lasts at least this long from its first answer on.
 const ROUND_MIN: Duration = Duration::from_millis(100);
-/// Who hears nothing for this long stops counting what is in flight: three times as long as a peer may hold an
+/// After this long without an answer what is in flight stops counting: three times as long as a peer may hold an
 /// acknowledgement, and short enough that a window without congestion is not full by then.
 const SILENT: Duration = Duration::from_millis(75);
 /// The shortest round trip is forgotten after one to two of these: paths change.
@@ -59,23 +61,15 @@ impl Base {
     }
 }
 
-/// What a round says about the path.
+/// What a round shows of the path.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Reading {
     /// How much longer than the shortest round trip the quickest answer took.
     pub(super) excess: Duration,
-    /// How much longer than the quickest the answers took on average.
-    pub(super) jitter: Duration,
+    /// The queue that there is for certain: the excess less the jitter.
+    pub(super) queue: Duration,
     /// What was answered.
     pub(super) bytes_per_s: u64,
-}
-
-impl Reading {
-    /// The queue that there is for certain. Jitter spreads the answers and lifts even the quickest of a few above the
-    /// shortest of thousands, by less than it lies below their mean; a queue lifts all alike.
-    pub(super) fn surely(&self) -> Duration {
-        self.excess.saturating_sub(self.jitter)
-    }
 }
 
 /// Reads the queue from the answers of a round.
@@ -84,9 +78,8 @@ pub(super) struct Round {
     began: Instant,
     /// When the first acknowledgement of the round came.
     first: Option<Instant>,
-    acks: u32,
-    quickest: Duration,
-    sum: Duration,
+    /// Of each acknowledgement the quickest.
+    round_trips: RoundTrips,
     /// Bytes answered after the first acknowledgement.
     bytes: u64,
 }
@@ -96,9 +89,7 @@ impl Round {
         Self {
             began: now,
             first: None,
-            acks: 0,
-            quickest: Duration::MAX,
-            sum: Duration::ZERO,
+            round_trips: RoundTrips::NONE,
             bytes: 0,
         }
     }
@@ -108,7 +99,7 @@ impl Round {
         sent >= self.began
     }
 
-    /// Takes an acknowledgement, whose quickest packet took `took`; speaks when that ends the round, which has
+    /// Takes an acknowledgement, whose quickest packet took `took`; a reading when that ends the round, which has
     /// `acks_min` of them at least.
     pub(super) fn record(
         &mut self,
@@ -122,17 +113,15 @@ impl Round {
             None => self.first = Some(now),
             Some(_) => self.bytes = self.bytes.saturating_add(bytes),
         }
-        self.acks = self.acks.saturating_add(1);
-        self.quickest = self.quickest.min(took);
-        self.sum = self.sum.saturating_add(took);
+        self.round_trips.add(took);
         let lasted = now.saturating_duration_since(self.first?);
-        if self.acks < acks_min || lasted < ROUND_MIN {
+        if self.round_trips.count() < acks_min || lasted < ROUND_MIN {
             return None;
         }
         let per_s = u128::from(self.bytes) * 1_000_000_000 / lasted.as_nanos().max(1);
         let reading = Reading {
-            excess: self.quickest.saturating_sub(base),
-            jitter: (self.sum / self.acks).saturating_sub(self.quickest),
+            excess: self.round_trips.excess(base),
+            queue: self.round_trips.queue(base),
             bytes_per_s: u64::try_from(per_s).unwrap_or(u64::MAX),
         };
         *self = Self::new(now);
@@ -149,10 +138,10 @@ impl Round {
 #[derive(Clone, Debug)]
 pub(super) struct Silence {
     /// The last answer.
-    heard: Instant,
+    answered_at: Instant,
     silent: bool,
     in_flight: u64,
-    /// What was sent before the last silence was broken says nothing about queues.
+    /// When the last silence was broken: what was sent before shows no queue.
     broken: Option<Instant>,
     /// Bytes of that which are still in flight.
     ignored: u64,
@@ -161,7 +150,7 @@ pub(super) struct Silence {
 impl Silence {
     pub(super) fn new(now: Instant) -> Self {
         Self {
-            heard: now,
+            answered_at: now,
             silent: false,
             in_flight: 0,
             broken: None,
@@ -170,7 +159,7 @@ impl Silence {
     }
 
     pub(super) fn sent(&mut self, now: Instant, bytes: u64) {
-        self.silent = now.saturating_duration_since(self.heard) >= SILENT;
+        self.silent = now.saturating_duration_since(self.answered_at) >= SILENT;
         self.in_flight = self.in_flight.saturating_add(bytes);
     }
 
@@ -182,9 +171,9 @@ impl Silence {
     }
 
     /// The end of an acknowledgement that left so much in flight. True if it broke a silence.
-    pub(super) fn heard(&mut self, now: Instant, in_flight: u64) -> bool {
+    pub(super) fn end_acks(&mut self, now: Instant, in_flight: u64) -> bool {
         let broken = std::mem::replace(&mut self.silent, false);
-        self.heard = now;
+        self.answered_at = now;
         self.in_flight = in_flight;
         if broken {
             self.broken = Some(now);
@@ -207,9 +196,10 @@ impl Silence {
     /// The window that there is in truth when congestion leaves `window`; `room` is what one more packet needs.
     pub(super) fn widen(&self, window: u64, room: u64) -> u64 {
         let widened = window.saturating_add(self.ignored);
-        match self.silent {
-            true => widened.max(self.in_flight.saturating_add(room)),
-            false => widened,
+        if self.silent {
+            widened.max(self.in_flight.saturating_add(room))
+        } else {
+            widened
         }
     }
 }

@@ -116,13 +116,13 @@ fn a_standing_queue_is_steered_to_the_target_and_its_end_lets_the_window_grow_ba
     path.rounds(2, ms(100));
     let full = path.window.window();
     path.rounds(1, ms(150));
-    assert_eq!(path.window.window(), full, "one reading does not tell");
+    assert_eq!(path.window.window(), full, "one reading is not enough");
     path.rounds(2, ms(150));
     // what was carried in the shortest round trip and the target
     let carried = 120 * (100 + 12) + 2400;
-    let given_up = 2 * 120 * 12;
+    let probe_reduction = 2 * 120 * 12;
     let window = path.window.window();
-    assert!(window.abs_diff(carried - given_up) < 700, "{window}");
+    assert!(window.abs_diff(carried - probe_reduction) < 700, "{window}");
     path.rounds(30, ms(150));
     assert_eq!(path.window.window(), WINDOW_MIN);
     path.rounds(4, ms(100));

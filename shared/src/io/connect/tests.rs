@@ -1,4 +1,4 @@
-//! Two endpoints on loopback: who gets in, and who is told what.
+//! Two endpoints on loopback: who gets in, and what the others read.
 
 use std::net::UdpSocket;
 
@@ -10,16 +10,12 @@ use crate::io::listen::AcceptError;
 use crate::io::loopback::{PATIENCE, Slave, TRAFFIC, open, pair, patiently, slave};
 use crate::io::quic::{client_endpoint, transport};
 use crate::io::tls;
-use crate::io::tls::VERSION_PROTOCOL;
-use crate::io::versions::{CLOSE_OTHER_VERSION, version_of_master};
+use crate::wire::ALPN;
 
-/// Connects as a program that speaks `protocols`.
-async fn connect_speaking(
-    slave: &Slave,
-    protocols: &[&str],
-) -> Result<Connection, ConnectionError> {
+/// Connects as a program whose protocol is `protocol`.
+async fn connect_as(slave: &Slave, protocol: &str) -> Result<Connection, ConnectionError> {
     let verifier = Arc::new(PinVerifier::new(slave.identity.pin()));
-    let crypto = tls::client_speaking(verifier, protocols).unwrap();
+    let crypto = tls::client_as(verifier, protocol).unwrap();
     let mut config = quinn::ClientConfig::new(Arc::new(crypto));
     config.transport_config(Arc::new(transport(TRAFFIC)));
     let endpoint = client_endpoint(open()).unwrap();
@@ -94,66 +90,25 @@ async fn an_impostor_with_a_copy_of_the_certificate_but_not_the_key_is_refused()
 }
 
 #[tokio::test]
-async fn programs_of_other_versions_name_both_versions_on_both_sides() {
-    let slave = slave();
-    let newer = async {
-        let connection = connect_speaking(&slave, &["mmt/9", VERSION_PROTOCOL]).await;
-        version_of_slave(&connection.unwrap(), "mmt/9").await
-    };
-    let (theirs, refused) = tokio::join!(patiently(newer), patiently(slave.accept()));
-    assert_eq!(theirs, ALPN);
-    let text = refused.unwrap_err().to_string();
-    assert!(
-        text.contains(&format!("{ALPN:?}")) && text.contains("\"mmt/9\""),
-        "{text}"
-    );
-}
-
-#[tokio::test]
-async fn a_slave_of_another_version_is_named_to_the_master() {
-    let identity = Identity::ephemeral().unwrap();
-    let crypto = tls::server_speaking(&identity, &["mmt/7", VERSION_PROTOCOL]).unwrap();
-    let endpoint = serving(crypto);
-    let address = endpoint.local_addr().unwrap();
-    let other = async {
-        let connection = endpoint.accept().await.unwrap().await.unwrap();
-        let theirs = version_of_master(&connection).await;
-        connection.close(CLOSE_OTHER_VERSION, b"mmt/7");
-        (theirs, connection)
-    };
-    let client = client_endpoint(open()).unwrap();
-    let (up, (theirs, _)) = tokio::join!(
-        connect(&client, address, identity.pin(), TRAFFIC, PATIENCE),
-        patiently(other),
-    );
-    assert_eq!(theirs, ALPN);
-    let text = up.unwrap_err().to_string();
-    assert!(
-        text.contains(&format!("{ALPN:?}")) && text.contains("\"mmt/7\""),
-        "{text}"
-    );
-}
-
-#[tokio::test]
-async fn a_foreign_protocol_is_refused_in_the_handshake() {
-    let slave = slave();
-    let up = tokio::select! {
-        up = patiently(connect_speaking(&slave, &["h3"])) => up,
-        _ = slave.listener.next() => unreachable!("it was let in"),
-    };
-    let error = connect_error(slave.address, PATIENCE, up.unwrap_err());
-    assert!(
-        matches!(error, ConnectError::OtherProtocol { .. }),
-        "{error}"
-    );
-    assert_eq!(slave.listener.turned_away().unreadable, 1);
-}
-
-#[tokio::test]
-async fn a_peer_that_offers_this_version_alone_gets_in() {
-    let slave = slave();
-    let (up, down) = tokio::join!(connect_speaking(&slave, &[ALPN]), slave.accept());
-    assert!(up.is_ok() && down.is_ok());
+async fn another_version_or_protocol_is_refused_in_the_handshake_naming_ours() {
+    for protocol in ["mmt/0", "h3"] {
+        let slave = slave();
+        let up = tokio::select! {
+            up = patiently(connect_as(&slave, protocol)) => up,
+            _ = slave.listener.next() => unreachable!("it was let in"),
+        };
+        let error = connect_error(slave.address, PATIENCE, up.unwrap_err());
+        assert!(
+            matches!(error, ConnectError::OtherProtocol { .. }),
+            "{error}"
+        );
+        let text = error.to_string();
+        assert!(
+            text.contains(&format!("{ALPN:?}")) && text.contains("version"),
+            "{text}"
+        );
+        assert_eq!(slave.listener.turned_away().unreadable, 1);
+    }
 }
 
 #[tokio::test]

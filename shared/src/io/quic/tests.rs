@@ -75,7 +75,7 @@ async fn a_slave_that_was_killed_and_restarted_resets_the_old_connection() {
     while !killed.is_finished() {
         tokio::time::sleep(Duration::from_millis(1)).await;
     }
-    assert_eq!(up.close_reason(), None, "a killed slave says nothing");
+    assert_eq!(up.close_reason(), None, "a killed slave sends nothing");
     let socket = socket::for_quic(socket::bind(address).unwrap()).unwrap();
     let _restarted = server_endpoint(socket, &identity, TRAFFIC).unwrap();
     let beat = async {

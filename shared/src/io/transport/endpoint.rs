@@ -1,34 +1,66 @@
 //! Endpoints of either transport: the master's way to a connection, and the slave's to those of masters.
 //!
-//! On raw UDP nobody has proven anything when the connection is there; on QUIC the slave has. Who may operate is
-//! judged by the hello in both cases.
+//! When the connection is there, the slave has proven itself. Who may operate is judged by the hello.
 
 use std::io;
 use std::net::SocketAddr;
 use std::sync::Arc;
 use std::time::Duration;
 
-use quinn::{AsyncUdpSocket, TokioRuntime, VarInt};
+use quinn::{AsyncUdpSocket, VarInt};
 
-use super::{Connection, Transport, byte};
+use super::choice::Transport;
+use super::connection::{CLOSE_OTHER_TRANSPORT, Connection};
 use crate::io::connect::{ConnectError, connect};
 use crate::io::identity::Identity;
 use crate::io::listen::{self, AcceptError, TurnedAway};
 use crate::io::quic::{EndpointError, Traffic, client_endpoint, server_endpoint};
-use crate::io::raw_udp::{self, OpenError};
+use crate::io::raw_udp::SharedSocket;
 use crate::pairing::Pin;
+
+/// The socket that raw datagrams share with QUIC; none if they go by QUIC.
+type Raw = Option<Arc<SharedSocket>>;
 
 /// An endpoint; clones are the same one.
 #[derive(Clone, Debug)]
-pub enum Endpoint {
-    /// Of QUIC.
-    Quic(quinn::Endpoint),
-    /// Of raw UDP.
-    RawUdp(Arc<raw_udp::Endpoint>),
+pub struct Endpoint {
+    quic: quinn::Endpoint,
+    raw: Raw,
+}
+
+/// The socket for QUIC and for raw datagrams.
+fn share(transport: Transport, socket: Arc<dyn AsyncUdpSocket>) -> (Arc<dyn AsyncUdpSocket>, Raw) {
+    if transport == Transport::Quic {
+        return (socket, None);
+    }
+    let shared = Arc::new(SharedSocket::new(socket));
+    (Arc::clone(&shared) as _, Some(shared))
+}
+
+/// What QUIC has to carry of a side's traffic.
+fn by_quic(raw: &Raw, traffic: Traffic) -> Traffic {
+    let datagram_max = raw.as_ref().map_or(traffic.datagram_max, |_| 0);
+    Traffic {
+        datagram_max,
+        ..traffic
+    }
+}
+
+/// The connection, if both sides use the same transport: one that has its datagrams beside QUIC takes none by QUIC.
+fn join(quic: quinn::Connection, raw: &Raw) -> Option<Connection> {
+    if quic.max_datagram_size().is_some() == raw.is_some() {
+        quic.close(
+            CLOSE_OTHER_TRANSPORT,
+            b"--transport is not the same on both sides",
+        );
+        return None;
+    }
+    let flow = raw.as_ref().map(|socket| socket.flow(&quic));
+    Some(Connection::new(quic, flow))
 }
 
 impl Endpoint {
-    /// The slave's endpoint; raw UDP has no use for `identity` and `traffic`.
+    /// The slave's endpoint.
     ///
     /// Call it inside of a tokio runtime with I/O and time.
     ///
@@ -40,10 +72,9 @@ impl Endpoint {
         identity: &Identity,
         traffic: Traffic,
     ) -> Result<Self, EndpointError> {
-        match transport {
-            Transport::Quic => server_endpoint(socket, identity, traffic).map(Self::Quic),
-            Transport::RawUdp { .. } => Ok(Self::raw_udp(socket, true)),
-        }
+        let (socket, raw) = share(transport, socket);
+        let quic = server_endpoint(socket, identity, by_quic(&raw, traffic))?;
+        Ok(Self { quic, raw })
     }
 
     /// The master's endpoint.
@@ -56,19 +87,12 @@ impl Endpoint {
         transport: Transport,
         socket: Arc<dyn AsyncUdpSocket>,
     ) -> Result<Self, EndpointError> {
-        match transport {
-            Transport::Quic => client_endpoint(socket).map(Self::Quic),
-            Transport::RawUdp { .. } => Ok(Self::raw_udp(socket, false)),
-        }
+        let (socket, raw) = share(transport, socket);
+        let quic = client_endpoint(socket)?;
+        Ok(Self { quic, raw })
     }
 
-    fn raw_udp(socket: Arc<dyn AsyncUdpSocket>, accepts: bool) -> Self {
-        let runtime = Arc::new(TokioRuntime);
-        Self::RawUdp(Arc::new(raw_udp::Endpoint::new(socket, runtime, accepts)))
-    }
-
-    /// Connects to the slave at `address`, within `limit`. QUIC has it prove that it holds the key of `pin`; on raw
-    /// UDP it is whoever answers.
+    /// Connects to the slave at `address`, which must prove that it holds the key of `pin`, within `limit`.
     ///
     /// # Errors
     /// See [`ConnectError`].
@@ -79,121 +103,81 @@ impl Endpoint {
         traffic: Traffic,
         limit: Duration,
     ) -> Result<Connection, ConnectError> {
-        match self {
-            Self::Quic(endpoint) => connect(endpoint, address, pin, traffic, limit)
-                .await
-                .map(Connection::Quic),
-            Self::RawUdp(endpoint) => {
-                let opened = endpoint.connect(address, limit).await;
-                opened
-                    .map(Connection::RawUdp)
-                    .map_err(|error| connect_error(address, error))
-            }
-        }
+        let traffic = by_quic(&self.raw, traffic);
+        let quic = connect(&self.quic, address, pin, traffic, limit).await?;
+        join(quic, &self.raw).ok_or(ConnectError::OtherTransport { address })
     }
 
     /// Where it is bound.
     ///
     /// # Errors
-    /// What the system says.
+    /// Those of the system.
     pub fn local_addr(&self) -> io::Result<SocketAddr> {
-        match self {
-            Self::Quic(endpoint) => endpoint.local_addr(),
-            Self::RawUdp(endpoint) => endpoint.local_addr(),
-        }
+        self.quic.local_addr()
     }
 
     /// Closes all connections and takes no more.
     pub fn close(&self, code: VarInt, reason: &[u8]) {
-        match self {
-            Self::Quic(endpoint) => endpoint.close(code, reason),
-            Self::RawUdp(endpoint) => endpoint.close(byte(code), reason),
-        }
+        self.quic.close(code, reason);
     }
 
     /// Waits until the ends of all connections have gone out.
     pub async fn wait_idle(&self) {
-        match self {
-            Self::Quic(endpoint) => endpoint.wait_idle().await,
-            // said once, and not waited for
-            Self::RawUdp(_) => {}
-        }
+        self.quic.wait_idle().await;
     }
 }
 
-fn connect_error(address: SocketAddr, error: OpenError) -> ConnectError {
-    match error {
-        OpenError::NoAnswer { limit } => ConnectError::NoAnswer { address, limit },
-        OpenError::OtherVersion { theirs } => ConnectError::OtherVersion { address, theirs },
-        OpenError::Randomness => ConnectError::Randomness,
-        OpenError::Lost(source) => ConnectError::Failed { address, source },
-    }
+/// Takes the connections of masters at a slave's endpoint.
+#[derive(Debug)]
+pub struct Listener {
+    quic: listen::Listener,
+    raw: Raw,
 }
 
-/// Masters that knock at a slave's endpoint.
+/// A master that connects. Let it finish in a task of its own, so that a slow one holds up nobody.
 #[derive(Debug)]
-pub enum Listener {
-    /// Of QUIC.
-    Quic(listen::Listener),
-    /// Of raw UDP.
-    RawUdp(Arc<raw_udp::Endpoint>),
-}
-
-/// A master that knocks. Let it finish in a task of its own, so that a slow one holds up nobody.
-#[derive(Debug)]
-pub enum Handshake {
-    /// Of QUIC, under way.
-    Quic(listen::Handshake),
-    /// Of raw UDP: it is over.
-    RawUdp(raw_udp::Connection),
+pub struct Handshake {
+    quic: listen::Handshake,
+    raw: Raw,
 }
 
 impl Listener {
     /// A listener on an endpoint that accepts.
     #[must_use]
     pub fn new(endpoint: Endpoint) -> Self {
-        match endpoint {
-            Endpoint::Quic(endpoint) => Self::Quic(listen::Listener::new(endpoint)),
-            Endpoint::RawUdp(endpoint) => Self::RawUdp(endpoint),
+        Self {
+            quic: listen::Listener::new(endpoint.quic),
+            raw: endpoint.raw,
         }
     }
 
-    /// What was turned away so far; raw UDP turns nobody away.
+    /// What was turned away so far.
     #[must_use]
     pub fn turned_away(&self) -> TurnedAway {
-        match self {
-            Self::Quic(listener) => listener.turned_away(),
-            Self::RawUdp(_) => TurnedAway::default(),
-        }
+        self.quic.turned_away()
     }
 
     /// The next handshake that is let in; `None` once the endpoint is closed. Cancel-safe.
     pub async fn next(&self) -> Option<Handshake> {
-        match self {
-            Self::Quic(listener) => listener.next().await.map(Handshake::Quic),
-            Self::RawUdp(endpoint) => endpoint.accept().await.map(Handshake::RawUdp),
-        }
+        let (quic, raw) = (self.quic.next().await?, self.raw.clone());
+        Some(Handshake { quic, raw })
     }
 }
 
 impl Handshake {
-    /// Who knocks.
+    /// Who connects.
     #[must_use]
     pub fn address(&self) -> SocketAddr {
-        match self {
-            Self::Quic(handshake) => handshake.address(),
-            Self::RawUdp(connection) => connection.remote_address(),
-        }
+        self.quic.address()
     }
 
-    /// The connection, once the handshake is over and the versions agree. Its master is not trusted yet.
+    /// The connection, once the handshake is over. Its master is not trusted yet.
     ///
     /// # Errors
     /// See [`AcceptError`].
     pub async fn finish(self) -> Result<Connection, AcceptError> {
-        match self {
-            Self::Quic(handshake) => handshake.finish().await.map(Connection::Quic),
-            Self::RawUdp(connection) => Ok(Connection::RawUdp(connection)),
-        }
+        let address = self.address();
+        let quic = self.quic.finish().await?;
+        join(quic, &self.raw).ok_or(AcceptError::OtherTransport { address })
     }
 }

@@ -1,4 +1,4 @@
-//! A histogram of durations with a bounded relative error, of fixed size.
+//! A histogram of durations with a bounded relative error, of fixed size, and its quantiles.
 //!
 //! Below 64 ns each nanosecond has a bucket; above, each octave up to 2^36 ns (69 s) has 64 equal
 //! buckets, so that a bucket is at most 1/64 = 1.6 % of its values wide. A quantile is reported as the
@@ -20,6 +20,22 @@ const BUCKETS: usize = (PER_OCTAVE * (OCTAVES + 1)) as usize;
 pub struct Histogram {
     counts: [u32; BUCKETS],
     total: u64,
+    max: Duration,
+}
+
+/// How durations are spread.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Quantiles {
+    /// Durations counted; with none, all the others are zero.
+    pub count: u64,
+    /// Half were not longer.
+    pub p50: Duration,
+    /// 99 of 100 were not longer.
+    pub p99: Duration,
+    /// 999 of 1000 were not longer.
+    pub p999: Duration,
+    /// The longest, exactly.
+    pub max: Duration,
 }
 
 impl Default for Histogram {
@@ -35,15 +51,17 @@ impl Histogram {
         Self {
             counts: [0; BUCKETS],
             total: 0,
+            max: Duration::ZERO,
         }
     }
 
     /// Counts one duration.
-    pub fn note(&mut self, duration: Duration) {
+    pub fn record(&mut self, duration: Duration) {
         if let Some(count) = self.counts.get_mut(bucket(duration_nanos(duration))) {
             *count = count.saturating_add(1);
         }
         self.total = self.total.saturating_add(1);
+        self.max = self.max.max(duration);
     }
 
     /// How many have been counted.
@@ -69,6 +87,20 @@ impl Histogram {
             }
         }
         None
+    }
+
+    /// The quantiles so far. Takes some microseconds.
+    #[must_use]
+    pub fn quantiles(&self) -> Quantiles {
+        // the middle of a bucket may lie above all that is in it
+        let at = |q| self.quantile(q).unwrap_or_default().min(self.max);
+        Quantiles {
+            count: self.total,
+            p50: at(0.5),
+            p99: at(0.99),
+            p999: at(0.999),
+            max: self.max,
+        }
     }
 }
 
@@ -111,7 +143,7 @@ mod tests {
         let mut histogram = Histogram::new();
         assert_eq!(histogram.quantile(0.5), None);
         for ms in 1..=100 {
-            histogram.note(Duration::from_millis(ms));
+            histogram.record(Duration::from_millis(ms));
         }
         for (q, ms) in [(0.0, 1.0), (0.5, 50.0), (0.99, 99.0), (1.0, 100.0)] {
             let found = histogram.quantile(q).unwrap().as_secs_f64() * 1e3;
@@ -119,13 +151,26 @@ mod tests {
         }
         assert_eq!(histogram.quantile(f64::NAN), None);
         assert_eq!(histogram.total(), 100);
+        let all = histogram.quantiles();
+        assert_eq!((all.count, all.max), (100, Duration::from_millis(100)));
+        assert!(all.p50 < all.p99 && all.p999 <= all.max);
+    }
+
+    #[test]
+    fn an_empty_histogram_has_no_count_and_extremes_are_counted() {
+        let mut histogram = Histogram::new();
+        assert_eq!(histogram.quantiles(), Quantiles::default());
+        histogram.record(Duration::ZERO);
+        histogram.record(Duration::MAX);
+        assert_eq!(histogram.quantiles().count, 2);
+        assert_eq!(histogram.quantiles().max, Duration::MAX);
     }
 
     proptest! {
         #[test]
         fn one_value_is_reported_within_0_8_percent(nanos in 1_u64..(1 << 36)) {
             let mut histogram = Histogram::new();
-            histogram.note(Duration::from_nanos(nanos));
+            histogram.record(Duration::from_nanos(nanos));
             let found = histogram.quantile(0.5).unwrap().as_nanos() as f64;
             prop_assert!((found / nanos as f64 - 1.0).abs() <= 0.5 / 64.0);
         }

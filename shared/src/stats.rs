@@ -1,0 +1,7 @@
+//! Statistics that fill while the system runs: quantiles, values of the last seconds, the queue in round trips.
+//!
+//! Pure and of fixed size: time comes as an argument, and nothing allocates.
+
+pub mod histogram;
+pub mod queue;
+pub mod recent;
