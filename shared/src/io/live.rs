@@ -1,11 +1,11 @@
-//! A look at something that runs, for a screen: the newest value wins, older ones are gone.
+//! A snapshot of something that runs, for a screen: the newest value wins, older ones are gone.
 //!
-//! For tokio's side and screens only: it locks. A loop thread hands its looks over through a triple buffer,
+//! For tokio's side and screens only: it locks. A loop thread hands its snapshots over through a triple buffer,
 //! which a task empties into this cell.
 
 use tokio::sync::watch;
 
-/// The newest look.
+/// The newest snapshot.
 #[derive(Debug)]
 pub struct LiveCell<T>(watch::Sender<T>);
 
@@ -22,12 +22,12 @@ impl<T: Clone> LiveCell<T> {
         Self(watch::Sender::new(first))
     }
 
-    /// Shows `look` from now on.
-    pub fn set(&self, look: T) {
-        self.0.send_replace(look);
+    /// Shows `snapshot` from now on.
+    pub fn set(&self, snapshot: T) {
+        self.0.send_replace(snapshot);
     }
 
-    /// The newest look. From any thread; waits only while another one copies it in or out.
+    /// The newest snapshot. From any thread; waits only while another one copies it in or out.
     #[must_use]
     pub fn get(&self) -> T {
         self.0.borrow().clone()
@@ -45,7 +45,7 @@ mod tests {
     use super::*;
 
     #[tokio::test]
-    async fn the_newest_look_wins_and_wakes_who_waits() {
+    async fn the_newest_snapshot_wins_and_wakes_who_waits() {
         let cell = LiveCell::<u32>::default();
         assert_eq!(cell.get(), 0);
         let mut receiver = cell.subscribe();

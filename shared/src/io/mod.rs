@@ -32,4 +32,4 @@ pub mod truth;
 pub mod wake;
 
 #[cfg(test)]
-mod loopback;
+mod tests;

@@ -10,7 +10,7 @@ use std::time::Duration;
 
 use quinn::{
     AckFrequencyConfig, AsyncUdpSocket, ClientConfig, ConnectionIdGenerator, Endpoint,
-    EndpointConfig, IdleTimeout, Runtime, ServerConfig, TokioRuntime, TransportConfig, VarInt,
+    EndpointConfig, IdleTimeout, ServerConfig, TokioRuntime, TransportConfig, VarInt,
 };
 use quinn_proto::HashedConnectionIdGenerator;
 use ring::hmac;
@@ -71,31 +71,12 @@ pub fn server_endpoint(
     identity: &Identity,
     traffic: Traffic,
 ) -> Result<Endpoint, EndpointError> {
-    server_endpoint_on(Arc::new(TokioRuntime), socket, identity, traffic)
-}
-
-/// The slave's endpoint on any runtime of quinn's, to which the socket must belong.
-///
-/// # Errors
-/// As [`server_endpoint`].
-pub fn server_endpoint_on(
-    runtime: Arc<dyn Runtime>,
-    socket: Arc<dyn AsyncUdpSocket>,
-    identity: &Identity,
-    traffic: Traffic,
-) -> Result<Endpoint, EndpointError> {
     let mut config = ServerConfig::with_crypto(Arc::new(tls::server(identity)?));
     config.transport_config(Arc::new(transport(traffic)));
     config.max_incoming(INCOMING_MAX);
     config.incoming_buffer_size(INCOMING_BYTES);
     config.incoming_buffer_size_total(INCOMING_BYTES * INCOMING_MAX as u64);
-    let keys = stable_keys(identity);
-    Ok(Endpoint::new_with_abstract_socket(
-        keys,
-        Some(config),
-        socket,
-        runtime,
-    )?)
+    endpoint(stable_keys(identity), Some(config), socket)
 }
 
 /// The master's endpoint.
@@ -105,28 +86,24 @@ pub fn server_endpoint_on(
 /// # Errors
 /// The socket fails.
 pub fn client_endpoint(socket: Arc<dyn AsyncUdpSocket>) -> Result<Endpoint, EndpointError> {
-    client_endpoint_on(Arc::new(TokioRuntime), socket)
+    endpoint(EndpointConfig::default(), None, socket)
 }
 
-/// The master's endpoint on any runtime of quinn's, to which the socket must belong.
-///
-/// # Errors
-/// As [`client_endpoint`].
-pub fn client_endpoint_on(
-    runtime: Arc<dyn Runtime>,
+fn endpoint(
+    config: EndpointConfig,
+    server: Option<ServerConfig>,
     socket: Arc<dyn AsyncUdpSocket>,
 ) -> Result<Endpoint, EndpointError> {
-    let config = EndpointConfig::default();
-    Ok(Endpoint::new_with_abstract_socket(
-        config, None, socket, runtime,
-    )?)
+    let runtime = Arc::new(TokioRuntime);
+    let endpoint = Endpoint::new_with_abstract_socket(config, server, socket, runtime);
+    Ok(endpoint?)
 }
 
 /// The configuration of one connection attempt.
 ///
 /// # Errors
 /// TLS could not be set up.
-pub fn client_config(
+pub(super) fn client_config(
     verifier: Arc<PinVerifier>,
     traffic: Traffic,
 ) -> Result<ClientConfig, TlsError> {

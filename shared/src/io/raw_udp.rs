@@ -186,7 +186,7 @@ impl Flow {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::io::loopback::open;
+    use crate::io::tests::open;
 
     #[tokio::test]
     async fn of_several_packets_in_a_buffer_quic_keeps_its_own_in_order() {

@@ -7,8 +7,8 @@ use bytes::Bytes;
 use super::*;
 use crate::io::identity::Identity;
 use crate::io::listen::AcceptError;
-use crate::io::loopback::{PATIENCE, Slave, TRAFFIC, open, pair, patiently, slave};
 use crate::io::quic::{client_endpoint, transport};
+use crate::io::tests::{PATIENCE, Slave, TRAFFIC, open, pair, patiently, slave};
 use crate::io::tls;
 use crate::wire::ALPN;
 

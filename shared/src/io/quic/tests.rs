@@ -7,8 +7,8 @@ use tokio::time::timeout;
 use super::*;
 use crate::io::connect::connect;
 use crate::io::listen::Listener;
-use crate::io::loopback::{PATIENCE, TRAFFIC, open, pair, patiently};
 use crate::io::socket;
+use crate::io::tests::{PATIENCE, TRAFFIC, open, pair, patiently};
 
 #[tokio::test]
 async fn of_datagrams_that_cannot_leave_only_the_newest_two_are_kept() {

@@ -1,7 +1,7 @@
 //! Frames between two endpoints on loopback.
 
 use super::*;
-use crate::io::loopback::{PATIENCE, pair};
+use crate::io::tests::{PATIENCE, pair};
 
 #[tokio::test]
 async fn frames_arrive_whole_in_order_and_bounded() {

@@ -6,8 +6,8 @@ use bytes::Bytes;
 
 use super::*;
 use crate::io::identity::Identity;
-use crate::io::loopback::{PATIENCE, TRAFFIC, open, patiently};
 use crate::io::raw_udp::{HEADER, PACKET_MAX};
+use crate::io::tests::{PATIENCE, TRAFFIC, open, patiently};
 
 const RAW_UDP: Transport = Transport::RawUdp { insist: false };
 
