@@ -104,13 +104,6 @@ impl Bottleneck {
         bits_per_s: 1_000_000,
         queue: Duration::from_secs(1),
     };
-
-    /// How long sending a packet of so many bytes takes.
-    #[must_use]
-    pub fn serialisation(&self, bytes: usize) -> Duration {
-        let bits = 8 * bytes as u64;
-        Duration::from_nanos(bits.saturating_mul(1_000_000_000) / self.bits_per_s.max(1))
-    }
 }
 
 /// The path, the same in both directions.

@@ -16,7 +16,7 @@ use mmt_client::operator::scripted::{Picture, Scripted, View};
 use mmt_netem::config::LinkConfig;
 use mmt_netem::counters::Tally;
 use mmt_netem::link::{Direction, LinkId};
-use mmt_netem::pipe::SimPath;
+use mmt_netem::{Link, Packet};
 use mmt_server::environment::Environment;
 use mmt_server::link::SlaveLink;
 use mmt_server::slave::{Slave, SlaveTick};
@@ -73,8 +73,8 @@ pub struct World {
     hand_force: Vec2,
     /// The remote scene on its way to the operator's eyes, if that is what it looks at.
     picture: Option<VecDeque<(Time, View)>>,
-    up: SimPath<Packet>,
-    down: SimPath<Packet>,
+    up: Link<Datagram>,
+    down: Link<Datagram>,
     /// The delay of `down`, without jitter.
     down_delay: Duration,
     slave_clock: SlaveClock,
@@ -98,7 +98,7 @@ impl SlaveClock {
 }
 
 #[derive(Clone, Copy, Debug)]
-struct Packet {
+struct Datagram {
     bytes: [u8; DATAGRAM_MAX],
     length: usize,
 }
@@ -157,7 +157,7 @@ impl World {
         slave.start_at(operator.start());
         let (down_delay, _) = config.down.delay.parts();
         let path = |link: LinkConfig, direction| {
-            SimPath::try_new(link, config.seed, LinkId::first(direction))
+            Link::try_new(link, config.seed, LinkId::first(direction))
         };
         Ok(Self {
             now: Time::ZERO,
@@ -247,7 +247,7 @@ impl World {
     /// Datagrams that the queues before the bottlenecks of both directions dropped.
     #[must_use]
     pub fn dropped_in_queues(&self) -> u64 {
-        let of = |path: &SimPath<Packet>| path.counters().dropped.queue.packets;
+        let of = |path: &Link<Datagram>| path.counters().dropped.queue.packets;
         of(&self.up) + of(&self.down)
     }
 
@@ -256,8 +256,8 @@ impl World {
     /// # Errors
     /// When a number of the network is not accepted.
     pub fn rewire(&mut self, link: &LinkConfig, seed: u64) -> Result<(), WorldError> {
-        self.up = SimPath::try_new(link.clone(), seed, LinkId::first(Direction::Up))?;
-        self.down = SimPath::try_new(link.clone(), seed, LinkId::first(Direction::Down))?;
+        self.up = Link::try_new(link.clone(), seed, LinkId::first(Direction::Up))?;
+        self.down = Link::try_new(link.clone(), seed, LinkId::first(Direction::Down))?;
         (self.down_delay, _) = link.delay.parts();
         Ok(())
     }
@@ -314,12 +314,12 @@ impl World {
 
     fn deliver_down(&mut self) {
         let mut newest: Option<Update> = None;
-        while let Some(packet) = self.down.pop_due(self.now) {
+        while let Some(packet) = self.down.poll_delivered(self.now) {
             // QUIC drops what does not authenticate
-            if packet.corrupted_bit.is_some() {
+            if packet.is_corrupted() {
                 continue;
             }
-            let Packet { bytes, length } = packet.payload;
+            let Datagram { bytes, length } = packet.payload;
             let bytes = bytes.get(..length).unwrap_or_default();
             match self.master_link.handle(packet.due, bytes) {
                 Some(FromSlave::Update(update)) => {
@@ -358,10 +358,12 @@ impl World {
             .master_link
             .send(self.now, tick.sample, tick.port, &mut bytes);
         if let Ok(Some(length)) = sent {
-            self.up.push(self.now, length, Packet { bytes, length });
+            self.up
+                .offer(self.now, Packet::new(length, Datagram { bytes, length }));
         }
         if let Ok(Some(length)) = self.master_link.heartbeat(self.now, &mut bytes) {
-            self.up.push(self.now, length, Packet { bytes, length });
+            self.up
+                .offer(self.now, Packet::new(length, Datagram { bytes, length }));
         }
         tick
     }
@@ -395,11 +397,11 @@ impl World {
     }
 
     fn deliver_up(&mut self) {
-        while let Some(packet) = self.up.pop_due(self.now) {
-            if packet.corrupted_bit.is_some() {
+        while let Some(packet) = self.up.poll_delivered(self.now) {
+            if packet.is_corrupted() {
                 continue;
             }
-            let Packet { bytes, length } = packet.payload;
+            let Datagram { bytes, length } = packet.payload;
             let bytes = bytes.get(..length).unwrap_or_default();
             let arrived = self.slave_clock.at(packet.due);
             if let Some(command) = self.slave_link.handle(arrived, bytes) {
@@ -428,16 +430,19 @@ impl World {
                 self.outcome.updates.sent(update.cause);
                 self.outcome.staleness.sent(self.now, update.sequence);
                 if let Ok(length) = self.slave_link.send_update(now, update, &mut bytes) {
-                    self.down.push(self.now, length, Packet { bytes, length });
+                    self.down
+                        .offer(self.now, Packet::new(length, Datagram { bytes, length }));
                 }
             }
         }
         self.send_tool(now, tick.as_ref());
         if let Ok(Some(length)) = self.slave_link.repeat(now, &mut bytes) {
-            self.down.push(self.now, length, Packet { bytes, length });
+            self.down
+                .offer(self.now, Packet::new(length, Datagram { bytes, length }));
         }
         if let Ok(Some(length)) = self.slave_link.heartbeat(now, &mut bytes) {
-            self.down.push(self.now, length, Packet { bytes, length });
+            self.down
+                .offer(self.now, Packet::new(length, Datagram { bytes, length }));
         }
         tick
     }
@@ -450,7 +455,8 @@ impl World {
         self.outcome.forces += 1;
         let mut bytes = [0; DATAGRAM_MAX];
         if let Ok(length) = self.slave_link.send_tool(now, &tool, &mut bytes) {
-            self.down.push(self.now, length, Packet { bytes, length });
+            self.down
+                .offer(self.now, Packet::new(length, Datagram { bytes, length }));
         }
     }
 

@@ -7,7 +7,7 @@ use std::hint::black_box;
 use std::time::Duration;
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use mmt_netem::{Link, LinkId, PacketMeta, Pipe};
+use mmt_netem::{Link, LinkId, Packet};
 use mmt_shared::time::{TICK, Time};
 
 const SETTINGS: [&str; 12] = [
@@ -25,38 +25,18 @@ const SETTINGS: [&str; 12] = [
     "delay 50ms 5ms loss 1%; at 1s over 2s delay 80ms; loop 5s",
 ];
 
-fn offer(criterion: &mut Criterion) {
-    let mut group = criterion.benchmark_group("Link::offer");
+fn offer_and_poll(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("Link: offer and poll");
     for words in SETTINGS {
         let mut link = Link::try_new(words.parse().unwrap(), 1, LinkId::UP).unwrap();
         let mut now = Time::ZERO;
         group.bench_function(words, |bencher| {
             bencher.iter(|| {
                 now += TICK;
-                let meta = PacketMeta {
-                    bytes: 100,
-                    in_flight: 50,
-                    ecn_capable: false,
-                };
-                link.offer(black_box(now), black_box(meta))
-            });
-        });
-    }
-    group.finish();
-}
-
-fn through_a_pipe(criterion: &mut Criterion) {
-    let mut group = criterion.benchmark_group("Pipe: push and pop");
-    for words in SETTINGS {
-        let mut pipe = Pipe::try_new(words.parse().unwrap(), 1, LinkId::UP).unwrap();
-        let mut now = Time::ZERO;
-        group.bench_function(words, |bencher| {
-            bencher.iter(|| {
-                now += TICK;
-                while let Some(packet) = pipe.pop_due(now) {
+                while let Some(packet) = link.poll(now) {
                     black_box(packet);
                 }
-                pipe.push(now, 100, 0_u64)
+                link.offer(black_box(now), Packet::new(100, 0_u64));
             });
         });
     }
@@ -69,6 +49,6 @@ criterion_group! {
         .sample_size(50)
         .warm_up_time(Duration::from_millis(500))
         .measurement_time(Duration::from_secs(2));
-    targets = offer, through_a_pipe
+    targets = offer_and_poll
 }
 criterion_main!(benches);

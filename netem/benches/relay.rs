@@ -155,14 +155,15 @@ fn carry() -> Result<(), Box<dyn Error>> {
         PACKETS_PER_TICK * TICKS,
         PACKETS_PER_TICK * 1000,
         seen.up.link.offered.packets,
-        seen.up.forwarded.packets,
+        seen.up.sent.packets,
         seen.up.blocked.packets,
         seen.lateness.p50_us,
         seen.lateness.p99_us
     );
     // what the kernel had no room for never reached the relay; the rest must have been sent on
-    match seen.up.forwarded.packets == seen.up.link.offered.packets {
-        true => Ok(()),
-        false => Err("the relay lost packets of its own".into()),
+    if seen.up.sent.packets == seen.up.link.offered.packets {
+        Ok(())
+    } else {
+        Err("the relay lost packets of its own".into())
     }
 }

@@ -1,10 +1,10 @@
 //! What became of packets: counts of packets and bytes, drops by cause.
 //!
-//! The law that holds at any moment: offered + duplicated = delivered + the sum of the drops.
+//! The law that holds at any moment: offered + duplicated = delivered + in flight + the sum of the drops.
 
 use serde::Serialize;
 
-use crate::fate::DropCause;
+use crate::packet::DropCause;
 
 /// A number of packets and the bytes in them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
@@ -86,16 +86,16 @@ impl Drops {
     }
 }
 
-/// What a link decided since it was made.
+/// What became of the packets of a link since it was made.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct LinkCounters {
     /// Packets offered to the link.
     pub offered: Tally,
     /// Copies that the link made of them.
     pub duplicated: Tally,
-    /// Packets and copies that the link delivers, now or later.
+    /// Packets and copies that came through.
     pub delivered: Tally,
-    /// Those among them with a bit turned over.
+    /// Those among them with a bit flipped.
     pub corrupted: Tally,
     /// Those among them marked as having met congestion.
     pub marked: Tally,

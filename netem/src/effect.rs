@@ -12,8 +12,8 @@ use serde::Serialize;
 use crate::config::{ConfigError, Correlation, LinkConfig, Loss, Order};
 use crate::counters::Drops;
 use crate::direction::LinkId;
-use crate::fate::{DropCause, Fate};
-use crate::pipe::Pipe;
+use crate::link::Link;
+use crate::packet::{DropCause, Fate, Packet};
 use crate::record::summary::{mean_run, nearest_rank, runs};
 
 /// Packets sampled. The mean of a delay is then known to 0.4 % of its standard deviation; where delays or
@@ -142,36 +142,49 @@ struct Stream {
 
 impl Stream {
     fn through(config: &LinkConfig, rate_hz: f64) -> Result<Self, ConfigError> {
-        let mut pipe = Pipe::try_new(config.clone(), SEED, LinkId::UP)?;
+        let mut link = Link::try_new(config.clone(), SEED, LinkId::UP)?;
+        let packets = sample_size(config);
         let mut stream = Self {
             delays_ms: Vec::with_capacity(PACKETS as usize),
             reordered: 0,
             drops: Drops::default(),
             marked: 0,
-            lost: Vec::with_capacity(PACKETS as usize),
+            lost: vec![false; packets as usize],
         };
         let mut newest = 0;
-        let capable = config.ecn || config.profile.steps.iter().any(|step| step.settings.ecn);
-        for packet in 0..sample_size(config) {
+        let ecn_capable = config.ecn || config.profile.steps.iter().any(|step| step.settings.ecn);
+        for packet in 0..packets {
             let now = Time::ZERO + Duration::from_secs_f64(f64::from(packet) / rate_hz);
-            stream.collect(&mut pipe, now, &mut newest);
-            let fate = pipe.push_ecn(now, BYTES, capable, ());
-            let on_the_way = [DropCause::Loss, DropCause::Outage, DropCause::Mtu];
-            let lost = on_the_way.iter().any(|cause| fate == Fate::Drop(*cause));
-            stream.lost.push(lost);
+            stream.collect(&mut link, now, &mut newest);
+            let packet = Packet {
+                ecn_capable,
+                ..Packet::new(BYTES, ())
+            };
+            link.offer(now, packet);
         }
-        stream.collect(&mut pipe, Time::MAX, &mut newest);
-        stream.drops = pipe.counters().dropped;
-        stream.marked = pipe.counters().marked.packets;
+        stream.collect(&mut link, Time::MAX, &mut newest);
+        stream.drops = link.counters().dropped;
+        stream.marked = link.counters().marked.packets;
         Ok(stream)
     }
 
-    fn collect(&mut self, pipe: &mut Pipe<()>, now: Time, newest: &mut u64) {
-        while let Some(packet) = pipe.pop_due(now) {
-            let delay = packet.due.saturating_since(packet.offered_at);
-            self.delays_ms.push(delay.as_secs_f64() * 1e3);
-            self.reordered += u64::from(packet.number < *newest);
-            *newest = packet.number.max(*newest);
+    fn collect(&mut self, link: &mut Link<()>, now: Time, newest: &mut u64) {
+        while let Some(packet) = link.poll(now) {
+            match packet.fate {
+                Fate::Delivered { .. } => {
+                    let delay = packet.due.saturating_since(packet.offered_at);
+                    self.delays_ms.push(delay.as_secs_f64() * 1e3);
+                    self.reordered += u64::from(packet.number < *newest);
+                    *newest = packet.number.max(*newest);
+                }
+                Fate::Dropped(DropCause::Loss | DropCause::Outage | DropCause::Mtu) => {
+                    let number = usize::try_from(packet.number).ok();
+                    if let Some(lost) = number.and_then(|number| self.lost.get_mut(number)) {
+                        *lost = true;
+                    }
+                }
+                Fate::Dropped(_) => {}
+            }
         }
     }
 }

@@ -1,7 +1,7 @@
 //! The drivers in real time: [`socket`] wraps a QUIC socket, [`relay`] stands between two hosts.
 //!
-//! Both let the pure [`crate::Pipe`] decide and only keep its times, each on one thread of its own that
-//! waits for absolute deadlines. How late it was is measured ([`lateness`]) and never fed back.
+//! Both let the pure [`crate::Link`] decide and only keep its times ([`driver`]), each on one thread of its
+//! own that waits for absolute deadlines. How late it was is measured ([`lateness`]) and never fed back.
 
 #![allow(
     clippy::disallowed_methods,
@@ -10,8 +10,8 @@
 )]
 
 pub mod alarm;
+pub mod driver;
 pub mod lateness;
-mod log;
 pub mod record_file;
 pub mod relay;
 pub mod socket;

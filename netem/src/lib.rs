@@ -1,9 +1,8 @@
 //! The emulated link of mmt: one pure state machine and the three ways to drive it.
 //!
-//! [`link::Link`] decides what becomes of a packet; it never sleeps, reads no clock and touches no
-//! socket. [`pipe::Pipe`] adds the packets in flight. The drivers: *sim* is a pipe stepped in virtual
-//! time ([`pipe::SimPath`]); *wrap* decorates a QUIC socket and *relay* stands between two hosts, both
-//! in `io` behind the feature of that name.
+//! [`link::Link`] takes packets in and hands them out when they leave or are dropped; it never sleeps, reads
+//! no clock and touches no socket. The drivers: *sim* is a link stepped in virtual time; *wrap* decorates a
+//! QUIC socket and *relay* stands between two hosts, both in `io` behind the feature of that name.
 
 #![cfg_attr(
     not(feature = "io"),
@@ -26,11 +25,10 @@ pub mod counters;
 mod direction;
 pub mod distribution;
 pub mod effect;
-pub mod fate;
 #[cfg(feature = "io")]
 pub mod io;
 pub mod link;
-pub mod pipe;
+pub mod packet;
 pub mod presets;
 mod quantile;
 pub mod record;
@@ -38,7 +36,7 @@ pub mod trace;
 pub mod words;
 
 pub use config::{Delay, LinkConfig, Loss, Order, Probability};
+pub use direction::{Direction, LinkId};
 pub use effect::{Effect, effect};
-pub use fate::{DropCause, Fate};
-pub use link::{Direction, Link, LinkId, PacketMeta};
-pub use pipe::{Pipe, SimPath};
+pub use link::Link;
+pub use packet::{Departure, DropCause, Fate, Packet};

@@ -1,186 +1,124 @@
-//! One direction of an emulated path, as a pure state machine.
+//! One direction of an emulated path, as a pure state machine: a packet goes in, and later it comes out.
 //!
-//! A packet is offered with the time of its arrival, and its fate is known at once: a drop with its
-//! cause, or the times at which it leaves. The order of the stages is that of a real path: MTU, copy,
-//! loss, limit, corruption, bottleneck with its queue, propagation with jitter, order. The times are
-//! theoretical: whoever releases packets late must not feed its lateness back, so it does not add up.
+//! [`Link::offer`] takes a packet at the time of its arrival. [`Link::poll`] hands out what has left or was
+//! dropped by now, and [`Link::poll_timeout`] tells when to poll next. No departure is promised at the offer:
+//! packets wait before the bottleneck and leave at the rate of the moment. The order of the stages is that of
+//! a real path: MTU, copy, loss, limit, corruption, bottleneck with its queue, propagation with jitter, order,
+//! slots. All times are theoretical: lateness of whoever polls changes none of them, so it does not add up.
 //!
-//! It must never sleep, read a clock, touch a socket or allocate.
+//! It must never sleep, read a clock or touch a socket.
 
 use mmt_shared::time::Time;
 
 use crate::config::{ConfigError, LinkConfig};
 use crate::counters::LinkCounters;
-use crate::fate::{Deliveries, Delivery, DropCause, Fate};
+pub use crate::direction::{Direction, LinkId};
+use crate::packet::{Departure, Packet};
 
 mod bottleneck;
-mod catch_up;
 mod codel;
 mod correlated;
-mod losing;
+mod loss_model;
+mod propagation;
 mod slots;
 mod stages;
 mod streams;
 mod timeline;
 
-pub use crate::direction::{Direction, LinkId};
-
-use stages::{Departure, Passing, Stages};
-use streams::Streams;
+use stages::Stages;
 use timeline::Timeline;
 
-/// What a link must know about a packet.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct PacketMeta {
-    /// Its length, bytes (UDP payload in the drivers of this crate).
-    pub bytes: usize,
-    /// Packets offered earlier that have not left yet; whoever holds them counts them.
-    pub in_flight: usize,
-    /// Whether its sender takes a mark for a loss (ECN, RFC 3168).
-    pub ecn_capable: bool,
-}
-
-/// One direction of an emulated path. A pure function of its settings, its seed and its offers.
+/// One direction of an emulated path with the packets on it. A pure function of its settings, its seed and
+/// the calls.
+///
+/// The law that holds at any moment: offered + duplicated = dropped + in flight + delivered.
 #[derive(Clone, Debug)]
-pub struct Link {
-    config: LinkConfig,
+pub struct Link<T> {
     timeline: Timeline,
-    streams: Streams,
-    stages: Stages,
-    origin: Time,
-    offers: u64,
-    counters: LinkCounters,
+    stages: Stages<T>,
 }
 
-impl Link {
+impl<T: Clone> Link<T> {
     /// A link with these settings. The draws depend on the seed (`seed`, or that of the settings if they have
-    /// one) and `id` alone. Its time begins at
-    /// [`Time::ZERO`]; see [`Self::set_origin`].
+    /// one) and `id` alone. Its time begins at [`Time::ZERO`]; see [`Self::set_origin`].
     ///
     /// # Errors
     /// A setting out of its range.
     pub fn try_new(config: LinkConfig, seed: u64, id: LinkId) -> Result<Self, ConfigError> {
         config.check()?;
         let seed = config.seed.unwrap_or(seed);
-        let timeline = Timeline::new(&config);
-        let mut stages = Stages::new(seed, id);
-        stages.prepare(timeline.settings());
         Ok(Self {
-            config,
-            timeline,
-            streams: Streams::new(seed, id),
-            stages,
-            origin: Time::ZERO,
-            offers: 0,
-            counters: LinkCounters::default(),
+            stages: Stages::new(seed, id, config.limit),
+            timeline: Timeline::new(Time::ZERO, config),
         })
     }
 
-    /// Says when the time of the link begins, before the first offer: profiles, outages, replays and all
-    /// that is correlated in time count from there.
-    pub fn set_origin(&mut self, origin: Time) {
-        self.origin = origin;
-    }
-
-    /// Decides what becomes of the packet that arrives at `now`.
+    /// Takes in the packet that arrives at `now`. Poll first: what is due and not polled yet still counts
+    /// against the limit.
     ///
-    /// `now` is the theoretical time of arrival: for a link behind another one, the time at which the
-    /// packet was due to leave that one.
-    pub fn offer(&mut self, now: Time, meta: PacketMeta) -> Fate {
-        self.counters.offered.count(meta.bytes);
-        let draws = self.streams.draw();
-        let elapsed = now.saturating_since(self.origin);
-        let config = self.timeline.at(elapsed, &self.config);
-        let passing = Passing {
-            number: self.offers,
-            elapsed,
-            bytes: meta.bytes,
-            in_flight: meta.in_flight,
-            ecn_capable: meta.ecn_capable,
-        };
-        self.offers = self.offers.saturating_add(1);
-        let (itself, copy) = self.stages.pass(config, passing, &draws);
-        self.settle(meta.bytes, itself, copy)
+    /// `now` is the theoretical time of arrival: for a link behind another one, [`Departure::due`].
+    pub fn offer(&mut self, now: Time, packet: Packet<T>) {
+        self.stages.offer(&self.timeline, now, packet);
     }
 
-    /// Counts the packet and its copy, and joins their fates.
-    fn settle(
-        &mut self,
-        bytes: usize,
-        itself: Result<Departure, DropCause>,
-        copy: Option<Result<Departure, DropCause>>,
-    ) -> Fate {
-        if copy.is_some() {
-            self.counters.duplicated.count(bytes);
-        }
-        for result in [Some(itself), copy].into_iter().flatten() {
-            match result {
-                Ok(departure) => {
-                    self.counters.delivered.count(bytes);
-                    if departure.corrupted_bit.is_some() {
-                        self.counters.corrupted.count(bytes);
-                    }
-                    if departure.marked {
-                        self.counters.marked.count(bytes);
-                    }
-                }
-                Err(cause) => self.counters.dropped.count(cause, bytes),
-            }
-        }
-        let delivery = |departure: Departure| Delivery {
-            due: self.origin + departure.after,
-            corrupted_bit: departure.corrupted_bit,
-            marked: departure.marked,
-        };
-        let copy = copy.and_then(Result::ok).map(delivery);
-        match (itself.map(delivery), copy) {
-            (Ok(itself), copy) => Fate::Deliver(Deliveries::of(itself, copy)),
-            // the copy stands in for the packet
-            (Err(_), Some(copy)) => Fate::Deliver(Deliveries::of(copy, None)),
-            (Err(cause), None) => Fate::Drop(cause),
-        }
+    /// The next packet that has left or was dropped by `now`: by time, then by order of offer.
+    ///
+    /// Of a packet and its copy, a drop is handed out only if it is the packet's own, and a copy whose packet
+    /// was dropped at the offer stands in for it. All drops are counted.
+    pub fn poll(&mut self, now: Time) -> Option<Departure<T>> {
+        self.stages.poll(&self.timeline, now)
     }
 
-    /// Takes new settings for the packets offered from now on. Packets in flight keep their times, the
-    /// counters and the random streams go on, and under [`crate::Order::Fifo`] no packet overtakes an
-    /// earlier one, not even one of the old settings. Time is still counted from the origin, and a seed
-    /// among the new settings changes nothing.
+    /// The next packet that came through by `now`, see [`Self::poll`].
+    pub fn poll_delivered(&mut self, now: Time) -> Option<Departure<T>> {
+        std::iter::from_fn(|| self.poll(now)).find(Departure::is_delivered)
+    }
+
+    /// When to poll next; `None` while nothing is on the link. At that time something leaves, is dropped, or
+    /// goes on to the next stage.
+    #[must_use]
+    pub fn poll_timeout(&self) -> Option<Time> {
+        self.stages.next_event(&self.timeline)
+    }
+
+    /// Takes new settings from `now` on. What waits before the bottleneck is sent at the new rate and then
+    /// takes the new delay; what has passed the bottleneck keeps its time. Counters and random streams go on,
+    /// and under [`crate::Order::Fifo`] no packet overtakes an earlier one, not even one of the old settings.
+    /// Time is still counted from the origin, and a seed among the new settings changes nothing.
     ///
     /// # Errors
     /// A setting out of its range; the old settings stay.
-    pub fn reconfigure(&mut self, config: LinkConfig) -> Result<(), ConfigError> {
+    pub fn reconfigure(&mut self, now: Time, config: LinkConfig) -> Result<(), ConfigError> {
         config.check()?;
-        self.timeline = Timeline::new(&config);
-        self.stages.prepare(self.timeline.settings());
-        self.config = config;
+        self.stages.settle(&self.timeline, now);
+        self.timeline = Timeline::new(self.timeline.origin(), config);
         Ok(())
     }
+}
 
-    /// The settings, with all that they say about later.
+impl<T> Link<T> {
+    /// Sets when the time of the link begins, before the first offer: profiles, outages, replays and all that
+    /// is correlated in time count from there.
+    pub fn set_origin(&mut self, origin: Time) {
+        self.timeline.set_origin(origin);
+    }
+
+    /// The settings, with all that they have for later.
     #[must_use]
     pub fn config(&self) -> &LinkConfig {
-        &self.config
+        self.timeline.config()
     }
 
-    /// When the settings in force at `now` change next because of their profile; the fates of packets
-    /// need no call at that time, only who shows settings does.
+    /// Packets and copies on the link.
     #[must_use]
-    pub fn next_change(&self, now: Time) -> Option<Time> {
-        let elapsed = now.saturating_since(self.origin);
-        let next = self.timeline.next_change(elapsed)?;
-        Some(self.origin + next)
+    pub fn in_flight(&self) -> usize {
+        self.stages.in_flight()
     }
 
-    /// Packets before the bottleneck and being sent, as of the last offer.
-    #[must_use]
-    pub fn backlog(&self) -> usize {
-        self.stages.backlog()
-    }
-
-    /// What the link decided so far.
+    /// What became of the packets so far.
     #[must_use]
     pub fn counters(&self) -> LinkCounters {
-        self.counters
+        self.stages.counters()
     }
 }
 

@@ -8,11 +8,11 @@ use std::iter::Peekable;
 use std::str::FromStr;
 use std::time::Duration;
 
+mod draft;
 mod error;
-mod losing;
+mod loss;
 mod number;
 mod print;
-mod said;
 mod sentence;
 #[cfg(test)]
 mod tests;
@@ -20,8 +20,8 @@ mod tests;
 pub use error::{ParseError, Reason};
 
 use crate::config::{LinkConfig, Profile, STEPS_MAX, Step};
+use draft::Draft;
 use number::time;
-use said::Said;
 
 const A_WORD: &str = "delay, loss, outage, order, reorder, duplicate, corrupt, mtu, rate, queue, codel, \
                       slot, ecn, limit, trace, seed, preset or none";
@@ -152,9 +152,10 @@ impl<'a, 'r> Parser<'a, 'r> {
         {
             return Err(word.expected("a time after the step before it and its ramp"));
         }
-        let ramp = match self.takes("over") {
-            true => time(self.argument())?,
-            false => Duration::ZERO,
+        let ramp = if self.takes("over") {
+            time(self.argument())?
+        } else {
+            Duration::ZERO
         };
         let settings = self.settings()?;
         if settings.seed.is_some() {
@@ -175,11 +176,11 @@ impl<'a, 'r> Parser<'a, 'r> {
 
     /// The settings up to a semicolon or the end.
     fn settings(&mut self) -> Result<LinkConfig, ParseError> {
-        let mut said = Said::default();
+        let mut draft = Draft::default();
         while let Some(word) = self.words.next_if(|word| word.text != ";") {
-            self.sentence(&mut said, word)?;
+            self.sentence(&mut draft, word)?;
         }
-        said.finish()
+        draft.finish()
     }
 }
 

@@ -14,7 +14,7 @@
 
 use std::time::{Duration, Instant};
 
-use mmt_netem::{Link, LinkId, PacketMeta};
+use mmt_netem::{Link, LinkId, Packet};
 use mmt_shared::time::Time;
 use str0m_netem::{
     Bitrate, DataSize, GilbertElliot, Input, Netem, NetemConfig, Output, Probability, RandomLoss,
@@ -47,13 +47,9 @@ fn ours(words: &str) -> Vec<Option<f64>> {
     let mut now = Time::ZERO;
     let mut one = || {
         now += INTERVAL;
-        let meta = PacketMeta {
-            bytes: BYTES,
-            in_flight: 0,
-            ecn_capable: false,
-        };
-        let due = link.offer(now, meta).due();
-        due.map(|due| due.saturating_since(now).as_secs_f64() * 1e3)
+        link.offer(now, Packet::new(BYTES, ()));
+        let out = link.poll_delivered(Time::MAX)?;
+        Some(out.due.saturating_since(now).as_secs_f64() * 1e3)
     };
     (0..N).map(|_| one()).collect()
 }
@@ -153,14 +149,9 @@ fn packets_at_a_rate_are_equally_far_apart() {
         }
     }
     let mut link = Link::try_new("rate 1mbit".parse().unwrap(), 1, LinkId::UP).unwrap();
-    let meta = PacketMeta {
-        bytes: BYTES,
-        in_flight: 0,
-        ecn_capable: false,
-    };
-    let ours: Vec<Duration> = (0..10)
-        .filter_map(|_| link.offer(Time::ZERO, meta).due())
-        .map(|due| due.saturating_since(Time::ZERO))
+    (0..10).for_each(|_| link.offer(Time::ZERO, Packet::new(BYTES, ())));
+    let ours: Vec<Duration> = std::iter::from_fn(|| link.poll(Time::MAX))
+        .map(|out| out.due.saturating_since(Time::ZERO))
         .collect();
     let apart = |dues: &[Duration]| -> Vec<Duration> {
         dues.windows(2).map(|pair| pair[1] - pair[0]).collect()

@@ -5,6 +5,7 @@
 use std::net::SocketAddr;
 use std::time::Duration;
 
+use mmt_netem::io::driver::DirectionCounters;
 use mmt_netem::io::lateness::Lateness;
 use mmt_netem::io::socket::SocketCounters;
 use mmt_shared::io::transport::DatagramCounts;
@@ -57,10 +58,10 @@ impl Ended {
         MasterTotals {
             duration_ns: u64::try_from(self.duration.as_nanos()).unwrap_or(u64::MAX),
             traffic: Traffic {
-                udp_datagrams_sent: self.sockets.sent_datagrams,
-                udp_bytes_sent: self.sockets.sent_bytes,
-                udp_datagrams_received: self.sockets.received_datagrams,
-                udp_bytes_received: self.sockets.received_bytes,
+                udp_datagrams_sent: self.sockets.outgoing.sent.packets,
+                udp_bytes_sent: self.sockets.outgoing.sent.bytes,
+                udp_datagrams_received: self.sockets.received.packets,
+                udp_bytes_received: self.sockets.received.bytes,
                 ..link.end().traffic()
             },
             updates_applied: self.haptic.applied,
@@ -154,8 +155,11 @@ impl Ended {
         let duration_s = self.duration.as_secs_f64();
         let report = |datagrams, bytes| WireReport::new(datagrams, bytes, header_bytes, duration_s);
         UpDown {
-            up: report(self.sockets.sent_datagrams, self.sockets.sent_bytes),
-            down: report(self.sockets.received_datagrams, self.sockets.received_bytes),
+            up: report(
+                self.sockets.outgoing.sent.packets,
+                self.sockets.outgoing.sent.bytes,
+            ),
+            down: report(self.sockets.received.packets, self.sockets.received.bytes),
         }
     }
 
@@ -176,7 +180,6 @@ impl Ended {
 
     fn drops(&self, link: &MasterLink) -> Counts {
         let (traffic, peer) = (link.end().traffic(), link.end().peer());
-        let socket = &self.sockets.dropped;
         let queued = self.counts.given;
         [
             ("bad_echoes", u64::from(peer.bad_echoes())),
@@ -195,19 +198,17 @@ impl Ended {
             ("datagrams_unsealed", self.counts.unsealed),
             ("datagrams_unsent", self.counts.unsent),
             ("forces_not_finite", self.haptic.forces_rejected),
-            ("netem_abandoned", socket.abandoned.packets),
-            ("netem_limit", socket.limit.packets),
-            ("netem_loss", socket.loss.packets),
-            ("netem_mtu", socket.mtu.packets),
-            ("netem_queue", socket.queue.packets),
             ("samples_off_grid", u64::from(link.samples_refused())),
             ("samples_ring_full", self.haptic.samples_dropped),
             ("samples_skipped", u64::from(link.samples_skipped())),
             ("samples_unsent", link.pending() as u64),
-            ("socket_blocked", socket.blocked.packets),
-            ("socket_failed", socket.failed.packets),
         ]
         .into_iter()
+        .chain(
+            self.sockets
+                .outgoing
+                .drops_since(&DirectionCounters::default()),
+        )
         .map(|(name, n)| (name.to_owned(), n))
         .collect()
     }

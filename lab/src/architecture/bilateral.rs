@@ -19,7 +19,7 @@ use mmt_client::operator::scripted::{Phase, Picture, Scripted, View};
 use mmt_netem::config::{LinkConfig, Loss};
 use mmt_netem::counters::Tally;
 use mmt_netem::link::{Direction, LinkId};
-use mmt_netem::pipe::SimPath;
+use mmt_netem::{Link, Packet};
 use mmt_server::environment::Environment;
 use mmt_server::slave::SlaveError;
 use mmt_shared::metrics::{ContactBreaks, ForcePeak, ForceSummary};
@@ -57,8 +57,8 @@ pub struct Bilateral {
     slave: BilateralSlave,
     operator: Operator,
     hand_force: Vec2,
-    up: SimPath<ToSlave>,
-    down: SimPath<ToMaster>,
+    up: Link<ToSlave>,
+    down: Link<ToMaster>,
     /// The scene on its way to the operator's eyes, with the time of its arrival.
     scenes: VecDeque<(Time, View)>,
     seen: View,
@@ -114,8 +114,8 @@ impl Bilateral {
             )?,
             operator,
             hand_force: Vec2::zeros(),
-            up: SimPath::try_new(config.up.clone(), config.seed, LinkId::first(Direction::Up))?,
-            down: SimPath::try_new(
+            up: Link::try_new(config.up.clone(), config.seed, LinkId::first(Direction::Up))?,
+            down: Link::try_new(
                 config.down.clone(),
                 config.seed,
                 LinkId::first(Direction::Down),
@@ -196,8 +196,8 @@ impl Bilateral {
     /// One millisecond with the hand at `hip` (m), whoever moves it; `pushes` says whether it pushes the object.
     pub fn step_at(&mut self, hip: Vec2, pushes: bool) -> Option<BilateralSlaveTick> {
         self.now += TICK;
-        while let Some(packet) = self.down.pop_due(self.now) {
-            if packet.corrupted_bit.is_none() {
+        while let Some(packet) = self.down.poll_delivered(self.now) {
+            if !packet.is_corrupted() {
                 self.master.receive(&packet.payload);
             }
         }
@@ -209,9 +209,10 @@ impl Bilateral {
         outcome
             .felt
             .push_hand(self.now, hip, -tick.hand_force, pushes);
-        self.up.push(self.now, self.bytes, tick.message);
-        while let Some(packet) = self.up.pop_due(self.now) {
-            if packet.corrupted_bit.is_none() {
+        self.up
+            .offer(self.now, Packet::new(self.bytes, tick.message));
+        while let Some(packet) = self.up.poll_delivered(self.now) {
+            if !packet.is_corrupted() {
                 self.slave.receive(packet.due, &packet.payload);
             }
         }
@@ -221,7 +222,7 @@ impl Bilateral {
     fn slave_tick(&mut self) -> Option<BilateralSlaveTick> {
         let tick = self.slave.tick(self.now)?;
         if let Some(message) = tick.message {
-            self.down.push(self.now, self.bytes, message);
+            self.down.offer(self.now, Packet::new(self.bytes, message));
         }
         let outcome = &mut self.outcome;
         outcome.breaks.push(tick.in_contact);

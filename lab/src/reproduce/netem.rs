@@ -4,12 +4,11 @@ use std::time::Duration;
 
 use mmt_netem::config::LinkConfig;
 use mmt_netem::effect::Effect;
-use mmt_netem::fate::Fate;
 use mmt_netem::link::{Direction, LinkId};
-use mmt_netem::pipe::Pipe;
 use mmt_netem::presets::{PRESETS, Preset};
 use mmt_netem::record::summary::Summary;
 use mmt_netem::record::{End, Entry};
+use mmt_netem::{Link, Packet};
 use mmt_shared::time::{TICK, Time};
 
 use super::{Extent, Findings, Laboratory, ReproduceError};
@@ -83,39 +82,18 @@ fn run(
     seed: u64,
     duration: Duration,
 ) -> Result<Vec<Entry>, mmt_netem::config::ConfigError> {
-    let mut pipe: Pipe<()> = Pipe::try_new(config.clone(), seed, LinkId::first(Direction::Up))?;
+    let mut link: Link<()> = Link::try_new(config.clone(), seed, LinkId::first(Direction::Up))?;
     let mut entries = Vec::new();
-    let take = |pipe: &mut Pipe<()>, now: Time, entries: &mut Vec<Entry>| {
-        while let Some(packet) = pipe.pop_due(now) {
-            entries.push(Entry {
-                direction: Direction::Up,
-                number: packet.number,
-                offered: packet.offered_at,
-                bytes: packet.bytes as u32,
-                backlog: 0,
-                end: End::Sent {
-                    due: packet.due,
-                    sent: packet.due,
-                    copy: packet.copy,
-                    corrupted: packet.corrupted_bit.is_some(),
-                },
-            });
-        }
-    };
-    for number in 0..duration.as_millis() as u64 {
-        let now = Time::ZERO + TICK * (number as u32 + 1);
-        take(&mut pipe, now, &mut entries);
-        if let Fate::Drop(cause) = pipe.push(now, BYTES, ()) {
-            entries.push(Entry {
-                direction: Direction::Up,
-                number,
-                offered: now,
-                bytes: BYTES as u32,
-                backlog: pipe.in_flight() as u32,
-                end: End::Dropped(cause),
-            });
-        }
+    let mut now = Time::ZERO;
+    for _ in 0..duration.as_millis() {
+        now += TICK;
+        let out = std::iter::from_fn(|| link.poll(now));
+        entries.extend(out.map(|out| Entry::of(Direction::Up, &out)));
+        link.offer(now, Packet::new(BYTES, ()));
     }
+    // the last packet is on record if it was dropped at once
+    let dropped = std::iter::from_fn(|| link.poll(now)).filter(|out| !out.is_delivered());
+    entries.extend(dropped.map(|out| Entry::of(Direction::Up, &out)));
     Ok(entries)
 }
 

@@ -50,13 +50,12 @@ impl Framing {
         let bytes = i64::try_from(bytes).unwrap_or(i64::MAX);
         let framed = bytes.saturating_add(self.overhead.into()).max(0);
         let cell = i64::from(self.cell);
-        let weight = match cell {
-            0 => framed,
-            cell => {
-                let cells = framed.saturating_add(cell - 1) / cell;
-                let filled = cell.saturating_add(self.cell_overhead.into()).max(0);
-                cells.saturating_mul(filled)
-            }
+        let weight = if cell == 0 {
+            framed
+        } else {
+            let cells = framed.saturating_add(cell - 1) / cell;
+            let filled = cell.saturating_add(self.cell_overhead.into()).max(0);
+            cells.saturating_mul(filled)
         };
         u64::try_from(weight).unwrap_or(0).min(WEIGHT_MAX)
     }
@@ -71,6 +70,9 @@ pub struct Queue {
     pub packets: Option<u32>,
     /// How long a packet would wait before its own sending begins.
     pub wait: Option<Duration>,
+    /// Whether a packet that finds no room drives out those that have waited longest, instead of being
+    /// dropped itself.
+    pub drop_head: bool,
     /// Active queue management on top of the limits.
     pub codel: Option<Codel>,
 }

@@ -165,8 +165,8 @@ impl LinkConfig {
 }
 
 fn holds(fits: bool, what: &'static str, range: &'static str) -> Result<(), ConfigError> {
-    match fits {
-        true => Ok(()),
-        false => Err(ConfigError::OutOfRange { what, range }),
+    if !fits {
+        return Err(ConfigError::OutOfRange { what, range });
     }
+    Ok(())
 }

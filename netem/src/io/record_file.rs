@@ -33,8 +33,9 @@ pub struct RecordWriter {
 }
 
 impl RecordWriter {
-    /// Hands over a packet; never waits.
+    /// Hands over a packet, with times of the drivers' clock; never waits.
     pub(super) fn push(&self, entry: Entry) {
+        let entry = entry.since(self.origin);
         if self.sender.try_send(Some(entry)).is_err() {
             self.missed.fetch_add(1, Ordering::Relaxed);
         }
@@ -44,11 +45,6 @@ impl RecordWriter {
     #[must_use]
     pub fn missed(&self) -> u64 {
         self.missed.load(Ordering::Relaxed)
-    }
-
-    /// A time of the drivers' clock as the record counts it.
-    pub(super) fn since_start(&self, time: Time) -> Time {
-        Time::ZERO + time.saturating_since(self.origin)
     }
 }
 
@@ -68,16 +64,13 @@ impl RecordFile {
         let text = path.extension().is_some_and(|end| end == "csv");
         let mut file = BufWriter::new(File::create(path)?);
         let mut bytes = Vec::new();
-        let form = match text {
-            true => {
-                bytes.extend_from_slice(csv::heading(heading).as_bytes());
-                Form::Csv
-            }
-            false => {
-                let mut writer = binary::Writer::default();
-                writer.heading(&mut bytes, heading);
-                Form::Binary(writer)
-            }
+        let form = if text {
+            bytes.extend_from_slice(csv::heading(heading).as_bytes());
+            Form::Csv
+        } else {
+            let mut writer = binary::Writer::default();
+            writer.heading(&mut bytes, heading);
+            Form::Binary(writer)
         };
         file.write_all(&bytes)?;
         file.flush()?;

@@ -14,17 +14,15 @@ use std::time::Duration;
 use serde::Serialize;
 
 use super::alarm::{Alarm, now};
+use super::driver::{DirectionCounters, Driver};
 use super::lateness::{Lateness, Recorder};
 use super::lock;
-use super::log::Log;
 use super::record_file::RecordWriter;
 use crate::config::{ConfigError, LinkConfig};
-use crate::counters::{LinkCounters, Tally};
+use crate::counters::Tally;
 use crate::direction::LinkId;
-use crate::pipe::Pipe;
 
 mod clients;
-mod lane;
 mod port;
 #[cfg(test)]
 mod tests;
@@ -87,7 +85,7 @@ pub struct RelaySnapshot {
     pub clients_met: u64,
     /// Datagrams from clients beyond [`CLIENTS_MAX`], or without a socket to be had: never offered.
     pub refused: Tally,
-    /// Times that the target's host said that nobody listens there (ICMP port unreachable).
+    /// Times that the target's host answered that nobody listens there (ICMP port unreachable).
     pub unreachable: u64,
     /// Other errors of receiving.
     pub receive_errors: u64,
@@ -97,25 +95,6 @@ pub struct RelaySnapshot {
     pub unrecorded: u64,
     /// How late packets left, both directions.
     pub lateness: Lateness,
-}
-
-/// One direction of the relay. Bytes are UDP payload.
-///
-/// `offered + duplicated = dropped by the link + in_flight + forwarded + blocked + failed + orphaned`.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
-pub struct DirectionCounters {
-    /// What the link decided.
-    pub link: LinkCounters,
-    /// Packets on the link now.
-    pub in_flight: u64,
-    /// Packets really sent on.
-    pub forwarded: Tally,
-    /// Packets dropped because the socket was full.
-    pub blocked: Tally,
-    /// Packets that the socket refused with an error.
-    pub failed: Tally,
-    /// Packets whose client was forgotten while they were in flight.
-    pub orphaned: Tally,
 }
 
 /// What a relay can do besides.
@@ -130,7 +109,7 @@ pub struct Extras {
 
 /// What the handle asks of the thread.
 #[derive(Debug, Default)]
-struct Orders {
+struct Commands {
     links: Option<(LinkConfig, LinkConfig)>,
     rebind: bool,
 }
@@ -167,19 +146,21 @@ impl Relay {
         seed: u64,
         extras: Extras,
     ) -> Result<RelayHandle, RelayError> {
-        let (mut up, mut down) = (
-            Pipe::try_new(up, seed, LinkId::UP)?,
-            Pipe::try_new(down, seed, LinkId::DOWN)?,
-        );
-        let origin = now();
-        up.set_origin(origin);
-        down.set_origin(origin);
+        let (origin, lateness) = (now(), Arc::new(Recorder::default()));
+        let driver = |config, id| {
+            let (record, lateness) = (extras.record.clone(), Arc::clone(&lateness));
+            Driver::try_new(config, seed, id, origin, record, lateness)
+        };
+        let (up, down) = (driver(up, LinkId::UP)?, driver(down, LinkId::DOWN)?);
         if to.port() == 0 || to.ip().is_unspecified() {
             return Err(RelayError::Target { to });
         }
-        let (port, local) = listen_on(listen).map_err(|source| match listen == to {
-            true => RelayError::Loop { to },
-            false => RelayError::Listen { listen, source },
+        let (port, local) = listen_on(listen).map_err(|source| {
+            if listen == to {
+                RelayError::Loop { to }
+            } else {
+                RelayError::Listen { listen, source }
+            }
         })?;
         if local == to {
             return Err(RelayError::Loop { to });
@@ -187,13 +168,12 @@ impl Relay {
         let shared = Arc::new(Shared {
             alarm: Alarm::try_new().map_err(RelayError::Thread)?,
             stopping: AtomicBool::new(false),
-            orders: Mutex::new(Orders::default()),
+            commands: Mutex::new(Commands::default()),
             board: Mutex::new(RelaySnapshot::default()),
-            lateness: Recorder::default(),
+            lateness,
         });
-        let log = Log::new(extras.record);
         let clients = Clients::new(to);
-        let mut worker = Worker::new(port, clients, up, down, log, shared.clone());
+        let mut worker = Worker::new(port, clients, up, down, extras.record, shared.clone());
         worker.rebind_every(extras.rebind_every, origin);
         let thread = std::thread::Builder::new()
             .name("netem-relay".to_owned())
@@ -226,10 +206,10 @@ pub struct RelayHandle {
 struct Shared {
     alarm: Alarm,
     stopping: AtomicBool,
-    orders: Mutex<Orders>,
-    /// The counts as of the thread's last look around, without the lateness.
+    commands: Mutex<Commands>,
+    /// The counts as of the thread's last round, without the lateness.
     board: Mutex<RelaySnapshot>,
-    lateness: Recorder,
+    lateness: Arc<Recorder>,
 }
 
 impl RelayHandle {
@@ -248,25 +228,25 @@ impl RelayHandle {
         }
     }
 
-    /// New settings for both directions, for the packets to come ([`crate::Link::reconfigure`]).
+    /// New settings for both directions from now on ([`crate::Link::reconfigure`]).
     ///
     /// # Errors
     /// A setting out of its range; the old settings stay.
     pub fn reconfigure(&self, up: LinkConfig, down: LinkConfig) -> Result<(), ConfigError> {
         up.check()?;
         down.check()?;
-        lock(&self.shared.orders).links = Some((up, down));
+        lock(&self.shared.commands).links = Some((up, down));
         self.shared.alarm.ring();
         Ok(())
     }
 
     /// Gives every client a new port toward the target, once, now.
     pub fn rebind(&self) {
-        lock(&self.shared.orders).rebind = true;
+        lock(&self.shared.commands).rebind = true;
         self.shared.alarm.ring();
     }
 
-    /// Whether the relay is at work; false after an error that [`Self::stop`] tells.
+    /// Whether the relay is at work; false after an error that [`Self::stop`] returns.
     #[must_use]
     pub fn is_running(&self) -> bool {
         self.thread
@@ -274,7 +254,7 @@ impl RelayHandle {
             .is_some_and(|thread| !thread.is_finished())
     }
 
-    /// Stops the relay and tells what it did. Packets in flight are lost and show as such.
+    /// Stops the relay and returns what it did. Packets in flight are lost and show as such.
     ///
     /// # Errors
     /// The error by which the relay had ended before.

@@ -1,9 +1,9 @@
 //! The *wrap* driver: a QUIC socket whose outgoing datagrams pass through an emulated link.
 //!
 //! [`EmulatedSocket`] decorates any socket of quinn's. Without emulation it passes straight through and
-//! only counts. With it, each datagram is judged at once and the ones that go on are sent by a thread of
-//! their own at their times; sending never blocks, never waits and never reports a full queue: what does
-//! not fit is dropped and counted.
+//! only counts. With it, each datagram goes on the link, and a thread of its own sends what comes through at
+//! its time. Sending never blocks, never waits and never reports a full queue: what does not fit is dropped
+//! and counted.
 
 use std::fmt;
 use std::io::{self, IoSliceMut};
@@ -12,11 +12,12 @@ use std::pin::Pin;
 use std::sync::Arc;
 use std::task::{Context, Poll};
 
-use quinn::udp::{EcnCodepoint, RecvMeta, Transmit};
+use quinn::udp::{RecvMeta, Transmit};
 use quinn::{AsyncUdpSocket, UdpPoller};
 
 use crate::config::{ConfigError, LinkConfig};
 use crate::direction::LinkId;
+use crate::io::driver::Datagram;
 use crate::io::record_file::RecordWriter;
 
 mod control;
@@ -26,7 +27,7 @@ mod release;
 mod tests;
 
 pub use control::SocketControl;
-pub use meter::{SocketCounters, SocketDrops, SocketMeter};
+pub use meter::{SocketCounters, SocketMeter};
 use release::Release;
 
 /// A socket could not be wrapped.
@@ -93,9 +94,10 @@ impl EmulatedSocket {
     ) -> Result<Self, WrapError> {
         let meter = SocketMeter::default();
         config.check()?;
-        let release = match config.is_transparent() && extras.is_empty() {
-            true => None,
-            false => Some(Release::start(&inner, config, seed, id, &meter, extras)?),
+        let release = if config.is_transparent() && extras.is_empty() {
+            None
+        } else {
+            Some(Release::start(&inner, config, seed, id, &meter, extras)?)
         };
         Ok(Self {
             inner,
@@ -126,7 +128,14 @@ impl AsyncUdpSocket for EmulatedSocket {
             return sent;
         };
         for contents in segments(transmit) {
-            release.offer(Datagram::of(transmit, contents));
+            release.offer(Datagram {
+                address: Address {
+                    destination: transmit.destination,
+                    src_ip: transmit.src_ip,
+                },
+                ecn: transmit.ecn,
+                contents: contents.to_owned(),
+            });
         }
         Ok(())
     }
@@ -184,34 +193,11 @@ impl UdpPoller for AlwaysWritable {
     }
 }
 
-/// An outgoing datagram with all that quinn says about it.
-#[derive(Clone, Debug)]
-struct Datagram {
+/// Where an outgoing datagram goes, and from which address.
+#[derive(Clone, Copy, Debug)]
+struct Address {
     destination: SocketAddr,
-    ecn: Option<EcnCodepoint>,
     src_ip: Option<IpAddr>,
-    contents: Vec<u8>,
-}
-
-impl Datagram {
-    fn of(transmit: &Transmit<'_>, contents: &[u8]) -> Self {
-        Self {
-            destination: transmit.destination,
-            ecn: transmit.ecn,
-            src_ip: transmit.src_ip,
-            contents: contents.to_owned(),
-        }
-    }
-
-    fn as_transmit(&self) -> Transmit<'_> {
-        Transmit {
-            destination: self.destination,
-            ecn: self.ecn,
-            contents: &self.contents,
-            segment_size: None,
-            src_ip: self.src_ip,
-        }
-    }
 }
 
 /// The datagrams in a transmit: one, or as many as the segment size makes of it.

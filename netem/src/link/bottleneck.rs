@@ -1,154 +1,381 @@
-//! The bottleneck: packets wait their turn, are sent at a rate, or find no room.
+//! The bottleneck: packets find room or not, wait their turn, and are sent at the rate of the moment.
 //!
-//! First in, first out: nothing that comes later changes what happens to a packet, so its departure is
-//! known when it arrives.
+//! First in, first out. Nothing is decided before its time: each call carries the queue on to `now` under the
+//! settings in force at each moment, so that a change of rate or trace applies to what waits.
 
 use std::collections::VecDeque;
+use std::sync::Arc;
 use std::time::Duration;
 
 use super::codel::CodelState;
+use super::stages::ROOM;
+use super::timeline::Timeline;
 use crate::config::{LinkConfig, Queue, Rate, Service};
-use crate::fate::DropCause;
-use crate::trace::mahimahi::OPPORTUNITY_BYTES;
+use crate::packet::DropCause;
+use crate::trace::mahimahi::{OPPORTUNITY_BYTES, Opportunities};
 
 /// A packet that is heavier than this does not make `CoDel` wait longer: the usual MTU.
 const MTU_BYTES: u64 = 1500;
 
-/// The state of the bottleneck. Times are counted from the start of the link.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Bottleneck {
-    /// When it is done with all that it took.
+/// The state of the bottleneck. Times are counted from the origin of the link.
+#[derive(Clone, Debug)]
+pub(super) struct Bottleneck<P> {
+    /// The packets that wait, the first perhaps being sent.
+    waiting: VecDeque<Waiting<P>>,
+    /// The weight of them all, bytes.
+    bytes: u64,
+    /// What is left to send of them, but for what is on the wire, bytes.
+    bytes_left: u64,
+    /// How long that takes at a constant rate.
+    time_left: TimeLeft,
+    /// The first packet is on the wire until then.
+    sending_until: Option<Duration>,
+    /// The wire sends nothing more before then.
     free_at: Duration,
-    /// The opportunity in use, and the bytes left in it.
-    opportunity: u64,
-    left_bytes: u64,
-    /// When each packet will be gone, and its weight.
-    waiting: VecDeque<(Duration, u64)>,
-    waiting_bytes: u64,
-    room: usize,
+    opportunity: Opportunity,
     codel: CodelState,
 }
 
-impl Bottleneck {
-    /// Makes room, so that no packet ever has to.
-    pub(super) fn prepare<'a>(&mut self, settings: impl Iterator<Item = &'a LinkConfig>) {
-        let limits = settings.filter(|config| config.rate.is_some());
-        let room = limits.map(|config| config.limit as usize).max();
-        self.room = room.unwrap_or(0).max(self.waiting.len());
-        self.waiting
-            .reserve(self.room.saturating_sub(self.waiting.len()));
+/// A packet before the bottleneck.
+#[derive(Clone, Debug)]
+struct Waiting<P> {
+    packet: P,
+    arrived: Duration,
+    /// What it weighs on the wire, and what of that is left to send, bytes.
+    weight: u64,
+    left: u64,
+    ecn_capable: bool,
+    /// When its sending began, and whether `CoDel` marked it then.
+    began: Option<Duration>,
+    marked: bool,
+}
+
+/// A packet that left the bottleneck.
+#[derive(Clone, Debug)]
+pub(super) struct Sent<P> {
+    pub(super) packet: P,
+    /// When.
+    pub(super) at: Duration,
+    /// How long it waited until its sending began, or until it was dropped.
+    pub(super) queued: Duration,
+    /// Whether `CoDel` marked it.
+    pub(super) marked: bool,
+    /// Why it was dropped, if it was.
+    pub(super) dropped: Option<DropCause>,
+}
+
+/// How long sending takes what waits, at the rate asked for last.
+#[derive(Clone, Copy, Debug, Default)]
+struct TimeLeft {
+    /// Zero: not known.
+    bits_per_second: u64,
+    total: Duration,
+}
+
+/// The opportunity in use of a trace.
+#[derive(Clone, Debug, Default)]
+struct Opportunity {
+    trace: Option<Arc<Opportunities>>,
+    number: u64,
+    bytes_left: u64,
+}
+
+/// What the bottleneck does next.
+enum Next {
+    /// Something at this time, under the settings then.
+    At(Duration),
+    /// The trace gives the next opportunity at `at`; the settings stay until then.
+    Opportunity { at: Duration },
+    /// The settings change first.
+    Change(Duration),
+}
+
+impl<P> Bottleneck<P> {
+    pub(super) fn new(limit: u32) -> Self {
+        Self {
+            waiting: VecDeque::with_capacity(ROOM.min(limit as usize)),
+            bytes: 0,
+            bytes_left: 0,
+            time_left: TimeLeft::default(),
+            sending_until: None,
+            free_at: Duration::ZERO,
+            opportunity: Opportunity::default(),
+            codel: CodelState::default(),
+        }
     }
 
     /// Packets waiting and being sent.
-    pub(super) fn backlog(&self) -> usize {
+    pub(super) fn len(&self) -> usize {
         self.waiting.len()
     }
 
-    /// When the packet that arrives at `now` leaves the bottleneck, or why it does not; also whether `CoDel`
-    /// marks it, which it does instead of dropping if `spared`.
-    pub(super) fn pass(
+    /// From `now` on other settings are in force; carry the queue on to `now` first.
+    pub(super) fn change_at(&mut self, now: Duration) {
+        self.free_at = self.free_at.max(now);
+    }
+
+    /// Whether a packet that weighs `weight` finds no room at `now`.
+    pub(super) fn is_full(
         &mut self,
         rate: &Rate,
         queue: &Queue,
         now: Duration,
-        bytes: usize,
-        spared: bool,
-    ) -> Result<(Duration, bool), DropCause> {
-        self.forget(now);
-        let weight = rate.framing.weight(bytes);
-        let idle = self.free_at <= now;
-        let begins = self.begin(&rate.service, now);
-        let wait = begins.saturating_sub(now);
-        if self.is_full(queue, weight, wait) {
-            return Err(DropCause::Queue);
-        }
-        let mut marked = false;
-        if let Some(codel) = queue.codel {
-            let target = codel.target.max(sending_time(&rate.service, MTU_BYTES));
-            let interval = codel.interval;
-            let hit = self.codel.drops(target, interval, begins, wait, idle);
-            if hit && !spared {
-                self.wait(begins, weight);
-                return Err(DropCause::Codel);
-            }
-            marked = hit;
-        }
-        let gone = self.send(&rate.service, begins, weight);
-        self.wait(gone, weight);
-        Ok((gone, marked))
-    }
-
-    fn forget(&mut self, now: Duration) {
-        while let Some((_, weight)) = self.waiting.front().filter(|(gone, _)| *gone <= now) {
-            self.waiting_bytes = self.waiting_bytes.saturating_sub(*weight);
-            self.waiting.pop_front();
-        }
-    }
-
-    fn wait(&mut self, gone: Duration, weight: u64) {
-        self.waiting.push_back((gone, weight));
-        self.waiting_bytes = self.waiting_bytes.saturating_add(weight);
-    }
-
-    fn is_full(&self, queue: &Queue, weight: u64, wait: Duration) -> bool {
+        weight: u64,
+    ) -> bool {
         let packets = self.waiting.len();
-        packets >= self.room
-            || queue.wait.is_some_and(|limit| wait > limit)
-            || queue.packets.is_some_and(|limit| packets >= limit as usize)
+        queue.packets.is_some_and(|limit| packets >= limit as usize)
             || queue
                 .bytes
-                .is_some_and(|limit| self.waiting_bytes.saturating_add(weight) > limit)
+                .is_some_and(|limit| self.bytes.saturating_add(weight) > limit)
+            || queue
+                .wait
+                .is_some_and(|limit| self.wait(&rate.service, now) > limit)
     }
 
-    /// When the sending of the next packet begins.
-    fn begin(&mut self, service: &Service, now: Duration) -> Duration {
+    /// How long a packet that comes at `now` waits until its sending begins, if the settings stay.
+    fn wait(&mut self, service: &Service, now: Duration) -> Duration {
+        let free_at = self.sending_until.unwrap_or(self.free_at);
         match service {
-            Service::Constant { .. } => self.free_at.max(now),
-            Service::Opportunities(trace) => {
-                let next = trace.first_from(now);
-                if next > self.opportunity || self.left_bytes == 0 {
-                    self.opportunity = next.max(self.opportunity);
-                    self.left_bytes = OPPORTUNITY_BYTES;
+            Service::Constant { bits_per_second } => {
+                if self.time_left.bits_per_second != *bits_per_second {
+                    self.count_time_left(*bits_per_second);
                 }
-                trace.time(self.opportunity)
+                let on_the_wire = free_at.saturating_sub(now);
+                on_the_wire.saturating_add(self.time_left.total)
+            }
+            Service::Opportunities(trace) => {
+                let (mut number, left) = self.opportunity.at(trace, free_at.max(now));
+                if let Some(beyond) = self.bytes_left.checked_sub(left) {
+                    number = number.saturating_add(1 + beyond / OPPORTUNITY_BYTES);
+                }
+                trace.time(number).saturating_sub(now)
             }
         }
     }
 
-    /// Sends a packet from `begins` on; returns when it is gone.
-    fn send(&mut self, service: &Service, begins: Duration, weight: u64) -> Duration {
-        let gone = match service {
-            Service::Constant { .. } => begins.saturating_add(sending_time(service, weight)),
-            Service::Opportunities(trace) => {
-                let mut rest = weight;
-                while rest > self.left_bytes {
-                    rest -= self.left_bytes;
-                    self.opportunity = self.opportunity.saturating_add(1);
-                    self.left_bytes = OPPORTUNITY_BYTES;
-                }
-                self.left_bytes -= rest;
-                let gone = trace.time(self.opportunity);
-                if self.left_bytes == 0 {
-                    self.opportunity = self.opportunity.saturating_add(1);
-                }
-                gone
-            }
+    fn count_time_left(&mut self, bits_per_second: u64) {
+        let times = self.waiting.iter();
+        let times = times.map(|waiting| sending_time(bits_per_second, waiting.left));
+        self.time_left = TimeLeft {
+            bits_per_second,
+            total: times.fold(Duration::ZERO, Duration::saturating_add),
         };
-        self.free_at = gone;
-        gone
+    }
+
+    /// Puts a packet at the end of the queue.
+    pub(super) fn push(&mut self, packet: P, weight: u64, ecn_capable: bool, now: Duration) {
+        self.bytes = self.bytes.saturating_add(weight);
+        self.bytes_left = self.bytes_left.saturating_add(weight);
+        self.time_left.add(weight);
+        self.waiting.push_back(Waiting {
+            packet,
+            arrived: now,
+            weight,
+            left: weight,
+            ecn_capable,
+            began: None,
+            marked: false,
+        });
+    }
+
+    /// Drops the packet that has waited longest, but for one whose sending has begun.
+    pub(super) fn drop_head(&mut self, now: Duration) -> Option<Sent<P>> {
+        let begun = self.waiting.front().is_some_and(|w| w.began.is_some());
+        self.take(usize::from(begun), now, Some(DropCause::Queue))
+    }
+
+    /// The next packet that has left the bottleneck by `now`.
+    pub(super) fn poll(&mut self, timeline: &Timeline, now: Duration) -> Option<Sent<P>> {
+        loop {
+            match self.next(timeline)? {
+                Next::At(at) if at <= now => {
+                    if let Some(sent) = self.serve(timeline.at(at), at) {
+                        return Some(sent);
+                    }
+                }
+                Next::Opportunity { at } if at <= now => {
+                    if let Some(sent) = self.use_opportunity(timeline.at(at), at) {
+                        return Some(sent);
+                    }
+                }
+                Next::Change(at) if at <= now => self.change_at(at),
+                _ => return None,
+            }
+        }
+    }
+
+    /// When to poll next.
+    pub(super) fn next_event(&self, timeline: &Timeline) -> Option<Duration> {
+        self.next(timeline).map(|next| match next {
+            Next::At(at) | Next::Opportunity { at } | Next::Change(at) => at,
+        })
+    }
+
+    fn next(&self, timeline: &Timeline) -> Option<Next> {
+        let first = self.waiting.front()?;
+        if let Some(until) = self.sending_until {
+            return Some(Next::At(until));
+        }
+        let ready = self.free_at.max(first.arrived);
+        let Some(Service::Opportunities(trace)) = service(timeline.at(ready)) else {
+            return Some(Next::At(ready));
+        };
+        let (number, _) = self.opportunity.at(trace, ready);
+        let at = trace.time(number);
+        let change = timeline.next_change(ready).filter(|change| *change <= at);
+        Some(change.map_or(Next::Opportunity { at }, Next::Change))
+    }
+
+    /// At a constant rate, or at none: ends the sending of the first packet, or begins it.
+    fn serve(&mut self, settings: &LinkConfig, now: Duration) -> Option<Sent<P>> {
+        if self.sending_until.take().is_some() {
+            self.free_at = now;
+            return self.take(0, now, None);
+        }
+        let Some(Service::Constant { bits_per_second }) = service(settings) else {
+            self.begin(now);
+            return self.take(0, now, None);
+        };
+        if self.codel_drops(settings, now) {
+            return self.take(0, now, Some(DropCause::Codel));
+        }
+        self.begin(now);
+        let first = self.waiting.front_mut()?;
+        let left = std::mem::take(&mut first.left);
+        self.bytes_left = self.bytes_left.saturating_sub(left);
+        self.time_left.remove(left);
+        self.sending_until = Some(now.saturating_add(sending_time(*bits_per_second, left)));
+        None
+    }
+
+    /// Sends of the first packet what the opportunity at `now` carries.
+    fn use_opportunity(&mut self, settings: &LinkConfig, now: Duration) -> Option<Sent<P>> {
+        let Some(Service::Opportunities(trace)) = service(settings) else {
+            return None;
+        };
+        let ready = self.free_at.max(self.waiting.front()?.arrived);
+        if self.codel_drops(settings, now) {
+            return self.take(0, now, Some(DropCause::Codel));
+        }
+        self.begin(now);
+        let first = self.waiting.front_mut()?;
+        let sent = self.opportunity.send(trace, ready, first.left);
+        first.left = first.left.saturating_sub(sent);
+        let done = first.left == 0;
+        self.bytes_left = self.bytes_left.saturating_sub(sent);
+        self.time_left = TimeLeft::default();
+        self.free_at = now;
+        if done { self.take(0, now, None) } else { None }
+    }
+
+    fn begin(&mut self, now: Duration) {
+        if let Some(first) = self.waiting.front_mut() {
+            first.began.get_or_insert(now);
+        }
+    }
+
+    /// Whether `CoDel` drops the first packet, whose sending would begin now; one that understands is marked
+    /// instead.
+    fn codel_drops(&mut self, settings: &LinkConfig, now: Duration) -> bool {
+        let (Some(first), Some(codel), Some(rate)) = (
+            self.waiting
+                .front_mut()
+                .filter(|first| first.began.is_none()),
+            settings.queue.codel,
+            &settings.rate,
+        ) else {
+            return false;
+        };
+        let target = codel.target.max(mtu_time(&rate.service));
+        let wait = now.saturating_sub(first.arrived);
+        let hit = self.codel.drops(target, codel.interval, now, wait);
+        first.marked = hit && settings.ecn && first.ecn_capable;
+        hit && !first.marked
+    }
+
+    /// Takes a packet out of the queue.
+    fn take(&mut self, at: usize, now: Duration, dropped: Option<DropCause>) -> Option<Sent<P>> {
+        let out = self.waiting.remove(at)?;
+        self.bytes = self.bytes.saturating_sub(out.weight);
+        self.bytes_left = self.bytes_left.saturating_sub(out.left);
+        self.time_left.remove(out.left);
+        if self.waiting.is_empty() {
+            self.codel.idle();
+        }
+        Some(Sent {
+            packet: out.packet,
+            at: now,
+            queued: out.began.unwrap_or(now).saturating_sub(out.arrived),
+            marked: out.marked,
+            dropped,
+        })
     }
 }
 
-/// How long `bytes` bytes take on the wire; on a trace, on average.
-fn sending_time(service: &Service, bytes: u64) -> Duration {
-    match service {
-        Service::Constant { bits_per_second } => {
-            let rate = u128::from((*bits_per_second).max(1));
-            let nanos = (u128::from(bytes) * 8_000_000_000 + rate / 2) / rate;
-            Duration::from_nanos(u64::try_from(nanos).unwrap_or(u64::MAX))
+impl TimeLeft {
+    fn add(&mut self, bytes: u64) {
+        if self.bits_per_second > 0 {
+            let time = sending_time(self.bits_per_second, bytes);
+            self.total = self.total.saturating_add(time);
         }
+    }
+
+    fn remove(&mut self, bytes: u64) {
+        if self.bits_per_second > 0 {
+            let time = sending_time(self.bits_per_second, bytes);
+            self.total = self.total.saturating_sub(time);
+        }
+    }
+}
+
+impl Opportunity {
+    /// The first opportunity of `trace` from `ready` on, and the bytes that are left in it. One that was used
+    /// up, or that passed unused, is gone.
+    fn at(&self, trace: &Arc<Opportunities>, ready: Duration) -> (u64, u64) {
+        let first = trace.first_from(ready);
+        if !self
+            .trace
+            .as_ref()
+            .is_some_and(|own| Arc::ptr_eq(own, trace))
+        {
+            return (first, OPPORTUNITY_BYTES);
+        }
+        if first > self.number || self.bytes_left == 0 {
+            return (first.max(self.number), OPPORTUNITY_BYTES);
+        }
+        (self.number, self.bytes_left)
+    }
+
+    /// Uses the next opportunity for `bytes` bytes; returns how many of them it carries.
+    fn send(&mut self, trace: &Arc<Opportunities>, ready: Duration, bytes: u64) -> u64 {
+        let (number, left) = self.at(trace, ready);
+        let sent = bytes.min(left);
+        *self = Self {
+            trace: Some(Arc::clone(trace)),
+            number: number.saturating_add(u64::from(sent == left)),
+            bytes_left: left - sent,
+        };
+        sent
+    }
+}
+
+fn service(settings: &LinkConfig) -> Option<&Service> {
+    settings.rate.as_ref().map(|rate| &rate.service)
+}
+
+/// How long `bytes` bytes take on the wire.
+fn sending_time(bits_per_second: u64, bytes: u64) -> Duration {
+    let rate = u128::from(bits_per_second.max(1));
+    let nanos = (u128::from(bytes) * 8_000_000_000 + rate / 2) / rate;
+    Duration::from_nanos(u64::try_from(nanos).unwrap_or(u64::MAX))
+}
+
+/// How long a packet of one MTU takes; on a trace, on average.
+fn mtu_time(service: &Service) -> Duration {
+    match service {
+        Service::Constant { bits_per_second } => sending_time(*bits_per_second, MTU_BYTES),
         Service::Opportunities(trace) => {
-            let nanos = bytes as f64 * 8e9 / trace.mean_bit_s();
+            let nanos = MTU_BYTES as f64 * 8e9 / trace.mean_bit_s();
             Duration::from_nanos(nanos as u64)
         }
     }

@@ -1,8 +1,7 @@
 //! Controlled delay (RFC 8289): drops from the head of a queue that has been long for too long.
 //!
-//! RFC 8289 also spares a queue that holds less than one MTU when a packet is taken out. What will have
-//! arrived by then is not known at the offer; instead the target is never below the time that one MTU
-//! takes to send, as RFC 8290, section 5.2.1, advises for slow links.
+//! RFC 8289 also spares a queue that holds less than one MTU when a packet is taken out. Instead the target
+//! is never below the time that one MTU takes to send, as RFC 8290, section 5.2.1, advises for slow links.
 
 use std::time::Duration;
 
@@ -16,24 +15,24 @@ pub(super) struct CodelState {
     drop_next: Duration,
     count: u32,
     last_count: u32,
-    /// A drop of the dropping state whose successor is not judged yet.
+    /// A drop of the dropping state whose successor is not decided yet.
     unsettled: bool,
 }
 
 impl CodelState {
-    /// Whether the packet taken out of the queue at `now`, after waiting for `wait`, is dropped. `idle`:
-    /// the queue had run empty before it came.
+    /// The queue has run empty.
+    pub(super) fn idle(&mut self) {
+        (self.first_above, self.dropping) = (None, false);
+    }
+
+    /// Whether the packet taken out of the queue at `now`, after waiting for `wait`, is dropped.
     pub(super) fn drops(
         &mut self,
         target: Duration,
         interval: Duration,
         now: Duration,
         wait: Duration,
-        idle: bool,
     ) -> bool {
-        if idle {
-            (self.first_above, self.dropping) = (None, false);
-        }
         let long = self.has_been_long(target, interval, now, wait);
         if self.dropping {
             self.while_dropping(interval, now, long)

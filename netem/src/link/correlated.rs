@@ -8,9 +8,12 @@ use std::time::Duration;
 use mmt_shared::rng::Substream;
 use mmt_shared::time::duration_nanos;
 
-use super::catch_up::CATCH_UP_STEPS;
 use crate::config::Chance;
 use crate::quantile::standard_normal;
+
+/// The most steps that one packet makes a process in time take, about 20 ms of work. After a longer
+/// silence the process begins anew, at a random point of its stationary distribution.
+pub(super) const CATCH_UP_STEPS: u64 = 1 << 20;
 
 /// The share of a standard normal below `z`.
 fn standard_normal_share(z: f64) -> f64 {
@@ -79,9 +82,10 @@ impl InTime {
         let (step, elapsed) = (tau / 2, duration_nanos(elapsed));
         let rho = libm::exp(-0.5);
         self.advance_to(elapsed / step, rho);
-        let share = match elapsed / step == self.cell {
-            true => (elapsed % step) as f64 / step as f64,
-            false => 0.0,
+        let share = if elapsed / step == self.cell {
+            (elapsed % step) as f64 / step as f64
+        } else {
+            0.0
         };
         // the straight line between two correlated numbers, brought back to variance one
         let (a, b) = (1.0 - share, share);

@@ -31,7 +31,7 @@ pub(super) struct Draws {
     pub(super) state: f64,
     /// Whether there is a copy.
     pub(super) duplicate: f64,
-    /// Whether a bit is turned over, and which.
+    /// Whether a bit is flipped, and which.
     pub(super) corrupt: f64,
     pub(super) corrupted_bit: f64,
     /// Whether it overtakes.

@@ -4,9 +4,12 @@ use std::time::Duration;
 
 use super::*;
 use crate::config::{Delay, Loss, Order, Probability};
+use crate::direction::Direction;
+use crate::packet::{DropCause, Fate};
 
 mod bottleneck;
 mod codel_reference;
+mod conservation;
 mod jitter;
 mod losses;
 mod order;
@@ -17,24 +20,71 @@ mod tc_words;
 const N: u64 = 100_000;
 const MS: Duration = Duration::from_millis(1);
 
-fn link(words: &str, seed: u64, id: LinkId) -> Link {
+/// What became of a packet: when it left, or why it did not.
+type Met = Result<Time, DropCause>;
+
+fn link(words: &str, seed: u64, id: LinkId) -> Link<()> {
     Link::try_new(words.parse().unwrap(), seed, id).unwrap()
 }
 
+fn met(departure: &Departure<()>) -> Met {
+    match departure.fate {
+        Fate::Delivered { .. } => Ok(departure.due),
+        Fate::Dropped(cause) => Err(cause),
+    }
+}
+
+/// Offers packets, polls before each and to the end: what became of each, without the copies.
+fn run(
+    link: &mut Link<()>,
+    packets: impl Iterator<Item = (Time, Packet<()>)>,
+) -> Vec<Departure<()>> {
+    let mut out = with_copies(link, packets);
+    out.retain(|departure| !departure.copy);
+    out
+}
+
+fn with_copies(
+    link: &mut Link<()>,
+    packets: impl Iterator<Item = (Time, Packet<()>)>,
+) -> Vec<Departure<()>> {
+    let mut out = Vec::new();
+    let mut last = Time::ZERO;
+    for (now, packet) in packets {
+        out.extend(std::iter::from_fn(|| link.poll(now)));
+        link.offer(now, packet);
+        last = now;
+    }
+    while link.in_flight() > 0 {
+        last = link.poll_timeout().unwrap().max(last);
+        out.extend(std::iter::from_fn(|| link.poll(last)));
+    }
+    out.extend(std::iter::from_fn(|| link.poll(last)));
+    out.sort_by_key(|departure| (departure.number, departure.copy));
+    out
+}
+
+/// What becomes of one packet, the link being empty.
+fn one(link: &mut Link<()>, now: Time, bytes: usize) -> Met {
+    let out = run(link, std::iter::once((now, Packet::new(bytes, ()))));
+    met(&out[0])
+}
+
 /// The fates of packets at 1 kHz.
-fn fates(words: &str, seed: u64, id: LinkId) -> Vec<Fate> {
-    let mut link = link(words, seed, id);
-    (0..N)
-        .map(|packet| link.offer(Time::from_millis(packet), PacketMeta::default()))
+fn fates(words: &str, seed: u64, id: LinkId) -> Vec<Met> {
+    let packets = (0..N).map(|packet| (Time::from_millis(packet), Packet::new(0, ())));
+    run(&mut link(words, seed, id), packets)
+        .iter()
+        .map(met)
         .collect()
 }
 
 /// Delays of the delivered packets, ms; `None` for the dropped.
-fn delays(fates: &[Fate]) -> Vec<Option<f64>> {
-    let delay = |(packet, fate): (usize, &Fate)| {
+fn delays(fates: &[Met]) -> Vec<Option<f64>> {
+    let delay = |(packet, fate): (usize, &Met)| {
         let sent = Time::from_millis(packet as u64);
-        fate.due()
-            .map(|due| due.saturating_since(sent).as_secs_f64() * 1e3)
+        let due = fate.ok()?;
+        Some(due.saturating_since(sent).as_secs_f64() * 1e3)
     };
     fates.iter().enumerate().map(delay).collect()
 }
@@ -82,7 +132,7 @@ fn switching_one_feature_on_leaves_the_draws_of_the_others_alone() {
     let jitter = fates("delay 50ms 5ms order free", 7, LinkId::UP);
     let both = fates("delay 50ms 5ms order free loss 20%", 7, LinkId::UP);
     let loss = fates("loss 20%", 7, LinkId::UP);
-    let lost = |fate: &Fate| *fate == Fate::Drop(DropCause::Loss);
+    let lost = |fate: &Met| *fate == Err(DropCause::Loss);
     assert!(both.iter().any(lost) && !both.iter().all(lost));
     for ((jitter, both), loss) in jitter.iter().zip(&both).zip(&loss) {
         assert_eq!(lost(both), lost(loss));
@@ -100,22 +150,15 @@ fn a_packet_takes_one_draw_of_each_feature_whatever_the_settings() {
         "delay 9ms 3ms distribution normal limit 1",
     ] {
         let mut link = link(before, 3, LinkId::DOWN);
-        for packet in 0..N {
-            if packet == N / 2 {
-                let words = "delay 50ms 5ms loss 10% order free";
-                link.reconfigure(words.parse().unwrap()).unwrap();
-            }
-            let meta = PacketMeta {
-                bytes: 100,
-                in_flight: 1,
-                ecn_capable: false,
-            };
-            let fate = link.offer(Time::from_millis(packet), meta);
-            assert!(
-                packet < N / 2 || fate == steady[packet as usize],
-                "{before}"
-            );
-        }
+        let packets =
+            |from, to| (from..to).map(|packet| (Time::from_millis(packet), Packet::new(100, ())));
+        run(&mut link, packets(0, N / 2));
+        let words = "delay 50ms 5ms loss 10% order free";
+        let half = Time::from_millis(N / 2);
+        link.reconfigure(half, words.parse().unwrap()).unwrap();
+        let then = run(&mut link, packets(N / 2, N));
+        let then: Vec<Met> = then.iter().map(met).collect();
+        assert_eq!(then, steady[N as usize / 2..], "{before}");
     }
 }
 
@@ -123,7 +166,7 @@ fn a_packet_takes_one_draw_of_each_feature_whatever_the_settings() {
 fn raising_the_loss_only_ever_adds_lost_packets() {
     let few = fates("loss 1%", 5, LinkId::UP);
     let many = fates("loss 5%", 5, LinkId::UP);
-    let lost = Fate::Drop(DropCause::Loss);
+    let lost = Err(DropCause::Loss);
     assert!(
         few.iter()
             .zip(&many)
@@ -136,7 +179,7 @@ fn free_order_reorders_and_fifo_never_does() {
     let reordered = |words: String| {
         let dues: Vec<Time> = fates(&words, 11, LinkId::UP)
             .iter()
-            .filter_map(Fate::due)
+            .filter_map(|fate| fate.ok())
             .collect();
         dues.windows(2).filter(|pair| pair[1] < pair[0]).count()
     };
@@ -153,31 +196,22 @@ fn free_order_reorders_and_fifo_never_does() {
 fn fifo_only_ever_makes_a_packet_wait() {
     let free = fates("delay 50ms 5ms order free", 13, LinkId::UP);
     let fifo = fates("delay 50ms 5ms", 13, LinkId::UP);
-    let waits = free
-        .iter()
-        .zip(&fifo)
-        .filter(|(a, b)| a.due() < b.due())
-        .count();
+    let waits = free.iter().zip(&fifo).filter(|(a, b)| a < b).count();
     assert!(waits > 0);
-    assert!(free.iter().zip(&fifo).all(|(a, b)| a.due() <= b.due()));
+    assert!(free.iter().zip(&fifo).all(|(a, b)| a <= b));
 }
 
 #[test]
 fn fifo_holds_across_a_reconfiguration() {
     let mut link = link("delay 500ms", 1, LinkId::UP);
-    let before = link.offer(Time::ZERO, PacketMeta::default()).due();
-    link.reconfigure("delay 1ms".parse().unwrap()).unwrap();
-    let after = link
-        .offer(Time::from_millis(1), PacketMeta::default())
-        .due();
-    assert_eq!(before, Some(Time::from_millis(500)));
-    assert_eq!(after, before);
-    link.reconfigure("delay 1ms order free".parse().unwrap())
-        .unwrap();
-    let free = link
-        .offer(Time::from_millis(1), PacketMeta::default())
-        .due();
-    assert_eq!(free, Some(Time::from_millis(2)));
+    let now = Time::from_millis(1);
+    let before = one(&mut link, Time::ZERO, 0);
+    link.reconfigure(now, "delay 1ms".parse().unwrap()).unwrap();
+    let after = one(&mut link, now, 0);
+    assert_eq!((before, after), (Ok(Time::from_millis(500)), before));
+    let free = "delay 1ms order free".parse().unwrap();
+    link.reconfigure(now, free).unwrap();
+    assert_eq!(one(&mut link, now, 0), Ok(Time::from_millis(2)));
 }
 
 #[test]
@@ -187,7 +221,7 @@ fn refused_settings_leave_the_old_ones_in_force() {
         limit: 0,
         ..LinkConfig::default()
     };
-    assert!(link.reconfigure(bad).is_err());
+    assert!(link.reconfigure(Time::ZERO, bad).is_err());
     assert_eq!(link.config().to_string(), "delay 5ms");
 }
 
@@ -244,7 +278,7 @@ fn loss_is_binomial() {
     for percent in [0.1, 1.0, 5.0, 50.0] {
         let lost = fates(&format!("loss {percent}%"), 19, LinkId::UP)
             .iter()
-            .filter(|fate| **fate == Fate::Drop(DropCause::Loss))
+            .filter(|fate| **fate == Err(DropCause::Loss))
             .count() as u64;
         let level = binomial_level(N, lost, percent / 100.0);
         assert!(level > 0.001, "{percent} %: lost {lost}, level {level}");
@@ -255,9 +289,9 @@ fn loss_is_binomial() {
         );
     }
     let all = fates("loss 100%", 19, LinkId::UP);
-    assert!(all.iter().all(|fate| *fate == Fate::Drop(DropCause::Loss)));
+    assert!(all.iter().all(|fate| *fate == Err(DropCause::Loss)));
     let none = fates("loss 0%", 19, LinkId::UP);
-    assert!(none.iter().all(|fate| fate.due().is_some()));
+    assert!(none.iter().all(Met::is_ok));
 }
 
 #[test]
@@ -265,7 +299,7 @@ fn losses_do_not_come_in_bursts() {
     let fates = fates("loss 10%", 23, LinkId::UP);
     let pairs = fates
         .windows(2)
-        .filter(|pair| pair.iter().all(|fate| fate.due().is_none()))
+        .filter(|pair| pair.iter().all(Met::is_err))
         .count() as f64;
     // p^2 of the pairs; neighbouring pairs share a packet, which widens the spread by under a half
     let (n, p2) = (N as f64, 0.01);
@@ -288,15 +322,9 @@ fn up_and_down_are_uncorrelated() {
 
 #[test]
 fn every_packet_is_counted_once() {
-    let mut link = link("delay 50ms 5ms loss 10% limit 3", 31, LinkId::UP);
-    for packet in 0..1000 {
-        let meta = PacketMeta {
-            bytes: packet,
-            in_flight: packet % 5,
-            ecn_capable: false,
-        };
-        link.offer(Time::from_millis(packet as u64), meta);
-    }
+    let mut link = link("delay 5ms 1ms loss 10% limit 3", 31, LinkId::UP);
+    let packet = |ms| (Time::from_millis(ms), Packet::new(ms as usize, ()));
+    run(&mut link, (0..1000).map(packet));
     let counters = link.counters();
     assert_eq!(counters.offered.packets, 1000);
     assert_eq!(counters.offered.bytes, 999 * 1000 / 2);
@@ -311,13 +339,10 @@ fn every_packet_is_counted_once() {
 fn the_ends_of_time_do_not_panic() {
     let mut link = link("delay 3600s 3600s distribution normal", 37, LinkId::UP);
     for now in [Time::MAX, Time::ZERO, Time::MAX] {
-        let meta = PacketMeta {
-            bytes: usize::MAX,
-            in_flight: 0,
-            ecn_capable: false,
-        };
-        link.offer(now, meta);
-        link.offer(now, meta);
+        for _ in 0..2 {
+            link.offer(now, Packet::new(usize::MAX, ()));
+            link.poll(now);
+        }
     }
     assert_eq!(link.counters().offered.bytes, u64::MAX);
 }
@@ -338,7 +363,7 @@ fn the_drawn_delays_are_pinned() {
     };
     let mut link = Link::try_new(config, 42, LinkId::UP).unwrap();
     let dues: Vec<Option<u64>> = (0..6)
-        .map(|_| link.offer(Time::ZERO, PacketMeta::default()).due())
+        .map(|_| one(&mut link, Time::ZERO, 0).ok())
         .map(|due| due.map(Time::as_nanos))
         .collect();
     let pinned = [None, None, Some(59_658_122), Some(42_363_868), None, None];

@@ -2,60 +2,102 @@
 
 use std::time::Duration;
 
-use mmt_shared::time::duration_nanos;
+use mmt_shared::time::{Time, duration_nanos};
 
 use crate::config::LinkConfig;
 
-/// The stretches of constant settings of a link, and the one in force.
+/// The settings of a link over time. Times are counted from the origin.
 #[derive(Clone, Debug)]
 pub(super) struct Timeline {
+    origin: Time,
+    config: LinkConfig,
+    /// The stretches of constant settings, each with its beginning.
     stretches: Vec<(Duration, LinkConfig)>,
-    repeat: Option<Duration>,
 }
 
 impl Timeline {
-    pub(super) fn new(config: &LinkConfig) -> Self {
+    pub(super) fn new(origin: Time, config: LinkConfig) -> Self {
         Self {
-            stretches: config.profile.stretches(config),
-            repeat: config.profile.repeat,
+            origin,
+            stretches: config.profile.stretches(&config),
+            config,
         }
     }
 
-    /// The settings in force `elapsed` after the start.
-    pub(super) fn at<'a>(&'a self, elapsed: Duration, base: &'a LinkConfig) -> &'a LinkConfig {
+    pub(super) fn origin(&self) -> Time {
+        self.origin
+    }
+
+    pub(super) fn set_origin(&mut self, origin: Time) {
+        self.origin = origin;
+    }
+
+    pub(super) fn config(&self) -> &LinkConfig {
+        &self.config
+    }
+
+    /// How long after the origin `time` is.
+    pub(super) fn elapsed(&self, time: Time) -> Duration {
+        time.saturating_since(self.origin)
+    }
+
+    /// The time `elapsed` after the origin.
+    pub(super) fn time(&self, elapsed: Duration) -> Time {
+        self.origin + elapsed
+    }
+
+    /// The settings in force `elapsed` after the origin.
+    pub(super) fn at(&self, elapsed: Duration) -> &LinkConfig {
         // most links never change
         if self.stretches.len() <= 1 {
-            return base;
+            return &self.config;
         }
-        let within = match self.repeat {
-            Some(repeat) => {
-                Duration::from_nanos(duration_nanos(elapsed) % duration_nanos(repeat).max(1))
-            }
-            None => elapsed,
-        };
+        let (_, within) = self.round(elapsed);
         let begun = self.stretches.partition_point(|(at, _)| *at <= within);
         let stretch = self.stretches.get(begun.saturating_sub(1));
-        stretch.map_or(base, |(_, settings)| settings)
-    }
-
-    /// Every set of settings that ever is in force.
-    pub(super) fn settings(&self) -> impl Iterator<Item = &LinkConfig> {
-        self.stretches.iter().map(|(_, settings)| settings)
+        stretch.map_or(&self.config, |(_, settings)| settings)
     }
 
     /// When the settings in force at `elapsed` change next.
     pub(super) fn next_change(&self, elapsed: Duration) -> Option<Duration> {
-        let (rounds, within) = match self.repeat {
-            Some(repeat) => {
-                let repeat = duration_nanos(repeat).max(1);
-                let elapsed = duration_nanos(elapsed);
-                let within = Duration::from_nanos(elapsed % repeat);
-                (Duration::from_nanos(elapsed - elapsed % repeat), within)
-            }
-            None => (Duration::ZERO, elapsed),
+        if self.stretches.len() <= 1 {
+            return None;
+        }
+        let (round, within) = self.round(elapsed);
+        let begun = self.stretches.partition_point(|(at, _)| *at <= within);
+        let next = self.stretches.get(begun).map(|(at, _)| *at);
+        let next = next.or(self.config.profile.repeat)?;
+        Some(round.saturating_add(next))
+    }
+
+    /// The beginning of the round of the loop that `elapsed` is in, and how far into it that is.
+    fn round(&self, elapsed: Duration) -> (Duration, Duration) {
+        let Some(repeat) = self.config.profile.repeat else {
+            return (Duration::ZERO, elapsed);
         };
-        let next = self.stretches.iter().map(|(at, _)| *at);
-        let next = next.filter(|at| *at > within).min().or(self.repeat)?;
-        (self.stretches.len() > 1).then(|| rounds.saturating_add(next))
+        let elapsed = duration_nanos(elapsed);
+        let within = elapsed % duration_nanos(repeat).max(1);
+        let begin = Duration::from_nanos(elapsed - within);
+        (begin, Duration::from_nanos(within))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_next_change_is_that_of_the_steps_and_then_of_the_loop() {
+        let next = |words: &str, ms| {
+            let timeline = Timeline::new(Time::ZERO, words.parse().unwrap());
+            let next = timeline.next_change(Duration::from_millis(ms));
+            next.map(|next| next.as_millis())
+        };
+        let looped = "delay 20ms; at 1s delay 80ms; at 2s loss 100%; loop 3s";
+        assert_eq!(next(looped, 100), Some(1000));
+        assert_eq!(next(looped, 2100), Some(3000));
+        assert_eq!(next(looped, 3500), Some(4000));
+        assert_eq!(next("delay 20ms; at 3s none", 3100), None);
+        assert_eq!(next("delay 20ms", 0), None);
     }
 }

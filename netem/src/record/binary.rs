@@ -6,7 +6,7 @@ use mmt_shared::time::Time;
 
 use super::entry::{End, Entry, Heading};
 use crate::direction::Direction;
-use crate::fate::DropCause;
+use crate::packet::DropCause;
 use crate::trace::TraceError;
 
 /// How a record in binary begins.

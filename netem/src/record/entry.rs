@@ -6,7 +6,7 @@ use mmt_shared::time::Time;
 use serde::{Deserialize, Serialize};
 
 use crate::direction::Direction;
-use crate::fate::DropCause;
+use crate::packet::{Departure, DropCause, Fate};
 
 /// What a record says of the run it is of.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -34,6 +34,42 @@ pub struct Entry {
     pub backlog: u32,
     /// What became of it.
     pub end: End,
+}
+
+impl Entry {
+    /// What is on record of a packet that was sent at the very time when it was due.
+    #[must_use]
+    pub fn of<T>(direction: Direction, departure: &Departure<T>) -> Self {
+        let end = match departure.fate {
+            Fate::Dropped(cause) => End::Dropped(cause),
+            Fate::Delivered { corrupted_bit, .. } => End::Sent {
+                due: departure.due,
+                sent: departure.due,
+                copy: departure.copy,
+                corrupted: corrupted_bit.is_some(),
+            },
+        };
+        Self {
+            direction,
+            number: departure.number,
+            offered: departure.offered_at,
+            bytes: u32::try_from(departure.bytes).unwrap_or(u32::MAX),
+            backlog: departure.backlog,
+            end,
+        }
+    }
+
+    /// The same with its times counted from `origin`.
+    #[must_use]
+    pub fn since(mut self, origin: Time) -> Self {
+        let from_origin = |time: &mut Time| *time = Time::ZERO + time.saturating_since(origin);
+        from_origin(&mut self.offered);
+        if let End::Sent { due, sent, .. } = &mut self.end {
+            from_origin(due);
+            from_origin(sent);
+        }
+        self
+    }
 }
 
 /// What became of a packet.

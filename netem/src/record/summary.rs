@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::entry::{End, Entry};
 use crate::counters::Tally;
 use crate::direction::Direction;
-use crate::fate::DropCause;
+use crate::packet::DropCause;
 
 /// Beyond this p99 of release lateness the emulation is degraded.
 pub const P99_DEGRADED_US: f64 = 250.0;

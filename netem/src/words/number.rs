@@ -72,10 +72,10 @@ pub(super) fn time(word: Word<'_>) -> Result<Duration, ParseError> {
 /// A time that is not shorter than `least`.
 pub(super) fn time_from(word: Word<'_>, least: Duration) -> Result<Duration, ParseError> {
     let time = time(word)?;
-    match time >= least {
-        true => Ok(time),
-        false => Err(out_of_range(word, format!("{least:?} to {DELAY_MAX:?}"))),
+    if time < least {
+        return Err(out_of_range(word, format!("{least:?} to {DELAY_MAX:?}")));
     }
+    Ok(time)
 }
 
 pub(super) fn percentage(word: Word<'_>) -> Result<Probability, ParseError> {
@@ -93,10 +93,10 @@ pub(super) fn bits_per_second(word: Word<'_>) -> Result<u64, ParseError> {
     let known = RATE_UNITS.iter().find(|(name, _)| *name == unit);
     let (_, factor) = known.ok_or_else(|| word.expected(A_RATE))?;
     let rate = (number * factor + 0.5) as u64;
-    match (1..=RATE_MAX_BIT_S).contains(&rate) {
-        true => Ok(rate),
-        false => Err(out_of_range(word, "1bit to 1tbit".to_owned())),
+    if !(1..=RATE_MAX_BIT_S).contains(&rate) {
+        return Err(out_of_range(word, "1bit to 1tbit".to_owned()));
     }
+    Ok(rate)
 }
 
 /// A limit of a queue.
@@ -126,10 +126,10 @@ pub(super) fn queue_limit(word: Word<'_>) -> Result<QueueLimit, ParseError> {
     };
     let number = number.ok_or_else(|| word.expected("a size such as 64kb"))?;
     let bytes = (number * factor + 0.5) as u64;
-    match (1..=1 << 40).contains(&bytes) {
-        true => Ok(QueueLimit::Bytes(bytes)),
-        false => Err(out_of_range(word, "1b to 1048576mb".to_owned())),
+    if !(1..=1 << 40).contains(&bytes) {
+        return Err(out_of_range(word, "1b to 1048576mb".to_owned()));
     }
+    Ok(QueueLimit::Bytes(bytes))
 }
 
 /// A whole number without a unit; `what` names its unit in the message.

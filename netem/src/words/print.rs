@@ -229,7 +229,8 @@ fn queue(queue: &Queue) -> Option<String> {
         queue.wait.map(|wait| Exact(wait).to_string()),
     ];
     let limits: Vec<String> = limits.into_iter().flatten().collect();
-    (!limits.is_empty()).then(|| format!("queue {}", limits.join(" ")))
+    let end = if queue.drop_head { " drop-head" } else { "" };
+    (!limits.is_empty()).then(|| format!("queue {}{end}", limits.join(" ")))
 }
 
 fn codel(codel: Codel) -> String {

@@ -2,14 +2,14 @@
 
 use std::sync::Arc;
 
+use super::draft::{Draft, Shape};
 use super::number::{
     QueueLimit, bits_per_second, percentage, queue_limit, signed_bytes, time, time_from, whole,
 };
-use super::said::{DelaySaid, Said, Shape, once};
 use super::{A_WORD, ParseError, Parser, Reason, Word};
 use crate::config::{
-    Chance, Codel, Correlation, Framing, LIMIT_MAX, Order, Probability, Queue, Rate, STEPS_MAX,
-    Service, Slot, SlotGap, TAU_MIN,
+    Chance, Codel, Correlation, Delay, Framing, LIMIT_MAX, Order, Probability, Queue, Rate,
+    STEPS_MAX, Service, Slot, SlotGap, TAU_MIN,
 };
 use crate::direction::Direction;
 use crate::distribution::{Cdf, Table};
@@ -17,99 +17,111 @@ use crate::presets;
 use crate::trace::mahimahi::Opportunities;
 use crate::trace::path::{PathTrace, Replay};
 
+/// The sentences that may come once, by their first word and the name that they are remembered by.
+const ONCE: [(&str, &str); 20] = [
+    ("delay", "delay"),
+    ("latency", "delay"),
+    ("distribution", "distribution"),
+    ("order", "order"),
+    ("reorder", "reorder"),
+    ("gap", "gap"),
+    ("loss", "loss"),
+    ("drop", "loss"),
+    ("duplicate", "duplicate"),
+    ("corrupt", "corrupt"),
+    ("mtu", "mtu"),
+    ("rate", "rate"),
+    ("queue", "queue"),
+    ("codel", "codel"),
+    ("limit", "limit"),
+    ("trace", "trace"),
+    ("slot", "slot"),
+    ("ecn", "ecn"),
+    ("seed", "seed"),
+    ("none", "none"),
+];
+
 impl<'a> Parser<'a, '_> {
     pub(super) fn sentence(
         &mut self,
-        said: &mut Said<'a>,
+        draft: &mut Draft<'a>,
         word: Word<'a>,
     ) -> Result<(), ParseError> {
-        let first = !std::mem::replace(&mut said.anything, true);
-        if said.none {
+        let first = draft.is_empty();
+        if draft.seen("none").is_some() || (word.text == "none" && !first) {
             return Err(word.expected("nothing beside none"));
         }
         match word.text {
-            "none" if first => said.none = true,
-            "none" => return Err(word.expected("nothing beside none")),
-            "preset" if first => said.preset = Some(self.preset()?),
+            "preset" if first => {
+                draft.config = self.preset()?;
+                draft.note("preset", word);
+                return Ok(());
+            }
             "preset" => return Err(word.expected("the preset before everything else")),
-            "delay" | "latency" => self.delay(said, word)?,
-            "distribution" => {
-                let shape = self.shape()?;
-                once(&mut said.distribution, (word, shape), word)?;
+            "outage" => {
+                if draft.seen("outage").is_none() {
+                    draft.config.outages.clear();
+                }
+                if draft.config.outages.len() >= STEPS_MAX {
+                    return Err(word.expected("1000 outages at most"));
+                }
+                draft.note("outage", word);
+                draft.config.outages.push(self.outage()?);
+                return Ok(());
             }
-            "order" => {
-                let order = self.order()?;
-                once(&mut said.order, order, word)?;
-            }
-            "reorder" => {
-                let chance = self.chance()?;
-                once(&mut said.reorder, (word, chance), word)?;
-            }
+            _ => {}
+        }
+        let known = ONCE.iter().find(|(text, _)| *text == word.text);
+        let (_, name) = known.ok_or_else(|| word.expected(A_WORD))?;
+        draft.once(name, word)?;
+        self.clause(draft, name)
+    }
+
+    /// What comes after the first word of a sentence that may come once.
+    fn clause(&mut self, draft: &mut Draft<'a>, name: &str) -> Result<(), ParseError> {
+        let config = &mut draft.config;
+        match name {
+            "delay" => (config.delay, config.correlation) = self.delay()?,
+            "distribution" => draft.shape = Some(self.shape()?),
+            "order" => config.order = self.order()?,
+            "reorder" => draft.reorder(Some(self.chance()?), None),
             "gap" => {
-                let gap = whole(self.argument(), 1, 1_000_000, "packets")?;
-                let gap = u32::try_from(gap).unwrap_or(u32::MAX);
-                once(&mut said.gap, (word, gap), word)?;
+                let gap = self.count(1_000_000, "packets")?;
+                draft.reorder(None, Some(gap));
             }
-            "loss" | "drop" => {
-                let loss = self.loss()?;
-                once(&mut said.loss, (word, loss), word)?;
+            "loss" => config.loss = self.loss()?,
+            "duplicate" => config.duplicate = self.chance()?,
+            "corrupt" => config.corrupt = self.chance()?,
+            "mtu" => config.mtu = Some(self.count(u32::MAX, "bytes")?),
+            "rate" => config.rate = Some(self.rate()?),
+            "queue" => {
+                // without `codel` beside it the queue of a preset has none any more
+                let codel = config.queue.codel;
+                config.queue = self.queue()?;
+                if draft.seen("codel").is_some() {
+                    draft.config.queue.codel = codel;
+                }
             }
-            "outage" if said.outages.len() < STEPS_MAX => said.outages.push(self.outage()?),
-            "duplicate" => {
-                let chance = self.chance()?;
-                once(&mut said.duplicate, chance, word)?;
-            }
-            "corrupt" => {
-                let chance = self.chance()?;
-                once(&mut said.corrupt, chance, word)?;
-            }
-            _ => return self.sentence_of_the_bottleneck(said, word),
+            "codel" => config.queue.codel = Some(self.codel()?),
+            "limit" => config.limit = self.count(LIMIT_MAX, "packets")?,
+            "trace" => config.replay = Some(self.replay()?),
+            "slot" => config.slot = Some(self.slot()?),
+            "ecn" => config.ecn = true,
+            "seed" => config.seed = Some(whole(self.argument(), 0, u64::MAX, "of 64 bits")?),
+            _ => {}
         }
         Ok(())
     }
 
-    fn sentence_of_the_bottleneck(
-        &mut self,
-        said: &mut Said<'a>,
-        word: Word<'a>,
-    ) -> Result<(), ParseError> {
-        match word.text {
-            "mtu" => {
-                let mtu = whole(self.argument(), 1, u32::MAX.into(), "bytes")?;
-                once(&mut said.mtu, u32::try_from(mtu).unwrap_or(u32::MAX), word)
-            }
-            "rate" => {
-                let rate = self.rate()?;
-                once(&mut said.rate, rate, word)
-            }
-            "queue" => {
-                let queue = self.queue()?;
-                once(&mut said.queue, (word, queue), word)
-            }
-            "codel" => {
-                let codel = self.codel()?;
-                once(&mut said.codel, (word, codel), word)
-            }
-            "limit" => {
-                let limit = whole(self.argument(), 1, LIMIT_MAX.into(), "packets")?;
-                let limit = u32::try_from(limit).unwrap_or(LIMIT_MAX);
-                once(&mut said.limit, limit, word)
-            }
-            "trace" => {
-                let replay = self.replay()?;
-                once(&mut said.replay, (word, replay), word)
-            }
-            "slot" => {
-                let slot = self.slot()?;
-                once(&mut said.slot, slot, word)
-            }
-            "ecn" => once(&mut said.ecn, word, word),
-            "seed" => {
-                let seed = whole(self.argument(), 0, u64::MAX, "of 64 bits")?;
-                once(&mut said.seed, (word, seed), word)
-            }
-            _ => Err(word.expected(A_WORD)),
-        }
+    /// A whole number from 1 on.
+    fn count(&mut self, most: u32, what: &'static str) -> Result<u32, ParseError> {
+        let count = whole(self.argument(), 1, most.into(), what)?;
+        Ok(u32::try_from(count).unwrap_or(most))
+    }
+
+    /// A time, if the next word is a number.
+    fn time_if_given(&mut self) -> Result<Option<std::time::Duration>, ParseError> {
+        self.number().map(time).transpose()
     }
 
     fn preset(&mut self) -> Result<crate::LinkConfig, ParseError> {
@@ -135,35 +147,33 @@ impl<'a> Parser<'a, '_> {
         make(word.text, &text).map_err(|error| wrong(error.to_string()))
     }
 
-    fn delay(&mut self, said: &mut Said<'a>, word: Word<'a>) -> Result<(), ParseError> {
-        if self.takes("cdf") {
+    fn delay(&mut self) -> Result<(Delay, Correlation), ParseError> {
+        let delay = if self.takes("cdf") {
             let points = self.argument();
-            let cdf = match points.text.contains('@') {
-                true => inline_cdf(points)?,
-                false => self.file(points, Cdf::parse)?,
+            let cdf = if points.text.contains('@') {
+                inline_cdf(points)?
+            } else {
+                self.file(points, Cdf::parse)?
             };
-            once(&mut said.delay, DelaySaid::Measured(cdf), word)?;
+            Delay::Empirical(Arc::new(cdf))
         } else {
-            let delay = time(self.argument())?;
-            let jitter = match self.number() {
-                Some(word) => Some(time(word)?),
-                None => None,
+            let mean = time(self.argument())?;
+            let Some(half_width) = self.time_if_given()? else {
+                let delay = Delay::Constant { delay: mean };
+                return Ok((delay, Correlation::None));
             };
-            once(&mut said.delay, DelaySaid::Times(delay, jitter), word)?;
-            if jitter.is_some()
-                && let Some(word) = self.number()
-            {
-                said.correlation = Some(Correlation::PerPacket(percentage(word)?));
+            let delay = Delay::Uniform { mean, half_width };
+            if let Some(word) = self.number() {
+                return Ok((delay, Correlation::PerPacket(percentage(word)?)));
             }
-            if jitter.is_none() {
-                return Ok(());
-            }
-        }
-        if said.correlation.is_none() && self.takes("tau") {
-            let tau = time_from(self.argument(), TAU_MIN)?;
-            said.correlation = Some(Correlation::InTime(tau));
-        }
-        Ok(())
+            delay
+        };
+        let correlation = if self.takes("tau") {
+            Correlation::InTime(time_from(self.argument(), TAU_MIN)?)
+        } else {
+            Correlation::None
+        };
+        Ok((delay, correlation))
     }
 
     fn shape(&mut self) -> Result<Shape, ParseError> {
@@ -186,26 +196,20 @@ impl<'a> Parser<'a, '_> {
     }
 
     fn slot(&mut self) -> Result<Slot, ParseError> {
-        let gap = match self.takes("distribution") {
-            true => {
-                let shape = self.shape()?;
-                let (mean, jitter) = (time(self.argument())?, time(self.argument())?);
-                SlotGap::Drawn(shape.delay(mean, jitter))
-            }
-            false => {
-                let least = time(self.argument())?;
-                let most = match self.number() {
-                    Some(word) => time_from(word, least)?,
-                    None => least,
-                };
-                SlotGap::Uniform { least, most }
-            }
+        let gap = if self.takes("distribution") {
+            let shape = self.shape()?;
+            let (mean, jitter) = (time(self.argument())?, time(self.argument())?);
+            SlotGap::Drawn(shape.delay(mean, jitter))
+        } else {
+            let least = time(self.argument())?;
+            let most = self.number().map(|word| time_from(word, least));
+            let most = most.transpose()?.unwrap_or(least);
+            SlotGap::Uniform { least, most }
         };
         let (mut packets, mut bytes) = (None, None);
         loop {
             if self.takes("packets") {
-                let most = whole(self.argument(), 1, u32::MAX.into(), "packets")?;
-                packets = Some(u32::try_from(most).unwrap_or(u32::MAX));
+                packets = Some(self.count(u32::MAX, "packets")?);
             } else if self.takes("bytes") {
                 bytes = Some(whole(self.argument(), 1, u64::MAX, "bytes")?);
             } else {
@@ -242,14 +246,12 @@ impl<'a> Parser<'a, '_> {
     }
 
     fn rate(&mut self) -> Result<Rate, ParseError> {
-        let service = match self.takes("trace") {
-            true => {
-                let name = self.argument();
-                Service::Opportunities(Arc::new(self.file(name, Opportunities::parse)?))
-            }
-            false => Service::Constant {
-                bits_per_second: bits_per_second(self.argument())?,
-            },
+        let service = if self.takes("trace") {
+            let name = self.argument();
+            Service::Opportunities(Arc::new(self.file(name, Opportunities::parse)?))
+        } else {
+            let bits_per_second = bits_per_second(self.argument())?;
+            Service::Constant { bits_per_second }
         };
         let mut framing = Framing::default();
         if let Some(word) = self.number() {
@@ -267,18 +269,24 @@ impl<'a> Parser<'a, '_> {
 
     fn queue(&mut self) -> Result<Queue, ParseError> {
         let mut queue = Queue::default();
-        let mut word = self.argument();
-        loop {
-            match queue_limit(word)? {
-                QueueLimit::Bytes(bytes) => once(&mut queue.bytes, bytes, word)?,
-                QueueLimit::Packets(packets) => once(&mut queue.packets, packets, word)?,
-                QueueLimit::Wait(wait) => once(&mut queue.wait, wait, word)?,
+        let mut next = Some(self.argument());
+        while let Some(word) = next {
+            let repeated = match queue_limit(word)? {
+                QueueLimit::Bytes(bytes) => queue.bytes.replace(bytes).is_some(),
+                QueueLimit::Packets(packets) => queue.packets.replace(packets).is_some(),
+                QueueLimit::Wait(wait) => queue.wait.replace(wait).is_some(),
+            };
+            if repeated {
+                return Err(word.wrong(Reason::Repeated));
             }
-            match self.number() {
-                Some(next) => word = next,
-                None => return Ok(queue),
-            }
+            next = self.number();
         }
+        queue.drop_head = self.takes("drop-head");
+        // the default, as tc's queues have it
+        if !queue.drop_head {
+            self.takes("drop-tail");
+        }
+        Ok(queue)
     }
 
     fn codel(&mut self) -> Result<Codel, ParseError> {

@@ -246,6 +246,7 @@ fn settings_print_in_the_words_they_are_written_in() {
         "duplicate 1% 10% corrupt 0.1% mtu 1200",
         "rate 1mbit 28 queue 64000b 100p 50ms codel limit 20",
         "rate 64kbit -14 48 5 codel 20ms 200ms",
+        "rate 1mbit queue 100p drop-head codel",
         "delay 20ms; at 10s over 5s delay 80ms loss 2%; at 20s none; loop 30s",
         "loss 100%",
     ] {
@@ -397,6 +398,7 @@ fn any_rate() -> impl Strategy<Value = (Option<Rate>, Queue)> {
                 bytes: limits.0,
                 packets: limits.1,
                 wait: limits.2,
+                drop_head: limits.0.is_some_and(|bytes| bytes % 2 == 0),
                 codel: codel.map(|(target, interval)| Codel {
                     target: MS * target,
                     interval: MS * interval,

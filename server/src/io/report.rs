@@ -80,10 +80,10 @@ impl Outcome {
         let (before, after) = (&self.before, &self.after);
         let since = |after: u64, before| after.saturating_sub(before);
         Traffic {
-            udp_datagrams_sent: since(after.sent_datagrams, before.sent_datagrams),
-            udp_bytes_sent: since(after.sent_bytes, before.sent_bytes),
-            udp_datagrams_received: since(after.received_datagrams, before.received_datagrams),
-            udp_bytes_received: since(after.received_bytes, before.received_bytes),
+            udp_datagrams_sent: since(after.outgoing.sent.packets, before.outgoing.sent.packets),
+            udp_bytes_sent: since(after.outgoing.sent.bytes, before.outgoing.sent.bytes),
+            udp_datagrams_received: since(after.received.packets, before.received.packets),
+            udp_bytes_received: since(after.received.bytes, before.received.bytes),
             ..self.link.end().traffic()
         }
     }

@@ -228,7 +228,7 @@ fn a_relay_prints_its_address_first_and_its_counters_when_interrupted() {
     assert_eq!(document["ending"], "interrupted");
     let up = &document["counters"]["up"];
     assert_eq!(up["link"]["offered"], up["link"]["dropped"]["loss"]);
-    assert_eq!(up["forwarded"]["packets"], 0);
+    assert_eq!(up["sent"]["packets"], 0);
 }
 
 #[test]

@@ -3,7 +3,7 @@
 use std::fmt;
 
 use mmt_netem::counters::Tally;
-use mmt_netem::io::relay::DirectionCounters;
+use mmt_netem::io::driver::DirectionCounters;
 
 use super::NetemReport;
 
@@ -13,7 +13,7 @@ type Count = fn(&DirectionCounters) -> Tally;
 /// The rows; those below the first two are left out while they are zero.
 const ROWS: [(&str, Count); 14] = [
     ("offered", |direction| direction.link.offered),
-    ("forwarded", |direction| direction.forwarded),
+    ("sent on", |direction| direction.sent),
     ("lost on the link", |direction| direction.link.dropped.loss),
     ("lost in an outage", |direction| {
         direction.link.dropped.outage
@@ -27,7 +27,7 @@ const ROWS: [(&str, Count); 14] = [
     ("over the limit", |direction| direction.link.dropped.limit),
     ("socket full", |direction| direction.blocked),
     ("socket error", |direction| direction.failed),
-    ("client forgotten", |direction| direction.orphaned),
+    ("client forgotten", |direction| direction.abandoned),
 ];
 /// Rows that are always there.
 const ALWAYS: usize = 2;

@@ -124,8 +124,8 @@ impl Endpoint {
         })?;
         side.cpu = thread_cpu_time().saturating_sub(cpu);
         let after = self.meter.snapshot();
-        side.packets = after.sent_datagrams - before.sent_datagrams;
-        side.bytes = after.sent_bytes - before.sent_bytes;
+        side.packets = after.outgoing.sent.packets - before.outgoing.sent.packets;
+        side.bytes = after.outgoing.sent.bytes - before.outgoing.sent.bytes;
         Ok(side)
     }
 

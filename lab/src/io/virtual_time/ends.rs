@@ -1,6 +1,6 @@
 //! The two ends of a run: sockets in memory and quinn's endpoints on them.
 //!
-//! A socket hands packets to its way at once and is always writable. Every random number that quinn lets be seeded
+//! A socket hands packets to its path at once and is always writable. Every random number that quinn lets be seeded
 //! is; what remains random (keys, connection ids) changes bytes, never lengths or times.
 
 use std::collections::VecDeque;
@@ -24,7 +24,7 @@ use quinn::{
 
 use super::error::VirtualTimeError;
 use super::executor::{Executor, lock};
-use super::path::{Packet, Way};
+use super::path::{Datagram, OneWay};
 use crate::transport::{Case, Stack};
 
 /// What QUIC adds to a message, bytes (short header, 8-byte connection id, frame, tag).
@@ -37,13 +37,13 @@ pub(super) struct MemorySocket {
     executor: Executor,
     mine: SocketAddr,
     theirs: SocketAddr,
-    out: Arc<Mutex<Way>>,
+    out: Arc<Mutex<OneWay>>,
     inbox: Mutex<Inbox>,
 }
 
 #[derive(Default)]
 struct Inbox {
-    packets: VecDeque<Packet>,
+    packets: VecDeque<Datagram>,
     reader: Option<Waker>,
 }
 
@@ -52,7 +52,7 @@ impl MemorySocket {
         executor: &Executor,
         mine: SocketAddr,
         theirs: SocketAddr,
-        out: Arc<Mutex<Way>>,
+        out: Arc<Mutex<OneWay>>,
     ) -> Arc<Self> {
         Arc::new(Self {
             executor: executor.clone(),
@@ -64,7 +64,7 @@ impl MemorySocket {
     }
 
     /// A packet has arrived.
-    pub(super) fn deliver(&self, packet: Packet) {
+    pub(super) fn deliver(&self, packet: Datagram) {
         let reader = {
             let mut inbox = lock(&self.inbox);
             inbox.packets.push_back(packet);
@@ -89,7 +89,7 @@ impl AsyncUdpSocket for MemorySocket {
 
     fn try_send(&self, transmit: &Transmit<'_>) -> io::Result<()> {
         let now = self.executor.time();
-        lock(&self.out).take(now, transmit.contents, transmit.ecn);
+        lock(&self.out).offer(now, transmit.contents, transmit.ecn);
         Ok(())
     }
 

@@ -1,63 +1,64 @@
-//! The emulated path between two ends, one direction each: outage, bottleneck with a queue, then an emulated link.
+//! The emulated path between two ends, one direction: outage and bottleneck with a queue, then the rest of the path.
 //!
-//! A packet's fate is known when it is handed over; who drives the run takes it out when it is due. Nothing here
-//! knows what packets carry, and nothing here may wait or read a clock.
+//! Both are links of the emulator, one behind the other: what the queue or an outage drops never meets the second,
+//! and takes no draw of it. Nothing here knows what packets carry, and nothing here may wait or read a clock.
 
 use std::ops::Range;
 use std::time::Duration;
 
-use mmt_netem::config::ConfigError;
-use mmt_netem::{LinkId, SimPath};
+use mmt_netem::config::{ConfigError, Framing, LIMIT_MAX, Outage, Queue, Rate, Service};
+use mmt_netem::{Departure, Link, LinkConfig, LinkId, Packet};
 use mmt_shared::time::Time;
 use quinn::udp::EcnCodepoint;
 
-use crate::transport::{Bottleneck, Conditions, Sent};
+use crate::transport::{Conditions, Sent};
 
 /// IPv4 and UDP headers, bytes (RFC 791, RFC 768): what a packet has beyond its UDP payload.
-const HEADERS: usize = 28;
+const HEADERS: u8 = 28;
 
 /// A UDP datagram under way.
 #[derive(Clone, Debug)]
-pub(super) struct Packet {
+pub(super) struct Datagram {
     pub(super) contents: Vec<u8>,
     pub(super) ecn: Option<EcnCodepoint>,
-    /// How long the bottleneck takes to send it.
-    serialisation: Duration,
-}
-
-/// A packet at the far end.
-#[derive(Debug)]
-pub(super) struct Arrived {
-    pub(super) packet: Packet,
-    /// What the path itself took for it: serialisation, propagation, jitter; no waiting behind others.
+    /// What the path itself took for it so far: serialisation, propagation, jitter; no waiting behind others.
     pub(super) own: Duration,
 }
 
 /// One direction of the path.
 #[derive(Debug)]
-pub(super) struct Way {
-    link: SimPath<Packet>,
-    bottleneck: Option<Bottleneck>,
-    /// When the bottleneck has sent all that it took in.
-    free_at: Time,
-    /// Nothing gets through.
-    pub(super) outage: Range<Time>,
+pub(super) struct OneWay {
+    bottleneck: Link<Datagram>,
+    rest: Link<Datagram>,
     sent: Sent,
 }
 
-impl Way {
+impl OneWay {
     pub(super) fn try_new(
         conditions: &Conditions,
         seed: u64,
         id: LinkId,
     ) -> Result<Self, ConfigError> {
         Ok(Self {
-            link: SimPath::try_new(conditions.link(), seed, id)?,
-            bottleneck: conditions.bottleneck,
-            free_at: Time::ZERO,
-            outage: Time::MAX..Time::MAX,
+            bottleneck: Link::try_new(bottleneck(conditions), seed, id)?,
+            rest: Link::try_new(conditions.link(), seed, id)?,
             sent: Sent::default(),
         })
+    }
+
+    /// Nothing gets through in this time; to be set before it begins.
+    pub(super) fn set_outage(
+        &mut self,
+        now: Time,
+        outage: &Range<Time>,
+    ) -> Result<(), ConfigError> {
+        let mut config = self.bottleneck.config().clone();
+        config.outages.push(Outage {
+            at: outage.start.saturating_since(Time::ZERO),
+            length: outage.end.saturating_since(outage.start),
+            every: None,
+        });
+        self.bottleneck.reconfigure(now, config)
     }
 
     /// What was handed over so far.
@@ -66,51 +67,66 @@ impl Way {
     }
 
     /// Hands a packet over at `now`.
-    pub(super) fn take(&mut self, now: Time, contents: &[u8], ecn: Option<EcnCodepoint>) {
-        let bytes = contents.len() + HEADERS;
+    pub(super) fn offer(&mut self, now: Time, contents: &[u8], ecn: Option<EcnCodepoint>) {
         self.sent.packets += 1;
-        self.sent.bytes += bytes as u64;
-        if self.outage.contains(&now) {
-            return;
-        }
-        let Some((leaves, serialisation)) = self.pass_bottleneck(now, bytes) else {
-            return;
-        };
-        let packet = Packet {
+        self.sent.bytes += contents.len() as u64 + u64::from(HEADERS);
+        let datagram = Datagram {
             contents: contents.to_owned(),
             ecn,
-            serialisation,
+            own: Duration::ZERO,
         };
-        self.link.push(leaves, contents.len(), packet);
+        self.bottleneck
+            .offer(now, Packet::new(contents.len(), datagram));
+        self.pass_on(now);
     }
 
-    /// When a packet has left the bottleneck, and how long sending it took; none if the queue is full.
-    fn pass_bottleneck(&mut self, now: Time, bytes: usize) -> Option<(Time, Duration)> {
-        let Some(bottleneck) = self.bottleneck else {
-            return Some((now, Duration::ZERO));
-        };
-        if self.free_at.saturating_since(now) > bottleneck.queue {
-            return None;
+    fn pass_on(&mut self, now: Time) {
+        while let Some(out) = self.bottleneck.poll_delivered(now) {
+            let (at, bytes) = (out.due, out.bytes);
+            self.rest.offer(at, Packet::new(bytes, charged(out)));
         }
-        let serialisation = bottleneck.serialisation(bytes);
-        self.free_at = self.free_at.max(now) + serialisation;
-        Some((self.free_at, serialisation))
     }
 
-    /// When the next packet arrives.
-    pub(super) fn next_due(&self) -> Option<Time> {
-        self.link.next_due()
+    /// When to poll next.
+    pub(super) fn poll_timeout(&self) -> Option<Time> {
+        let timeouts = [self.bottleneck.poll_timeout(), self.rest.poll_timeout()];
+        timeouts.into_iter().flatten().min()
     }
 
     /// The next packet that has arrived by `now`.
-    pub(super) fn pop_due(&mut self, now: Time) -> Option<Arrived> {
-        let released = self.link.pop_due(now)?;
-        let propagation = released.due.saturating_since(released.offered_at);
-        Some(Arrived {
-            own: released.payload.serialisation + propagation,
-            packet: released.payload,
-        })
+    pub(super) fn poll(&mut self, now: Time) -> Option<Datagram> {
+        self.pass_on(now);
+        self.rest.poll_delivered(now).map(charged)
     }
+}
+
+/// The link with the bottleneck alone.
+fn bottleneck(conditions: &Conditions) -> LinkConfig {
+    let bottleneck = conditions.bottleneck;
+    LinkConfig {
+        rate: bottleneck.map(|bottleneck| Rate {
+            service: Service::Constant {
+                bits_per_second: bottleneck.bits_per_s,
+            },
+            framing: Framing {
+                overhead: HEADERS.into(),
+                ..Framing::default()
+            },
+        }),
+        queue: Queue {
+            wait: bottleneck.map(|bottleneck| bottleneck.queue),
+            ..Queue::default()
+        },
+        limit: LIMIT_MAX,
+        ..LinkConfig::default()
+    }
+}
+
+/// What left a link, with the time that this link itself took for it.
+fn charged(out: Departure<Datagram>) -> Datagram {
+    let took = out.due.saturating_since(out.offered_at);
+    let own = out.payload.own + took.saturating_sub(out.queued);
+    Datagram { own, ..out.payload }
 }
 
 #[cfg(test)]
@@ -118,10 +134,11 @@ mod tests {
     use mmt_netem::Probability;
 
     use super::*;
+    use crate::transport::Bottleneck;
 
     const MS: Duration = Duration::from_millis(1);
 
-    fn way(bottleneck: Option<Bottleneck>) -> Way {
+    fn one_way(bottleneck: Option<Bottleneck>) -> OneWay {
         let conditions = Conditions {
             round_trip: 20 * MS,
             loss: Probability::ZERO,
@@ -129,40 +146,43 @@ mod tests {
             outage: Duration::ZERO,
             bottleneck,
         };
-        Way::try_new(&conditions, 1, LinkId::UP).unwrap()
+        OneWay::try_new(&conditions, 1, LinkId::UP).unwrap()
     }
 
-    fn arrivals(way: &mut Way) -> Vec<(Time, Duration)> {
-        std::iter::from_fn(|| {
-            let due = way.next_due()?;
-            way.pop_due(due).map(|arrived| (due, arrived.own))
-        })
-        .collect()
+    fn arrivals(path: &mut OneWay) -> Vec<(Time, Duration)> {
+        let mut arrivals = Vec::new();
+        while let Some(now) = path.poll_timeout() {
+            while let Some(arrived) = path.poll(now) {
+                arrivals.push((now, arrived.own));
+            }
+        }
+        arrivals
     }
 
     #[test]
     fn waiting_behind_others_is_not_the_paths_own_time() {
-        let mut way = way(Some(Bottleneck::NARROW));
+        let mut path = one_way(Some(Bottleneck::NARROW));
         // 97 bytes and 28 of headers: 1 ms at 1 Mbit/s
-        way.take(Time::ZERO, &[0; 97], None);
-        way.take(Time::ZERO, &[0; 97], None);
+        path.offer(Time::ZERO, &[0; 97], None);
+        path.offer(Time::ZERO, &[0; 97], None);
         let expected = [
             (Time::from_millis(11), 11 * MS),
             (Time::from_millis(12), 11 * MS),
         ];
-        assert_eq!(arrivals(&mut way), expected);
-        assert_eq!((way.sent().packets, way.sent().bytes), (2, 250));
+        assert_eq!(arrivals(&mut path), expected);
+        assert_eq!((path.sent().packets, path.sent().bytes), (2, 250));
     }
 
     #[test]
     fn a_full_queue_and_an_outage_drop() {
-        let mut narrow = way(Some(Bottleneck::NARROW));
-        (0..1500).for_each(|_| narrow.take(Time::ZERO, &[0; 97], None));
+        let mut narrow = one_way(Some(Bottleneck::NARROW));
+        (0..1500).for_each(|_| narrow.offer(Time::ZERO, &[0; 97], None));
         assert_eq!(arrivals(&mut narrow).len(), 1001);
 
-        let mut broken = way(None);
-        broken.outage = Time::from_millis(1)..Time::from_millis(3);
-        (0..5).for_each(|ms| broken.take(Time::from_millis(ms), &[0; 97], None));
+        let mut broken = one_way(None);
+        let outage = Time::from_millis(1)..Time::from_millis(3);
+        broken.set_outage(Time::ZERO, &outage).unwrap();
+        (0..5).for_each(|ms| broken.offer(Time::from_millis(ms), &[0; 97], None));
         assert_eq!(arrivals(&mut broken).len(), 3);
     }
 }

@@ -18,11 +18,11 @@ use quinn::{Connection, ConnectionError, Endpoint};
 use super::ends::{Ends, MemorySocket, ends};
 use super::error::VirtualTimeError;
 use super::executor::{Executor, lock};
-use super::path::{Arrived, Way};
+use super::path::{Datagram, OneWay};
 use crate::transport::{Case, HEARTBEAT, HEARTBEAT_BYTES, Log, Outcome, Sent};
 
-/// Told of each packet that came: when, and what the path itself took for it.
-type Told<'a> = &'a mut dyn FnMut(Time, Duration) -> Result<(), VirtualTimeError>;
+/// Is called for each packet that came: when, and what the path itself took for it.
+type Arrived<'a> = &'a mut dyn FnMut(Time, Duration) -> Result<(), VirtualTimeError>;
 
 /// Name given to the TLS library, which wants one; it is not sent.
 const SERVER_NAME: &str = "mmt";
@@ -40,15 +40,15 @@ pub fn run(case: &Case) -> Result<Outcome, VirtualTimeError> {
 }
 
 /// One direction with the socket at its far end.
-struct Lane {
-    way: Arc<Mutex<Way>>,
+struct Direction {
+    path: Arc<Mutex<OneWay>>,
     far: Arc<MemorySocket>,
 }
 
 struct Setup {
     executor: Executor,
-    up: Lane,
-    down: Lane,
+    up: Direction,
+    down: Direction,
     ends: Ends,
 }
 
@@ -62,20 +62,20 @@ impl Setup {
     fn new(case: &Case) -> Result<Self, VirtualTimeError> {
         let executor = Executor::new();
         let address = |host| SocketAddr::from((Ipv4Addr::new(192, 0, 2, host), 4433));
-        let way =
-            |id| Way::try_new(&case.conditions, case.seed, id).map(|way| Arc::new(Mutex::new(way)));
-        let (up, down) = (way(LinkId::UP)?, way(LinkId::DOWN)?);
+        let path = |id| OneWay::try_new(&case.conditions, case.seed, id);
+        let up = Arc::new(Mutex::new(path(LinkId::UP)?));
+        let down = Arc::new(Mutex::new(path(LinkId::DOWN)?));
         let master = MemorySocket::new(&executor, address(1), address(2), Arc::clone(&up));
         let slave = MemorySocket::new(&executor, address(2), address(1), Arc::clone(&down));
         let ends = ends(case, &executor, Arc::clone(&master), Arc::clone(&slave))?;
         Ok(Self {
             executor,
-            up: Lane {
-                way: up,
+            up: Direction {
+                path: up,
                 far: slave,
             },
-            down: Lane {
-                way: down,
+            down: Direction {
+                path: down,
                 far: master,
             },
             ends,
@@ -116,8 +116,9 @@ impl Setup {
     fn measure(&self, case: &Case) -> Result<Outcome, VirtualTimeError> {
         let pair = self.shake_hands()?;
         let start = next_on_grid(self.executor.time());
-        for lane in [&self.up, &self.down] {
-            lock(&lane.way).outage = case.outage(start);
+        let (now, outage) = (self.executor.time(), case.outage(start));
+        for direction in [&self.up, &self.down] {
+            lock(&direction.path).set_outage(now, &outage)?;
         }
         let mut log = Log::new(case, start);
         let before = self.sent();
@@ -147,15 +148,16 @@ impl Setup {
         Ok(log.outcome(after.0.since(before.0), after.1.since(before.1)))
     }
 
-    /// Lets time go on to `now` and everything happen that is due; `told` hears the time and the path's own
-    /// share of it for each packet, after the tasks have run.
-    fn pass(&self, now: Time, told: Told<'_>) -> Result<(), VirtualTimeError> {
+    /// Lets time go on to `now` and everything happen that is due; calls `arrived` for each packet, after the
+    /// tasks have run.
+    fn pass(&self, now: Time, arrived: Arrived<'_>) -> Result<(), VirtualTimeError> {
         self.executor.jump(now);
-        for lane in [&self.up, &self.down] {
-            while let Some(packet) = lane.pop_due(now) {
-                lane.far.deliver(packet.packet);
+        for direction in [&self.up, &self.down] {
+            while let Some(datagram) = direction.poll(now) {
+                let own = datagram.own;
+                direction.far.deliver(datagram);
                 self.executor.settle();
-                told(now, packet.own)?;
+                arrived(now, own)?;
             }
         }
         self.executor.fire();
@@ -166,18 +168,18 @@ impl Setup {
     /// When something happens next if nobody sends.
     fn next_event(&self) -> Option<Time> {
         let timer = self.executor.next_timer();
-        let packets = [&self.up, &self.down].map(|lane| lock(&lane.way).next_due());
+        let packets = [&self.up, &self.down].map(|way| lock(&way.path).poll_timeout());
         timer.into_iter().chain(packets.into_iter().flatten()).min()
     }
 
     fn sent(&self) -> (Sent, Sent) {
-        (lock(&self.up.way).sent(), lock(&self.down.way).sent())
+        (lock(&self.up.path).sent(), lock(&self.down.path).sent())
     }
 }
 
-impl Lane {
-    fn pop_due(&self, now: Time) -> Option<Arrived> {
-        lock(&self.way).pop_due(now)
+impl Direction {
+    fn poll(&self, now: Time) -> Option<Datagram> {
+        lock(&self.path).poll(now)
     }
 }
 

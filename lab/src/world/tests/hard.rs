@@ -267,7 +267,7 @@ fn after_an_outage_of_60_ms_the_speed_limit_keeps_the_force_on_the_object_low() 
         let name = format!("{one_way_ms} ms, outages, {speed_max_m_per_s} m/s");
         let felt = felt(&name, &config, |world| {
             let outage = world.now.as_nanos() / 1_000_000 % 700 < 60;
-            while outage && world.up.pop_due(world.now + TICK).is_some() {}
+            while outage && world.up.poll_delivered(world.now + TICK).is_some() {}
         });
         felt.slave_peak_n
     };

@@ -7,6 +7,8 @@ use std::os::fd::AsFd;
 use quinn::udp::{EcnCodepoint, RecvMeta, Transmit, UdpSocketState};
 use rustix::event::{PollFd, PollFlags};
 
+use crate::io::driver::Outcome;
+
 /// Kernel buffers asked for, bytes: bursts of 1000 full packets. The kernel gives what it may.
 const KERNEL_BUFFER: usize = 4 << 20;
 /// Messages taken at one call.
@@ -19,14 +21,6 @@ const MESSAGE_MAX: usize = 65_535;
 pub(super) struct Port {
     socket: UdpSocket,
     state: UdpSocketState,
-}
-
-/// What became of a datagram given to a port.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Sent {
-    Yes,
-    Blocked,
-    Failed,
 }
 
 impl Port {
@@ -43,9 +37,9 @@ impl Port {
         PollFd::from_borrowed_fd(self.socket.as_fd(), PollFlags::IN)
     }
 
-    /// Sends one datagram. `unreachable` counts the refusals of earlier datagrams that the kernel tells
+    /// Sends one datagram. `unreachable` counts the refusals of earlier datagrams that the kernel reports
     /// at this occasion; they cost this datagram nothing.
-    pub(super) fn send(&self, transmit: &Transmit<'_>, unreachable: &mut u64) -> Sent {
+    pub(super) fn send(&self, transmit: &Transmit<'_>, unreachable: &mut u64) -> Outcome {
         let try_send = || self.state.try_send((&self.socket).into(), transmit);
         let mut sent = try_send();
         if matches!(&sent, Err(error) if error.kind() == io::ErrorKind::ConnectionRefused) {
@@ -53,9 +47,9 @@ impl Port {
             sent = try_send();
         }
         match sent {
-            Ok(()) => Sent::Yes,
-            Err(error) if error.kind() == io::ErrorKind::WouldBlock => Sent::Blocked,
-            Err(_) => Sent::Failed,
+            Ok(()) => Outcome::Sent,
+            Err(error) if error.kind() == io::ErrorKind::WouldBlock => Outcome::Blocked,
+            Err(_) => Outcome::Failed,
         }
     }
 }
@@ -137,9 +131,9 @@ mod tests {
             };
             port.send(&transmit, &mut unreachable)
         };
-        assert_eq!(send(b"to nobody"), Sent::Yes);
+        assert_eq!(send(b"to nobody"), Outcome::Sent);
         let target = UdpSocket::bind(vacant).unwrap();
-        assert_eq!(send(b"to you"), Sent::Yes);
+        assert_eq!(send(b"to you"), Outcome::Sent);
         assert_eq!(unreachable, 1);
         let patience = Duration::from_secs(30);
         target.set_read_timeout(Some(patience)).unwrap();

@@ -43,10 +43,10 @@ fn until(relay: &RelayHandle, holds: impl Fn(&RelaySnapshot) -> bool) -> RelaySn
 fn offered_is_accounted_for(counters: &DirectionCounters) {
     let after = counters.link.dropped.total().packets
         + counters.in_flight
-        + counters.forwarded.packets
+        + counters.sent.packets
         + counters.blocked.packets
         + counters.failed.packets
-        + counters.orphaned.packets;
+        + counters.abandoned.packets;
     let before = counters.link.offered.packets + counters.link.duplicated.packets;
     assert_eq!(before, after, "{counters:?}");
 }
@@ -70,11 +70,11 @@ fn forwards_both_ways(listen: IpAddr, target: IpAddr) {
     assert_eq!(receive(&client), (b"down".to_vec(), relay.local_addr()));
     assert!(start.elapsed() >= Duration::from_millis(5));
 
-    until(&relay, |seen| seen.down.forwarded.packets == 1);
+    until(&relay, |seen| seen.down.sent.packets == 1);
     let end = relay.stop().unwrap();
     let tally = |packets, bytes| Tally { packets, bytes };
-    assert_eq!(end.up.forwarded, tally(1, 2));
-    assert_eq!(end.down.forwarded, tally(1, 4));
+    assert_eq!(end.up.sent, tally(1, 2));
+    assert_eq!(end.down.sent, tally(1, 4));
     assert_eq!(
         (end.clients, end.clients_met, end.lateness.count),
         (1, 1, 2)
@@ -138,7 +138,7 @@ fn fifo_keeps_the_order_and_every_loss_has_its_count() {
     });
     offered_is_accounted_for(&end.up);
     assert!(end.up.link.dropped.loss.packets > 0);
-    let arrived: Vec<u8> = (0..end.up.forwarded.packets)
+    let arrived: Vec<u8> = (0..end.up.sent.packets)
         .map(|_| receive(&server).0[0])
         .collect();
     assert!(arrived.is_sorted(), "{arrived:?}");
@@ -351,7 +351,7 @@ fn every_packet_is_on_record_in_both_forms() {
         let (read, entries) = crate::record::read(&std::fs::read(&path).unwrap()).unwrap();
         assert_eq!(read, heading);
         let summary = crate::record::summary::Summary::of(&entries, crate::Direction::Up);
-        assert_eq!(summary.sent, end.up.forwarded, "{name}");
+        assert_eq!(summary.sent, end.up.sent, "{name}");
         assert!(end.up.link.duplicated.packets > 0 && end.up.link.corrupted.packets > 0);
         assert_eq!(summary.corrupted, end.up.link.corrupted.packets);
         let entry = |number| entries.iter().any(|entry| entry.number == number);

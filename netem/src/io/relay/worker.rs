@@ -1,4 +1,4 @@
-//! The thread of a relay: receive, let the links decide, send at the times they gave.
+//! The thread of a relay: receives, offers to the links, and sends what they deliver.
 
 use std::io;
 use std::sync::Arc;
@@ -12,16 +12,16 @@ use mmt_shared::io::realtime;
 use mmt_shared::time::Time;
 
 use super::clients::Clients;
-use super::lane::{Lane, Parcel, harm};
-use super::port::{Port, Receiver, Sent};
+use super::port::{Port, Received, Receiver};
 use super::{RelaySnapshot, Shared};
 use crate::counters::Tally;
 use crate::direction::Direction;
 use crate::io::alarm::{now, wait};
+use crate::io::driver::{Datagram, Driver, Outcome};
 use crate::io::lateness::Lateness;
 use crate::io::lock;
-use crate::io::log::Log;
-use crate::pipe::{Pipe, Released};
+use crate::io::record_file::RecordWriter;
+use crate::packet::Departure;
 
 /// Batches taken from one socket before the times are looked at again.
 const BATCHES: usize = 16;
@@ -31,9 +31,10 @@ pub(super) struct Worker {
     listen: Port,
     clients: Clients,
     receiver: Receiver,
-    up: Lane,
-    down: Lane,
-    log: Log,
+    /// The links, whose datagrams know the number of their client.
+    up: Driver<u64>,
+    down: Driver<u64>,
+    record: Option<RecordWriter>,
     refused: Tally,
     unreachable: u64,
     receive_errors: u64,
@@ -53,18 +54,18 @@ impl Worker {
     pub(super) fn new(
         listen: Port,
         clients: Clients,
-        up: Pipe<Parcel>,
-        down: Pipe<Parcel>,
-        log: Log,
+        up: Driver<u64>,
+        down: Driver<u64>,
+        record: Option<RecordWriter>,
         shared: Arc<Shared>,
     ) -> Self {
         Self {
             listen,
             clients,
             receiver: Receiver::new(),
-            up: Lane::new(up),
-            down: Lane::new(down),
-            log,
+            up,
+            down,
+            record,
             rebinds: 0,
             rebind: None,
             refused: Tally::default(),
@@ -81,14 +82,14 @@ impl Worker {
     }
 
     /// Does what the handle asks for and what is due.
-    fn obey(&mut self) {
-        let orders = std::mem::take(&mut *lock(&self.shared.orders));
-        if let Some((up, down)) = orders.links {
+    fn apply_commands(&mut self) {
+        let commands = std::mem::take(&mut *lock(&self.shared.commands));
+        if let Some((up, down)) = commands.links {
             // the handle has checked them
-            let _ = self.up.pipe.reconfigure(up);
-            let _ = self.down.pipe.reconfigure(down);
+            let _ = self.up.reconfigure(now(), up);
+            let _ = self.down.reconfigure(now(), down);
         }
-        let mut rebind = orders.rebind;
+        let mut rebind = commands.rebind;
         if let Some((every, next)) = &mut self.rebind
             && *next <= now()
         {
@@ -106,7 +107,7 @@ impl Worker {
         let _ = realtime::request();
         while !self.shared.stopping.load(Ordering::Acquire) {
             self.release_due();
-            self.obey();
+            self.apply_commands();
             self.clients.expire(now());
             self.publish();
             let ready = self.wait()?;
@@ -123,8 +124,8 @@ impl Worker {
 
     fn wait(&self) -> io::Result<Ready> {
         let until = [
-            self.up.pipe.next_due(),
-            self.down.pipe.next_due(),
+            self.up.poll_timeout(),
+            self.down.poll_timeout(),
             self.clients.next_expiry(),
             self.rebind.map(|(_, next)| next),
         ];
@@ -157,12 +158,11 @@ impl Worker {
             clients,
             receiver,
             up,
-            log,
             refused,
             ..
         } = self;
-        let mut take = |received: super::port::Received<'_>| match clients.meet(&received, now()) {
-            Some(client) => up.offer(log, Direction::Up, client, &received),
+        let mut take = |received: Received<'_>| match clients.meet(&received, now()) {
+            Some(client) => up.offer(now(), datagram(client, &received)),
             None => refused.count(received.contents.len()),
         };
         for _ in 0..BATCHES {
@@ -178,9 +178,9 @@ impl Worker {
             return;
         };
         for _ in 0..BATCHES {
-            let (down, log) = (&mut self.down, &self.log);
+            let down = &mut self.down;
             let received = self.receiver.receive(&client.port, |received| {
-                down.offer(log, Direction::Down, number, &received);
+                down.offer(now(), datagram(number, &received));
             });
             match received {
                 Ok(()) => client.seen(now()),
@@ -199,55 +199,35 @@ impl Worker {
     }
 
     fn release_due(&mut self) {
-        while let Some(packet) = self.up.pipe.pop_due(now()) {
-            self.release(Direction::Up, packet);
+        while let Some(packet) = self.up.poll(now()) {
+            let moment = now();
+            let outcome = self.send(Direction::Up, &packet);
+            self.up.finish(&packet, outcome, moment);
         }
-        while let Some(packet) = self.down.pipe.pop_due(now()) {
-            self.release(Direction::Down, packet);
+        while let Some(packet) = self.down.poll(now()) {
+            let moment = now();
+            let outcome = self.send(Direction::Down, &packet);
+            self.down.finish(&packet, outcome, moment);
         }
     }
 
-    fn release(&mut self, direction: Direction, mut packet: Released<Parcel>) {
-        harm(&mut packet);
-        let moment = now();
-        self.shared.lateness.record(packet.due, moment);
-        let sent = match direction {
-            Direction::Up => self.send_up(&packet),
-            Direction::Down => self.send_down(&packet),
+    /// Sends to the target from the client's own port, or to the client from the address that it knows.
+    fn send(&mut self, direction: Direction, packet: &Departure<Datagram<u64>>) -> Outcome {
+        let Some(client) = self.clients.get(packet.payload.address) else {
+            return Outcome::Abandoned;
         };
-        let (took, backlog) = (sent == Some(Sent::Yes), packet.payload.backlog);
-        self.log.released(direction, &packet, backlog, took, moment);
-        let lane = match direction {
-            Direction::Up => &mut self.up,
-            Direction::Down => &mut self.down,
+        let (port, destination, src_ip) = match direction {
+            Direction::Up => (&client.port, self.clients.target(), None),
+            Direction::Down => (&self.listen, client.addr, client.local_ip),
         };
-        lane.sent.count(sent, packet.bytes);
-    }
-
-    /// Sends to the target; `None` if the client is forgotten.
-    fn send_up(&mut self, packet: &Released<Parcel>) -> Option<Sent> {
-        let client = self.clients.get(packet.payload.client)?;
         let transmit = Transmit {
-            destination: self.clients.target(),
+            destination,
             ecn: packet.payload.ecn,
             contents: &packet.payload.contents,
             segment_size: None,
-            src_ip: None,
+            src_ip,
         };
-        Some(client.port.send(&transmit, &mut self.unreachable))
-    }
-
-    /// Sends to the client from the address that it knows; `None` if it is forgotten.
-    fn send_down(&mut self, packet: &Released<Parcel>) -> Option<Sent> {
-        let client = self.clients.get(packet.payload.client)?;
-        let transmit = Transmit {
-            destination: client.addr,
-            ecn: packet.payload.ecn,
-            contents: &packet.payload.contents,
-            segment_size: None,
-            src_ip: client.local_ip,
-        };
-        Some(self.listen.send(&transmit, &mut self.unreachable))
+        port.send(&transmit, &mut self.unreachable)
     }
 
     fn publish(&self) {
@@ -260,9 +240,17 @@ impl Worker {
             unreachable: self.unreachable,
             receive_errors: self.receive_errors,
             rebinds: self.rebinds,
-            unrecorded: self.log.missed(),
+            unrecorded: self.record.as_ref().map_or(0, RecordWriter::missed),
             // the handle reads the histogram itself
             lateness: Lateness::default(),
         };
+    }
+}
+
+fn datagram(client: u64, received: &Received<'_>) -> Datagram<u64> {
+    Datagram {
+        address: client,
+        ecn: received.ecn,
+        contents: received.contents.to_owned(),
     }
 }

@@ -1,4 +1,4 @@
-//! New settings for wrapped sockets while they are at work. It must never touch what is in flight.
+//! New settings for wrapped sockets while they are at work.
 
 use std::sync::{Arc, Mutex, Weak};
 
@@ -19,8 +19,8 @@ struct Controlled {
 }
 
 impl SocketControl {
-    /// New settings for the datagrams to come ([`crate::Link::reconfigure`]), of sockets made earlier and
-    /// of those made later.
+    /// New settings from now on ([`crate::Link::reconfigure`]), for sockets made earlier and for those made
+    /// later.
     ///
     /// # Errors
     /// A setting out of its range; the old settings stay.

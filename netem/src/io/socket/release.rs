@@ -2,25 +2,24 @@
 
 use std::io;
 use std::pin::Pin;
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, MutexGuard};
 use std::task::{Context, Poll, Waker};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
 use mmt_shared::io::realtime;
 use mmt_shared::time::Time;
-use quinn::udp::EcnCodepoint;
+use quinn::udp::Transmit;
 use quinn::{AsyncUdpSocket, UdpPoller};
 
-use super::meter::{SocketMeter, Unsent};
-use super::{Datagram, SocketExtras, WrapError};
+use super::meter::SocketMeter;
+use super::{Address, SocketExtras, WrapError};
 use crate::config::{ConfigError, LinkConfig};
-use crate::direction::{Direction, LinkId};
-use crate::fate::{Fate, turn_bit};
+use crate::direction::LinkId;
 use crate::io::alarm::{Alarm, now};
+use crate::io::driver::{Datagram, Driver, Outcome};
 use crate::io::lock;
-use crate::io::log::{Dropped, Log};
-use crate::pipe::{Pipe, Released};
+use crate::packet::Departure;
 
 /// How long the thread waits for a full socket before it drops the datagram: long against the time in
 /// which a kernel empties a socket, short against the delays that are emulated.
@@ -38,58 +37,29 @@ pub(super) struct Shared {
     queue: Mutex<Queue>,
     alarm: Arc<Alarm>,
     meter: SocketMeter,
-    direction: Direction,
-    log: Log,
 }
 
 #[derive(Debug)]
 struct Queue {
-    pipe: Pipe<Parcel>,
+    driver: Driver<Address>,
     closed: bool,
 }
 
-/// A datagram on the link.
-#[derive(Clone, Debug)]
-struct Parcel {
-    datagram: Datagram,
-    /// Packets in flight when it was offered.
-    backlog: u32,
-}
-
 impl Shared {
-    /// New settings for the datagrams to come.
+    /// New settings from now on.
     ///
     /// # Errors
     /// A setting out of its range; the old settings stay.
     pub(super) fn reconfigure(&self, config: LinkConfig) -> Result<(), ConfigError> {
-        lock(&self.queue).pipe.reconfigure(config)
+        lock(&self.queue).driver.reconfigure(now(), config)?;
+        // what waits may be due sooner now
+        self.alarm.ring();
+        Ok(())
     }
 
-    /// Puts a datagram on the link now; also whether something is now due sooner than before.
-    fn push(&self, datagram: Datagram) -> (Fate, bool) {
-        let bytes = datagram.contents.len();
-        let mut queue = lock(&self.queue);
-        let next = queue.pipe.next_due();
-        let backlog = u32::try_from(queue.pipe.in_flight()).unwrap_or(u32::MAX);
-        let number = queue.pipe.counters().offered.packets;
-        // read under the lock: times of offers never go back
-        let offered_at = now();
-        let capable = datagram.ecn.is_some();
-        let parcel = Parcel { datagram, backlog };
-        let fate = queue.pipe.push_ecn(offered_at, bytes, capable, parcel);
-        let sooner = queue.pipe.next_due() != next;
-        drop(queue);
-        if let Fate::Drop(cause) = fate {
-            let packet = Dropped {
-                number,
-                offered_at,
-                bytes,
-                backlog,
-                cause,
-            };
-            self.log.dropped(self.direction, &packet);
-        }
-        (fate, sooner)
+    /// Lets everybody see what was counted, before the lock is given back.
+    fn publish(&self, queue: &MutexGuard<'_, Queue>) {
+        self.meter.publish(queue.driver.counters());
     }
 }
 
@@ -102,17 +72,15 @@ impl Release {
         meter: &SocketMeter,
         extras: SocketExtras,
     ) -> Result<Self, WrapError> {
-        let mut pipe = Pipe::try_new(config, seed, id)?;
-        pipe.set_origin(now());
+        let (record, lateness) = (extras.record, meter.recorder());
+        let driver = Driver::try_new(config, seed, id, now(), record, lateness)?;
         let shared = Arc::new(Shared {
             queue: Mutex::new(Queue {
-                pipe,
+                driver,
                 closed: false,
             }),
             alarm: Arc::new(Alarm::try_new()?),
             meter: meter.clone(),
-            direction: id.direction,
-            log: Log::new(extras.record),
         });
         if let Some(control) = extras.control {
             control.attach(&shared)?;
@@ -133,18 +101,14 @@ impl Release {
     }
 
     /// Puts a datagram on the link, now.
-    pub(super) fn offer(&self, datagram: Datagram) {
-        let bytes = datagram.contents.len();
-        self.shared.meter.offered(bytes);
-        let (fate, sooner) = self.shared.push(datagram);
-        match fate {
-            Fate::Drop(cause) => self.shared.meter.dropped(cause, bytes),
-            Fate::Deliver(deliveries) => {
-                for _ in deliveries.copies() {
-                    self.shared.meter.duplicated(bytes);
-                }
-            }
-        }
+    pub(super) fn offer(&self, datagram: Datagram<Address>) {
+        let mut queue = lock(&self.shared.queue);
+        let next = queue.driver.poll_timeout();
+        // read under the lock: times of offers never go back
+        queue.driver.offer(now(), datagram);
+        let sooner = queue.driver.poll_timeout() != next;
+        self.shared.publish(&queue);
+        drop(queue);
         if sooner {
             self.shared.alarm.ring();
         }
@@ -164,7 +128,7 @@ impl Drop for Release {
 
 /// What the thread does next.
 enum Step {
-    Send(Released<Parcel>),
+    Send(Departure<Datagram<Address>>),
     Wait(Option<Time>),
     End,
 }
@@ -183,7 +147,7 @@ impl Sender {
         let _ = realtime::request();
         loop {
             match self.step() {
-                Step::Send(packet) => self.release(packet),
+                Step::Send(packet) => self.release(&packet),
                 // Only a program error makes the wait fail; to end beats to spin.
                 Step::Wait(until) if self.shared.alarm.wait(until).is_ok() => {}
                 Step::Wait(_) | Step::End => break self.abandon(),
@@ -196,63 +160,53 @@ impl Sender {
         if queue.closed {
             return Step::End;
         }
-        match queue.pipe.pop_due(now()) {
-            Some(packet) => Step::Send(packet),
-            None => Step::Wait(queue.pipe.next_due()),
+        if let Some(packet) = queue.driver.poll(now()) {
+            return Step::Send(packet);
         }
+        self.shared.publish(&queue);
+        Step::Wait(queue.driver.poll_timeout())
     }
 
-    fn release(&mut self, mut packet: Released<Parcel>) {
-        let shared = self.shared.clone();
-        if let Some(bit) = packet.corrupted_bit {
-            turn_bit(&mut packet.payload.datagram.contents, bit);
-        }
-        if packet.marked {
-            packet.payload.datagram.ecn = Some(EcnCodepoint::Ce);
-        }
+    fn release(&mut self, packet: &Departure<Datagram<Address>>) {
         let moment = now();
-        shared.meter.recorder().record(packet.due, moment);
-        let sent = self.send(&packet.payload.datagram);
-        match sent {
-            Ok(()) => shared.meter.sent(packet.bytes),
-            Err(why) => shared.meter.unsent(why, packet.bytes),
-        }
-        let backlog = packet.payload.backlog;
-        let log = &shared.log;
-        log.released(shared.direction, &packet, backlog, sent.is_ok(), moment);
+        let outcome = self.send(&packet.payload);
+        let mut queue = lock(&self.shared.queue);
+        queue.driver.finish(packet, outcome, moment);
+        self.shared.publish(&queue);
     }
 
     /// Sends, waiting at most [`PATIENCE`] for room in the socket.
-    fn send(&mut self, datagram: &Datagram) -> Result<(), Unsent> {
+    fn send(&mut self, datagram: &Datagram<Address>) -> Outcome {
+        let transmit = Transmit {
+            destination: datagram.address.destination,
+            ecn: datagram.ecn,
+            contents: &datagram.contents,
+            segment_size: None,
+            src_ip: datagram.address.src_ip,
+        };
         let deadline = now() + PATIENCE;
         loop {
-            match self.inner.try_send(&datagram.as_transmit()) {
-                Ok(()) => return Ok(()),
-                Err(error) if error.kind() != io::ErrorKind::WouldBlock => {
-                    return Err(Unsent::Failed);
-                }
-                Err(_) if now() >= deadline => return Err(Unsent::Blocked),
-                Err(_) => self.wait_for_room(deadline)?,
+            match self.inner.try_send(&transmit) {
+                Ok(()) => return Outcome::Sent,
+                Err(error) if error.kind() != io::ErrorKind::WouldBlock => return Outcome::Failed,
+                Err(_) if now() >= deadline => return Outcome::Blocked,
+                Err(_) if self.wait_for_room(deadline).is_err() => return Outcome::Failed,
+                Err(_) => {}
             }
         }
     }
 
-    fn wait_for_room(&mut self, deadline: Time) -> Result<(), Unsent> {
+    fn wait_for_room(&mut self, deadline: Time) -> io::Result<()> {
         let mut cx = Context::from_waker(&self.waker);
         match self.poller.as_mut().poll_writable(&mut cx) {
-            Poll::Ready(Ok(())) => Ok(()),
-            Poll::Ready(Err(_)) => Err(Unsent::Failed),
-            Poll::Pending => {
-                let waited = self.shared.alarm.wait(Some(deadline));
-                waited.map_err(|_| Unsent::Failed)
-            }
+            Poll::Ready(ready) => ready,
+            Poll::Pending => self.shared.alarm.wait(Some(deadline)),
         }
     }
 
     fn abandon(&self) {
         let mut queue = lock(&self.shared.queue);
-        while let Some(packet) = queue.pipe.pop_due(Time::MAX) {
-            self.shared.meter.unsent(Unsent::Abandoned, packet.bytes);
-        }
+        queue.driver.abandon();
+        self.shared.publish(&queue);
     }
 }

@@ -7,6 +7,7 @@ use std::task::Waker;
 use std::time::{Duration, Instant};
 
 use mmt_shared::time::Time;
+use quinn::udp::EcnCodepoint;
 use quinn::{ClientConfig, Endpoint, EndpointConfig, Runtime, ServerConfig, TokioRuntime};
 
 use super::*;
@@ -112,11 +113,23 @@ fn until(what: &str, mut holds: impl FnMut() -> bool) {
 }
 
 fn offered_is_accounted_for(counters: &SocketCounters) {
-    let total = counters.dropped.total();
-    let packets = counters.sent_datagrams + total.packets + counters.in_flight();
-    assert_eq!(counters.offered_datagrams, packets);
-    if counters.in_flight() == 0 {
-        assert_eq!(counters.offered_bytes, counters.sent_bytes + total.bytes);
+    let out = &counters.outgoing;
+    let gone = [
+        out.sent,
+        out.blocked,
+        out.failed,
+        out.abandoned,
+        out.link.dropped.total(),
+    ];
+    let gone = gone.into_iter().fold(Tally::default(), Tally::plus);
+    let offered = out.link.offered.plus(out.link.duplicated);
+    assert_eq!(
+        offered.packets,
+        gone.packets + out.in_flight,
+        "{counters:?}"
+    );
+    if out.in_flight == 0 {
+        assert_eq!(offered.bytes, gone.bytes, "{counters:?}");
     }
 }
 
@@ -136,7 +149,7 @@ fn a_datagram_leaves_whole_marked_in_order_and_never_early() {
         assert_eq!(*ecn, Some(EcnCodepoint::Ect0));
     }
     let meter = socket.meter();
-    until("counted", || meter.snapshot().sent_datagrams == 50);
+    until("counted", || meter.snapshot().outgoing.sent.packets == 50);
     assert_eq!(meter.lateness().count, 50);
 }
 
@@ -184,12 +197,18 @@ fn a_socket_at_work_takes_new_settings_and_keeps_the_times_of_what_is_in_flight(
     let (at, contents, _) = inner.sent.lock().unwrap()[1].clone();
     assert_eq!(contents, b"in flight");
     assert!(at.saturating_since(start) >= Duration::from_millis(20));
-    assert_eq!(socket.meter().snapshot().dropped.loss.packets, 1);
+    assert_eq!(
+        socket.meter().snapshot().outgoing.link.dropped.loss.packets,
+        1
+    );
 
     // a socket made later begins with the newest settings, not with its own
     let later = wrap_with(&inner, "none", extras);
     later.try_send(&transmit(b"lost too", None)).unwrap();
-    assert_eq!(later.meter().snapshot().dropped.loss.packets, 1);
+    assert_eq!(
+        later.meter().snapshot().outgoing.link.dropped.loss.packets,
+        1
+    );
     // and one that is gone is in nobody's way
     drop(socket);
     reconfigure("none").unwrap();
@@ -217,7 +236,7 @@ fn what_a_socket_met_is_on_record_and_is_met_again_by_a_replay() {
         std::thread::sleep(Duration::from_micros(100));
     }
     let meter = socket.meter();
-    until("all decided", || meter.snapshot().in_flight() == 0);
+    until("all decided", || meter.snapshot().outgoing.in_flight == 0);
     // the thread writes the last one down after it has counted it
     drop(socket);
     assert_eq!(file.finish().unwrap(), 0);
@@ -227,8 +246,8 @@ fn what_a_socket_met_is_on_record_and_is_met_again_by_a_replay() {
     assert_eq!((read, entries.len()), (heading, 100));
     let summary = crate::record::summary::Summary::of(&entries, Direction::Up);
     let counters = meter.snapshot();
-    assert_eq!(summary.sent.packets, counters.sent_datagrams);
-    assert!(counters.dropped.loss.packets > 10);
+    assert_eq!(summary.sent.packets, counters.outgoing.sent.packets);
+    assert!(counters.outgoing.link.dropped.loss.packets > 10);
     // the binary form replays as the CSV does
     let text = crate::record::as_text(bytes).unwrap();
     let replay = crate::words::parse("trace session up", &mut |_| Ok(text.clone())).unwrap();
@@ -237,12 +256,13 @@ fn what_a_socket_met_is_on_record_and_is_met_again_by_a_replay() {
     let mut sorted = entries;
     sorted.sort_by_key(|entry| entry.number);
     for entry in sorted {
-        let fate = link.offer(entry.offered, crate::PacketMeta::default());
+        link.offer(entry.offered, crate::Packet::new(0, ()));
+        let due = link.poll_delivered(Time::MAX).map(|out| out.due);
         let sent = match entry.end {
             crate::record::End::Sent { sent, .. } => Some(sent),
             _ => None,
         };
-        assert_eq!(fate.due(), sent, "packet {}", entry.number);
+        assert_eq!(due, sent, "packet {}", entry.number);
     }
 }
 
@@ -252,13 +272,13 @@ fn dropping_the_socket_ends_its_thread_and_counts_what_was_in_flight() {
     let socket = wrap(&inner, "delay 3600s");
     socket.try_send(&transmit(b"late", None)).unwrap();
     let meter = socket.meter();
-    assert_eq!(meter.snapshot().in_flight(), 1);
+    assert_eq!(meter.snapshot().outgoing.in_flight, 1);
     assert!(Arc::strong_count(&inner) > 2, "the thread holds the socket");
     drop(socket);
     assert_eq!(Arc::strong_count(&inner), 1);
     let counters = meter.snapshot();
     assert_eq!(
-        counters.dropped.abandoned,
+        counters.outgoing.abandoned,
         Tally {
             packets: 1,
             bytes: 4
@@ -277,12 +297,14 @@ fn each_datagram_of_a_batch_has_its_own_fate() {
         socket.try_send(&transmit(&batch, Some(3))).unwrap();
     }
     let meter = socket.meter();
-    until("all judged and sent", || meter.snapshot().in_flight() == 0);
+    until("all judged and sent", || {
+        meter.snapshot().outgoing.in_flight == 0
+    });
     let counters = meter.snapshot();
     // 85 datagrams of 3 bytes and one of 1 byte
-    assert_eq!(counters.offered_datagrams, 4 * 86);
-    assert_eq!(counters.offered_bytes, 4 * 256);
-    assert!(counters.dropped.loss.packets > 0 && counters.sent_datagrams > 0);
+    assert_eq!(counters.outgoing.link.offered.packets, 4 * 86);
+    assert_eq!(counters.outgoing.link.offered.bytes, 4 * 256);
+    assert!(counters.outgoing.link.dropped.loss.packets > 0 && counters.outgoing.sent.packets > 0);
     offered_is_accounted_for(&counters);
     let longest = inner.contents().iter().map(Vec::len).max();
     assert_eq!(longest, Some(3));
@@ -296,9 +318,9 @@ fn a_full_link_drops_and_counts_instead_of_blocking() {
         socket.try_send(&transmit(b"x", None)).unwrap();
     }
     let counters = socket.meter().snapshot();
-    assert_eq!(counters.in_flight(), 10);
+    assert_eq!(counters.outgoing.in_flight, 10);
     assert_eq!(
-        counters.dropped.limit,
+        counters.outgoing.link.dropped.limit,
         Tally {
             packets: 5,
             bytes: 5
@@ -313,14 +335,16 @@ fn a_real_socket_that_is_full_or_broken_costs_the_datagram_and_a_count() {
     let meter = socket.meter();
     inner.full.store(true, Ordering::Relaxed);
     socket.try_send(&transmit(b"full", None)).unwrap();
-    until("given up", || meter.snapshot().dropped.blocked.packets == 1);
+    until("given up", || {
+        meter.snapshot().outgoing.blocked.packets == 1
+    });
     inner.full.store(false, Ordering::Relaxed);
     inner.broken.store(true, Ordering::Relaxed);
     socket.try_send(&transmit(b"broken", None)).unwrap();
-    until("failed", || meter.snapshot().dropped.failed.packets == 1);
+    until("failed", || meter.snapshot().outgoing.failed.packets == 1);
     inner.broken.store(false, Ordering::Relaxed);
     socket.try_send(&transmit(b"well", None)).unwrap();
-    until("sent", || meter.snapshot().sent_datagrams == 1);
+    until("sent", || meter.snapshot().outgoing.sent.packets == 1);
     assert_eq!(inner.contents(), [b"well"]);
     offered_is_accounted_for(&meter.snapshot());
 }
@@ -341,12 +365,18 @@ fn without_emulation_the_socket_passes_straight_through_and_counts() {
     socket.try_send(&transmit(&[0; 5], None)).unwrap_err();
     let counters = socket.meter().snapshot();
     assert_eq!(
-        (counters.offered_datagrams, counters.offered_bytes),
+        (
+            counters.outgoing.link.offered.packets,
+            counters.outgoing.link.offered.bytes
+        ),
         (4, 2505)
     );
-    assert_eq!((counters.sent_datagrams, counters.sent_bytes), (3, 2500));
     assert_eq!(
-        counters.dropped.failed,
+        (counters.outgoing.sent.packets, counters.outgoing.sent.bytes),
+        (3, 2500)
+    );
+    assert_eq!(
+        counters.outgoing.failed,
         Tally {
             packets: 1,
             bytes: 5
@@ -362,8 +392,8 @@ fn received_datagrams_are_counted_one_by_one() {
         let mut cx = Context::from_waker(Waker::noop());
         assert!(socket.poll_recv(&mut cx, &mut [], &mut meta).is_ready());
         let counters = socket.meter().snapshot();
-        assert_eq!(counters.received_datagrams, 3 + 1 + 1);
-        assert_eq!(counters.received_bytes, 2507);
+        assert_eq!(counters.received.packets, 3 + 1 + 1);
+        assert_eq!(counters.received.bytes, 2507);
     }
 }
 
@@ -444,7 +474,9 @@ async fn quic_works_over_the_emulated_link_and_pays_its_delay() {
     let (elapsed, client, server) = asked.await.unwrap();
     assert!(elapsed >= Duration::from_millis(2 * 18), "{elapsed:?}");
     for meter in [client, server] {
-        until("the thread to end", || meter.snapshot().in_flight() == 0);
+        until("the thread to end", || {
+            meter.snapshot().outgoing.in_flight == 0
+        });
         offered_is_accounted_for(&meter.snapshot());
         assert!(meter.lateness().count > 0);
     }
@@ -457,9 +489,9 @@ async fn what_one_end_sends_is_what_the_other_receives() {
         let (_, client, server) = asked.await.unwrap();
         let (client, server) = (client.snapshot(), server.snapshot());
         for (from, to) in [(client, server), (server, client)] {
-            assert!(from.sent_bytes > 50_000, "{from:?}");
-            assert_eq!(from.sent_datagrams, to.received_datagrams, "{words}");
-            assert_eq!(from.sent_bytes, to.received_bytes, "{words}");
+            assert!(from.outgoing.sent.bytes > 50_000, "{from:?}");
+            assert_eq!(from.outgoing.sent.packets, to.received.packets, "{words}");
+            assert_eq!(from.outgoing.sent.bytes, to.received.bytes, "{words}");
         }
     }
 }

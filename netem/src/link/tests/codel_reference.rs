@@ -1,8 +1,7 @@
 //! `CoDel` against a second implementation: the pseudo-code of RFC 8289, section 5, on a real queue.
 //!
-//! The reference takes packets out of a queue when the wire is free, as a router does; the link decides at
-//! the offer. Both must drop the same packets and send the others at the same times. The reference leaves
-//! out what the link leaves out: the exemption of a queue of less than one MTU.
+//! Both must drop the same packets and send the others at the same times. The reference leaves out what the
+//! link leaves out: the exemption of a queue of less than one MTU.
 
 use std::collections::VecDeque;
 
@@ -62,9 +61,10 @@ impl Router {
                 self.dropped.extend(packet.map(|(number, _)| number));
                 self.count += 1;
                 (packet, ok_to_drop) = self.dodequeue(now);
-                match ok_to_drop {
-                    true => self.drop_next = self.control_law(self.drop_next),
-                    false => self.dropping = false,
+                if ok_to_drop {
+                    self.drop_next = self.control_law(self.drop_next);
+                } else {
+                    self.dropping = false;
                 }
             }
         } else if ok_to_drop {
@@ -126,16 +126,13 @@ fn codel_drops_the_packets_that_the_code_of_the_rfc_drops() {
         let arrivals = arrivals(seed);
         let expected = reference(&arrivals);
         let mut link = link("rate 8mbit codel limit 1000000", 9, LinkId::UP);
-        let meta = PacketMeta {
-            bytes: 1000,
-            in_flight: 0,
-            ecn_capable: false,
-        };
+        let offers = arrivals
+            .iter()
+            .map(|at| (Time::from_nanos(*at), Packet::new(1000, ())));
         let mut dropped = 0;
-        for (number, (at, expected)) in arrivals.iter().zip(&expected).enumerate() {
-            let fate = link.offer(Time::from_nanos(*at), meta);
-            let due = fate.due().map(Time::as_nanos);
-            assert_eq!(due, *expected, "seed {seed}, packet {number}, {fate:?}");
+        for (out, expected) in run(&mut link, offers).iter().zip(&expected) {
+            let due = met(out).ok().map(Time::as_nanos);
+            assert_eq!(due, *expected, "seed {seed}, {out:?}");
             dropped += u32::from(due.is_none());
         }
         // several phases of dropping, and phases without

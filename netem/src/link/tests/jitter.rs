@@ -69,9 +69,12 @@ fn gamma_is_met_and_is_not_the_lognormal_of_its_moments() {
 #[test]
 fn a_measured_distribution_is_met() {
     let mut values = drawn("delay cdf 40ms@0%,50ms@80%,100ms@100% order free", 107);
-    let cdf = |x: f64| match x < 50.0 {
-        true => 0.08 * (x - 40.0),
-        false => 0.8 + 0.004 * (x - 50.0),
+    let cdf = |x: f64| {
+        if x < 50.0 {
+            0.08 * (x - 40.0)
+        } else {
+            0.8 + 0.004 * (x - 50.0)
+        }
     };
     let ks = kolmogorov_smirnov(&mut values, cdf);
     assert!(ks < 1.95, "{ks}");

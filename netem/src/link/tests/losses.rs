@@ -2,12 +2,12 @@
 //! (one false alarm in 16 000) unless another level is named; seeds are fixed.
 
 use super::*;
-use crate::fate::turn_bit;
+use crate::packet::flip_bit;
 use crate::record::summary::{mean_run, runs};
 
 fn lost(words: &str, seed: u64) -> Vec<bool> {
     let fates = fates(words, seed, LinkId::UP);
-    fates.iter().map(|fate| fate.due().is_none()).collect()
+    fates.iter().map(Met::is_err).collect()
 }
 
 fn share(lost: &[bool]) -> f64 {
@@ -108,10 +108,10 @@ fn bursts_in_time_have_their_share_and_their_length_at_any_rate() {
     for (rate_hz, seed) in [(1000_u64, 71), (100, 71)] {
         let mut link = link("loss burst 5% 40ms", seed, LinkId::UP);
         let step = 1_000_000_000 / rate_hz;
-        let lost: Vec<bool> = (0..2_000 * rate_hz)
-            .map(|packet| link.offer(Time::from_nanos(packet * step), PacketMeta::default()))
-            .map(|fate| fate.due().is_none())
-            .collect();
+        let packets = 0..2_000 * rate_hz;
+        let packets = packets.map(|packet| (Time::from_nanos(packet * step), Packet::new(0, ())));
+        let out = run(&mut link, packets);
+        let lost: Vec<bool> = out.iter().map(|out| met(out).is_err()).collect();
         // 2500 bursts in 2000 s: the share is known to 1 / sqrt(2500), times sqrt(2)
         assert!(
             (share(&lost) / 0.05 - 1.0).abs() < 4.0 * 0.0283,
@@ -144,7 +144,7 @@ fn named_packets_and_scheduled_outages_are_lost_and_no_others() {
     let out = fates("outage 1s for 50ms every 10s", 1, LinkId::UP);
     for (ms, fate) in out.iter().enumerate() {
         let expected = ms >= 1000 && (ms - 1000) % 10_000 < 50;
-        assert_eq!(*fate == Fate::Drop(DropCause::Outage), expected, "{ms} ms");
+        assert_eq!(*fate == Err(DropCause::Outage), expected, "{ms} ms");
     }
 }
 
@@ -152,16 +152,14 @@ fn named_packets_and_scheduled_outages_are_lost_and_no_others() {
 fn copies_and_turned_bits_have_their_shares_and_their_counts() {
     let mut link = link("duplicate 10% corrupt 5% mtu 1000", 73, LinkId::UP);
     let mut turned = [0_u64; 8];
-    for packet in 0..N {
-        let meta = PacketMeta {
-            bytes: if packet % 10 == 0 { 1001 } else { 1000 },
-            in_flight: 0,
-            ecn_capable: false,
-        };
-        let fate = link.offer(Time::from_millis(packet), meta);
-        assert_eq!(packet % 10 == 0, fate == Fate::Drop(DropCause::Mtu));
-        if let Fate::Deliver(deliveries) = fate
-            && let Some(bit) = deliveries.itself().corrupted_bit
+    let bytes = |packet| if packet % 10 == 0 { 1001 } else { 1000 };
+    let offer = |packet| (Time::from_millis(packet), Packet::new(bytes(packet), ()));
+    for out in run(&mut link, (0..N).map(offer)) {
+        assert_eq!(out.number % 10 == 0, met(&out) == Err(DropCause::Mtu));
+        if let Fate::Delivered {
+            corrupted_bit: Some(bit),
+            ..
+        } = out.fate
         {
             assert!(bit < 8000);
             turned[(bit / 1000) as usize] += 1;
@@ -186,7 +184,7 @@ fn copies_and_turned_bits_have_their_shares_and_their_counts() {
         counters.delivered.plus(counters.dropped.total())
     );
     let mut bytes = [0_u8; 2];
-    turn_bit(&mut bytes, 9);
-    turn_bit(&mut bytes, 16);
+    flip_bit(&mut bytes, 9);
+    flip_bit(&mut bytes, 16);
     assert_eq!(bytes, [0, 2]);
 }

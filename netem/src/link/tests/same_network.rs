@@ -3,12 +3,11 @@
 use super::*;
 
 /// The fates of packets at 1 kHz, only those of every `step`-th sent.
-fn every(words: &str, step: u64) -> Vec<Fate> {
-    let mut link = link(words, 307, LinkId::UP);
-    (0..N)
-        .step_by(step as usize)
-        .map(|packet| link.offer(Time::from_millis(packet), PacketMeta::default()))
-        .collect()
+fn every(words: &str, step: u64) -> Vec<Met> {
+    let packets = (0..N).step_by(step as usize);
+    let packets = packets.map(|packet| (Time::from_millis(packet), Packet::new(0, ())));
+    let out = run(&mut link(words, 307, LinkId::UP), packets);
+    out.iter().map(met).collect()
 }
 
 #[test]
@@ -21,7 +20,7 @@ fn loss_and_delay_in_time_are_the_same_for_two_packet_rates() {
     ] {
         let fast = every(words, 1);
         let slow = every(words, 7);
-        let same: Vec<Fate> = fast.iter().step_by(7).copied().collect();
+        let same: Vec<Met> = fast.iter().step_by(7).copied().collect();
         assert_eq!(slow, same, "{words}");
         assert!(slow.iter().any(|fate| *fate != slow[0]));
     }
@@ -30,7 +29,7 @@ fn loss_and_delay_in_time_are_the_same_for_two_packet_rates() {
         every("loss gemodel 1% 10%", 1),
         every("loss gemodel 1% 10%", 7),
     );
-    let same: Vec<Fate> = fast.iter().step_by(7).copied().collect();
+    let same: Vec<Met> = fast.iter().step_by(7).copied().collect();
     assert_ne!(slow, same);
 }
 
@@ -40,8 +39,8 @@ fn order_by_fifo_is_the_same_where_no_packet_waits_for_another() {
         every("delay 50ms 1ms tau 1s", 1),
         every("delay 50ms 1ms tau 1s", 10),
     );
-    let dues = |fates: &[Fate], step| -> Vec<f64> {
-        let dues = fates.iter().step_by(step).filter_map(Fate::due);
+    let dues = |fates: &[Met], step| -> Vec<f64> {
+        let dues = fates.iter().step_by(step).filter_map(|fate| fate.ok());
         dues.map(|due| due.as_secs_f64() * 1e3).collect()
     };
     let apart = dues(&fast, 10);
@@ -75,10 +74,7 @@ fn no_feature_moves_the_delays_of_another() {
         for feature in FEATURES {
             let both = fates(&format!("{jitter} {feature}"), 311, LinkId::UP);
             for (alone, both) in alone.iter().zip(&both) {
-                assert!(
-                    both.due().is_none() || both.due() == alone.due(),
-                    "{feature}"
-                );
+                assert!(both.is_err() || both == alone, "{feature}");
             }
         }
     }
@@ -102,8 +98,8 @@ fn no_feature_moves_the_losses_of_another() {
             "rate 1gbit",
         ] {
             let both = fates(&format!("{feature} {loss}"), 313, LinkId::UP);
-            let lost = |fate: &Fate| fate.due().is_none();
-            let same = alone.iter().zip(&both).all(|(a, b)| lost(a) == lost(b));
+            let mut pairs = alone.iter().zip(&both);
+            let same = pairs.all(|(a, b)| a.is_err() == b.is_err());
             assert!(same, "{loss} beside {feature}");
         }
     }
@@ -111,27 +107,25 @@ fn no_feature_moves_the_losses_of_another() {
 
 #[test]
 fn a_copy_takes_nothing_from_the_packets() {
-    let alone = fates("delay 50ms 5ms order free loss 10%", 317, LinkId::UP);
-    let both = fates(
-        "delay 50ms 5ms order free loss 10% duplicate 30%",
-        317,
-        LinkId::UP,
-    );
-    let mut copies = 0;
-    for (alone, both) in alone.iter().zip(&both) {
-        match (alone, both) {
-            (Fate::Deliver(alone), Fate::Deliver(both)) => {
-                assert_eq!(alone.itself(), both.itself());
-                copies += both.copies().count();
-            }
-            // a copy may come through where the packet was lost
-            (Fate::Drop(_), _) => {}
-            (Fate::Deliver(_), Fate::Drop(_)) => panic!("a copy cost its packet"),
-        }
+    let through = |words: &str| {
+        let packets = (0..N).map(|packet| (Time::from_millis(packet), Packet::new(0, ())));
+        with_copies(&mut link(words, 317, LinkId::UP), packets)
+    };
+    let words = "delay 50ms 5ms order free loss 10%";
+    let alone = through(words);
+    let both = through(&format!("{words} duplicate 30%"));
+    let copies = both.iter().filter(|out| out.copy).count() as f64;
+    let itself = both.iter().filter(|out| !out.copy);
+    for (alone, both) in alone.iter().zip(itself) {
+        // a copy may come through where the packet was lost
+        assert!(
+            met(alone).is_err() || met(alone) == met(both),
+            "a copy cost its packet"
+        );
     }
     let expected = 0.3 * 0.81 * N as f64;
     assert!(
-        (copies as f64 - expected).abs() < 4.0 * expected.sqrt(),
+        (copies - expected).abs() < 4.0 * expected.sqrt(),
         "{copies}"
     );
 }

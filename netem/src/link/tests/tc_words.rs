@@ -3,13 +3,9 @@
 use super::*;
 
 fn departures(words: &str, packets: u64, bytes: usize) -> Vec<u64> {
-    let mut link = link(words, 5, LinkId::UP);
-    let meta = PacketMeta {
-        bytes,
-        ..PacketMeta::default()
-    };
-    let due = |packet| link.offer(Time::from_millis(packet), meta).due();
-    let dues = (1..=packets).filter_map(due);
+    let packets = (1..=packets).map(|ms| (Time::from_millis(ms), Packet::new(bytes, ())));
+    let out = run(&mut link(words, 5, LinkId::UP), packets);
+    let dues = out.iter().filter_map(|out| met(out).ok());
     dues.map(|due| due.as_nanos() / 1000).collect()
 }
 
@@ -75,22 +71,22 @@ fn gaps_of_slots_are_drawn_as_they_say() {
 
 #[test]
 fn what_would_be_lost_is_marked_if_its_sender_understands() {
-    let capable = PacketMeta {
-        bytes: 1000,
-        ecn_capable: true,
-        ..PacketMeta::default()
-    };
-    let deaf = PacketMeta {
-        ecn_capable: false,
-        ..capable
-    };
-    let fates = |words: &str, meta: PacketMeta| -> (Vec<bool>, LinkCounters) {
+    let (deaf, capable) = (
+        Packet::new(1000, ()),
+        Packet {
+            ecn_capable: true,
+            ..Packet::new(1000, ())
+        },
+    );
+    let fates = |words: &str, packet: Packet<()>| -> (Vec<bool>, LinkCounters) {
         let mut link = link(words, 7, LinkId::UP);
-        let mut hit = |packet| match link.offer(Time::from_millis(packet), meta) {
-            Fate::Drop(_) => true,
-            Fate::Deliver(deliveries) => deliveries.itself().marked,
+        let offers = (0..20_000).map(|ms| (Time::from_millis(ms), packet));
+        let hit = |out: &Departure<()>| match out.fate {
+            Fate::Dropped(_) => true,
+            Fate::Delivered { marked, .. } => marked,
         };
-        ((0..20_000).map(&mut hit).collect(), link.counters())
+        let hits = run(&mut link, offers).iter().map(hit).collect();
+        (hits, link.counters())
     };
     let (lost, _) = fates("loss 5% ecn", deaf);
     let (marked, counters) = fates("loss 5% ecn", capable);

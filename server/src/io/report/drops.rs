@@ -13,7 +13,6 @@ use crate::io::worker::Finished;
 pub(super) fn drops(shared: &Shared, outcome: &Outcome, traffic: &Traffic) -> Counts {
     let read = |counter: &AtomicU64| counter.load(Ordering::Relaxed);
     let (lost, refusals) = (&outcome.lost, &shared.refusals);
-    let (netem, before) = (outcome.after.dropped, outcome.before.dropped);
     let away = shared.listener.turned_away();
     let mut drops = named([
         ("datagrams_malformed", traffic.malformed.into()),
@@ -30,30 +29,6 @@ pub(super) fn drops(shared: &Shared, outcome: &Outcome, traffic: &Traffic) -> Co
         ("send_too_large", lost.too_large),
         ("send_unsupported", lost.unsupported),
         ("send_disconnected", lost.disconnected),
-        (
-            "netem_loss",
-            netem.loss.packets.saturating_sub(before.loss.packets),
-        ),
-        (
-            "netem_limit",
-            netem.limit.packets.saturating_sub(before.limit.packets),
-        ),
-        (
-            "netem_mtu",
-            netem.mtu.packets.saturating_sub(before.mtu.packets),
-        ),
-        (
-            "netem_queue",
-            netem.queue.packets.saturating_sub(before.queue.packets),
-        ),
-        (
-            "socket_blocked",
-            netem.blocked.packets.saturating_sub(before.blocked.packets),
-        ),
-        (
-            "socket_failed",
-            netem.failed.packets.saturating_sub(before.failed.packets),
-        ),
         ("masters_busy", read(&refusals.busy)),
         ("masters_wrong_token", read(&refusals.wrong_token)),
         ("masters_bad_hello", read(&refusals.bad_hello)),
@@ -64,6 +39,8 @@ pub(super) fn drops(shared: &Shared, outcome: &Outcome, traffic: &Traffic) -> Co
         ("handshakes_refused", away.refused),
         ("handshakes_unreadable", away.unreadable),
     ]);
+    let (socket, before) = (&outcome.after.outgoing, &outcome.before.outgoing);
+    drops.extend(named(socket.drops_since(before)));
     if let Some(finished) = &outcome.finished {
         drops.extend(slave_drops(finished));
     }

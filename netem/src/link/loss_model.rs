@@ -5,14 +5,13 @@ use std::time::Duration;
 use mmt_shared::rng::Substream;
 use mmt_shared::time::duration_nanos;
 
-use super::catch_up::CATCH_UP_STEPS;
-use super::correlated::ByPacket;
+use super::correlated::{ByPacket, CATCH_UP_STEPS};
 use super::streams::Draws;
 use crate::config::{FourState, GilbertElliott, Loss, TimedBursts};
 
 /// The states of all loss models; those not in use rest.
 #[derive(Clone, Debug)]
-pub(super) struct Losing {
+pub(super) struct LossModel {
     correlated: ByPacket,
     bad: bool,
     state: ChainState,
@@ -29,14 +28,20 @@ enum ChainState {
     Four,
 }
 
-/// What a loss model says of a packet: its probability of loss, and the number to hold against it.
+/// The probability that a packet is lost, and the uniform number that decides: below it is lost.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Verdict {
+pub(super) struct LossDraw {
     pub(super) probability: f64,
     pub(super) draw: f64,
 }
 
-impl Losing {
+impl LossDraw {
+    pub(super) fn is_lost(self) -> bool {
+        self.draw < self.probability
+    }
+}
+
+impl LossModel {
     pub(super) fn new(bursts: Substream) -> Self {
         Self {
             correlated: ByPacket::default(),
@@ -46,14 +51,14 @@ impl Losing {
         }
     }
 
-    /// The verdict on packet `number`, `elapsed` after the start. Chains by packet take their step.
-    pub(super) fn judge(
+    /// The draw for packet `number`, `elapsed` after the start. Chains by packet take their step.
+    pub(super) fn draw(
         &mut self,
         loss: &Loss,
         number: u64,
         elapsed: Duration,
         draws: &Draws,
-    ) -> Verdict {
+    ) -> LossDraw {
         let certain = |lost: bool| if lost { 1.0 } else { 0.0 };
         let mut draw = draws.loss;
         let probability = match loss {
@@ -71,21 +76,20 @@ impl Losing {
                 self.state = self.state.after(chain, draws.state);
                 certain(matches!(self.state, ChainState::Three | ChainState::Four))
             }
-            Loss::Bursts(bursts) => match self.bursts.on(bursts, elapsed) {
-                true => bursts.loss_inside.get(),
-                false => bursts.loss_between.get(),
-            },
+            Loss::Bursts(bursts) if self.bursts.on(bursts, elapsed) => bursts.loss_inside.get(),
+            Loss::Bursts(bursts) => bursts.loss_between.get(),
             Loss::Every(n) => certain(number % (*n).max(1) == (*n).max(1) - 1),
             Loss::Listed(list) => certain(list.holds(number)),
         };
-        Verdict { probability, draw }
+        LossDraw { probability, draw }
     }
 
     /// As in the kernel: the state decides about this packet, then moves on.
     fn gemodel(&mut self, chain: &GilbertElliott, draw: f64) -> f64 {
-        let (loss, leaves) = match self.bad {
-            true => (chain.loss_in_bad, chain.to_good),
-            false => (chain.loss_in_good, chain.to_bad),
+        let (loss, leaves) = if self.bad {
+            (chain.loss_in_bad, chain.to_good)
+        } else {
+            (chain.loss_in_good, chain.to_bad)
         };
         self.bad ^= draw < leaves.get();
         loss.get()
@@ -168,9 +172,10 @@ impl Bursts {
     fn duration(&mut self, settings: &TimedBursts) -> u64 {
         let share = settings.share.get();
         let burst = duration_nanos(settings.mean) as f64;
-        let mean = match self.on {
-            true => burst,
-            false => burst * (1.0 - share) / share,
+        let mean = if self.on {
+            burst
+        } else {
+            burst * (1.0 - share) / share
         };
         let nanos = -libm::log1p(-self.stream.uniform()) * mean;
         (nanos as u64).saturating_add(1)

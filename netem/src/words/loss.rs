@@ -28,12 +28,13 @@ impl<'a> Parser<'a, '_> {
     fn independent(&mut self, first: Word<'a>) -> Result<Loss, ParseError> {
         let probability = percentage(first)?;
         let correlation = self.percentage_or(Probability::ZERO)?;
-        Ok(match correlation == Probability::ZERO {
-            true => Loss::Independent { probability },
-            false => Loss::Correlated {
+        Ok(if correlation == Probability::ZERO {
+            Loss::Independent { probability }
+        } else {
+            Loss::Correlated {
                 probability,
                 correlation,
-            },
+            }
         })
     }
 
@@ -56,12 +57,10 @@ impl<'a> Parser<'a, '_> {
             p23: self.percentage_or(Probability::ONE)?,
             p14: self.percentage_or(Probability::ZERO)?,
         };
-        match chain.is_chain() {
-            true => Ok(Loss::FourState(chain)),
-            false => {
-                Err(word.expected("p13 and p14, and p31 and p32, to be 100% together at most"))
-            }
+        if !chain.is_chain() {
+            return Err(word.expected("p13 and p14, and p31 and p32, to be 100% together at most"));
         }
+        Ok(Loss::FourState(chain))
     }
 
     fn bursts(&mut self) -> Result<Loss, ParseError> {
@@ -80,17 +79,14 @@ impl<'a> Parser<'a, '_> {
             return Err(word.expected("for and how long"));
         }
         let length = time(self.argument())?;
-        let every = match self.takes("every") {
-            true => {
-                let word = self.argument();
-                let every = time(word)?;
-                if every <= length {
-                    return Err(word.expected("a time longer than the outage"));
-                }
-                Some(every)
+        let mut every = None;
+        if self.takes("every") {
+            let word = self.argument();
+            every = Some(time(word)?).filter(|every| *every > length);
+            if every.is_none() {
+                return Err(word.expected("a time longer than the outage"));
             }
-            false => None,
-        };
+        }
         Ok(Outage { at, length, every })
     }
 }

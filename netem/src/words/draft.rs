@@ -1,0 +1,127 @@
+//! Settings as far as they are read, and which words were seen.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use super::{ParseError, Reason, Word};
+use crate::config::{Chance, Delay, LinkConfig, Loss, Probability, Reorder};
+use crate::distribution::Table;
+
+/// The distribution of a jitter.
+pub(super) enum Shape {
+    Uniform,
+    Normal,
+    Pareto,
+    ParetoNormal,
+    LogNormal,
+    Gamma,
+    Table(Table),
+}
+
+impl Shape {
+    /// The distribution of this shape.
+    pub(super) fn delay(self, mean: Duration, jitter: Duration) -> Delay {
+        let (sigma, scale, half_width) = (jitter, jitter, jitter);
+        match self {
+            Self::Uniform => Delay::Uniform { mean, half_width },
+            Self::Normal => Delay::Normal { mean, sigma },
+            Self::Pareto => Delay::Pareto { mean, scale },
+            Self::ParetoNormal => Delay::ParetoNormal { mean, scale },
+            Self::LogNormal => Delay::LogNormal { mean, sigma },
+            Self::Gamma => Delay::Gamma { mean, sigma },
+            Self::Table(table) => {
+                let table = Arc::new(table);
+                Delay::Table { mean, scale, table }
+            }
+        }
+    }
+}
+
+/// Settings as far as they are read.
+#[derive(Default)]
+pub(super) struct Draft<'a> {
+    pub(super) config: LinkConfig,
+    /// The shape of the jitter, which may stand before the delay.
+    pub(super) shape: Option<Shape>,
+    /// The words that began the sentences so far, each by its first spelling.
+    seen: Vec<(&'static str, Word<'a>)>,
+}
+
+impl<'a> Draft<'a> {
+    pub(super) fn is_empty(&self) -> bool {
+        self.seen.is_empty()
+    }
+
+    /// The word that began the sentence of this name, if there was one.
+    pub(super) fn seen(&self, name: &str) -> Option<Word<'a>> {
+        let mut seen = self.seen.iter();
+        seen.find(|(seen, _)| *seen == name).map(|(_, word)| *word)
+    }
+
+    /// Takes note of a sentence that may come more than once.
+    pub(super) fn note(&mut self, name: &'static str, word: Word<'a>) {
+        self.seen.push((name, word));
+    }
+
+    /// Takes note of a sentence that may come once.
+    pub(super) fn once(&mut self, name: &'static str, word: Word<'a>) -> Result<(), ParseError> {
+        if self.seen(name).is_some() {
+            return Err(word.wrong(Reason::Repeated));
+        }
+        self.note(name, word);
+        Ok(())
+    }
+
+    /// Sets how packets overtake; what is not given stays.
+    pub(super) fn reorder(&mut self, chance: Option<Chance>, gap: Option<u32>) {
+        // a gap alone: every candidate overtakes, as in tc
+        let alone = Reorder {
+            chance: Chance {
+                probability: Probability::ONE,
+                correlation: Probability::ZERO,
+            },
+            gap: 1,
+        };
+        let reorder = self.config.reorder.get_or_insert(alone);
+        reorder.chance = chance.unwrap_or(reorder.chance);
+        reorder.gap = gap.unwrap_or(reorder.gap);
+    }
+
+    /// The settings, if the sentences go together.
+    pub(super) fn finish(mut self) -> Result<LinkConfig, ParseError> {
+        let trace = self.seen("trace");
+        if let Some(word) = trace
+            && (self.seen("delay").or(self.seen("loss"))).is_some()
+        {
+            return Err(word.expected("no delay and no loss beside a trace: it has its own"));
+        }
+        if let (Some(word), Some(shape)) = (self.seen("distribution"), self.shape.take()) {
+            self.config.delay = match self.config.delay {
+                Delay::Uniform { mean, half_width } if self.seen("delay").is_some() => {
+                    shape.delay(mean, half_width)
+                }
+                _ => return Err(word.expected("delay with a jitter beside a distribution")),
+            };
+        }
+        if let Some(word) = self.seen("reorder").or(self.seen("gap"))
+            && self.config.delay == Delay::default()
+        {
+            return Err(word.expected("a delay beside it: without one nothing can overtake"));
+        }
+        if trace.is_some() {
+            (self.config.delay, self.config.loss) = (Delay::default(), Loss::default());
+        }
+        if let Some(word) = self.seen("queue").or(self.seen("codel"))
+            && self.config.rate.is_none()
+        {
+            return Err(word.expected("a rate beside it: without one nothing ever waits"));
+        }
+        if let Some(word) = self.seen("ecn")
+            && self.config.loss == Loss::None
+            && self.config.queue.codel.is_none()
+        {
+            return Err(word.expected("loss or codel beside it: nothing else marks"));
+        }
+        Ok(self.config)
+    }
+}
