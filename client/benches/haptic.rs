@@ -15,6 +15,7 @@ use mmt_client::master::Master;
 use mmt_client::operator::Operator;
 use mmt_client::operator::scripted::{Scripted, ScriptedConfig};
 use mmt_shared::model::geometry::{BoxFootprint, Pose, Twist, Vec2};
+use mmt_shared::model::local_model::BodyState;
 use mmt_shared::model::params::{ModelParams, ModelState};
 use mmt_shared::model::settings::Mode;
 use mmt_shared::model::update::{Cause, Update};
@@ -32,6 +33,17 @@ struct Haptic {
 }
 
 impl Haptic {
+    /// What the model is, as an update would tell it.
+    fn state(&self) -> ModelState {
+        let BodyState {
+            params,
+            footprint,
+            pose,
+            twist,
+        } = *self.master.model().state();
+        ModelState::try_new(params, footprint, pose, twist).unwrap()
+    }
+
     fn new(mode: Mode) -> Self {
         let device = DeviceProfile::default();
         let coupling = device.coupling();
@@ -97,9 +109,8 @@ fn apply(criterion: &mut Criterion) {
             sequence: 1,
             cause: Cause::Deadband,
             answers: haptic.now - Duration::from_millis(100),
-            newest_command: 1,
             slave_in_contact: true,
-            state: *haptic.master.model().state(),
+            state: haptic.state(),
         };
         criterion.bench_function(&format!("haptic/apply/{name}"), |bencher| {
             bencher.iter(|| haptic.master.apply(black_box(&update)));
@@ -123,9 +134,8 @@ fn replay(criterion: &mut Criterion) {
                 sequence: 1,
                 cause: Cause::Deadband,
                 answers: haptic.now - Duration::from_secs(1),
-                newest_command: 1,
                 slave_in_contact: true,
-                state: *haptic.master.model().state(),
+                state: haptic.state(),
             };
             haptic.master.apply(black_box(&update));
             haptic.tick(&mut out);

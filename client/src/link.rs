@@ -3,17 +3,16 @@
 //! Pure. An update passes the sequence window and `accept` here or never reaches the model. A sample is never sent
 //! in another form than it was first.
 
-use mmt_shared::channel::datagram_channel::{LinkEnd, Outgoing, SealError};
+use mmt_shared::channel::datagram_channel::{LinkEnd, SealError};
 use mmt_shared::channel::peer::{Freshness, SequenceWindow};
 use mmt_shared::channel::rate_control::StretchMax;
 use mmt_shared::model::contact::Coupling;
 use mmt_shared::model::sample::HipSample;
 use mmt_shared::model::tool::{HandPort, Scene, Tool};
 use mmt_shared::model::update::Update;
+use mmt_shared::stats::session::UpdateDrops;
 use mmt_shared::time::Time;
-use mmt_shared::wire::{
-    Architecture, Command, Matter, SAMPLES_MAX, SampleBlock, Side, UpdateDrops,
-};
+use mmt_shared::wire::{Architecture, Command, Message, SAMPLES_MAX, SampleBlock, Side};
 use serde::{Deserialize, Serialize};
 
 /// Most ticks from one packed sample to the next: play-out takes its velocity from samples of 5 ms.
@@ -151,9 +150,9 @@ impl MasterLink {
     /// Takes in a datagram that arrived at `now`.
     pub fn handle(&mut self, now: Time, bytes: &[u8]) -> Option<FromSlave> {
         let opened = self.end.open(now, bytes)?;
-        match opened.matter {
-            Matter::Update(raw) => {
-                if self.window.offer(raw.sequence()) != Freshness::Fresh {
+        match opened.message {
+            Message::Update(raw) => {
+                if self.window.offer(raw.sequence) != Freshness::Fresh {
                     return None;
                 }
                 match raw.accept(&self.coupling) {
@@ -164,9 +163,9 @@ impl MasterLink {
                     }
                 }
             }
-            Matter::Scene(scene) => opened.is_newest.then_some(FromSlave::Scene(scene)),
-            Matter::Tool(tool) => opened.is_newest.then_some(FromSlave::Tool(tool)),
-            Matter::Command(_) | Matter::Heartbeat => None,
+            Message::Scene(scene) => opened.is_newest.then_some(FromSlave::Scene(scene)),
+            Message::Tool(tool) => opened.is_newest.then_some(FromSlave::Tool(tool)),
+            Message::Command(_) | Message::Heartbeat => None,
         }
     }
 
@@ -201,9 +200,7 @@ impl MasterLink {
             port,
         };
         self.block.clear();
-        self.end
-            .seal(now, Outgoing::Command(&command), out)
-            .map(Some)
+        self.end.seal(now, Message::Command(command), out).map(Some)
     }
 
     /// Ticks from one packed sample to the next.
@@ -236,7 +233,7 @@ impl MasterLink {
         if now < self.end.heartbeat_due() {
             return Ok(None);
         }
-        self.end.seal(now, Outgoing::Heartbeat, out).map(Some)
+        self.end.seal(now, Message::Heartbeat, out).map(Some)
     }
 }
 

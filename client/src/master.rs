@@ -265,7 +265,6 @@ mod tests {
             sequence: 1,
             cause: Cause::Timer,
             answers: Time::from_millis(1),
-            newest_command: 1,
             slave_in_contact: true,
             state,
         }

@@ -64,8 +64,6 @@ impl TdpaHand {
     pub fn port(&self) -> HandPort {
         HandPort {
             in_j: self.energy.in_j,
-            wants_force: true,
-            passive_tool: true,
         }
     }
 
@@ -74,9 +72,7 @@ impl TdpaHand {
         self.newest_round_trip_s = Some(now.saturating_since(tool.answers).as_secs_f64());
         self.tool_in_contact = tool.in_contact;
         self.other_in_j = self.other_in_j.max(tool.in_j);
-        if let Some(force) = tool.force {
-            self.received = force.newtons();
-        }
+        self.received = tool.force.newtons();
     }
 
     /// One tick with the HIP, m: the force on the object to be displayed, N.
@@ -115,10 +111,9 @@ mod tests {
     fn tool(answers_ms: u64, force: Vec2, in_j: f64) -> Tool {
         Tool {
             answers: Time::from_millis(answers_ms),
-            force: Some(ForceCounts::nearest(force)),
+            force: ForceCounts::nearest(force),
             in_contact: true,
             in_j,
-            model_error: 0.0,
         }
     }
 

@@ -1,4 +1,4 @@
--- Dissects mmt's messages in Wireshark and tshark, by what docs/protocol.md says (version 2 of the protocol).
+-- Dissects mmt's messages in Wireshark and tshark, by what docs/protocol.md says (version 3 of the protocol).
 --
 --   tshark -X lua_script:mmt.lua -o tls.keylog_file:KEYS -r SESSION.pcap -Y mmt
 --
@@ -18,7 +18,7 @@ local malformed = ProtoExpert.new("mmt.malformed.expert", "Not a message",
 mmt.experts = { malformed }
 
 local HEADER_BYTES, DATAGRAM_MAX, STREAM_MAX = 8, 1024, 4096
-local VERSION, TEXT_MAX, SAMPLES_MAX, TICK_NS = 2, 64, 32, 1000000
+local VERSION, TEXT_MAX, SAMPLES_MAX, TICK_NS = 3, 64, 32, 1000000
 local I32_MIN, I32_MAX = -2147483648, 2147483647
 local POSITION_COUNT_M, FORCE_COUNT_N = 1e-7, 1e-4
 
@@ -38,38 +38,17 @@ end
 declare("string", "magic type")
 declare("uint8", "version samples_per_command scene_hz")
 declare("uint16", "flags", base.HEX)
-declare("uint32", "length number echo.number echo.received newest_update samples.ticks sequence newest_command")
+declare("uint32", "length number echo.number echo.received newest_update samples.ticks sequence")
 declare("uint64", "sent echo.sent echo.held_ns samples.stamp answers")
 declare("int32", "samples.x samples.y samples.force_x samples.force_y force.x force.y")
-declare("bool", "slave_in_contact in_contact wants_force passive_tool")
+declare("bool", "slave_in_contact in_contact")
 declare("string", "cause role architecture program friction smoothing correction scheme refusal ending")
-declare("bytes", "token")
-declare("double", "object tool force in_j model_error hip stiffness_n_per_m damping_ns_per_m lambda tau_s")
+declare("bytes", "token report")
+declare("double", "object tool force in_j port.in_j hip stiffness_n_per_m damping_ns_per_m lambda tau_s")
 
 local STATE = "m b c inertia e east north west south x y angle v_x v_y omega"
 for name in STATE:gmatch("%S+") do declare("double", "state." .. name) end
 
-local KINDS = "commands updates scenes heartbeats tools"
-for _, way in ipairs { "sent", "received" } do
-    for name in KINDS:gmatch("%S+") do declare("uint32", "totals.traffic." .. way .. "." .. name) end
-end
-declare("uint32", "totals.traffic.duplicates totals.traffic.too_old totals.traffic.malformed")
-local UDP = "udp_datagrams_sent udp_bytes_sent udp_datagrams_received udp_bytes_received"
-for name in UDP:gmatch("%S+") do declare("uint64", "totals.traffic." .. name) end
-declare("uint64", "totals.duration_ns totals.samples_received totals.haptic_loop.ticks totals.haptic_loop.skipped")
-declare("uint32", "totals.updates_applied totals.updates_by_cause")
-local DROPS = "duplicate stale rejected superseded frozen"
-for name in DROPS:gmatch("%S+") do declare("uint32", "totals.updates_dropped." .. name) end
-local LOOP_TIMES, QUANTILES = "cpu_us lateness_us", "p50 p99 p999"
-for time in LOOP_TIMES:gmatch("%S+") do
-    for name in QUANTILES:gmatch("%S+") do declare("double", "totals.haptic_loop." .. time .. "." .. name) end
-end
-local METRICS = "pmse pmse_x pmse_y pmse_magnitude relative_error jnd7_share"
-for name in METRICS:gmatch("%S+") do declare("double", "totals.force." .. name) end
-local IDENTIFIED = "mass_kg damping_ns_per_m friction_n"
-for name in IDENTIFIED:gmatch("%S+") do
-    declare("double", "totals." .. name .. ".estimate totals." .. name .. ".truth")
-end
 declare("string", "malformed")
 mmt.fields = listed
 
@@ -288,32 +267,23 @@ local function command(r)
     for k = 1, count do
         r:group("sample " .. k, function() sample(r, k == 1, before) end)
     end
+    r:option("port", function()
+        r:group("port", function() r:energy("port.in_j") end)
+    end)
     return info .. ", " .. count .. " samples"
-end
-
-local function coupled_command(r)
-    local info = command(r)
-    r:energy("in_j")
-    r:bool("wants_force")
-    r:bool("passive_tool")
-    return info
 end
 
 local function tool(r)
     local info = envelope(r)
     r:u64("answers")
-    r:option("force", function()
-        r:group("force", function()
-            for _, name in ipairs { "force.x", "force.y" } do
-                local value, range = r:zigzag(32)
-                counted(r, name, range, value, FORCE_COUNT_N, "N")
-            end
-        end)
+    r:group("force", function()
+        for _, name in ipairs { "force.x", "force.y" } do
+            local value, range = r:zigzag(32)
+            counted(r, name, range, value, FORCE_COUNT_N, "N")
+        end
     end)
     r:bool("in_contact")
     r:energy("in_j")
-    local share = r:f64("model_error")
-    demand(share >= 0 and share <= 1, "model_error is not 0 to 1")
     return info
 end
 
@@ -328,7 +298,6 @@ local function update(r)
     local sequence = r:numbered("sequence")
     local cause = r:choice("cause", CAUSES)
     r:u64("answers")
-    r:u32("newest_command")
     r:bool("slave_in_contact")
     state(r)
     return info .. ", update " .. sequence .. " " .. cause
@@ -367,44 +336,12 @@ local function refused(r)
     return " " .. r:choice("refusal", { "busy", "wrong_token", "bad_hello", "ending" })
 end
 
-local function counts(r, prefix, names, take)
-    for name in names:gmatch("%S+") do take(r, prefix .. name) end
-end
-
-local function ending(r)
+-- The report is opaque: its bytes are for whoever prints it.
+local function farewell(r)
     local why = r:choice("ending", { "finished", "interrupted", "failed" })
-    r:u64("totals.duration_ns")
-    r:group("traffic", function()
-        counts(r, "totals.traffic.sent.", KINDS, r.u32)
-        counts(r, "totals.traffic.received.", KINDS, r.u32)
-        counts(r, "totals.traffic.", "duplicates too_old malformed", r.u32)
-        counts(r, "totals.traffic.", UDP, r.u64)
-    end)
+    local length = r:varint(32):tonumber()
+    if length > 0 then r.tree:add(fields.report, r:take(length)) end
     return " " .. why
-end
-
-local function master_farewell(r)
-    local info = ending(r)
-    r:u32("totals.updates_applied")
-    counts(r, "totals.updates_dropped.", DROPS, r.u32)
-    counts(r, "totals.haptic_loop.", "ticks skipped", r.u64)
-    for time in LOOP_TIMES:gmatch("%S+") do
-        r:option(time, function() r:floats("totals.haptic_loop." .. time .. ".", QUANTILES) end)
-    end
-    return info
-end
-
-local function slave_farewell(r)
-    local info = ending(r)
-    for _ = 1, #CAUSES do r:u32("totals.updates_by_cause") end
-    r:u64("totals.samples_received")
-    local function optional(name) r:option(name, function() r:f64(name) end) end
-    for name in METRICS:gmatch("%S+") do optional("totals.force." .. name) end
-    for name in IDENTIFIED:gmatch("%S+") do
-        optional("totals." .. name .. ".estimate")
-        optional("totals." .. name .. ".truth")
-    end
-    return info
 end
 
 -- Messages ----------------------------------------------------------------------------------------------
@@ -415,12 +352,10 @@ local TYPES = {
     [3] = { "scene", "slave", "datagram", scene },
     [4] = { "heartbeat", nil, "datagram", envelope },
     [5] = { "tool", "slave", "datagram", tool },
-    [6] = { "coupled_command", "master", "datagram", coupled_command },
     [16] = { "hello", "master", "stream", hello },
     [17] = { "welcome", "slave", "stream", welcome },
     [18] = { "refused", "slave", "stream", refused },
-    [19] = { "master_farewell", "master", "stream", master_farewell },
-    [20] = { "slave_farewell", "slave", "stream", slave_farewell },
+    [19] = { "farewell", nil, "stream", farewell },
 }
 
 -- Which side sent the packet; nil if its ports do not tell.

@@ -475,7 +475,12 @@ impl World {
                     number(v.y);
                 });
             if let Some(update) = &slave.update {
-                update.state.params.to_array().into_iter().for_each(number);
+                update
+                    .state
+                    .params()
+                    .to_array()
+                    .into_iter()
+                    .for_each(number);
                 self.log.update(update.answers.as_nanos().to_le_bytes());
             }
         }

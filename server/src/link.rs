@@ -6,14 +6,14 @@ pub use repeats::{REPEATS_MAX, Repeats, RepeatsError};
 
 use std::time::Duration;
 
-use mmt_shared::channel::datagram_channel::{LinkEnd, Outgoing, SealError};
+use mmt_shared::channel::datagram_channel::{LinkEnd, SealError};
 use mmt_shared::channel::rate_control::StretchMax;
 use mmt_shared::metrics::UpdateCounts;
 use mmt_shared::model::sample::HipSample;
 use mmt_shared::model::tool::{Scene, Tool};
 use mmt_shared::model::update::Update;
 use mmt_shared::time::Time;
-use mmt_shared::wire::{Architecture, Command, Matter, Side};
+use mmt_shared::wire::{Architecture, Command, Message, Side};
 
 use repeats::Repeating;
 
@@ -95,7 +95,7 @@ impl SlaveLink {
     /// the hello has spoken of one and no newer datagram has been there: an older one knows nothing that counts.
     pub fn handle(&mut self, now: Time, bytes: &[u8]) -> Option<Command> {
         let opened = self.end.open(now, bytes)?;
-        let Matter::Command(mut command) = opened.matter else {
+        let Message::Command(mut command) = opened.message else {
             return None;
         };
         let counts = opened.is_newest && self.config.architecture.feels_tool();
@@ -119,8 +119,8 @@ impl SlaveLink {
         })
     }
 
-    /// Writes an update to `out`; it is completed with the newest command seen. Returns its length. Its repeats
-    /// are due from now on, and those of the update before no more.
+    /// Writes an update to `out`; returns its length. Its repeats are due from now on, and those of the update
+    /// before no more.
     ///
     /// # Errors
     /// When it cannot be sealed.
@@ -173,7 +173,7 @@ impl SlaveLink {
         tool: &Tool,
         out: &mut [u8],
     ) -> Result<usize, SealError> {
-        self.end.seal(now, Outgoing::Tool(tool), out)
+        self.end.seal(now, Message::Tool(*tool), out)
     }
 
     /// When the next scene is due, seldomer under congestion; never where nobody looks.
@@ -196,16 +196,12 @@ impl SlaveLink {
     ) -> Result<Option<usize>, SealError> {
         self.scene_sent = now;
         scene
-            .map(|scene| self.end.seal(now, Outgoing::Scene(scene), out))
+            .map(|scene| self.end.seal(now, Message::Scene(*scene), out))
             .transpose()
     }
 
     fn seal(&mut self, now: Time, update: &Update, out: &mut [u8]) -> Result<usize, SealError> {
-        let update = Update {
-            newest_command: self.end.peer().newest(),
-            ..*update
-        };
-        self.end.seal(now, Outgoing::Update(&update), out)
+        self.end.seal(now, Message::Update(update.into()), out)
     }
 
     /// A heartbeat, if nothing has been sent for long enough.
@@ -216,7 +212,7 @@ impl SlaveLink {
         if now < self.end.heartbeat_due() {
             return Ok(None);
         }
-        self.end.seal(now, Outgoing::Heartbeat, out).map(Some)
+        self.end.seal(now, Message::Heartbeat, out).map(Some)
     }
 }
 

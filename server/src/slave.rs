@@ -70,6 +70,8 @@ pub struct Slave {
     reference: ForceReference,
     trigger: Trigger,
     updates: UpdateBuilder,
+    /// The state that the master starts from.
+    start: ModelState,
     force: ForceMetrics,
 }
 
@@ -115,6 +117,7 @@ impl Slave {
             reference: ForceReference::new(config.trigger_reference),
             trigger: Trigger::new(config.trigger),
             updates: UpdateBuilder::new(settings.correction, timer_carries_pose),
+            start,
             force: ForceMetrics::default(),
         })
     }
@@ -128,7 +131,7 @@ impl Slave {
     /// The state that the master starts from.
     #[must_use]
     pub fn state(&self) -> &ModelState {
-        self.shadow.ahead().state()
+        &self.start
     }
 
     /// The real object: the truth, for reports, never for the estimate.
@@ -152,6 +155,12 @@ impl Slave {
     #[must_use]
     pub fn refused_estimates(&self) -> u64 {
         self.object.refused
+    }
+
+    /// Updates whose state lay beyond what a master accepts and was brought to the edge of it.
+    #[must_use]
+    pub fn clamped_states(&self) -> u64 {
+        self.updates.clamped()
     }
 
     /// Play-out.
@@ -220,10 +229,9 @@ impl Slave {
         let port = self.tool_port();
         self.tool.is_passive().then(|| Tool {
             answers: tick.stamp,
-            force: Some(ForceCounts::nearest(port.held())),
+            force: ForceCounts::nearest(port.held()),
             in_contact: tick.in_contact,
             in_j: port.energy().in_j,
-            model_error: 0.0,
         })
     }
 
@@ -271,7 +279,7 @@ impl Slave {
             f_m: played.force,
             in_contact: contact.in_contact,
             truth: contact.truth,
-            update: cause.map(|cause| self.update(cause, &played, &contact)),
+            update: cause.and_then(|cause| self.update(cause, &played, &contact)),
         })
     }
 
@@ -287,8 +295,8 @@ impl Slave {
         }
     }
 
-    /// Makes the update and applies it to the shadow, as the master will.
-    fn update(&mut self, cause: Cause, played: &Played, contact: &Contact) -> Update {
+    /// Makes the update and applies it to the shadow, as the master will. None where what was found is not of numbers.
+    fn update(&mut self, cause: Cause, played: &Played, contact: &Contact) -> Option<Update> {
         let touch = self.reference.model(&self.shadow).rendered().touch;
         if let (Cause::MasterOnlyContact, Some(touch)) = (cause, touch) {
             self.object.observer.retract_face(played.hip, touch.face);
@@ -298,8 +306,53 @@ impl Slave {
         let (stamp, in_contact) = (played.stamp, contact.in_contact);
         let update = self
             .updates
-            .step(cause, stamp, in_contact, &self.object, model);
+            .step(cause, stamp, in_contact, &self.object, model)?;
         self.shadow.send(&update);
-        update
+        Some(update)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use mmt_shared::model::sample::HipCounts;
+    use mmt_shared::model::settings::Mode;
+    use mmt_shared::time::TICK;
+
+    use super::*;
+
+    /// The updates of 2 s in which the object, at the edge of the workspace, flies away at 0.5 m/s.
+    fn updates_of_an_object_that_leaves() -> (Vec<Update>, u64) {
+        let mut config = SlaveConfig::of_mode(Mode::Recommended);
+        config.trigger.scheme = Scheme::EverySample;
+        config.environment.pose = Pose::new(4.9, 0.0, 0.0);
+        let coupling = Coupling::for_stiffness(1000.0);
+        let mut slave = Slave::try_new(&config, coupling).unwrap();
+        let (mut now, mut updates) = (Time::ZERO, Vec::new());
+        for _ in 0..2000 {
+            now += TICK;
+            let flight = Twist::new(0.5, 0.0, 0.0);
+            slave.environment_mut().set_twist(flight);
+            let sample = HipSample {
+                stamp: now,
+                hip: HipCounts::nearest(Vec2::new(4.0, 0.0)),
+                ..HipSample::default()
+            };
+            slave.handle_sample(now, &sample, 0);
+            updates.extend(slave.tick(now).and_then(|tick| tick.update));
+        }
+        (updates, slave.clamped_states())
+    }
+
+    #[test]
+    fn an_object_beyond_the_workspace_is_at_its_edge_and_counted_and_updates_go_on() {
+        let (updates, clamped) = updates_of_an_object_that_leaves();
+        let x = |update: &Update| update.state.pose().position.x;
+        let most = updates.iter().map(x).fold(0.0, f64::max);
+        assert_eq!(most, 5.0, "it has left, and no master refuses it");
+        let at_the_edge = updates.iter().filter(|update| x(update) == 5.0).count();
+        assert!(at_the_edge > 500, "{at_the_edge}");
+        assert!(clamped >= at_the_edge as u64, "{clamped}");
+        let numbers = updates.iter().map(|update| update.sequence);
+        assert!(numbers.eq(1..=updates.len() as u32), "none is left out");
     }
 }

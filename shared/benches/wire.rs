@@ -12,8 +12,7 @@ use mmt_shared::model::sample::{ForceCounts, HipCounts, HipSample};
 use mmt_shared::model::update::{Cause, Update};
 use mmt_shared::time::Time;
 use mmt_shared::wire::{
-    Command, DATAGRAM_MAX, Datagram, Echo, Envelope, Matter, SampleBlock, Side, decode_datagram,
-    encode_command, encode_update,
+    Command, DATAGRAM_MAX, Datagram, Echo, Envelope, Message, SampleBlock, Side,
 };
 
 const COUPLING: Coupling = Coupling {
@@ -57,7 +56,6 @@ fn update() -> Option<Update> {
         sequence: 250,
         cause: Cause::Deadband,
         answers: Time::from_millis(30_000),
-        newest_command: 2999,
         slave_in_contact: true,
         state: ModelState::try_new(params, BoxFootprint::square(0.36), pose, twist).ok()?,
     })
@@ -65,26 +63,30 @@ fn update() -> Option<Update> {
 
 fn wire(criterion: &mut Criterion) {
     let mut out = [0; DATAGRAM_MAX];
-    let command = command();
+    let datagram = |message| Datagram {
+        envelope: ENVELOPE,
+        message,
+    };
+    let command = datagram(Message::Command(command()));
     criterion.bench_function("wire/encode command", |b| {
-        b.iter(|| encode_command(&ENVELOPE, black_box(&command), &mut out));
+        b.iter(|| black_box(&command).encode(&mut out));
     });
-    let length = encode_command(&ENVELOPE, &command, &mut out).unwrap_or(0);
+    let length = command.encode(&mut out).unwrap_or(0);
     let bytes = out.get(..length).unwrap_or_default().to_vec();
     criterion.bench_function("wire/decode command", |b| {
-        b.iter(|| decode_datagram(black_box(&bytes), Side::Master));
+        b.iter(|| Datagram::decode(black_box(&bytes), Side::Master));
     });
 
     let Some(update) = update() else { return };
     criterion.bench_function("wire/encode update", |b| {
-        b.iter(|| encode_update(&ENVELOPE, black_box(&update), &mut out));
+        b.iter(|| datagram(Message::Update(black_box(&update).into())).encode(&mut out));
     });
-    let length = encode_update(&ENVELOPE, &update, &mut out).unwrap_or(0);
-    let bytes = out.get(..length).unwrap_or_default().to_vec();
+    let length = datagram(Message::Update((&update).into())).encode(&mut out);
+    let bytes = out.get(..length.unwrap_or(0)).unwrap_or_default().to_vec();
     criterion.bench_function("wire/decode and accept update", |b| {
-        b.iter(|| match decode_datagram(black_box(&bytes), Side::Slave) {
+        b.iter(|| match Datagram::decode(black_box(&bytes), Side::Slave) {
             Ok(Datagram {
-                matter: Matter::Update(raw),
+                message: Message::Update(raw),
                 ..
             }) => raw.accept(&COUPLING).ok(),
             _ => None,

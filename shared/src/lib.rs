@@ -1,7 +1,7 @@
 //! What both sides of mmt run or agree on.
 //!
 //! The master feels with this code and the slave shadows with it: time, geometry, contact, parameters,
-//! the local model, metrics, wire messages. The crate is pure; clocks, threads and sockets live in `io`
+//! the local model, metrics, statistics, wire messages. The crate is pure; clocks, threads and sockets live in `io`
 //! behind the feature of that name.
 
 #![cfg_attr(

@@ -14,8 +14,8 @@ use crate::metrics::{
     AgeOfInformation, ContactBreaks, ForcePeak, ForceSummary, PoseError, UpdateCounts,
 };
 use crate::stats::histogram::Histogram;
-use crate::wire::KindCounts;
-use crate::wire::message::{Architecture, Ending};
+use crate::stats::session::KindCounts;
+use crate::wire::{Architecture, Ending};
 
 pub use number::Number;
 

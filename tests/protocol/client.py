@@ -36,7 +36,7 @@ from capture import Capture  # noqa: E402
 from decode import Refused, decode  # noqa: E402
 from push import COUPLING, START, Push  # noqa: E402
 
-ALPN = "mmt/2"
+ALPN = "mmt/3"
 OTHER_VERSION = 1  # code of the close
 NO_APPLICATION_PROTOCOL = 0x178  # TLS alert 120 as an error of QUIC (RFC 9001, section 4.8)
 DATAGRAM_MAX, STREAM_MAX = 1024, 4096
@@ -209,8 +209,8 @@ class Session:
             self.drops["malformed"] += 1
             return
         number = fields["number"]
-        if number in self.seen or number + 1024 <= self.newest:
-            self.drops["duplicates" if number in self.seen else "too_old"] += 1
+        if number + 1024 <= self.newest or number in self.seen:
+            self.drops["too_old" if number + 1024 <= self.newest else "duplicates"] += 1
             return
         self.seen.add(number)
         self.received[KINDS[kind]] += 1
@@ -282,8 +282,9 @@ class Session:
         for way in ("sent", "received"):
             traffic[f"udp_datagrams_{way}"] = udp.datagrams[way]
             traffic[f"udp_bytes_{way}"] = udp.bytes[way]
-        return messages.master_farewell(
-            self.now(), traffic, len(self.applied), self.updates, self.ticks)
+        return messages.farewell({
+            "duration_ns": self.now(), "traffic": traffic, "updates_applied": len(self.applied),
+            "updates_dropped": self.updates, "haptic_loop": {"ticks": self.ticks, "skipped": 0}})
 
     def document(self, theirs):
         states = [update["state"] for update in self.applied]
@@ -313,8 +314,9 @@ async def session(master, token, pin):
     await running.operate()
     master.say(running.farewell())
     kind, theirs = await master.hear_message()
-    if kind != "slave_farewell":
+    if kind != "farewell":
         raise Over(1, outcome=f"{kind} instead of a farewell")
+    theirs["report"] = json.loads(bytes.fromhex(theirs["report"]))
     return running.document(theirs)
 
 

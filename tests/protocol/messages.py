@@ -4,10 +4,11 @@ Reading is the business of tests/golden/decode.py, which goes by the same page.
 Must never write what that decoder would refuse. Python 3.10 or later, standard library only.
 """
 
+import json
 import struct
 
-VERSION = 2
-COMMAND, HEARTBEAT, HELLO, MASTER_FAREWELL = 1, 4, 16, 19
+VERSION = 3
+COMMAND, HEARTBEAT, HELLO, FAREWELL = 1, 4, 16, 19
 TICK_NS = 1_000_000
 
 
@@ -68,7 +69,7 @@ def heartbeat(fields):
 
 
 def command(fields, newest_update, samples):
-    """`samples`: dicts as the decoder makes them, oldest first."""
+    """`samples`: dicts as the decoder makes them, oldest first. The hand feels no tool, so there is no port."""
     out = header(COMMAND) + envelope(fields) + u32(newest_update) + u32(len(samples))
     keys = ("x", "y", "force_x", "force_y")
     before = None
@@ -81,7 +82,7 @@ def command(fields, newest_update, samples):
                 raise ValueError("samples off the grid of 1 ms")
             out += u32(ticks) + b"".join(zigzag(sample[key] - before[key]) for key in keys)
         before = sample
-    return out
+    return out + option(None, f64)
 
 
 def hello(token, coupling, samples_per_command, hip, program):
@@ -90,16 +91,7 @@ def hello(token, coupling, samples_per_command, hip, program):
             + mmt + no_scenes + f64(*hip) + text(program))
 
 
-def master_farewell(duration_ns, traffic, applied, dropped, ticks):
-    """A finished session. `traffic`: dict with the names of the document; nothing of a haptic loop."""
-    finished, skipped, absent = u32(0), u64(0), b"\0"
-    udp = "udp_datagrams_sent udp_bytes_sent udp_datagrams_received udp_bytes_received"
-    kinds = "commands updates scenes heartbeats tools"
-    drops = "duplicate stale rejected superseded frozen"
-    out = header(MASTER_FAREWELL) + finished + u64(duration_ns)
-    for counts in (traffic["sent"], traffic["received"]):
-        out += b"".join(u32(counts[name]) for name in kinds.split())
-    out += b"".join(u32(traffic[name]) for name in ("duplicates", "too_old", "malformed"))
-    out += b"".join(u64(traffic[name]) for name in udp.split())
-    out += u32(applied) + b"".join(u32(dropped[name]) for name in drops.split())
-    return out + u64(ticks) + skipped + absent + absent
+def farewell(report):
+    """A finished session. `report`: what the document names, as a dict."""
+    finished, raw = u32(0), json.dumps(report).encode()
+    return header(FAREWELL) + finished + u32(len(raw)) + raw

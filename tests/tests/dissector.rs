@@ -6,13 +6,14 @@
 
 use std::collections::BTreeMap;
 
+use mmt_shared::wire::{Datagram, Kind, Side, StreamMessage};
+
 use crate::harness::process::did_not_run;
 use crate::harness::root;
 use crate::harness::tshark::{
     DATAGRAM_PORT, Field, Fields, Packet, SLAVE_PORT, STREAM_PORT, TsharkError, decode_as, dissect,
     tshark, write_capture,
 };
-use mmt_shared::wire::{Kind, Side, decode_datagram, decode_stream_message};
 use serde_json::Value;
 
 /// Fields that a vector does not name: of the header, the frame, and what its numbers are made of.
@@ -173,6 +174,8 @@ fn shows(field: &Field, value: &Value) -> bool {
 fn differences(vector: &Vector, found: &Fields) -> Vec<String> {
     let mut expected = BTreeMap::new();
     leaves("", &vector.fields, &mut expected);
+    // there is nothing to show of no bytes
+    expected.retain(|name, values| name != "report" || values != &[""]);
     let mut all = Vec::new();
     for (name, values) in &expected {
         let fields = found.get(name).map_or(&[][..], Vec::as_slice);
@@ -239,13 +242,13 @@ fn is_message(vector: &Vector) -> bool {
         Side::Slave
     };
     if !vector.on_stream {
-        return decode_datagram(&vector.bytes, from).is_ok();
+        return Datagram::decode(&vector.bytes, from).is_ok();
     }
     let Some((prefix, message)) = vector.bytes.split_first_chunk() else {
         return false;
     };
     let announced = u32::from_le_bytes(*prefix);
-    usize::try_from(announced) == Ok(message.len()) && decode_stream_message(message, from).is_ok()
+    usize::try_from(announced) == Ok(message.len()) && StreamMessage::decode(message, from).is_ok()
 }
 
 /// A vector cut short at every byte, and with every byte altered in four ways.

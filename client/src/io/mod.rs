@@ -8,7 +8,6 @@
     reason = "the shell: clocks, threads and sockets are its business"
 )]
 
-mod close;
 mod end;
 mod error;
 pub mod haptic;

@@ -16,7 +16,7 @@ use mmt_shared::io::transport::{
 use mmt_shared::model::geometry::Vec2;
 use mmt_shared::wire::{
     Architecture, DATAGRAM_MAX, Hello, Label, Refusal, Role, STREAM_MESSAGE_MAX, Side,
-    StreamMessage, Welcome, decode_stream_message, encode_hello,
+    StreamMessage, Welcome,
 };
 use tokio::time::timeout;
 
@@ -201,7 +201,7 @@ async fn greet(
     let (mut send, mut receive) = opened.map_err(|error| unsent(WriteError::from(error).into()))?;
     let hello = hello(options, hip);
     let mut message = [0; STREAM_MESSAGE_MAX];
-    let length = encode_hello(&hello, &mut message)?;
+    let length = StreamMessage::Hello(hello).encode(&mut message)?;
     let message = message.get(..length).unwrap_or_default();
     let written = send.write_frame(message, limit).await;
     written.map_err(unsent)?;
@@ -228,7 +228,7 @@ fn hello(options: &MasterOptions, hip: Vec2) -> Hello {
 
 /// What the slave's answer to the hello comes to.
 fn judge(answer: &[u8], address: SocketAddr, hello: &Hello) -> Result<Welcome, MasterHostError> {
-    let answer = decode_stream_message(answer, Side::Slave)
+    let answer = StreamMessage::decode(answer, Side::Slave)
         .map_err(|source| MasterHostError::Unreadable { address, source })?;
     match answer {
         StreamMessage::Welcome(raw) => raw

@@ -8,14 +8,15 @@ use std::time::Duration;
 
 use bytes::Bytes;
 use mmt_shared::io::clock::Clock;
+use mmt_shared::io::farewell::{FarewellError, ReceivedFarewell};
 use mmt_shared::io::transport::{Connection, ConnectionError};
 use mmt_shared::io::wake::Wakeup;
 use mmt_shared::model::tool::Scene;
-use mmt_shared::wire::{DATAGRAM_MAX, Farewell, SlaveTotals};
+use mmt_shared::stats::session::SlaveTotals;
+use mmt_shared::wire::DATAGRAM_MAX;
 use tokio::sync::watch;
 use tokio::time::{MissedTickBehavior, interval};
 
-use super::close::FarewellError;
 use super::haptic::{HapticPort, Said};
 use super::{MasterLive, SessionEnd, SharedPath};
 use crate::failsafe::LinkState;
@@ -55,7 +56,7 @@ pub(super) struct Pump<'a> {
     /// Whether the read of the slave's farewell still waits; once it has ended it must not be asked again.
     pub(super) listening: bool,
     /// The slave's farewell, if it came.
-    pub(super) told: Option<Farewell<SlaveTotals>>,
+    pub(super) told: Option<ReceivedFarewell<SlaveTotals>>,
     shown: LinkState,
     scene: Option<Scene>,
 }
@@ -102,7 +103,7 @@ impl<'a> Pump<'a> {
         stop: &mut watch::Receiver<bool>,
         mut farewell: Pin<&mut F>,
     ) where
-        F: Future<Output = Result<Farewell<SlaveTotals>, FarewellError>>,
+        F: Future<Output = Result<ReceivedFarewell<SlaveTotals>, FarewellError>>,
     {
         let mut beat = interval(BEAT);
         beat.set_missed_tick_behavior(MissedTickBehavior::Delay);
@@ -167,7 +168,7 @@ impl<'a> Pump<'a> {
         self.end(SessionEnd::ConnectionLost);
     }
 
-    fn hear(&mut self, said: Result<Farewell<SlaveTotals>, FarewellError>) {
+    fn hear(&mut self, said: Result<ReceivedFarewell<SlaveTotals>, FarewellError>) {
         match said {
             Ok(farewell) => {
                 self.told = Some(farewell);

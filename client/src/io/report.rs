@@ -8,6 +8,7 @@ use std::time::Duration;
 use mmt_netem::io::driver::DirectionCounters;
 use mmt_netem::io::lateness::Lateness;
 use mmt_netem::io::socket::SocketCounters;
+use mmt_shared::io::farewell::ReceivedFarewell;
 use mmt_shared::io::transport::DatagramCounts;
 use mmt_shared::model::update::Cause;
 use mmt_shared::report::{
@@ -16,10 +17,10 @@ use mmt_shared::report::{
     QuantilesReport, UpDown, UpdatesReport, WireReport, ending_name,
 };
 use mmt_shared::stats::histogram::Quantiles as Spread;
-use mmt_shared::wire::{
-    Architecture, Farewell, Identified, LoopTotals, MasterTotals, Quantiles, SlaveTotals, Traffic,
-    UpdateDrops,
+use mmt_shared::stats::session::{
+    Identified, LoopTotals, MasterTotals, Quantiles, SlaveTotals, Traffic, UpdateDrops,
 };
+use mmt_shared::wire::Architecture;
 
 use super::haptic::HapticOutcome;
 use super::pump::PumpCounts;
@@ -36,7 +37,7 @@ pub(super) struct Ended {
     /// Updates that arrived and were not applied.
     pub(super) updates: UpdateDrops,
     pub(super) counts: PumpCounts,
-    pub(super) told: Option<Farewell<SlaveTotals>>,
+    pub(super) told: Option<ReceivedFarewell<SlaveTotals>>,
     pub(super) sockets: SocketCounters,
     /// Of the emulated network on what the master sent.
     pub(super) lateness: Lateness,
@@ -45,15 +46,8 @@ pub(super) struct Ended {
 }
 
 impl Ended {
-    /// What the master tells the slave.
-    pub(super) fn farewell(&self, link: &MasterLink) -> Farewell<MasterTotals> {
-        Farewell {
-            ending: self.end.ending(),
-            totals: self.totals(link),
-        }
-    }
-
-    fn totals(&self, link: &MasterLink) -> MasterTotals {
+    /// What the master reports to the slave.
+    pub(super) fn totals(&self, link: &MasterLink) -> MasterTotals {
         let timing = &self.haptic.timing;
         MasterTotals {
             duration_ns: u64::try_from(self.duration.as_nanos()).unwrap_or(u64::MAX),
@@ -122,7 +116,7 @@ impl Ended {
     }
 
     fn slave(&self) -> Option<&SlaveTotals> {
-        self.told.as_ref().map(|farewell| &farewell.totals)
+        self.told.as_ref()?.report.as_ref()
     }
 
     fn updates(&self) -> UpdatesReport {

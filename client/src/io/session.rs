@@ -4,14 +4,15 @@ use std::pin::pin;
 use std::thread::JoinHandle;
 
 use mmt_shared::io::clock::Clock;
+use mmt_shared::io::farewell::{FarewellError, ReceivedFarewell, receive_farewell, send_farewell};
 use mmt_shared::io::realtime::RealTime;
 use mmt_shared::io::wake;
 use mmt_shared::model::geometry::{BoxFootprint, Pose};
-use mmt_shared::wire::{Farewell, SlaveTotals, UpdateDrops};
+use mmt_shared::stats::session::{SlaveTotals, UpdateDrops};
+use mmt_shared::wire::Side;
 use tokio::sync::{oneshot, watch};
-use tokio::time::{error::Elapsed, timeout};
+use tokio::time::{Instant, error::Elapsed, timeout_at};
 
-use super::close::{FarewellError, read_farewell, send_farewell};
 use super::haptic::{HapticLoop, HapticOutcome, HapticParts, HapticPort};
 use super::open::{Line, Opened, PATIENCE, Patience, open};
 use super::pump::{Pump, stopped};
@@ -110,7 +111,7 @@ async fn operate(
         &live,
         options.path.clone(),
     );
-    let mut farewell = pin!(read_farewell(&mut receive));
+    let mut farewell = pin!(receive_farewell(&mut receive, Side::Slave));
     pump.run(&mut wakeup, &mut stop, farewell.as_mut()).await;
     let haptic = join(thread, &line, patience).await?;
     let mut ended = Ended {
@@ -127,11 +128,17 @@ async fn operate(
     };
     tracing::info!("the session ends: {}", ended.end);
     if pump.connected {
-        send_farewell(&mut send, &ended.farewell(&pump.link), patience.farewell).await;
+        let deadline = Instant::now() + patience.farewell;
+        let (ending, report) = (ended.end.ending(), ended.totals(&pump.link));
+        let sent = send_farewell(&mut send, ending, &report, patience.farewell).await;
+        if let Err(error) = sent {
+            tracing::warn!(%error, "the farewell did not reach the slave");
+        }
         if pump.listening {
-            ended.told = answer(timeout(patience.farewell, farewell).await);
+            ended.told = answer(timeout_at(deadline, farewell).await);
         } else {
-            send.delivered(patience.farewell).await;
+            send.delivered(deadline.saturating_duration_since(Instant::now()))
+                .await;
         }
     }
     ended.passed = line.connection.datagrams();
@@ -196,8 +203,8 @@ fn update_drops(link: &MasterLink, port: &HapticPort, haptic: &HapticOutcome) ->
 
 /// The slave's answer to the master's farewell, if it came in time and could be read.
 fn answer(
-    said: Result<Result<Farewell<SlaveTotals>, FarewellError>, Elapsed>,
-) -> Option<Farewell<SlaveTotals>> {
+    said: Result<Result<ReceivedFarewell<SlaveTotals>, FarewellError>, Elapsed>,
+) -> Option<ReceivedFarewell<SlaveTotals>> {
     match said {
         Ok(Ok(farewell)) => Some(farewell),
         Ok(Err(error)) => {

@@ -3,7 +3,6 @@
 use std::time::Duration;
 
 use mmt_netem::LinkConfig;
-use mmt_shared::channel::datagram_channel::Outgoing;
 use mmt_shared::io::connect::ConnectError;
 use mmt_shared::io::transport::Transport;
 use mmt_shared::model::contact::Coupling;
@@ -11,8 +10,9 @@ use mmt_shared::model::geometry::{Pose, Twist, Vec2};
 use mmt_shared::model::params::{ModelParams, ModelState};
 use mmt_shared::model::update::Cause;
 use mmt_shared::pairing::{Pin, Token};
+use mmt_shared::stats::session::{ForceTotals, Identified, SlaveTotals};
 use mmt_shared::time::{TICK, Time};
-use mmt_shared::wire::{Architecture, Ending, ForceTotals, Identified, Refusal, SlaveTotals};
+use mmt_shared::wire::{Architecture, Ending, Message, Refusal};
 use tokio::sync::watch;
 use tokio::time::{Instant, sleep, timeout};
 
@@ -97,6 +97,7 @@ async fn a_session_goes_from_hello_to_farewell_and_both_sides_are_in_the_report(
     let report = master.end().await.unwrap();
 
     assert_eq!(told.ending, Ending::Finished);
+    let totals = told.report.unwrap();
     let stamps = &slave.stamps;
     let on_grid = |pair: &[u64]| pair[1] > pair[0] && (pair[1] - pair[0]).is_multiple_of(1_000_000);
     assert!(stamps.len() > 100, "{}", stamps.len());
@@ -108,7 +109,7 @@ async fn a_session_goes_from_hello_to_farewell_and_both_sides_are_in_the_report(
     let dropped: u64 = report.updates.dropped.as_ref().unwrap().values().sum();
     assert!(applied > 0);
     assert_eq!(Some(applied + dropped), report.messages.down.updates);
-    assert_eq!(u64::from(told.totals.updates_applied), applied);
+    assert_eq!(u64::from(totals.updates_applied), applied);
     assert!(report.updates.age_ms.mean.get().unwrap() > 0.0);
     assert_eq!(report.updates.sent, Some(9));
     assert_eq!(report.updates.rate_hz.get(), Some(4.5));
@@ -118,7 +119,7 @@ async fn a_session_goes_from_hello_to_farewell_and_both_sides_are_in_the_report(
     assert_eq!(report.model.mass_kg.estimate.get(), Some(0.75));
     assert!(report.force.largest_n.get().is_some());
     let ticks = report.haptic_loop.ticks.unwrap();
-    assert_eq!(told.totals.haptic_loop.ticks, ticks);
+    assert_eq!(totals.haptic_loop.ticks, ticks);
     assert!(report.duration_s.get().unwrap() >= 0.4);
     assert!(report.haptic_loop.cpu_us.p50.get().unwrap() > 0.0);
     assert_eq!(report.slave_loop, Default::default());
@@ -301,7 +302,7 @@ async fn who_asks_for_scenes_sees_the_last_that_came_and_how_old_it_is() {
         tool: Vec2::new(-0.2, 0.0),
         force: Vec2::zeros(),
     };
-    slave.tell(Outgoing::Scene(&scene));
+    slave.tell(Message::Scene(scene));
     slave.serve_for(Duration::from_millis(100)).await;
     master.stop.send_replace(true);
     slave.serve().await;

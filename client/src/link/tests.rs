@@ -2,7 +2,7 @@
 
 use super::*;
 use mmt_shared::model::geometry::{Pose, Vec2};
-use mmt_shared::model::sample::HipCounts;
+use mmt_shared::model::sample::{ForceCounts, HipCounts};
 use mmt_shared::time::TICK;
 use mmt_shared::wire::DATAGRAM_MAX;
 
@@ -44,7 +44,7 @@ fn coupled_commands(
             continue;
         };
         let opened = slave.open(now, &out[..length]).unwrap();
-        let Matter::Command(command) = opened.matter else {
+        let Message::Command(command) = opened.message else {
             panic!("no command");
         };
         assert_eq!(command.port, port);
@@ -76,10 +76,7 @@ fn a_command_repeats_the_samples_of_as_many_commands_as_it_is_told() {
 
 #[test]
 fn where_the_hand_feels_the_tool_each_sample_goes_alone_with_the_hands_port() {
-    let port = Some(HandPort {
-        in_j: 0.5,
-        ..HandPort::default()
-    });
+    let port = Some(HandPort { in_j: 0.5 });
     let mut link = link(3, 1);
     link.config = link.config.for_architecture(Architecture::Tdpa);
     let alone = coupled_commands(&mut link, 1..=4, port);
@@ -120,9 +117,9 @@ fn congestion_spaces_the_samples_leaves_the_repeats_out_and_goes() {
     let mut hear = |link: &mut MasterLink, at: u64, took: u64| {
         let length = link
             .end
-            .seal(Time::from_millis(at - took), Outgoing::Heartbeat, &mut out);
+            .seal(Time::from_millis(at - took), Message::Heartbeat, &mut out);
         slave.open(Time::from_millis(at), &out[..length.unwrap()]);
-        let length = slave.seal(Time::from_millis(at), Outgoing::Heartbeat, &mut out);
+        let length = slave.seal(Time::from_millis(at), Message::Heartbeat, &mut out);
         link.handle(Time::from_millis(at), &out[..length.unwrap()]);
     };
     hear(&mut link, 1010, 10);
@@ -153,12 +150,11 @@ fn what_the_slave_sees_and_what_its_tool_feels_count_only_if_newer_than_all_befo
     };
     let tool = Tool {
         answers: Time::ZERO,
-        force: None,
+        force: ForceCounts::default(),
         in_contact: false,
         in_j: 0.0,
-        model_error: 0.1,
     };
-    for message in [Outgoing::Scene(&scene), Outgoing::Tool(&tool)] {
+    for message in [Message::Scene(scene), Message::Tool(tool)] {
         let (mut master, mut slave) = (link(10, 0), LinkEnd::new(Side::Slave, Time::ZERO));
         let mut seal = || {
             let mut out = [0; DATAGRAM_MAX];

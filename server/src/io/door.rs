@@ -10,13 +10,11 @@ use std::time::Duration;
 
 use mmt_shared::io::stream::ReadFrameError;
 use mmt_shared::io::transport::{
-    CLOSE_FINISHED, Connection, ConnectionError, Handshake, Listener, RecvStream, SendStream,
+    CLOSE_FINISHED, CLOSE_NO_HELLO, CLOSE_NOT_A_HELLO, Connection, ConnectionError, Handshake,
+    Listener, RecvStream, SendStream,
 };
 use mmt_shared::pairing::Token;
-use mmt_shared::wire::{
-    DecodeError, Hello, RawHello, Refusal, STREAM_MESSAGE_MAX, Side, StreamMessage,
-    decode_stream_message, encode_refused,
-};
+use mmt_shared::wire::{DecodeError, Hello, Refusal, STREAM_MESSAGE_MAX, Side, StreamMessage};
 use tokio::sync::{OwnedSemaphorePermit, Semaphore, mpsc, watch};
 use tokio::task::JoinSet;
 use tokio::time::timeout;
@@ -131,7 +129,17 @@ impl Door {
     fn no_hello(&self, address: SocketAddr, connection: &Connection, why: &Unwelcome) {
         count(&self.refusals.no_hello);
         tracing::warn!("{address} was not let in: {why}");
-        connection.close(CLOSE_FINISHED, b"no hello");
+        let code = match why {
+            Unwelcome::NoStream(_)
+            | Unwelcome::Silent
+            | Unwelcome::Unread(
+                ReadFrameError::Finished | ReadFrameError::Slow { .. } | ReadFrameError::Stream(_),
+            ) => CLOSE_NO_HELLO,
+            Unwelcome::Unread(ReadFrameError::Truncated | ReadFrameError::TooLong { .. })
+            | Unwelcome::Malformed(_)
+            | Unwelcome::NoHello => CLOSE_NOT_A_HELLO,
+        };
+        connection.close(code, why.to_string().as_bytes());
     }
 
     async fn answer(
@@ -140,7 +148,7 @@ impl Door {
         connection: Connection,
         send: SendStream,
         receive: RecvStream,
-        hello: &RawHello,
+        hello: &Hello,
     ) {
         match self.verdict(address, hello) {
             Ok((hello, lease)) => {
@@ -170,9 +178,9 @@ impl Door {
     fn verdict(
         &self,
         address: SocketAddr,
-        hello: &RawHello,
+        hello: &Hello,
     ) -> Result<(Hello, OwnedSemaphorePermit), Refusal> {
-        if *hello.token() != self.token {
+        if hello.token != self.token {
             return Err(Refusal::WrongToken);
         }
         let hello = hello.accept().map_err(|error| {
@@ -190,7 +198,9 @@ impl Door {
 /// Says no, and gives it some time to arrive: a close overtakes what the stream still holds.
 pub(super) async fn refuse(connection: &Connection, mut send: SendStream, refusal: Refusal) {
     let mut out = [0; STREAM_MESSAGE_MAX];
-    let length = encode_refused(refusal, &mut out).unwrap_or_default();
+    let length = StreamMessage::Refused(refusal)
+        .encode(&mut out)
+        .unwrap_or_default();
     let message = out.get(..length).unwrap_or_default();
     if send.write_frame(message, REFUSAL_WAIT).await.is_ok() {
         send.finish();
@@ -199,12 +209,10 @@ pub(super) async fn refuse(connection: &Connection, mut send: SendStream, refusa
     connection.close(CLOSE_FINISHED, b"refused");
 }
 
-async fn hello_of(
-    connection: &Connection,
-) -> Result<(SendStream, RecvStream, RawHello), Unwelcome> {
+async fn hello_of(connection: &Connection) -> Result<(SendStream, RecvStream, Hello), Unwelcome> {
     let (send, mut receive) = connection.accept_bi().await?;
     let frame = receive.read_frame(STREAM_MESSAGE_MAX, HELLO_WAIT).await?;
-    match decode_stream_message(&frame, Side::Master)? {
+    match StreamMessage::decode(&frame, Side::Master)? {
         StreamMessage::Hello(hello) => Ok((send, receive, hello)),
         _ => Err(Unwelcome::NoHello),
     }

@@ -15,11 +15,11 @@ use mmt_shared::report::{
     MessagesReport, ModelReport, QuantilesReport, ToolReport, UpDown, UpdatesReport, WireReport,
     ending_name,
 };
-use mmt_shared::time::TICK_S;
-use mmt_shared::wire::{
-    Ending, Farewell, ForceTotals, Identified, LoopTotals, MasterTotals, SlaveTotals, Traffic,
-    UpdateDrops,
+use mmt_shared::stats::session::{
+    ForceTotals, Identified, LoopTotals, MasterTotals, SlaveTotals, Traffic, UpdateDrops,
 };
+use mmt_shared::time::TICK_S;
+use mmt_shared::wire::Ending;
 
 use super::SlaveReport;
 use super::host::Shared;
@@ -94,7 +94,7 @@ pub(super) fn report(
     shared: &Shared,
     config: &SlaveConfig,
     outcome: &Outcome,
-    theirs: Option<&Farewell<MasterTotals>>,
+    theirs: Option<&MasterTotals>,
 ) -> SlaveReport {
     let version = env!("CARGO_PKG_VERSION");
     let mut report = SlaveReport::new(version, "slave", shared.configuration(config));
@@ -111,7 +111,7 @@ pub(super) fn report(
     report.emulation.down = shared.meter.lateness().report();
     report.drops = Some(drops::drops(shared, outcome, &traffic));
     if let Some(theirs) = theirs {
-        report.haptic_loop = loop_of_master(&theirs.totals.haptic_loop);
+        report.haptic_loop = loop_of_master(&theirs.haptic_loop);
     }
     if let Some(finished) = &outcome.finished {
         report.force = ForceReport::new(&finished.slave.force().summary(), None);
@@ -122,12 +122,12 @@ pub(super) fn report(
     report
 }
 
-fn updates(outcome: &Outcome, theirs: Option<&Farewell<MasterTotals>>) -> UpdatesReport {
+fn updates(outcome: &Outcome, theirs: Option<&MasterTotals>) -> UpdatesReport {
     let ticks = outcome.finished.as_ref().map(|finished| finished.ticks);
     let mut updates = UpdatesReport::default();
     updates.set_sent(&outcome.sent.plus(&ticks.unwrap_or_default()));
     updates.set_repeated(outcome.link.repeated());
-    if let Some(Farewell { totals, .. }) = theirs {
+    if let Some(totals) = theirs {
         updates.applied = Some(totals.updates_applied.into());
         updates.dropped = Some(dropped(&totals.updates_dropped));
     }
@@ -236,7 +236,7 @@ fn slave_loop(finished: &Finished) -> LoopReport {
 }
 
 fn loop_of_master(totals: &LoopTotals) -> LoopReport {
-    let quantiles = |of: Option<mmt_shared::wire::Quantiles>| {
+    let quantiles = |of: Option<mmt_shared::stats::session::Quantiles>| {
         of.map_or_else(QuantilesReport::default, |of| QuantilesReport {
             p50: of.p50.into(),
             p99: of.p99.into(),

@@ -12,6 +12,7 @@ use std::time::Duration;
 use bytes::Bytes;
 use mmt_netem::io::socket::SocketCounters;
 use mmt_shared::io::clock::Clock;
+use mmt_shared::io::farewell::{FAREWELL_WAIT, answer, receive_farewell, send_farewell};
 use mmt_shared::io::live::LiveCell;
 use mmt_shared::io::stream::WriteFrameError;
 use mmt_shared::io::transport::{CLOSE_FINISHED, Connection, RecvStream, SendStream};
@@ -19,11 +20,10 @@ use mmt_shared::io::truth::TruthSender;
 use mmt_shared::metrics::UpdateCounts;
 use mmt_shared::model::contact::Coupling;
 use mmt_shared::wire::{
-    DATAGRAM_MAX, Ending, Farewell, Hello, Label, Refusal, STREAM_MESSAGE_MAX, SlaveTotals,
-    Welcome, encode_slave_farewell, encode_welcome,
+    DATAGRAM_MAX, Ending, Hello, Label, Refusal, STREAM_MESSAGE_MAX, Side, StreamMessage, Welcome,
 };
 use tokio::sync::watch;
-use tokio::time::timeout;
+use tokio::time::{sleep, timeout};
 
 use super::door::{Admitted, refuse};
 use super::host::{Shared, SlaveHostError};
@@ -33,10 +33,8 @@ use super::{PROGRAM, SlaveLive, SlaveReport};
 use crate::link::{SlaveLink, SlaveLinkConfig};
 use crate::slave::{Slave, SlaveConfig};
 
-use end::{End, farewell_of};
+use end::End;
 
-/// How long each side waits for the other's farewell (protocol.md, section 2).
-const FAREWELL_WAIT: Duration = Duration::from_secs(1);
 /// How long the stream may take to take a message of ours.
 const WRITE_WAIT: Duration = Duration::from_secs(2);
 /// More datagrams than QUIC's queue holds.
@@ -175,7 +173,8 @@ async fn welcome(
     };
     let mut out = [0; STREAM_MESSAGE_MAX];
     // A slave that could be made has numbers that can be told.
-    let length = encode_welcome(&welcome, &mut out).unwrap_or_default();
+    let welcome = StreamMessage::Welcome((&welcome).into());
+    let length = welcome.encode(&mut out).unwrap_or_default();
     let message = out.get(..length).unwrap_or_default();
     send.write_frame(message, WRITE_WAIT).await
 }
@@ -219,11 +218,11 @@ impl<'a> Session<'a> {
     /// Goes on until somebody ends it; then says farewell and reports.
     pub(super) async fn operate(
         mut self,
-        receive: RecvStream,
+        mut receive: RecvStream,
         stop: &mut watch::Receiver<bool>,
         live: &LiveCell<SlaveLive>,
     ) -> Result<SlaveReport, SlaveHostError> {
-        let farewell = farewell_of(receive);
+        let farewell = receive_farewell(&mut receive, Side::Master);
         tokio::pin!(farewell);
         let end = self.until_end(farewell.as_mut(), stop, live).await;
         tracing::info!("{}: {end}", self.connection.remote_address());
@@ -237,19 +236,19 @@ impl<'a> Session<'a> {
             _ => Ending::Failed,
         };
         let outcome = self.outcome(ending, finished);
-        let said = self.say_farewell(ending, &outcome.totals()).await;
-        let theirs = match end {
-            End::Farewell(theirs) => Some(*theirs),
-            // Nothing can come any more.
-            End::Stream(_) => None,
-            _ if said.is_err() => None,
-            _ => timeout(FAREWELL_WAIT, farewell)
-                .await
-                .ok()
-                .and_then(Result::ok),
+        let totals = outcome.totals();
+        let sent = send_farewell(&mut self.send, ending, &totals, FAREWELL_WAIT).await;
+        let theirs = async {
+            match end {
+                End::Farewell(theirs) => Some(*theirs),
+                // Nothing can come any more.
+                End::Stream(_) => None,
+                _ if sent.is_err() => None,
+                _ => farewell.await.ok(),
+            }
         };
-        // The master closes: a close of ours could overtake what we said.
-        let _ = timeout(FAREWELL_WAIT, self.connection.closed()).await;
+        // The master closes: a close of ours could overtake our farewell.
+        let theirs = answer(theirs, self.connection.closed(), sleep(FAREWELL_WAIT)).await;
         self.connection
             .close(CLOSE_FINISHED, b"the session is over");
         match outcome.finished {
@@ -257,7 +256,7 @@ impl<'a> Session<'a> {
                 self.shared,
                 &self.config,
                 &outcome,
-                theirs.as_ref(),
+                theirs.and_then(|theirs| theirs.report).as_ref(),
             )),
             None => Err(SlaveHostError::Panicked),
         }
@@ -294,23 +293,5 @@ impl<'a> Session<'a> {
                 .to_canonical()
                 .is_ipv4(),
         }
-    }
-
-    async fn say_farewell(
-        &mut self,
-        ending: Ending,
-        totals: &SlaveTotals,
-    ) -> Result<(), WriteFrameError> {
-        let farewell = Farewell {
-            ending,
-            totals: *totals,
-        };
-        let mut out = [0; STREAM_MESSAGE_MAX];
-        // Totals come from reports, which hold no number that is not finite.
-        let length = encode_slave_farewell(&farewell, &mut out).unwrap_or_default();
-        let message = out.get(..length).unwrap_or_default();
-        self.send.write_frame(message, FAREWELL_WAIT).await?;
-        self.send.finish();
-        Ok(())
     }
 }

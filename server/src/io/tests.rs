@@ -78,15 +78,14 @@ async fn a_session_goes_from_the_welcome_to_a_report_that_agrees_with_the_master
     master.listen(1).await;
     let look = host.live.get();
     assert!(look.connected && look.elapsed_s > 0.5 && look.rtt_ms.is_some());
-    let mut sequences: Vec<_> = master.updates.iter().map(|u| u.sequence()).collect();
+    let mut sequences: Vec<_> = master.updates.iter().map(|u| u.sequence).collect();
     assert!(sequences.is_sorted(), "{sequences:?}");
     let all = sequences.len() as u64;
     sequences.dedup();
     let heard = sequences.len() as u64;
     assert!(heard > 0, "no update in a second of contact");
-    let farewell = patiently(master.farewell()).await;
-    assert_eq!(farewell.ending, Ending::Finished);
-    let totals = farewell.totals;
+    let (ending, totals) = patiently(master.farewell()).await;
+    assert_eq!(ending, Ending::Finished);
     let report = patiently(host.served).await.unwrap().unwrap().unwrap();
     assert_eq!(report.ending.as_deref(), Some("finished"));
     assert_eq!(report.updates.applied, Some(7));
@@ -125,15 +124,52 @@ async fn a_wrong_token_and_numbers_out_of_range_are_refused_by_name_and_the_righ
     let mut soft = Master::connect(&host.pairing).await;
     let refused = patiently(soft.hello(host.pairing.token, 1.0)).await;
     assert_eq!(refused.unwrap_err(), Refusal::BadHello);
-    let mut silent = Master::connect(&host.pairing).await;
-    silent.say(b"no message at all").await;
-    patiently(silent.connection.closed()).await;
     let (master, _) = patiently(Master::operate(&host.pairing)).await;
     patiently(master.farewell()).await;
     let drops = host.end().await.unwrap().drops.unwrap();
     assert_eq!(drops.get("masters_wrong_token"), Some(&2));
     assert_eq!(drops.get("masters_bad_hello"), Some(&1));
-    assert_eq!(drops.get("masters_no_hello"), Some(&1));
+}
+
+/// The code and the reason with which the slave closes on a master that writes these bytes on the stream and ends it.
+async fn closed_on(host: &Running, bytes: &[u8]) -> (u64, String) {
+    let mut stranger = Master::connect(&host.pairing).await;
+    stranger.write(bytes).await;
+    match patiently(stranger.connection.closed()).await {
+        quinn::ConnectionError::ApplicationClosed(close) => (
+            close.error_code.into_inner(),
+            String::from_utf8_lossy(&close.reason).into_owned(),
+        ),
+        other => panic!("{other}"),
+    }
+}
+
+#[tokio::test]
+async fn what_is_no_hello_is_told_apart_by_the_code_of_the_close() {
+    let host = run(options());
+    let (none, _) = closed_on(&host, b"").await;
+    assert_eq!(none, 2, "no hello");
+    for (bytes, fault) in [
+        (&b"\x08\0\0\0MMT"[..], "in the middle"),
+        (b"\xff\xff\0\0MMTP", "65535 bytes"),
+        (b"\x09\0\0\0not a hel", "another protocol"),
+        (b"\x09\0\0\0MMTP\x03\x10\0\0\0", "a hello is malformed"),
+        (b"\x0a\0\0\0MMTP\x03\x13\0\0\0\0", "no hello"),
+        (
+            b"\x09\0\0\0MMTP\x02\x10\0\0\0",
+            "version 2 of the protocol, this side version 3",
+        ),
+    ] {
+        let (code, reason) = closed_on(&host, bytes).await;
+        assert_eq!(code, 3, "{reason}");
+        assert!(reason.contains(fault), "{fault}: {reason}");
+    }
+    let drops = host
+        .end()
+        .await
+        .unwrap_or_else(|| panic!("no report"))
+        .drops;
+    assert_eq!(drops.unwrap().get("masters_no_hello"), Some(&7));
 }
 
 #[tokio::test]
@@ -212,9 +248,9 @@ async fn garbage_is_counted_and_harmless() {
 async fn a_message_that_is_no_farewell_ends_the_session_as_failed() {
     let host = run(options());
     let (mut master, _) = patiently(Master::operate(&host.pairing)).await;
-    master.say(b"MMTP\x02\x13\x00\x00").await;
-    let farewell = patiently(master.hear_farewell()).await;
-    assert_eq!(farewell.ending, Ending::Failed);
+    master.say(b"MMTP\x03\x10\x00\x00").await;
+    let (ending, _) = patiently(master.hear_farewell()).await;
+    assert_eq!(ending, Ending::Failed);
     master.connection.close(0u32.into(), b"");
     let report = host.end().await.unwrap();
     assert_eq!(report.ending.as_deref(), Some("failed"));
@@ -254,8 +290,8 @@ async fn a_host_that_is_stopped_says_farewell_and_reports() {
     let (mut master, _) = patiently(Master::operate(&host.pairing)).await;
     patiently(master.push(10)).await;
     host.stop.send_replace(true);
-    let farewell = patiently(master.hear_farewell()).await;
-    assert_eq!(farewell.ending, Ending::Interrupted);
+    let (ending, _) = patiently(master.hear_farewell()).await;
+    assert_eq!(ending, Ending::Interrupted);
     master.say_farewell().await;
     let report = patiently(host.served).await.unwrap().unwrap().unwrap();
     assert_eq!(report.ending.as_deref(), Some("interrupted"));
@@ -276,9 +312,9 @@ async fn a_panic_of_the_thread_ends_the_session_as_failed_and_is_an_error() {
     let pairing = host.pairing(None);
     let master = tokio::spawn(async move {
         let (mut master, _) = Master::operate(&pairing).await;
-        let farewell = master.hear_farewell().await;
+        let (ending, _) = master.hear_farewell().await;
         master.connection.close(0u32.into(), b"");
-        farewell.ending
+        ending
     });
     let admitted = patiently(masters.recv()).await.unwrap();
     let start = |_, _, _| Worker::start_with(|_| panic!("on purpose"));

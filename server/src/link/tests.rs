@@ -4,6 +4,7 @@ use super::*;
 use mmt_shared::model::contact::Coupling;
 use mmt_shared::model::geometry::{BoxFootprint, Pose, Twist, Vec2};
 use mmt_shared::model::params::{ModelParams, ModelState};
+use mmt_shared::model::sample::ForceCounts;
 use mmt_shared::model::tool::HandPort;
 use mmt_shared::model::update::Cause;
 use mmt_shared::wire::{DATAGRAM_MAX, SampleBlock};
@@ -19,7 +20,6 @@ fn update(sequence: u32, cause: Cause) -> Update {
         sequence,
         cause,
         answers: AT(1),
-        newest_command: 0,
         slave_in_contact: true,
         state: state.unwrap(),
     }
@@ -48,10 +48,10 @@ fn repeats(link: &mut SlaveLink, mut before: impl FnMut(u64, &mut SlaveLink)) ->
     for ms in 1..=100 {
         before(ms, link);
         while let Some(length) = link.repeat(AT(ms), &mut out).unwrap() {
-            let Matter::Update(raw) = master.open(AT(ms), &out[..length]).unwrap().matter else {
+            let Message::Update(raw) = master.open(AT(ms), &out[..length]).unwrap().message else {
                 panic!("no update");
             };
-            sent.push((ms, raw.sequence()));
+            sent.push((ms, raw.sequence));
         }
     }
     sent
@@ -100,7 +100,7 @@ fn what_the_master_has_is_not_repeated_and_without_times_nothing_is() {
         samples: block,
         port: None,
     };
-    let length = master.seal(AT(20), Outgoing::Command(&command), &mut bytes);
+    let length = master.seal(AT(20), Message::Command(command), &mut bytes);
     let length = length.unwrap();
     let sent = repeats(&mut with, |ms, link| match ms {
         5 => send(link, ms, &update(1, Cause::Timer)),
@@ -158,13 +158,7 @@ fn only_the_news_of_a_command_acknowledge() {
 
 #[test]
 fn a_port_counts_in_the_newest_command_only_and_where_the_hello_has_spoken_of_one() {
-    let port = |in_j| {
-        Some(HandPort {
-            in_j,
-            wants_force: true,
-            passive_tool: true,
-        })
-    };
+    let port = |in_j| Some(HandPort { in_j });
     let mut master = LinkEnd::new(Side::Master, Time::ZERO);
     let mut command = |ms, port| {
         let mut samples = SampleBlock::new();
@@ -180,7 +174,7 @@ fn a_port_counts_in_the_newest_command_only_and_where_the_hello_has_spoken_of_on
             port,
         };
         let mut bytes = [0; DATAGRAM_MAX];
-        let length = master.seal(AT(ms), Outgoing::Command(&command), &mut bytes);
+        let length = master.seal(AT(ms), Message::Command(command), &mut bytes);
         bytes[..length.unwrap()].to_vec()
     };
     let (first, second) = (command(1, port(0.1)), command(2, port(0.2)));
@@ -201,17 +195,16 @@ fn a_port_counts_in_the_newest_command_only_and_where_the_hello_has_spoken_of_on
 fn the_tools_state_stands_for_the_heartbeat() {
     let tool = Tool {
         answers: AT(7),
-        force: None,
+        force: ForceCounts::default(),
         in_contact: false,
         in_j: 0.25,
-        model_error: 0.125,
     };
     let mut link = link_of("none", Architecture::Tdpa);
     let mut master = LinkEnd::new(Side::Master, Time::ZERO);
     let mut out = [0; DATAGRAM_MAX];
     let length = link.send_tool(AT(40), &tool, &mut out).unwrap();
     let opened = master.open(AT(50), &out[..length]).unwrap();
-    assert_eq!(opened.matter, Matter::Tool(tool));
+    assert_eq!(opened.message, Message::Tool(tool));
     assert_eq!(link.end().heartbeat_due(), AT(90));
     assert_eq!(link.end().traffic().sent.tools, 1);
 }
@@ -235,7 +228,7 @@ fn scenes_are_due_as_often_as_somebody_wants_to_see_them() {
     let length = link.send_scene(AT(50), Some(&scene), &mut out);
     let length = length.unwrap().unwrap();
     let opened = master.open(AT(50), &out[..length]).unwrap();
-    assert_eq!(opened.matter, Matter::Scene(scene));
+    assert_eq!(opened.message, Message::Scene(scene));
     assert_eq!(link.scene_due(), Some(AT(100)));
     assert_eq!(
         link.send_scene(AT(100), None, &mut out),

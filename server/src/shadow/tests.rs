@@ -28,7 +28,6 @@ fn update(sequence: u32, answers_ms: u64, m: f64) -> Update {
         sequence,
         cause: Cause::Deadband,
         answers: Time::from_millis(answers_ms),
-        newest_command: 1,
         slave_in_contact: false,
         state: state(m),
     }

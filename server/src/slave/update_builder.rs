@@ -18,6 +18,8 @@ pub(super) struct UpdateBuilder {
     lag_s: f64,
     /// Whether an update that only the timer asked for carries the object's pose.
     timer_carries_pose: bool,
+    /// Updates whose state lay beyond what a master accepts.
+    clamped: u64,
 }
 
 impl UpdateBuilder {
@@ -30,10 +32,17 @@ impl UpdateBuilder {
                 PoseCorrection::Replay => IN_CONTACT_REPLAYED.tau_s,
             },
             timer_carries_pose,
+            clamped: 0,
         }
     }
 
-    /// The update that answers `stamp`. `model` is the copy of the master's model with every update that was sent.
+    /// Updates whose state lay beyond what a master accepts and was brought to the edge of it.
+    pub(super) fn clamped(&self) -> u64 {
+        self.clamped
+    }
+
+    /// The update that answers `stamp`; none where what was found is not of numbers. The master accepts no object beyond
+    /// the workspace, so one that has left it is at its edge. `model` is the copy of the master's model with every update that was sent.
     pub(super) fn step(
         &mut self,
         cause: Cause,
@@ -41,31 +50,32 @@ impl UpdateBuilder {
         in_contact: bool,
         object: &ObjectEstimate,
         model: &LocalModel,
-    ) -> Update {
-        self.sequence = self.sequence.saturating_add(1);
-        let omega = model.state().twist.angular;
-        let found = ModelState {
-            params: object.params,
-            footprint: object.observer.footprint(),
-            pose: object.observer.pose_ahead(omega, self.lag_s),
-            twist: object.observer.twist(),
-        };
+    ) -> Option<Update> {
         // what the model had at the stamp: nothing is left to be corrected there
         let parameters_only = cause == Cause::Timer && !self.timer_carries_pose;
         let own = model.history().at(stamp).filter(|_| parameters_only);
-        let state = own.map_or(found, |own| ModelState {
-            footprint: model.state().footprint,
-            pose: own.motion.pose,
-            twist: own.motion.twist,
-            ..found
-        });
-        Update {
+        let (footprint, pose, twist) = match own {
+            Some(own) => (model.state().footprint, own.motion.pose, own.motion.twist),
+            None => {
+                let (observer, omega) = (&object.observer, model.state().twist.angular);
+                let pose = observer.pose_ahead(omega, self.lag_s);
+                (observer.footprint(), pose, observer.twist())
+            }
+        };
+        let state = match ModelState::try_new(object.params, footprint, pose, twist) {
+            Ok(state) => state,
+            Err(_) => {
+                self.clamped += 1;
+                ModelState::nearest(object.params, footprint, pose, twist).ok()?
+            }
+        };
+        self.sequence = self.sequence.saturating_add(1);
+        Some(Update {
             sequence: self.sequence,
             cause,
             answers: stamp,
-            newest_command: 0,
             slave_in_contact: in_contact,
             state,
-        }
+        })
     }
 }

@@ -7,38 +7,19 @@ use std::time::Duration;
 
 use crate::channel::peer::{Arrival, NumbersSpent, Peer};
 use crate::channel::rate_control::{RateController, StretchMax};
-use crate::model::tool::{Scene, Tool};
-use crate::model::update::Update;
+use crate::stats::session::{KindCounts, Traffic};
 use crate::time::Time;
-use crate::wire::{
-    Command, EncodeError, KindCounts, Matter, Side, Traffic, decode_datagram, encode_command,
-    encode_heartbeat, encode_scene, encode_tool, encode_update,
-};
+use crate::wire::{Datagram, EncodeError, Message, Side};
 
 /// Each side sends at least this often: what is needed to call a link dead within a second and to keep
 /// the round-trip time fresh, and twenty small packets a second at the most.
 pub const HEARTBEAT: Duration = Duration::from_millis(50);
 
-/// What is to be sent.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Outgoing<'a> {
-    /// The master's motion.
-    Command(&'a Command),
-    /// The slave's model.
-    Update(&'a Update),
-    /// What a viewer sees.
-    Scene(&'a Scene),
-    /// What the tool feels.
-    Tool(&'a Tool),
-    /// Nothing but the envelope.
-    Heartbeat,
-}
-
 /// What a datagram brought.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Opened {
     /// What it is about.
-    pub matter: Matter,
+    pub message: Message,
     /// Whether no later datagram had arrived before it.
     pub is_newest: bool,
 }
@@ -92,12 +73,12 @@ impl LinkEnd {
     /// Reads a datagram that arrived at `now`. None, and counted, if it does not decode, was seen before
     /// or is too old to tell.
     pub fn open(&mut self, now: Time, bytes: &[u8]) -> Option<Opened> {
-        let Ok(datagram) = decode_datagram(bytes, self.side.other()) else {
+        let Ok(Datagram { envelope, message }) = Datagram::decode(bytes, self.side.other()) else {
             self.malformed = self.malformed.saturating_add(1);
             return None;
         };
         let measured = self.peer.round_trip().histogram().total();
-        let is_newest = match self.peer.handle(now, &datagram.envelope, bytes.len()) {
+        let is_newest = match self.peer.handle(now, &envelope, bytes.len()) {
             Arrival::Newest => true,
             Arrival::Reordered => false,
             Arrival::Duplicate | Arrival::TooOld => return None,
@@ -105,18 +86,8 @@ impl LinkEnd {
         if self.peer.round_trip().histogram().total() > measured {
             self.control_rate(now);
         }
-        let count = match datagram.matter {
-            Matter::Command(_) => &mut self.received.commands,
-            Matter::Update(_) => &mut self.received.updates,
-            Matter::Scene(_) => &mut self.received.scenes,
-            Matter::Tool(_) => &mut self.received.tools,
-            Matter::Heartbeat => &mut self.received.heartbeats,
-        };
-        *count = count.saturating_add(1);
-        Some(Opened {
-            matter: datagram.matter,
-            is_newest,
-        })
+        self.received.count(message.kind());
+        Some(Opened { message, is_newest })
     }
 
     fn control_rate(&mut self, now: Time) {
@@ -139,24 +110,12 @@ impl LinkEnd {
     pub fn seal(
         &mut self,
         now: Time,
-        what: Outgoing<'_>,
+        message: Message,
         out: &mut [u8],
     ) -> Result<usize, SealError> {
         let envelope = self.peer.stamp(now)?;
-        let (length, count) = match what {
-            Outgoing::Command(command) => (
-                encode_command(&envelope, command, out)?,
-                &mut self.sent.commands,
-            ),
-            Outgoing::Update(update) => (
-                encode_update(&envelope, update, out)?,
-                &mut self.sent.updates,
-            ),
-            Outgoing::Scene(scene) => (encode_scene(&envelope, scene, out)?, &mut self.sent.scenes),
-            Outgoing::Tool(tool) => (encode_tool(&envelope, tool, out)?, &mut self.sent.tools),
-            Outgoing::Heartbeat => (encode_heartbeat(&envelope, out)?, &mut self.sent.heartbeats),
-        };
-        *count = count.saturating_add(1);
+        let length = Datagram { envelope, message }.encode(out)?;
+        self.sent.count(message.kind());
         self.last_sent = now;
         Ok(length)
     }
@@ -218,9 +177,12 @@ mod tests {
         );
         let mut buffer = [0; DATAGRAM_MAX];
         let now = Time::from_millis(5);
-        let length = up.seal(now, Outgoing::Heartbeat, &mut buffer).unwrap();
+        let length = up.seal(now, Message::Heartbeat, &mut buffer).unwrap();
         let opened = down.open(now, &buffer[..length]).unwrap();
-        assert_eq!((opened.matter, opened.is_newest), (Matter::Heartbeat, true));
+        assert_eq!(
+            (opened.message, opened.is_newest),
+            (Message::Heartbeat, true)
+        );
         assert_eq!(down.open(now, &buffer[..length]), None, "a duplicate");
         assert_eq!(down.open(now, &buffer[..length - 1]), None, "cut short");
         let traffic = down.traffic();
@@ -236,7 +198,7 @@ mod tests {
         let mut end = LinkEnd::new(Side::Slave, Time::from_millis(100));
         assert_eq!(end.heartbeat_due(), Time::from_millis(150));
         let mut buffer = [0; DATAGRAM_MAX];
-        end.seal(Time::from_millis(120), Outgoing::Heartbeat, &mut buffer)
+        end.seal(Time::from_millis(120), Message::Heartbeat, &mut buffer)
             .unwrap();
         assert_eq!(end.heartbeat_due(), Time::from_millis(170));
         assert_eq!(

@@ -12,7 +12,7 @@ pub use round_trip::RoundTrip;
 pub use window::{Freshness, SequenceWindow, WINDOW};
 
 use crate::time::{Time, duration_nanos};
-use crate::wire::message::{Echo, Envelope};
+use crate::wire::{Echo, Envelope};
 use window::Window;
 
 /// The last number that a datagram or an update may have. Numbers never wrap: at 2 kHz they last for

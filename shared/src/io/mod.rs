@@ -2,7 +2,7 @@
 //! real-time scheduling, a wake from that loop to tokio, an identity, endpoints, framed streams.
 //!
 //! Everything here may read a clock, start a wait or open a file or socket; nothing here knows a model, a
-//! message or a session. The haptic thread uses `clock`, `ticker`, `realtime` and `wake` only.
+//! message or a session, but for the farewell. The haptic thread uses `clock`, `ticker`, `realtime` and `wake` only.
 
 #![allow(
     clippy::disallowed_methods,
@@ -14,6 +14,7 @@ pub mod alarm;
 pub mod clock;
 pub mod congestion;
 pub mod connect;
+pub mod farewell;
 pub mod identity;
 pub mod identity_file;
 pub mod listen;

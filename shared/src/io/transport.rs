@@ -10,6 +10,9 @@ mod endpoint;
 mod tests;
 
 pub use choice::{Insecure, Transport};
-pub use connection::{CLOSE_FINISHED, Connection, DatagramCounts, RecvStream, SendStream};
+pub use connection::{
+    CLOSE_FINISHED, CLOSE_NO_HELLO, CLOSE_NOT_A_HELLO, Connection, DatagramCounts, RecvStream,
+    SendStream,
+};
 pub use endpoint::{Endpoint, Handshake, Listener};
 pub use quinn::{ConnectionError, ReadError, SendDatagramError, VarInt, WriteError};

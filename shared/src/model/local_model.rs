@@ -18,6 +18,8 @@ use crate::model::settings::{ModelSettings, PoseCorrection, Smoothing};
 use crate::model::update::{Cause, Update};
 use crate::time::{TICK, TICK_S, Time};
 
+pub use body::BodyState;
+
 use body::Body;
 pub use replay::REPLAYED_PER_TICK;
 use replay::Replay;
@@ -65,7 +67,7 @@ impl LocalModel {
         Self {
             settings,
             body: Body::new(start),
-            target: start.params,
+            target: start.params(),
             correction: Correction::default(),
             history: History::with_capacity(HISTORY_TICKS),
             replay: Replay::new(start),
@@ -83,7 +85,7 @@ impl LocalModel {
 
     /// Parameters in use, footprint, pose and velocity now.
     #[must_use]
-    pub fn state(&self) -> &ModelState {
+    pub fn state(&self) -> &BodyState {
         &self.body.state
     }
 
@@ -125,7 +127,7 @@ impl LocalModel {
             return;
         }
         let before = self.energy_now();
-        self.take_params(&update.state.params);
+        self.take_params(&update.state.params());
         match self.settings.correction {
             PoseCorrection::Snap => self.snap(update),
             PoseCorrection::MatchedStamps => self.match_stamps(update),
@@ -161,9 +163,9 @@ impl LocalModel {
         let state = &mut self.body.state;
         match update.cause {
             Cause::MasterOnlyContact | Cause::SlaveOnlyContact | Cause::ContactLost => {
-                state.footprint = update.state.footprint;
+                state.footprint = update.state.footprint();
                 self.correction.snap(&mut state.pose);
-                state.twist = update.state.twist;
+                state.twist = update.state.twist();
             }
             Cause::Deadband | Cause::EverySample | Cause::Timer => {
                 let pivot = self.rendered.touch.map_or(state.pose.position, |t| t.proxy);
@@ -186,7 +188,7 @@ impl LocalModel {
             return;
         };
         self.correction
-            .aim(&update.state.pose, &then.motion.pose, &then.corrected);
+            .aim(&update.state.pose(), &then.motion.pose, &then.corrected);
     }
 
     /// Begins to replay the HIP from the sample that the update answers; the ticks go on with it. Until it
@@ -201,7 +203,7 @@ impl LocalModel {
     /// the centre moves instead (which no force notices), and the bleed brings the plane to its place.
     /// Only where it is `retracted` does a face that recedes do so at once. Returns the centre's shift.
     fn take_footprint(&mut self, update: &Update, retracted: bool) -> Vec2 {
-        let received = update.state.footprint;
+        let received = update.state.footprint();
         let Some((_, hip)) = self.previous else {
             self.body.state.footprint = received;
             return Vec2::zeros();

@@ -220,18 +220,20 @@ pub fn friction_torque_of_square(c: f64, side: f64) -> f64 {
     c * side * (std::f64::consts::SQRT_2 + libm::asinh(1.0)) / 6.0
 }
 
-/// All that the master needs to render the object: parameters, footprint, pose and velocity.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+/// All that the master needs to render the object: parameters, footprint, pose and velocity, every number checked.
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ModelState {
-    /// The impedance.
-    pub params: ModelParams,
-    /// One distance from the reference point to each face.
-    pub footprint: BoxFootprint,
-    /// `world_from_object`.
-    pub pose: Pose,
-    /// Velocity of the reference point and turning rate.
-    pub twist: Twist,
+    params: ModelParams,
+    footprint: BoxFootprint,
+    pose: Pose,
+    twist: Twist,
 }
+
+/// What [`ModelState::try_new`] accepts: least and greatest value.
+const COORDINATE_M: (f64, f64) = (-WORKSPACE_M, WORKSPACE_M);
+const TURN_RAD: (f64, f64) = (-ANGLE_RAD, ANGLE_RAD);
+const VELOCITY_M_PER_S: (f64, f64) = (-SPEED_M_PER_S, SPEED_M_PER_S);
+const RATE_RAD_PER_S: (f64, f64) = (-TURN_RATE_RAD_PER_S, TURN_RATE_RAD_PER_S);
 
 impl ModelState {
     /// A state whose every number has been checked.
@@ -247,33 +249,12 @@ impl ModelState {
         for face in Face::ALL {
             in_range("face offset", "m", footprint.offset(face), FACE_OFFSET_M)?;
         }
-        in_range(
-            "position x",
-            "m",
-            pose.position.x,
-            (-WORKSPACE_M, WORKSPACE_M),
-        )?;
-        in_range(
-            "position y",
-            "m",
-            pose.position.y,
-            (-WORKSPACE_M, WORKSPACE_M),
-        )?;
-        in_range("angle", "rad", pose.angle, (-ANGLE_RAD, ANGLE_RAD))?;
-        in_range(
-            "velocity x",
-            "m/s",
-            twist.linear.x,
-            (-SPEED_M_PER_S, SPEED_M_PER_S),
-        )?;
-        in_range(
-            "velocity y",
-            "m/s",
-            twist.linear.y,
-            (-SPEED_M_PER_S, SPEED_M_PER_S),
-        )?;
-        let rate = (-TURN_RATE_RAD_PER_S, TURN_RATE_RAD_PER_S);
-        in_range("turning rate", "rad/s", twist.angular, rate)?;
+        in_range("position x", "m", pose.position.x, COORDINATE_M)?;
+        in_range("position y", "m", pose.position.y, COORDINATE_M)?;
+        in_range("angle", "rad", pose.angle, TURN_RAD)?;
+        in_range("velocity x", "m/s", twist.linear.x, VELOCITY_M_PER_S)?;
+        in_range("velocity y", "m/s", twist.linear.y, VELOCITY_M_PER_S)?;
+        in_range("turning rate", "rad/s", twist.angular, RATE_RAD_PER_S)?;
         Ok(Self {
             params,
             footprint,
@@ -282,14 +263,67 @@ impl ModelState {
         })
     }
 
-    /// Checks numbers that came from outside: every field again, the stability bound included.
+    /// The state nearest to these numbers that [`ModelState::try_new`] accepts: an object that has left the workspace
+    /// is at its edge.
     ///
     /// # Errors
-    /// As [`ModelParams::try_new`] and [`ModelState::try_new`].
-    pub fn checked(&self, coupling: &Coupling) -> Result<Self, ParamsError> {
-        let [m, b, c, inertia, e] = self.params.to_array();
-        let params = ModelParams::try_new(m, b, c, inertia, e, coupling)?;
-        Self::try_new(params, self.footprint, self.pose, self.twist)
+    /// Names the first number that is not a number.
+    pub fn nearest(
+        params: ModelParams,
+        footprint: BoxFootprint,
+        pose: Pose,
+        twist: Twist,
+    ) -> Result<Self, ParamsError> {
+        let within = |value: f64, (least, most): (f64, f64)| value.clamp(least, most);
+        let BoxFootprint {
+            east,
+            north,
+            west,
+            south,
+        } = footprint;
+        let [east, north, west, south] =
+            [east, north, west, south].map(|offset| within(offset, FACE_OFFSET_M));
+        let footprint = BoxFootprint {
+            east,
+            north,
+            west,
+            south,
+        };
+        let pose = Pose::new(
+            within(pose.position.x, COORDINATE_M),
+            within(pose.position.y, COORDINATE_M),
+            within(pose.angle, TURN_RAD),
+        );
+        let twist = Twist::new(
+            within(twist.linear.x, VELOCITY_M_PER_S),
+            within(twist.linear.y, VELOCITY_M_PER_S),
+            within(twist.angular, RATE_RAD_PER_S),
+        );
+        Self::try_new(params, footprint, pose, twist)
+    }
+
+    /// The impedance.
+    #[must_use]
+    pub const fn params(&self) -> ModelParams {
+        self.params
+    }
+
+    /// One distance from the reference point to each face.
+    #[must_use]
+    pub const fn footprint(&self) -> BoxFootprint {
+        self.footprint
+    }
+
+    /// `world_from_object`.
+    #[must_use]
+    pub const fn pose(&self) -> Pose {
+        self.pose
+    }
+
+    /// Velocity of the reference point and turning rate.
+    #[must_use]
+    pub const fn twist(&self) -> Twist {
+        self.twist
     }
 }
 
@@ -365,5 +399,22 @@ mod tests {
             let a = edge.blend(&far, f64::from(k) / 10.0).to_array();
             assert!(ModelParams::try_new(a[0], a[1], a[2], a[3], a[4], &COUPLING).is_ok());
         }
+    }
+
+    #[test]
+    fn the_nearest_state_is_the_same_within_the_ranges_and_on_their_edge_beyond() {
+        let params = ModelParams::of_square(0.7, 3.0, 2.06, 0.36, &COUPLING).unwrap();
+        let nearest = |pose, twist| {
+            ModelState::nearest(params, BoxFootprint::square(0.36), pose, twist).unwrap()
+        };
+        let (pose, twist) = (Pose::new(4.99, -4.99, 6282.0), Twist::new(9.0, -9.0, 99.0));
+        let inside = ModelState::try_new(params, BoxFootprint::square(0.36), pose, twist);
+        assert_eq!(Ok(nearest(pose, twist)), inside);
+        let state = nearest(Pose::new(7.0, -7.0, 1e4), Twist::new(-99.0, 99.0, -1e3));
+        assert_eq!(state.pose(), Pose::new(5.0, -5.0, 6283.0));
+        assert_eq!(state.twist(), Twist::new(-10.0, 10.0, -100.0));
+        let nowhere = Pose::new(f64::NAN, 0.0, 0.0);
+        let none = ModelState::nearest(params, BoxFootprint::square(0.36), nowhere, twist);
+        assert!(none.is_err());
     }
 }

@@ -73,7 +73,7 @@ impl ForceCounts {
 }
 
 /// One tick of the master: where the HIP was and the force that the local model rendered for it.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct HipSample {
     /// The tick's stamp by the master's clock.
     pub stamp: Time,

@@ -12,10 +12,6 @@ use crate::time::Time;
 pub struct HandPort {
     /// E_in, the energy that went in at the hand so far, J; it only grows.
     pub in_j: f64,
-    /// Whether the slave is to say the tool's force every tick.
-    pub wants_force: bool,
-    /// Whether the tool is to go only as far as the hand has paid for.
-    pub passive_tool: bool,
 }
 
 /// What the tool feels, where the hand may feel it too.
@@ -24,18 +20,16 @@ pub struct Tool {
     /// Stamp of the HIP sample that the tool was at, by the master's clock: its age is the round trip that the hand
     /// would feel, play-out included.
     pub answers: Time,
-    /// f_s, the measured contact force on the object; none where the master has not asked for it.
-    pub force: Option<ForceCounts>,
+    /// f_s, the measured contact force on the object.
+    pub force: ForceCounts,
     /// Whether the tool touches the object.
     pub in_contact: bool,
     /// E_in of the tool's port, J; it only grows.
     pub in_j: f64,
-    /// Relative force error of the local model over the last half second of contact, 0 to 1.
-    pub model_error: f64,
 }
 
 /// What a viewer sees of the remote scene between updates; the model never uses it.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Scene {
     /// Stamp of the HIP sample that the slave was at, by the master's clock.
     pub answers: Time,

@@ -54,21 +54,32 @@ impl Cause {
     }
 }
 
-/// What an update says: the whole state at one HIP sample, so that it supersedes all earlier ones.
+/// The whole state of the model at one moment, so that it supersedes all earlier ones.
 ///
-/// Off the wire comes a [`RawUpdate`](crate::wire::RawUpdate); only its `accept` makes one of these.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Update {
+/// Off the wire its state is a [`RawState`](crate::wire::RawState): only `accept` makes a [`ModelState`] of that.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Update<S = ModelState> {
     /// Number of the update, from 1, strictly increasing.
     pub sequence: u32,
     /// Why it was sent.
     pub cause: Cause,
-    /// Stamp of the HIP sample that it answers, by the master's clock.
+    /// The moment that it answers, by the master's clock: what the slave played, between two HIP samples as a rule.
     pub answers: Time,
-    /// Number of the newest command that the slave has seen.
-    pub newest_command: u32,
     /// Whether the slave's tool touches the object.
     pub slave_in_contact: bool,
-    /// Parameters, footprint, pose and velocity of the object at that sample.
-    pub state: ModelState,
+    /// Parameters, footprint, pose and velocity of the object at that moment.
+    pub state: S,
+}
+
+impl<S> Update<S> {
+    /// The same update with its state in another form.
+    pub(crate) fn with_state<T>(&self, state: T) -> Update<T> {
+        Update {
+            sequence: self.sequence,
+            cause: self.cause,
+            answers: self.answers,
+            slave_in_contact: self.slave_in_contact,
+            state,
+        }
+    }
 }

@@ -1,27 +1,19 @@
-//! How any message is written and read: header, postcard body, and the checks that all share.
+//! How any message is written and read: header, then a postcard body.
 //!
 //! Must never allocate, and never accept bytes that it would not have written itself.
 
 use postcard::ser_flavors::Flavor;
 use serde::{Deserialize, Serialize};
 
-use super::error::{DecodeError, EncodeError, FieldError, reason};
+use super::error::{DecodeError, EncodeError, reason};
 use super::header::{HEADER_BYTES, Kind, header};
 
-/// A message as it lies on the wire.
-pub(super) trait Body: Serialize {
-    /// Its type.
-    const KIND: Kind;
-
-    /// The rules that its fields keep, whatever the session: checked before writing and after reading.
-    fn check(&self) -> Result<(), FieldError>;
-}
-
 /// Writes header and body to the front of `out`; returns how many bytes that took.
-pub(super) fn write<B: Body>(body: &B, out: &mut [u8]) -> Result<usize, EncodeError> {
-    let kind = B::KIND;
-    body.check()
-        .map_err(|why| EncodeError::Field { kind, why })?;
+pub(super) fn write(
+    kind: Kind,
+    body: &impl Serialize,
+    out: &mut [u8],
+) -> Result<usize, EncodeError> {
     let length = out.len();
     let too_small = EncodeError::BufferTooSmall { kind, length };
     let (head, rest) = out.split_at_mut_checked(HEADER_BYTES).ok_or(too_small)?;
@@ -30,9 +22,11 @@ pub(super) fn write<B: Body>(body: &B, out: &mut [u8]) -> Result<usize, EncodeEr
     Ok(HEADER_BYTES + used.len())
 }
 
-/// Reads a body that must fill `bytes` exactly, in its one canonical form, and keep its rules.
-pub(super) fn read<'a, B: Body + Deserialize<'a>>(bytes: &'a [u8]) -> Result<B, DecodeError> {
-    let kind = B::KIND;
+/// Reads a body that must fill `bytes` exactly, in its one canonical form.
+pub(super) fn read<'a, B: Serialize + Deserialize<'a>>(
+    kind: Kind,
+    bytes: &'a [u8],
+) -> Result<B, DecodeError> {
     let (body, rest) =
         postcard::take_from_bytes::<B>(bytes).map_err(|error| DecodeError::Malformed {
             kind,
@@ -46,8 +40,6 @@ pub(super) fn read<'a, B: Body + Deserialize<'a>>(bytes: &'a [u8]) -> Result<B, 
     if left != Ok(0) {
         return Err(DecodeError::NotCanonical { kind });
     }
-    body.check()
-        .map_err(|why| DecodeError::Field { kind, why })?;
     Ok(body)
 }
 

@@ -1,25 +1,52 @@
-//! Messages in QUIC datagrams: an envelope and a command, update, scene, tool or heartbeat.
+//! Messages in QUIC datagrams: an envelope, then a command, update, scene, tool state or nothing more.
 //!
 //! One datagram is exactly one message. Nothing here allocates.
 
 use serde::{Deserialize, Serialize};
 
-use super::body::{Body, read, write};
+use super::body::{read, write};
 use super::error::{DecodeError, EncodeError, FieldError, demand, finite};
-use super::header::{Channel, DATAGRAM_MAX, Kind, Side, open};
-use super::message::{Command, Envelope};
-use super::raw::{RawScene, RawUpdate};
+use super::header::{Channel, Kind, Side, open};
 use super::samples::SampleBlock;
+use super::state::RawState;
 use crate::model::tool::{HandPort, Scene, Tool};
 use crate::model::update::Update;
+use crate::time::Time;
 
-/// A datagram that was read.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Datagram {
-    /// Number, stamp and echo.
-    pub envelope: Envelope,
-    /// What it is about.
-    pub matter: Matter,
+/// What every datagram carries besides its message.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Envelope {
+    /// Number of this datagram in its direction, from 1, whatever its type: the receiver counts loss by it.
+    pub number: u32,
+    /// When it was sent, by the sender's clock.
+    pub sent: Time,
+    /// The newest datagram that the sender has from the other side; none before the first.
+    pub echo: Option<Echo>,
+}
+
+/// The answer to a stamp: from it the other side computes the round-trip time without a common clock.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Echo {
+    /// Number of the newest datagram received from the other side.
+    pub number: u32,
+    /// That datagram's `sent`, by the other side's clock.
+    pub sent: Time,
+    /// How long it was held before this answer, ns.
+    pub held_ns: u64,
+    /// How many datagrams have been received from the other side so far.
+    pub received: u32,
+}
+
+/// The master's motion since its last command.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Command {
+    /// Number of the newest update that the master had accepted when it sent this, 0 before the first: the
+    /// acknowledgement that the shadow needs.
+    pub newest_update: u32,
+    /// One sample or more.
+    pub samples: SampleBlock,
+    /// The hand's port, where the hand feels the tool's force.
+    pub port: Option<HandPort>,
 }
 
 /// What a datagram is about.
@@ -28,11 +55,11 @@ pub struct Datagram {
     clippy::large_enum_variant,
     reason = "a command is the common case, and nothing here may allocate"
 )]
-pub enum Matter {
+pub enum Message {
     /// The master's motion.
     Command(Command),
-    /// The slave's model, its numbers not yet accepted.
-    Update(RawUpdate),
+    /// The slave's model; off the wire its state is not yet accepted.
+    Update(Update<RawState>),
     /// What a viewer sees.
     Scene(Scene),
     /// What the tool feels.
@@ -41,230 +68,105 @@ pub enum Matter {
     Heartbeat,
 }
 
-/// Writes a command to the front of `out`; returns its length, at most [`DATAGRAM_MAX`].
-///
-/// # Errors
-/// Says which field breaks a rule, or that `out` is too short; what is in `out` then must not be sent.
-pub fn encode_command(
-    envelope: &Envelope,
-    command: &Command,
-    out: &mut [u8],
-) -> Result<usize, EncodeError> {
-    let Command {
-        newest_update,
-        samples,
-        port,
-    } = *command;
-    let motion = Motion {
-        newest_update,
-        samples,
-    };
-    match port {
-        None => write(&Sealed(*envelope, motion), out),
-        Some(port) => write(&Sealed(*envelope, CoupledMotion(motion, port)), out),
-    }
-}
-
-/// Writes an update to the front of `out`; returns its length.
-///
-/// # Errors
-/// As [`encode_command`].
-pub fn encode_update(
-    envelope: &Envelope,
-    update: &Update,
-    out: &mut [u8],
-) -> Result<usize, EncodeError> {
-    write(&Sealed(*envelope, RawUpdate::of(update)), out)
-}
-
-/// Writes a scene to the front of `out`; returns its length.
-///
-/// # Errors
-/// As [`encode_command`].
-pub fn encode_scene(
-    envelope: &Envelope,
-    scene: &Scene,
-    out: &mut [u8],
-) -> Result<usize, EncodeError> {
-    write(&Sealed(*envelope, RawScene::of(scene)), out)
-}
-
-/// Writes what the tool feels to the front of `out`; returns its length.
-///
-/// # Errors
-/// As [`encode_command`].
-pub fn encode_tool(envelope: &Envelope, tool: &Tool, out: &mut [u8]) -> Result<usize, EncodeError> {
-    write(&Sealed(*envelope, *tool), out)
-}
-
-/// Writes a heartbeat to the front of `out`; returns its length.
-///
-/// # Errors
-/// As [`encode_command`].
-pub fn encode_heartbeat(envelope: &Envelope, out: &mut [u8]) -> Result<usize, EncodeError> {
-    write(&Sealed(*envelope, Silence), out)
-}
-
-/// Reads a datagram that `from` sent.
-///
-/// # Errors
-/// Says why the bytes are not exactly one message that `from` may send in a datagram.
-pub fn decode_datagram(bytes: &[u8], from: Side) -> Result<Datagram, DecodeError> {
-    let length = bytes.len();
-    if length > DATAGRAM_MAX {
-        return Err(DecodeError::TooLong { length });
-    }
-    let (kind, body) = open(bytes, from, Channel::Datagram)?;
-    let (envelope, matter) = match kind {
-        Kind::Command => {
-            let Sealed::<Motion>(envelope, motion) = read(body)?;
-            (envelope, Matter::Command(motion.with(None)))
-        }
-        Kind::CoupledCommand => {
-            let Sealed(envelope, CoupledMotion(motion, port)) = read(body)?;
-            (envelope, Matter::Command(motion.with(Some(port))))
-        }
-        Kind::Tool => {
-            let Sealed(envelope, tool) = read(body)?;
-            (envelope, Matter::Tool(tool))
-        }
-        Kind::Update => {
-            let Sealed(envelope, update) = read(body)?;
-            (envelope, Matter::Update(update))
-        }
-        Kind::Scene => {
-            let Sealed::<RawScene>(envelope, scene) = read(body)?;
-            (envelope, Matter::Scene(scene.scene()))
-        }
-        Kind::Heartbeat => {
-            let Sealed(envelope, Silence) = read(body)?;
-            (envelope, Matter::Heartbeat)
-        }
-        Kind::Hello
-        | Kind::Welcome
-        | Kind::Refused
-        | Kind::MasterFarewell
-        | Kind::SlaveFarewell => return Err(DecodeError::WrongChannel { kind }),
-    };
-    Ok(Datagram { envelope, matter })
-}
-
-/// The body of every datagram: the envelope, then the matter.
-#[derive(Serialize, Deserialize)]
-struct Sealed<M>(Envelope, M);
-
-/// The matter of a command.
-#[derive(Serialize, Deserialize)]
-struct Motion {
-    newest_update: u32,
-    samples: SampleBlock,
-}
-
-impl Motion {
-    fn with(&self, port: Option<HandPort>) -> Command {
-        Command {
-            newest_update: self.newest_update,
-            samples: self.samples,
-            port,
+impl Message {
+    /// Its type.
+    #[must_use]
+    pub const fn kind(&self) -> Kind {
+        match self {
+            Self::Command(_) => Kind::Command,
+            Self::Update(_) => Kind::Update,
+            Self::Scene(_) => Kind::Scene,
+            Self::Tool(_) => Kind::Tool,
+            Self::Heartbeat => Kind::Heartbeat,
         }
     }
 }
 
-/// The matter of a command with the hand's port.
-#[derive(Serialize, Deserialize)]
-struct CoupledMotion(Motion, HandPort);
-
-/// The matter of a heartbeat: no bytes.
-#[derive(Serialize, Deserialize)]
-struct Silence;
-
-/// What may stand behind an envelope.
-trait Sealable: Serialize {
-    const KIND: Kind;
-    fn check(&self) -> Result<(), FieldError>;
+/// A datagram: its envelope and its message.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Datagram {
+    /// Number, stamp and echo.
+    pub envelope: Envelope,
+    /// What it is about.
+    pub message: Message,
 }
 
-impl<M: Sealable> Body for Sealed<M> {
-    const KIND: Kind = M::KIND;
+impl Datagram {
+    /// Writes it to the front of `out`; returns its length, at most [`DATAGRAM_MAX`](super::DATAGRAM_MAX).
+    ///
+    /// # Errors
+    /// Names the field that breaks a rule, or that `out` is too short; what is in `out` then must not be sent.
+    pub fn encode(&self, out: &mut [u8]) -> Result<usize, EncodeError> {
+        let (kind, envelope) = (self.message.kind(), &self.envelope);
+        self.check()
+            .map_err(|why| EncodeError::Field { kind, why })?;
+        match &self.message {
+            Message::Command(command) => write(kind, &(envelope, command), out),
+            Message::Update(update) => write(kind, &(envelope, update), out),
+            Message::Scene(scene) => write(kind, &(envelope, scene), out),
+            Message::Tool(tool) => write(kind, &(envelope, tool), out),
+            Message::Heartbeat => write(kind, envelope, out),
+        }
+    }
 
+    /// Reads a datagram that `from` sent.
+    ///
+    /// # Errors
+    /// Why the bytes are not exactly one message that `from` may send in a datagram.
+    pub fn decode(bytes: &[u8], from: Side) -> Result<Self, DecodeError> {
+        let (kind, body) = open(bytes, from, Channel::Datagram)?;
+        let (envelope, message) = match kind {
+            Kind::Command => with(Message::Command, read(kind, body)?),
+            Kind::Update => with(Message::Update, read(kind, body)?),
+            Kind::Scene => with(Message::Scene, read(kind, body)?),
+            Kind::Tool => with(Message::Tool, read(kind, body)?),
+            Kind::Heartbeat => (read(kind, body)?, Message::Heartbeat),
+            Kind::Hello | Kind::Welcome | Kind::Refused | Kind::Farewell => {
+                return Err(DecodeError::WrongChannel { kind });
+            }
+        };
+        let datagram = Self { envelope, message };
+        match datagram.check() {
+            Ok(()) => Ok(datagram),
+            Err(why) => Err(DecodeError::Field { kind, why }),
+        }
+    }
+
+    /// The rules that fields keep, whatever the session: checked before writing and after reading.
     fn check(&self) -> Result<(), FieldError> {
-        let Self(envelope, matter) = self;
-        let echoed = envelope.echo.is_none_or(|echo| echo.number > 0);
-        demand(envelope.number > 0, "number", "must be 1 or more")?;
-        demand(echoed, "echoed number", "must be 1 or more")?;
-        matter.check()
+        let from_1 = "must be 1 or more";
+        demand(self.envelope.number > 0, "number", from_1)?;
+        let echo = self.envelope.echo;
+        let echoed = echo.is_none_or(|echo| echo.number > 0);
+        demand(echoed, "echoed number", from_1)?;
+        match &self.message {
+            Message::Command(command) => {
+                demand(!command.samples.is_empty(), "samples", from_1)?;
+                command.port.map_or(Ok(()), |port| energy(port.in_j))
+            }
+            Message::Update(update) => {
+                demand(update.sequence > 0, "sequence", from_1)?;
+                update.state.check()
+            }
+            Message::Scene(scene) => {
+                let object = scene.object;
+                finite("object", object.position.as_slice())?;
+                finite("object", &[object.angle])?;
+                finite("tool", scene.tool.as_slice())?;
+                finite("force", scene.force.as_slice())
+            }
+            Message::Tool(tool) => energy(tool.in_j),
+            Message::Heartbeat => Ok(()),
+        }
     }
 }
 
-impl Sealable for Motion {
-    const KIND: Kind = Kind::Command;
-
-    fn check(&self) -> Result<(), FieldError> {
-        let moves = !self.samples.is_empty();
-        demand(moves, "samples", "must be one or more")
-    }
+fn with<M>(message: fn(M) -> Message, (envelope, body): (Envelope, M)) -> (Envelope, Message) {
+    (envelope, message(body))
 }
 
-impl Sealable for CoupledMotion {
-    const KIND: Kind = Kind::CoupledCommand;
-
-    fn check(&self) -> Result<(), FieldError> {
-        let Self(motion, port) = self;
-        motion.check()?;
-        energy(port.in_j)
-    }
-}
-
-impl Sealable for Tool {
-    const KIND: Kind = Kind::Tool;
-
-    fn check(&self) -> Result<(), FieldError> {
-        energy(self.in_j)?;
-        let is_share = (0.0..=1.0).contains(&self.model_error);
-        finite("model_error", self.model_error)?;
-        demand(is_share, "model_error", "must be 0 to 1")
-    }
-}
-
-/// What went in at a port.
+/// What went in at a port, J.
 fn energy(in_j: f64) -> Result<(), FieldError> {
-    finite("in_j", in_j)?;
+    finite("in_j", &[in_j])?;
     demand(in_j >= 0.0, "in_j", "must be 0 or more")
-}
-
-impl Sealable for RawUpdate {
-    const KIND: Kind = Kind::Update;
-
-    fn check(&self) -> Result<(), FieldError> {
-        Self::check(self)
-    }
-}
-
-impl Sealable for RawScene {
-    const KIND: Kind = Kind::Scene;
-
-    fn check(&self) -> Result<(), FieldError> {
-        Self::check(self)
-    }
-}
-
-impl Sealable for Silence {
-    const KIND: Kind = Kind::Heartbeat;
-
-    fn check(&self) -> Result<(), FieldError> {
-        Ok(())
-    }
-}
-
-/// Writes what was read, accepted or not: the tests hold it against the bytes.
-#[cfg(test)]
-pub(super) fn encode_read(read: &Datagram, out: &mut [u8]) -> Result<usize, EncodeError> {
-    let envelope = read.envelope;
-    match &read.matter {
-        Matter::Command(command) => encode_command(&envelope, command, out),
-        Matter::Update(update) => write(&Sealed(envelope, *update), out),
-        Matter::Scene(scene) => encode_scene(&envelope, scene, out),
-        Matter::Tool(tool) => encode_tool(&envelope, tool, out),
-        Matter::Heartbeat => encode_heartbeat(&envelope, out),
-    }
 }

@@ -12,13 +12,13 @@ pub struct FieldError {
     pub rule: &'static str,
 }
 
-/// Passes a finite number; names any other.
-pub(super) fn finite(field: &'static str, value: f64) -> Result<(), FieldError> {
-    let rule = "must be a finite number";
-    demand(value.is_finite(), field, rule)
+/// Passes finite numbers; names the field of any other.
+pub(super) fn finite(field: &'static str, values: &[f64]) -> Result<(), FieldError> {
+    let all_finite = values.iter().all(|value| value.is_finite());
+    demand(all_finite, field, "must be finite")
 }
 
-/// Passes if `holds`; else says which field must do what.
+/// Passes if `holds`; else names the field and its rule.
 pub(super) fn demand(
     holds: bool,
     field: &'static str,

@@ -9,10 +9,10 @@ use super::error::DecodeError;
 pub const MAGIC: [u8; 4] = *b"MMTP";
 
 /// The version of the protocol that this code speaks.
-pub const PROTOCOL_VERSION: u8 = 2;
+pub const PROTOCOL_VERSION: u8 = 3;
 
 /// The protocol's name in the TLS handshake (ALPN, RFC 7301); it carries the version.
-pub const ALPN: &str = "mmt/2";
+pub const ALPN: &str = "mmt/3";
 
 /// Length of the header, bytes.
 pub const HEADER_BYTES: usize = 8;
@@ -61,11 +61,21 @@ pub enum Channel {
     Stream,
 }
 
+impl Channel {
+    /// The longest message on it, header included, bytes.
+    const fn longest(self) -> usize {
+        match self {
+            Self::Datagram => DATAGRAM_MAX,
+            Self::Stream => STREAM_MESSAGE_MAX,
+        }
+    }
+}
+
 /// The type of a message, with its number on the wire.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 #[repr(u8)]
 pub enum Kind {
-    /// HIP samples and the newest update seen; up.
+    /// HIP samples and the newest update accepted; up.
     Command = 1,
     /// The whole state of the model; down.
     Update = 2,
@@ -73,36 +83,30 @@ pub enum Kind {
     Scene = 3,
     /// A sign of life; both ways.
     Heartbeat = 4,
-    /// What the tool feels, where the hand may feel it too; down.
+    /// What the tool feels, where the hand feels it too; down.
     Tool = 5,
-    /// A command with what the hand's port says to the tool's; up.
-    CoupledCommand = 6,
     /// First message on the stream; up.
     Hello = 16,
     /// The slave's yes; down.
     Welcome = 17,
     /// The slave's no; down.
     Refused = 18,
-    /// The master's last message, with its totals; up.
-    MasterFarewell = 19,
-    /// The slave's last message, with its totals; down.
-    SlaveFarewell = 20,
+    /// The last message of a side, with its report; both ways.
+    Farewell = 19,
 }
 
 impl Kind {
     /// All types, in the order of their numbers.
-    pub const ALL: [Self; 11] = [
+    pub const ALL: [Self; 9] = [
         Self::Command,
         Self::Update,
         Self::Scene,
         Self::Heartbeat,
         Self::Tool,
-        Self::CoupledCommand,
         Self::Hello,
         Self::Welcome,
         Self::Refused,
-        Self::MasterFarewell,
-        Self::SlaveFarewell,
+        Self::Farewell,
     ];
 
     /// The number in the header.
@@ -120,53 +124,36 @@ impl Kind {
     /// The name used in messages and golden vectors.
     #[must_use]
     pub const fn name(self) -> &'static str {
-        match self {
-            Self::Command => "command",
-            Self::Update => "update",
-            Self::Scene => "scene",
-            Self::Heartbeat => "heartbeat",
-            Self::Tool => "tool",
-            Self::CoupledCommand => "coupled_command",
-            Self::Hello => "hello",
-            Self::Welcome => "welcome",
-            Self::Refused => "refused",
-            Self::MasterFarewell => "master_farewell",
-            Self::SlaveFarewell => "slave_farewell",
-        }
+        self.properties().0
     }
 
     /// The road that it travels.
     #[must_use]
     pub const fn channel(self) -> Channel {
-        match self {
-            Self::Command
-            | Self::Update
-            | Self::Scene
-            | Self::Heartbeat
-            | Self::Tool
-            | Self::CoupledCommand => Channel::Datagram,
-            Self::Hello
-            | Self::Welcome
-            | Self::Refused
-            | Self::MasterFarewell
-            | Self::SlaveFarewell => Channel::Stream,
-        }
+        self.properties().1
     }
 
     /// Whether `side` may send it.
     #[must_use]
-    pub const fn is_sent_by(self, side: Side) -> bool {
+    pub fn is_sent_by(self, side: Side) -> bool {
+        self.properties().2.is_none_or(|sender| sender == side)
+    }
+
+    /// Name, road and sender; no sender where both sides send it.
+    const fn properties(self) -> (&'static str, Channel, Option<Side>) {
+        use Channel::{Datagram, Stream};
+        const UP: Option<Side> = Some(Side::Master);
+        const DOWN: Option<Side> = Some(Side::Slave);
         match self {
-            Self::Heartbeat => true,
-            Self::Command | Self::CoupledCommand | Self::Hello | Self::MasterFarewell => {
-                matches!(side, Side::Master)
-            }
-            Self::Update
-            | Self::Scene
-            | Self::Tool
-            | Self::Welcome
-            | Self::Refused
-            | Self::SlaveFarewell => matches!(side, Side::Slave),
+            Self::Command => ("command", Datagram, UP),
+            Self::Update => ("update", Datagram, DOWN),
+            Self::Scene => ("scene", Datagram, DOWN),
+            Self::Heartbeat => ("heartbeat", Datagram, None),
+            Self::Tool => ("tool", Datagram, DOWN),
+            Self::Hello => ("hello", Stream, UP),
+            Self::Welcome => ("welcome", Stream, DOWN),
+            Self::Refused => ("refused", Stream, DOWN),
+            Self::Farewell => ("farewell", Stream, None),
         }
     }
 }
@@ -183,10 +170,13 @@ pub(super) fn open(
     from: Side,
     channel: Channel,
 ) -> Result<(Kind, &[u8]), DecodeError> {
+    let length = message.len();
+    if length > channel.longest() {
+        return Err(DecodeError::TooLong { length });
+    }
     let Some((&[m, t, u, v, theirs, number, low, high], body)) =
         message.split_first_chunk::<HEADER_BYTES>()
     else {
-        let length = message.len();
         return Err(DecodeError::TooShort { length });
     };
     if [m, t, u, v] != MAGIC {
@@ -216,7 +206,7 @@ mod tests {
     #[test]
     fn numbers_of_types_are_pinned() {
         let numbers = Kind::ALL.map(Kind::number);
-        assert_eq!(numbers, [1, 2, 3, 4, 5, 6, 16, 17, 18, 19, 20]);
+        assert_eq!(numbers, [1, 2, 3, 4, 5, 16, 17, 18, 19]);
         for number in 0..=u8::MAX {
             let kind = Kind::from_number(number);
             assert_eq!(kind.is_some(), numbers.contains(&number));
@@ -226,19 +216,23 @@ mod tests {
 
     #[test]
     fn header_is_readable_by_eye() {
-        assert_eq!(&header(Kind::Welcome), b"MMTP\x02\x11\x00\x00");
+        assert_eq!(&header(Kind::Welcome), b"MMTP\x03\x11\x00\x00");
         assert!(ALPN.ends_with(&PROTOCOL_VERSION.to_string()));
     }
 
     #[test]
     fn another_version_is_named_beside_ours_even_if_all_else_differs() {
-        let error = open(b"MMTP\x07\xff\xff\xff", Side::Master, Channel::Stream).unwrap_err();
-        assert_eq!(error, DecodeError::OtherVersion { theirs: 7 });
-        let text = error.to_string();
-        assert!(
-            text.contains("version 7") && text.contains("version 2"),
-            "{text}"
-        );
+        for theirs in [2, 7] {
+            let message = [b'M', b'M', b'T', b'P', theirs, 0xff, 0xff, 0xff];
+            let error = open(&message, Side::Master, Channel::Stream).unwrap_err();
+            assert_eq!(error, DecodeError::OtherVersion { theirs });
+            let text = error.to_string();
+            let named = format!("version {theirs}");
+            assert!(
+                text.contains(&named) && text.contains("version 3"),
+                "{text}"
+            );
+        }
     }
 
     #[test]
@@ -259,16 +253,16 @@ mod tests {
     fn flags_short_headers_foreign_magic_and_unknown_types_are_refused() {
         let read = |bytes: &[u8]| open(bytes, Side::Master, Channel::Datagram).unwrap_err();
         let length = 7;
-        assert_eq!(read(b"MMTP\x02\x01\0"), DecodeError::TooShort { length });
-        assert_eq!(read(b"MMTQ\x02\x01\0\0"), DecodeError::NotOurs);
+        assert_eq!(read(b"MMTP\x03\x01\0"), DecodeError::TooShort { length });
+        assert_eq!(read(b"MMTQ\x03\x01\0\0"), DecodeError::NotOurs);
         let number = 99;
         assert_eq!(
-            read(b"MMTP\x02\x63\0\0"),
+            read(b"MMTP\x03\x63\0\0"),
             DecodeError::UnknownType { number }
         );
         let (kind, flags) = (Kind::Command, 0x0100);
         assert_eq!(
-            read(b"MMTP\x02\x01\0\x01"),
+            read(b"MMTP\x03\x01\0\x01"),
             DecodeError::Flags { kind, flags }
         );
     }

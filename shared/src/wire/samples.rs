@@ -127,15 +127,7 @@ fn ticks_between(earlier: Time, later: Time) -> Option<u32> {
     (ticks > 0 && apart % tick == 0).then_some(ticks)
 }
 
-/// The first sample of a block on the wire.
-#[derive(Serialize, Deserialize)]
-struct First {
-    stamp: Time,
-    hip: HipCounts,
-    force: ForceCounts,
-}
-
-/// Every other sample on the wire: what changed since the one before.
+/// Every sample but the first on the wire: what changed since the one before.
 #[derive(Serialize, Deserialize)]
 struct Step {
     ticks: u32,
@@ -180,11 +172,7 @@ impl Serialize for SampleBlock {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let mut seq = serializer.serialize_seq(Some(self.length))?;
         if let Some(first) = self.as_slice().first() {
-            seq.serialize_element(&First {
-                stamp: first.stamp,
-                hip: first.hip,
-                force: first.force,
-            })?;
+            seq.serialize_element(first)?;
         }
         for (from, to) in self.as_slice().iter().zip(self.as_slice().iter().skip(1)) {
             let step = Step::between(from, to);
@@ -213,13 +201,8 @@ impl<'de> Visitor<'de> for Packed {
 
     fn visit_seq<A: SeqAccess<'de>>(self, mut seq: A) -> Result<SampleBlock, A::Error> {
         let mut block = SampleBlock::new();
-        let Some(first) = seq.next_element::<First>()? else {
+        let Some(mut sample) = seq.next_element::<HipSample>()? else {
             return Ok(block);
-        };
-        let mut sample = HipSample {
-            stamp: first.stamp,
-            hip: first.hip,
-            force: first.force,
         };
         block.push(sample).map_err(de::Error::custom)?;
         while let Some(step) = seq.next_element::<Step>()? {

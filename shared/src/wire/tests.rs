@@ -1,15 +1,15 @@
 //! Promises of the whole format: what is written reads back, and nothing else reads.
 
-use crate::model::sample::{ForceCounts, HipCounts, HipSample};
-use crate::model::tool::{HandPort, Scene, Tool};
-use crate::model::update::{Cause, Update};
 use proptest::prelude::*;
 
 use super::*;
 use crate::model::contact::Coupling;
 use crate::model::geometry::{BoxFootprint, Pose, Twist, Vec2};
 use crate::model::params::{ModelParams, ModelState, ParamsError};
+use crate::model::sample::{ForceCounts, HipCounts, HipSample};
 use crate::model::settings::{FrictionLaw, Mode, ModelSettings, PoseCorrection, Smoothing};
+use crate::model::tool::{HandPort, Scene, Tool};
+use crate::model::update::{Cause, Update};
 use crate::pairing::Token;
 use crate::time::Time;
 
@@ -39,7 +39,6 @@ fn update() -> Update {
         sequence: 1,
         cause: Cause::Deadband,
         answers: Time::ZERO,
-        newest_command: 0,
         slave_in_contact: false,
         state: state(),
     }
@@ -76,29 +75,10 @@ fn welcome() -> Welcome {
     }
 }
 
-fn slave_farewell() -> Farewell<SlaveTotals> {
-    let mut totals = SlaveTotals::default();
-    totals.force.pmse = Some(0.25);
-    totals.updates_by_cause = [1, 2, 3, 4, 5, 600];
-    totals.traffic.udp_bytes_sent = u64::MAX;
-    Farewell {
-        ending: Ending::Finished,
-        totals,
-    }
-}
-
-fn master_farewell() -> Farewell<MasterTotals> {
-    let mut totals = MasterTotals::default();
-    totals.haptic_loop.cpu_us = Some(Quantiles {
-        p50: 1.0,
-        p99: 2.0,
-        p999: 3.0,
-    });
-    Farewell {
-        ending: Ending::Interrupted,
-        totals,
-    }
-}
+const FAREWELL: Farewell<'_> = Farewell {
+    ending: Ending::Finished,
+    report: br#"{"duration_s":20.0}"#,
+};
 
 type Encoded = Result<usize, EncodeError>;
 
@@ -107,6 +87,15 @@ fn written(encode: impl FnOnce(&mut [u8]) -> Encoded) -> Vec<u8> {
     let length = encode(&mut buffer).unwrap();
     assert!(buffer[length..].iter().all(|&byte| byte == 0xee));
     buffer[..length].to_vec()
+}
+
+fn datagram(envelope: Envelope, message: Message) -> Vec<u8> {
+    let datagram = Datagram { envelope, message };
+    written(|out| datagram.encode(out))
+}
+
+fn on_stream(message: &StreamMessage<'_>) -> Vec<u8> {
+    written(|out| message.encode(out))
 }
 
 fn block(samples: impl IntoIterator<Item = HipSample>) -> SampleBlock {
@@ -142,11 +131,7 @@ fn command() -> Command {
 fn coupled_command() -> Command {
     Command {
         samples: push_samples(1, 0.0),
-        port: Some(HandPort {
-            in_j: 0.125,
-            wants_force: true,
-            passive_tool: false,
-        }),
+        port: Some(HandPort { in_j: 0.125 }),
         ..command()
     }
 }
@@ -154,212 +139,176 @@ fn coupled_command() -> Command {
 fn tool() -> Tool {
     Tool {
         answers: Time::from_millis(12),
-        force: Some(ForceCounts { x: 20_000, y: -5 }),
+        force: ForceCounts { x: 20_000, y: -5 },
         in_contact: true,
         in_j: 0.25,
-        model_error: 0.125,
     }
 }
 
-/// One encoded datagram of each type, with who sends it.
-fn datagrams() -> Vec<(Side, Vec<u8>)> {
-    vec![
-        (
-            Side::Master,
-            written(|out| encode_command(&ENVELOPE, &command(), out)),
-        ),
-        (
-            Side::Slave,
-            written(|out| encode_update(&ENVELOPE, &update(), out)),
-        ),
-        (
-            Side::Slave,
-            written(|out| encode_scene(&ENVELOPE, &scene(), out)),
-        ),
-        (Side::Slave, written(|out| encode_heartbeat(&ENVELOPE, out))),
-        (
-            Side::Slave,
-            written(|out| encode_tool(&ENVELOPE, &tool(), out)),
-        ),
-        (
-            Side::Master,
-            written(|out| encode_command(&ENVELOPE, &coupled_command(), out)),
-        ),
+fn messages() -> [Message; 6] {
+    [
+        Message::Command(command()),
+        Message::Update((&update()).into()),
+        Message::Scene(scene()),
+        Message::Heartbeat,
+        Message::Tool(tool()),
+        Message::Command(coupled_command()),
     ]
 }
 
-/// One encoded stream message of each type, with who sends it.
-fn stream_messages() -> Vec<(Side, Vec<u8>)> {
-    vec![
-        (Side::Master, written(|out| encode_hello(&hello(), out))),
-        (Side::Slave, written(|out| encode_welcome(&welcome(), out))),
-        (
-            Side::Slave,
-            written(|out| encode_refused(Refusal::Busy, out)),
-        ),
-        (
-            Side::Master,
-            written(|out| encode_master_farewell(&master_farewell(), out)),
-        ),
-        (
-            Side::Slave,
-            written(|out| encode_slave_farewell(&slave_farewell(), out)),
-        ),
+fn stream_messages() -> [StreamMessage<'static>; 4] {
+    [
+        StreamMessage::Hello(hello()),
+        StreamMessage::Welcome((&welcome()).into()),
+        StreamMessage::Refused(Refusal::Busy),
+        StreamMessage::Farewell(FAREWELL),
     ]
 }
 
-/// If the bytes read as a datagram, they are the bytes that would be written for it.
-fn reads_only_what_it_writes(bytes: &[u8], from: Side) -> Option<Datagram> {
-    let read = decode_datagram(bytes, from).ok()?;
-    assert_eq!(written(|out| datagram::encode_read(&read, out)), bytes);
-    Some(read)
+/// Who sends a message of this type; the slave where both do.
+fn sender(kind: Kind) -> Side {
+    let sides = [Side::Slave, Side::Master];
+    sides
+        .into_iter()
+        .find(|side| kind.is_sent_by(*side))
+        .unwrap()
 }
 
-fn stream_reads_only_what_it_writes(bytes: &[u8], from: Side) -> Option<StreamMessage> {
-    let read = decode_stream_message(bytes, from).ok()?;
-    assert_eq!(written(|out| stream::encode_read(&read, out)), bytes);
-    Some(read)
+/// One encoded message of each type, with who sends it: those in datagrams, then those on the stream.
+fn all() -> Vec<(Side, Vec<u8>)> {
+    let datagrams = messages().map(|message| (sender(message.kind()), datagram(ENVELOPE, message)));
+    let stream = stream_messages().map(|message| (sender(message.kind()), on_stream(&message)));
+    datagrams.into_iter().chain(stream).collect()
+}
+
+/// If the bytes read as a message, they are the bytes that would be written for it. Whether they do.
+fn reads_only_what_it_writes(bytes: &[u8], from: Side) -> bool {
+    let in_datagram = Datagram::decode(bytes, from);
+    if let Ok(read) = &in_datagram {
+        assert_eq!(written(|out| read.encode(out)), bytes);
+    }
+    let on_the_stream = StreamMessage::decode(bytes, from);
+    if let Ok(read) = &on_the_stream {
+        assert_eq!(on_stream(read), bytes);
+    }
+    in_datagram.is_ok() || on_the_stream.is_ok()
+}
+
+/// Why these bytes are no message on the road of their type.
+fn refused(bytes: &[u8], from: Side) -> DecodeError {
+    let kind = bytes.get(5).and_then(|number| Kind::from_number(*number));
+    match kind.map(Kind::channel) {
+        Some(Channel::Stream) => StreamMessage::decode(bytes, from).unwrap_err(),
+        _ => Datagram::decode(bytes, from).unwrap_err(),
+    }
 }
 
 #[test]
-fn every_datagram_reads_back_as_it_was_written() {
-    let matters = datagrams().into_iter().map(|(from, bytes)| {
-        let read = decode_datagram(&bytes, from).unwrap();
-        assert_eq!(read.envelope, ENVELOPE);
-        read.matter
-    });
-    let matters: Vec<_> = matters.collect();
-    assert_eq!(matters[0], Matter::Command(command()));
-    let Matter::Update(raw) = matters[1] else {
-        panic!("no update");
-    };
-    assert_eq!(raw.accept(&COUPLING), Ok(update()));
-    assert_eq!(matters[2], Matter::Scene(scene()));
-    assert_eq!(matters[3], Matter::Heartbeat);
-    assert_eq!(matters[4], Matter::Tool(tool()));
-    assert_eq!(matters[5], Matter::Command(coupled_command()));
-}
-
-#[test]
-fn every_stream_message_reads_back_as_it_was_written() {
-    let read = |(from, bytes): (Side, Vec<u8>)| decode_stream_message(&bytes, from).unwrap();
-    let messages: Vec<_> = stream_messages().into_iter().map(read).collect();
-    let StreamMessage::Hello(raw) = messages[0] else {
-        panic!("no hello");
-    };
-    assert_eq!(raw.token(), &hello().token);
-    assert_eq!(raw.accept(), Ok(hello()));
-    let StreamMessage::Welcome(raw) = messages[1] else {
-        panic!("no welcome");
-    };
-    assert_eq!(raw.accept(&COUPLING), Ok(welcome()));
-    assert_eq!(messages[2], StreamMessage::Refused(Refusal::Busy));
+fn every_message_reads_back_as_it_was_written() {
+    for message in messages() {
+        let bytes = datagram(ENVELOPE, message);
+        let read = Datagram::decode(&bytes, sender(message.kind())).unwrap();
+        assert_eq!((read.envelope, read.message), (ENVELOPE, message));
+    }
+    for message in stream_messages() {
+        let bytes = on_stream(&message);
+        let read = StreamMessage::decode(&bytes, sender(message.kind()));
+        assert_eq!(read, Ok(message));
+    }
+    let kinds = messages().map(|message| message.kind());
     assert_eq!(
-        messages[3],
-        StreamMessage::MasterFarewell(master_farewell())
+        kinds[..5],
+        [1, 2, 3, 4, 5].map(|n| Kind::from_number(n).unwrap())
     );
-    assert_eq!(messages[4], StreamMessage::SlaveFarewell(slave_farewell()));
-    let kinds: Vec<_> = messages.iter().map(StreamMessage::kind).collect();
-    assert_eq!(kinds, Kind::ALL[6..]);
+    assert_eq!(
+        stream_messages().map(|message| message.kind()),
+        Kind::ALL[5..]
+    );
+}
+
+#[test]
+fn what_is_accepted_is_what_was_sent() {
+    let raw = Update::<RawState>::from(&update());
+    assert_eq!(raw.accept(&COUPLING), Ok(update()));
+    assert_eq!(hello().accept(), Ok(hello()));
+    let raw = Welcome::<RawState>::from(&welcome());
+    assert_eq!(raw.accept(&COUPLING), Ok(welcome()));
 }
 
 #[test]
 fn no_message_reads_when_cut_short_or_continued() {
-    let error = |on_stream: bool, bytes: &[u8], from| {
-        if on_stream {
-            decode_stream_message(bytes, from).unwrap_err()
-        } else {
-            decode_datagram(bytes, from).unwrap_err()
-        }
-    };
-    let all = [datagrams(), stream_messages()].concat();
-    for (from, bytes) in all {
+    for (from, bytes) in all() {
         let kind = Kind::from_number(bytes[5]).unwrap();
-        let on_stream = kind.channel() == Channel::Stream;
         for length in 0..bytes.len() {
-            error(on_stream, &bytes[..length], from);
+            refused(&bytes[..length], from);
         }
         for extra in [1, 2, 8] {
             let mut longer = bytes.clone();
             longer.resize(bytes.len() + extra, 0);
             let expected = DecodeError::Trailing { kind, extra };
-            assert_eq!(error(on_stream, &longer, from), expected);
+            assert_eq!(refused(&longer, from), expected);
         }
     }
 }
 
 #[test]
 fn every_byte_changed_to_every_value_reads_as_itself_or_not_at_all() {
-    let (mut read, mut refused) = (0, 0);
-    let mut count = |is_read| if is_read { read += 1 } else { refused += 1 };
-    for (from, bytes) in datagrams() {
+    let mut counts = [0, 0];
+    for (from, bytes) in all() {
         for place in 0..bytes.len() {
             for value in 0..=u8::MAX {
                 let mut changed = bytes.clone();
                 changed[place] = value;
-                count(reads_only_what_it_writes(&changed, from).is_some());
+                counts[usize::from(reads_only_what_it_writes(&changed, from))] += 1;
             }
         }
     }
-    for (from, bytes) in stream_messages() {
-        for place in 0..bytes.len() {
-            for value in 0..=u8::MAX {
-                let mut changed = bytes.clone();
-                changed[place] = value;
-                count(stream_reads_only_what_it_writes(&changed, from).is_some());
-            }
-        }
-    }
-    assert!(read > 0 && refused > 0, "{read} {refused}");
+    assert!(counts[0] > 1000 && counts[1] > 1000, "{counts:?}");
 }
 
 #[test]
 fn an_over_long_varint_is_refused() {
-    let short = b"MMTP\x02\x04\0\0\x01\x00\x00";
-    assert!(decode_datagram(short, Side::Master).is_ok());
+    let short = b"MMTP\x03\x04\0\0\x01\x00\x00";
+    assert!(Datagram::decode(short, Side::Master).is_ok());
     let kind = Kind::Heartbeat;
     for long in [
-        &b"MMTP\x02\x04\0\0\x81\x00\x00\x00"[..],
-        &b"MMTP\x02\x04\0\0\x01\x80\x00\x00"[..],
-        &b"MMTP\x02\x04\0\0\x81\x80\x80\x80\x00\x00\x00"[..],
+        &b"MMTP\x03\x04\0\0\x81\x00\x00\x00"[..],
+        &b"MMTP\x03\x04\0\0\x01\x80\x00\x00"[..],
+        &b"MMTP\x03\x04\0\0\x81\x80\x80\x80\x00\x00\x00"[..],
     ] {
         let expected = Err(DecodeError::NotCanonical { kind });
-        assert_eq!(decode_datagram(long, Side::Master), expected);
+        assert_eq!(Datagram::decode(long, Side::Master), expected);
     }
 }
 
 #[test]
 fn bytes_longer_than_any_message_are_refused_unread() {
-    let mut bytes = datagrams()[0].1.clone();
-    bytes.resize(DATAGRAM_MAX + 1, 0);
-    let length = bytes.len();
-    let expected = Err(DecodeError::TooLong { length });
-    assert_eq!(decode_datagram(&bytes, Side::Master), expected);
-    bytes = stream_messages()[0].1.clone();
-    bytes.resize(STREAM_MESSAGE_MAX + 1, 0);
-    let length = bytes.len();
-    let expected = Err(DecodeError::TooLong { length });
-    assert_eq!(decode_stream_message(&bytes, Side::Master), expected);
+    for (message, most) in [(0, DATAGRAM_MAX), (6, STREAM_MESSAGE_MAX)] {
+        let (from, mut bytes) = all()[message].clone();
+        let length = most + 1;
+        bytes.resize(length, 0);
+        assert_eq!(refused(&bytes, from), DecodeError::TooLong { length });
+    }
 }
 
 /// Every float on the wire made NaN, infinite or huge: not finite never reads, huge is never accepted.
 #[test]
 fn no_number_that_is_not_finite_reads_and_none_out_of_range_is_accepted() {
-    let (_, bytes) = &datagrams()[1];
+    let bytes = datagram(ENVELOPE, messages()[1]);
     let floats = 15;
     for index in 0..floats {
         let place = bytes.len() - 8 * (floats - index);
         let with = |value: f64| {
             let mut changed = bytes.clone();
             changed[place..place + 8].copy_from_slice(&value.to_le_bytes());
-            decode_datagram(&changed, Side::Slave)
+            Datagram::decode(&changed, Side::Slave)
         };
         for value in [f64::NAN, -f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
             let error = with(value).unwrap_err();
             assert!(matches!(error, DecodeError::Field { .. }), "{error}");
         }
         for value in [f64::MAX, f64::MIN] {
-            let Matter::Update(raw) = with(value).unwrap().matter else {
+            let Message::Update(raw) = with(value).unwrap().message else {
                 panic!("no update");
             };
             let refused = raw.accept(&COUPLING).unwrap_err();
@@ -373,10 +322,7 @@ fn no_number_that_is_not_finite_reads_and_none_out_of_range_is_accepted() {
 
 #[test]
 fn an_update_below_the_stability_bound_is_not_accepted() {
-    let (from, bytes) = &datagrams()[1];
-    let Matter::Update(raw) = decode_datagram(bytes, *from).unwrap().matter else {
-        panic!("no update");
-    };
+    let raw = Update::<RawState>::from(&update());
     let stiff = Coupling::for_stiffness(10_000.0);
     let stiff = Coupling {
         damping_ns_per_m: 100.0 * stiff.damping_ns_per_m,
@@ -393,64 +339,59 @@ fn an_update_below_the_stability_bound_is_not_accepted() {
 fn what_the_other_side_would_refuse_is_not_written() {
     let mut out = [0; STREAM_MESSAGE_MAX];
     let refused = |encoded: Encoded| assert!(matches!(encoded, Err(EncodeError::Field { .. })));
-    let unnumbered = Envelope {
-        number: 0,
-        ..ENVELOPE
+    let mut not_sent = |message: Message| {
+        let envelope = ENVELOPE;
+        refused(Datagram { envelope, message }.encode(&mut out));
     };
-    refused(encode_heartbeat(&unnumbered, &mut out));
     let mut empty = command();
     empty.samples.clear();
-    refused(encode_command(&ENVELOPE, &empty, &mut out));
+    not_sent(Message::Command(empty));
     let mut bad = update();
     bad.sequence = 0;
-    refused(encode_update(&ENVELOPE, &bad, &mut out));
-    bad = update();
-    bad.state.pose.angle = f64::NAN;
-    refused(encode_update(&ENVELOPE, &bad, &mut out));
+    not_sent(Message::Update((&bad).into()));
     let mut bad = scene();
     bad.force.y = f64::INFINITY;
-    refused(encode_scene(&ENVELOPE, &bad, &mut out));
+    not_sent(Message::Scene(bad));
     for in_j in [-1e-9, f64::NAN, f64::INFINITY] {
-        refused(encode_tool(&ENVELOPE, &Tool { in_j, ..tool() }, &mut out));
-        let port = coupled_command().port.map(|port| HandPort { in_j, ..port });
-        let bad = Command { port, ..command() };
-        refused(encode_command(&ENVELOPE, &bad, &mut out));
+        not_sent(Message::Tool(Tool { in_j, ..tool() }));
+        let port = Some(HandPort { in_j });
+        not_sent(Message::Command(Command { port, ..command() }));
     }
-    for model_error in [-0.1, 1.1, f64::NAN] {
-        let bad = Tool {
-            model_error,
-            ..tool()
-        };
-        refused(encode_tool(&ENVELOPE, &bad, &mut out));
+    for envelope in [0, 1].map(|number| Envelope {
+        number,
+        echo: Some(Echo {
+            number,
+            sent: Time::ZERO,
+            held_ns: 0,
+            received: 0,
+        })
+        .filter(|_| number == 0),
+        ..ENVELOPE
+    }) {
+        let message = Message::Heartbeat;
+        let encoded = Datagram { envelope, message }.encode(&mut out);
+        assert_eq!(encoded.is_ok(), envelope.number == 1);
     }
-    let mut bad = slave_farewell();
-    bad.totals.force.pmse = Some(f64::NAN);
-    refused(encode_slave_farewell(&bad, &mut out));
-    let mut bad = master_farewell();
-    bad.totals.haptic_loop.lateness_us = Some(Quantiles {
-        p50: f64::NAN,
-        ..Quantiles::default()
-    });
-    refused(encode_master_farewell(&bad, &mut out));
     let mut bad = hello();
     bad.hip.x = f64::NAN;
-    refused(encode_hello(&bad, &mut out));
+    refused(StreamMessage::Hello(bad).encode(&mut out));
     let mut bad = welcome();
     bad.settings.smoothing = Smoothing::InTime { tau_s: f64::NAN };
-    refused(encode_welcome(&bad, &mut out));
+    refused(StreamMessage::Welcome((&bad).into()).encode(&mut out));
 }
 
 #[test]
 fn no_buffer_is_too_short_without_an_error() {
-    let (_, bytes) = &datagrams()[0];
-    for length in 0..bytes.len() {
-        let encoded = encode_command(&ENVELOPE, &command(), &mut vec![0; length]);
+    let (envelope, message) = (ENVELOPE, messages()[0]);
+    for length in 0..datagram(envelope, message).len() {
+        let encoded = Datagram { envelope, message }.encode(&mut vec![0; length]);
         assert!(matches!(encoded, Err(EncodeError::BufferTooSmall { .. })));
     }
-    let (_, bytes) = &stream_messages()[0];
-    for length in 0..bytes.len() {
-        let encoded = encode_hello(&hello(), &mut vec![0; length]);
-        assert!(matches!(encoded, Err(EncodeError::BufferTooSmall { .. })));
+    for message in stream_messages() {
+        for length in 0..on_stream(&message).len() {
+            let encoded = message.encode(&mut vec![0; length]);
+            assert!(matches!(encoded, Err(EncodeError::BufferTooSmall { .. })));
+        }
     }
 }
 
@@ -483,22 +424,23 @@ fn the_longest_messages_fit() {
         samples,
         port: None,
     };
-    let bytes = written(|out| encode_command(&envelope, &command, out));
-    // 8 header, 46 envelope, 5 newest update, 1 length, 30 the first sample, 25 each other
-    assert_eq!(bytes.len(), 8 + 46 + 5 + 1 + 30 + 31 * 25);
-    let coupled = Command {
-        port: Some(HandPort::default()),
-        ..command
-    };
-    let longest = written(|out| encode_command(&envelope, &coupled, out));
-    // 8 E_in, 1 for each wish
-    assert_eq!(longest.len(), bytes.len() + 10);
+    let bytes = datagram(envelope, Message::Command(command));
+    // 8 header, 46 envelope, 5 newest update, 1 length, 30 the first sample, 25 each other, 1 no port
+    assert_eq!(bytes.len(), 8 + 46 + 5 + 1 + 30 + 31 * 25 + 1);
+    let port = Some(HandPort::default());
+    let longest = datagram(envelope, Message::Command(Command { port, ..command }));
+    // E_in
+    assert_eq!(longest.len(), bytes.len() + 8);
     assert!(longest.len() <= DATAGRAM_MAX);
-    assert!(reads_only_what_it_writes(&bytes, Side::Master).is_some());
+    assert!(reads_only_what_it_writes(&longest, Side::Master));
+    let report = [b' '; STREAM_MESSAGE_MAX - 8 - 1 - 2];
+    let report = &report[..];
+    let farewell = StreamMessage::Farewell(Farewell { report, ..FAREWELL });
+    assert_eq!(on_stream(&farewell).len(), STREAM_MESSAGE_MAX);
 }
 
 #[test]
-fn ten_samples_of_a_push_take_115_bytes_in_all_and_125_with_a_strong_tremor() {
+fn ten_samples_of_a_push_take_116_bytes_in_all_and_126_with_a_strong_tremor() {
     let echo = Some(Echo {
         number: 300,
         sent: Time::from_millis(29_900),
@@ -516,12 +458,12 @@ fn ten_samples_of_a_push_take_115_bytes_in_all_and_125_with_a_strong_tremor() {
             samples: push_samples(10, tremor),
             port: None,
         };
-        written(|out| encode_command(&envelope, &command, out)).len()
+        datagram(envelope, Message::Command(command)).len()
     };
     // a hand without and with a strong tremor
     let (smooth, shaking) = (length(0.0), length(5e-4));
-    assert!(smooth <= 115, "{smooth} bytes");
-    assert!(smooth < shaking && shaking <= 125, "{shaking} bytes");
+    assert!(smooth <= 116, "{smooth} bytes");
+    assert!(smooth < shaking && shaking <= 126, "{shaking} bytes");
     println!("{smooth} bytes smooth, {shaking} bytes shaking");
 }
 
@@ -570,53 +512,59 @@ fn numbers_of_choices_are_pinned() {
 
 #[test]
 fn a_hello_or_welcome_with_a_number_out_of_range_is_not_accepted() {
-    let raw_hello = |hello: &Hello| raw::RawHello::of(hello).accept();
     for k_p in [49.9, 10_001.0, -1000.0] {
         let mut bad = hello();
         bad.coupling.stiffness_n_per_m = k_p;
-        assert!(matches!(raw_hello(&bad), Err(HelloError::Number(_))));
+        assert!(matches!(bad.accept(), Err(HelloError::Number(_))));
         let mut bad = welcome();
         bad.settings.coupling.stiffness_n_per_m = k_p;
-        let refused = raw::RawWelcome::of(&bad).accept(&bad.settings.coupling);
+        let refused = Welcome::<RawState>::from(&bad).accept(&bad.settings.coupling);
         assert!(matches!(refused, Err(WelcomeError::Number(_))));
     }
     for hz in [61, 255] {
         let mut bad = hello();
         bad.scene_hz = hz;
-        assert_eq!(raw_hello(&bad), Err(HelloError::SceneRate { hz }));
+        assert_eq!(bad.accept(), Err(HelloError::SceneRate { hz }));
     }
     for samples in [0, 33, 255] {
         let mut bad = hello();
         bad.samples_per_command = samples;
         let refused = Err(HelloError::SamplesPerCommand { samples });
-        assert_eq!(raw_hello(&bad), refused);
+        assert_eq!(bad.accept(), refused);
     }
     let mut far = hello();
     far.hip.y = 5.1;
-    assert!(raw_hello(&far).is_err());
-    let mut bad = welcome();
-    bad.state.pose.position.x = 6.0;
-    assert!(raw::RawWelcome::of(&bad).accept(&COUPLING).is_err());
+    assert!(far.accept().is_err());
+    let bytes = on_stream(&stream_messages()[1]);
+    let at = |value: f64| bytes.windows(8).position(|w| w == value.to_le_bytes());
+    let place = at(0.1).unwrap();
+    let mut bytes = bytes.clone();
+    bytes[place..place + 8].copy_from_slice(&6.0_f64.to_le_bytes());
+    let Ok(StreamMessage::Welcome(bad)) = StreamMessage::decode(&bytes, Side::Slave) else {
+        panic!("no welcome");
+    };
+    let refused = bad.accept(&COUPLING).unwrap_err();
+    assert!(refused.to_string().contains("position x"), "{refused}");
 }
 
 #[test]
 fn a_slave_cannot_make_the_hand_feel_another_stiffness_than_its_device_s() {
     let mut stiffer = welcome();
     stiffer.settings.coupling.stiffness_n_per_m = 2000.0;
-    let refused = raw::RawWelcome::of(&stiffer).accept(&COUPLING);
+    let refused = Welcome::<RawState>::from(&stiffer).accept(&COUPLING);
     assert!(matches!(refused, Err(WelcomeError::OtherCoupling { .. })));
 }
 
 #[test]
 fn a_text_too_long_or_with_control_characters_is_refused() {
-    let (from, good) = &stream_messages()[0];
+    let (from, good) = &all()[6];
     let text = b"mmt test";
     let at = good.windows(text.len()).position(|w| w == text).unwrap();
     let with = |text: &[u8]| {
         let mut bytes = good[..at - 1].to_vec();
         bytes.push(text.len() as u8);
         bytes.extend_from_slice(text);
-        decode_stream_message(&bytes, *from)
+        StreamMessage::decode(&bytes, *from).map(|message| message.kind())
     };
     assert!(with(&[b'a'; 64]).is_ok());
     for bad in [&[b'a'; 65][..], b"a\x1b[2J", b"a\n", b"\xff\xfe"] {
@@ -626,8 +574,8 @@ fn a_text_too_long_or_with_control_characters_is_refused() {
 
 #[test]
 fn a_printed_hello_does_not_show_the_token() {
-    let (from, bytes) = &stream_messages()[0];
-    let read = decode_stream_message(bytes, *from).unwrap();
+    let (from, bytes) = &all()[6];
+    let read = StreamMessage::decode(bytes, *from).unwrap();
     for shown in [format!("{read:?}"), format!("{:?}", hello())] {
         assert!(
             shown.contains("secret") && !shown.contains("7, 7"),
@@ -699,126 +647,110 @@ fn any_state() -> impl Strategy<Value = ModelState> {
     })
 }
 
-fn any_port() -> impl Strategy<Value = HandPort> {
-    (0.0..1e9, any::<bool>(), any::<bool>()).prop_map(|(in_j, wants_force, passive_tool)| {
-        HandPort {
-            in_j,
-            wants_force,
-            passive_tool,
-        }
-    })
-}
-
 proptest! {
     #[test]
     fn any_command_reads_back(
         envelope in any_envelope(),
         command in any_command(),
-        port in prop::option::of(any_port()),
+        in_j in prop::option::of(0.0..1e9),
     ) {
-        let command = Command { port, ..command };
-        let bytes = written(|out| encode_command(&envelope, &command, out));
-        let matter = Matter::Command(command);
+        let port = in_j.map(|in_j| HandPort { in_j });
+        let message = Message::Command(Command { port, ..command });
+        let bytes = datagram(envelope, message);
         prop_assert!(bytes.len() <= DATAGRAM_MAX);
-        prop_assert_eq!(decode_datagram(&bytes, Side::Master), Ok(Datagram { envelope, matter }));
+        prop_assert_eq!(Datagram::decode(&bytes, Side::Master), Ok(Datagram { envelope, message }));
     }
 
     #[test]
     fn any_update_reads_back(
         envelope in any_envelope(),
-        (sequence, newest_command) in (1_u32.., any::<u32>()),
+        sequence in 1_u32..,
         (cause, slave_in_contact) in (0..6_usize, any::<bool>()),
         (answers, state) in (any::<u64>(), any_state()),
     ) {
         let (cause, answers) = (Cause::ALL[cause], Time::from_nanos(answers));
-        let update = Update { sequence, cause, answers, newest_command, slave_in_contact, state };
-        let bytes = written(|out| encode_update(&envelope, &update, out));
-        let read = decode_datagram(&bytes, Side::Slave).unwrap();
+        let update = Update { sequence, cause, answers, slave_in_contact, state };
+        let bytes = datagram(envelope, Message::Update((&update).into()));
+        let read = Datagram::decode(&bytes, Side::Slave).unwrap();
         prop_assert_eq!(read.envelope, envelope);
-        let Matter::Update(raw) = read.matter else { panic!("no update") };
-        prop_assert_eq!(raw.sequence(), sequence);
+        let Message::Update(raw) = read.message else { panic!("no update") };
+        prop_assert_eq!(raw.sequence, sequence);
         prop_assert_eq!(raw.accept(&COUPLING), Ok(update));
     }
 
     #[test]
-    fn any_scene_and_heartbeat_read_back(
+    fn any_scene_tool_and_heartbeat_read_back(
         envelope in any_envelope(),
         answers in any::<u64>(),
         n in prop::array::uniform7(any_finite()),
+        ((x, y), in_contact, in_j) in (any::<(i32, i32)>(), any::<bool>(), 0.0..1e9),
     ) {
+        let answers = Time::from_nanos(answers);
         let scene = Scene {
-            answers: Time::from_nanos(answers),
+            answers,
             object: Pose::new(n[0], n[1], n[2]),
             tool: Vec2::new(n[3], n[4]),
             force: Vec2::new(n[5], n[6]),
         };
-        let bytes = written(|out| encode_scene(&envelope, &scene, out));
-        let matter = Matter::Scene(scene);
-        prop_assert_eq!(decode_datagram(&bytes, Side::Slave), Ok(Datagram { envelope, matter }));
-        let bytes = written(|out| encode_heartbeat(&envelope, out));
-        let matter = Matter::Heartbeat;
-        for from in [Side::Master, Side::Slave] {
-            prop_assert_eq!(decode_datagram(&bytes, from), Ok(Datagram { envelope, matter }));
+        let tool = Tool { answers, force: ForceCounts { x, y }, in_contact, in_j };
+        for message in [Message::Scene(scene), Message::Tool(tool), Message::Heartbeat] {
+            let bytes = datagram(envelope, message);
+            for from in [Side::Master, Side::Slave] {
+                let read = Datagram::decode(&bytes, from);
+                if message.kind().is_sent_by(from) {
+                    prop_assert_eq!(read, Ok(Datagram { envelope, message }));
+                } else {
+                    prop_assert!(read.is_err());
+                }
+            }
         }
     }
 
     #[test]
-    fn any_tool_reads_back(
-        envelope in any_envelope(),
-        (answers, in_j, model_error) in (any::<u64>(), 0.0..1e9, 0.0..=1.0),
-        (force, in_contact) in (prop::option::of(any::<[i32; 2]>()), any::<bool>()),
-    ) {
-        let answers = Time::from_nanos(answers);
-        let force = force.map(|[x, y]| ForceCounts { x, y });
-        let tool = Tool { answers, force, in_contact, in_j, model_error };
-        let bytes = written(|out| encode_tool(&envelope, &tool, out));
-        let matter = Matter::Tool(tool);
-        prop_assert_eq!(decode_datagram(&bytes, Side::Slave), Ok(Datagram { envelope, matter }));
-        prop_assert!(decode_datagram(&bytes, Side::Master).is_err());
-    }
-
-    #[test]
-    fn any_hello_and_welcome_read_back(
+    fn any_hello_welcome_and_farewell_read_back(
         token: [u8; 32],
         (k_p, k_d, tau) in (50.0..10_000.0, 0.0..100.0, 0.001..10.0),
         (samples, x) in (1..=32_u8, -5.0..5.0),
         (name, state) in (".{0,40}", any_state()),
+        report in prop::collection::vec(any::<u8>(), 0..4000),
     ) {
         let coupling = Coupling { stiffness_n_per_m: k_p, damping_ns_per_m: k_d };
         let hello = Hello {
             token: Token::new(token),
             coupling,
             samples_per_command: samples,
-            architecture: Architecture::ALL[usize::from(samples) % 3],
+            architecture: Architecture::ALL[usize::from(samples) % 2],
             hip: Vec2::new(x, -x),
             program: Label::clipped(&name),
             ..hello()
         };
-        let bytes = written(|out| encode_hello(&hello, out));
-        let Ok(StreamMessage::Hello(raw)) = decode_stream_message(&bytes, Side::Master) else {
-            panic!("no hello")
-        };
-        prop_assert_eq!(raw.accept(), Ok(hello));
+        prop_assert_eq!(hello.accept(), Ok(hello));
         let smoothing = Smoothing::InTime { tau_s: tau };
         let settings = ModelSettings { smoothing, ..welcome().settings };
         let scheme = Label::clipped(&name);
         let welcome = Welcome { settings, scheme, state, ..welcome() };
-        let bytes = written(|out| encode_welcome(&welcome, out));
-        let Ok(StreamMessage::Welcome(raw)) = decode_stream_message(&bytes, Side::Slave) else {
-            panic!("no welcome")
-        };
+        let raw = Welcome::<RawState>::from(&welcome);
         prop_assert_eq!(raw.accept(&COUPLING), Ok(welcome));
+        let farewell = Farewell { report: &report, ..FAREWELL };
+        for message in [
+            StreamMessage::Hello(hello),
+            StreamMessage::Welcome(raw),
+            StreamMessage::Farewell(farewell),
+        ] {
+            let bytes = on_stream(&message);
+            let read = StreamMessage::decode(&bytes, sender(message.kind()));
+            prop_assert_eq!(read, Ok(message));
+        }
     }
 
     #[test]
     fn mutated_bytes_read_as_themselves_or_not_at_all(
-        which in 0..9_usize,
+        which in 0..10_usize,
         changes in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..6),
         (cut, tail) in (any::<prop::sample::Index>(), prop::collection::vec(any::<u8>(), 0..6)),
         reach in any::<bool>(),
     ) {
-        let all = [datagrams(), stream_messages()].concat();
-        let (from, mut bytes) = all[which].clone();
+        let (from, mut bytes) = all()[which].clone();
         for (place, value) in changes {
             // past the header, half of the time
             let first = if reach { 8 } else { 0 };
@@ -826,11 +758,9 @@ proptest! {
             bytes[place] = value;
         }
         reads_only_what_it_writes(&bytes, from);
-        stream_reads_only_what_it_writes(&bytes, from);
         bytes.truncate(1 + cut.index(bytes.len()));
         bytes.extend_from_slice(&tail);
         reads_only_what_it_writes(&bytes, from);
-        stream_reads_only_what_it_writes(&bytes, from);
     }
 
     #[test]
@@ -844,8 +774,6 @@ proptest! {
             for from in [Side::Master, Side::Slave] {
                 reads_only_what_it_writes(&message, from);
                 reads_only_what_it_writes(&body, from);
-                stream_reads_only_what_it_writes(&message, from);
-                stream_reads_only_what_it_writes(&body, from);
             }
         }
     }

@@ -134,7 +134,11 @@ pub(crate) fn tshark(capture: &Path, options: &[String]) -> Result<String, Tshar
     let text = String::from_utf8_lossy(&output.stdout).into_owned();
     let printed = String::from_utf8_lossy(&output.stderr);
     let fault = ["Lua Error", "Lua:", "lua_script"];
-    if !output.status.success() || fault.iter().any(|f| text.contains(f) || printed.contains(f)) {
+    if !output.status.success()
+        || fault
+            .iter()
+            .any(|f| text.contains(f) || printed.contains(f))
+    {
         return Err(TsharkError::Failed(format!("{printed}\n{text}")));
     }
     Ok(text)

@@ -2,9 +2,10 @@
 
 use std::net::SocketAddr;
 
-use mmt_shared::channel::datagram_channel::{LinkEnd, Outgoing};
+use mmt_shared::channel::datagram_channel::LinkEnd;
 use mmt_shared::io::clock::Clock;
 use mmt_shared::io::congestion::RateCap;
+use mmt_shared::io::farewell::ReceivedFarewell;
 use mmt_shared::io::identity::Identity;
 use mmt_shared::io::listen::Listener;
 use mmt_shared::io::quic::{Traffic, server_endpoint};
@@ -13,11 +14,10 @@ use mmt_shared::io::stream::{read_frame, write_frame};
 use mmt_shared::model::geometry::{BoxFootprint, Pose};
 use mmt_shared::model::settings::Mode;
 use mmt_shared::model::update::Update;
+use mmt_shared::stats::session::{self, MasterTotals};
 use mmt_shared::time::Time;
 use mmt_shared::wire::{
-    DATAGRAM_MAX, Farewell, Hello, Label, MasterTotals, Matter, STREAM_MESSAGE_MAX, Side,
-    StreamMessage, Welcome, decode_stream_message, encode_refused, encode_slave_farewell,
-    encode_welcome,
+    DATAGRAM_MAX, Farewell, Hello, Label, Message, STREAM_MESSAGE_MAX, Side, StreamMessage, Welcome,
 };
 use quinn::{Connection, RecvStream, SendStream};
 
@@ -94,7 +94,8 @@ impl Session {
         let connection = handshake.unwrap().finish().await.unwrap();
         let (send, mut receive) = connection.accept_bi().await.unwrap();
         let message = read_frame(&mut receive, STREAM_MESSAGE_MAX, FOR_EVER).await;
-        let message = decode_stream_message(&message.unwrap(), Side::Master).unwrap();
+        let message = message.unwrap();
+        let message = StreamMessage::decode(&message, Side::Master).unwrap();
         let StreamMessage::Hello(hello) = message else {
             panic!("{message:?} instead of a hello");
         };
@@ -121,32 +122,30 @@ impl Session {
     }
 
     pub(super) async fn welcome(&mut self, coupling: Coupling) {
-        let mut out = [0; STREAM_MESSAGE_MAX];
-        let length = encode_welcome(&welcome_for(coupling), &mut out).unwrap();
-        self.write(&out[..length]).await;
+        self.say(&StreamMessage::Welcome((&welcome_for(coupling)).into()))
+            .await;
     }
 
     pub(super) async fn refuse(&mut self, refusal: Refusal) {
-        let mut out = [0; STREAM_MESSAGE_MAX];
-        let length = encode_refused(refusal, &mut out).unwrap();
-        self.write(&out[..length]).await;
+        self.say(&StreamMessage::Refused(refusal)).await;
     }
 
     pub(super) async fn say_farewell(&mut self, ending: Ending, totals: SlaveTotals) {
-        let mut out = [0; STREAM_MESSAGE_MAX];
-        let farewell = Farewell { ending, totals };
-        let length = encode_slave_farewell(&farewell, &mut out).unwrap();
-        self.write(&out[..length]).await;
+        let report = &session::to_report(&totals);
+        self.say(&StreamMessage::Farewell(Farewell { ending, report }))
+            .await;
     }
 
-    async fn write(&mut self, message: &[u8]) {
-        write_frame(&mut self.send, message, FOR_EVER)
+    async fn say(&mut self, message: &StreamMessage<'_>) {
+        let mut out = [0; STREAM_MESSAGE_MAX];
+        let length = message.encode(&mut out).unwrap();
+        write_frame(&mut self.send, &out[..length], FOR_EVER)
             .await
             .unwrap();
     }
 
     /// Takes samples in and sends an update every 20 ms, until the master says farewell.
-    pub(super) async fn serve(&mut self) -> Farewell<MasterTotals> {
+    pub(super) async fn serve(&mut self) -> ReceivedFarewell<MasterTotals> {
         timeout(FOR_EVER, self.serve_until_farewell())
             .await
             .unwrap()
@@ -160,7 +159,7 @@ impl Session {
         }
     }
 
-    async fn serve_until_farewell(&mut self) -> Farewell<MasterTotals> {
+    async fn serve_until_farewell(&mut self) -> ReceivedFarewell<MasterTotals> {
         let mut receive = self.receive.take().unwrap();
         let message =
             tokio::spawn(
@@ -170,8 +169,11 @@ impl Session {
             self.turn(Duration::from_millis(20)).await;
         }
         let message = message.await.unwrap().unwrap();
-        match decode_stream_message(&message, Side::Master).unwrap() {
-            StreamMessage::MasterFarewell(farewell) => farewell,
+        match StreamMessage::decode(&message, Side::Master).unwrap() {
+            StreamMessage::Farewell(Farewell { ending, report }) => ReceivedFarewell {
+                ending,
+                report: session::of_report(report),
+            },
             other => panic!("{other:?} instead of a farewell"),
         }
     }
@@ -182,7 +184,7 @@ impl Session {
             tokio::time::timeout_at(end, self.connection.read_datagram()).await
         {
             let opened = self.link.open(self.clock.now(), &bytes);
-            if let Some(Matter::Command(command)) = opened.map(|opened| opened.matter) {
+            if let Some(Message::Command(command)) = opened.map(|opened| opened.message) {
                 let stamps = command.samples.as_slice().iter();
                 self.stamps
                     .extend(stamps.map(|sample| sample.stamp.as_nanos()));
@@ -198,15 +200,14 @@ impl Session {
             sequence: self.sequence,
             cause: Cause::Timer,
             answers: Time::from_nanos(self.stamps.last().copied().unwrap_or(0)),
-            newest_command: self.link.peer().newest(),
             slave_in_contact: false,
             state: state(&self.hello.coupling),
         };
-        self.tell(Outgoing::Update(&update));
+        self.tell(Message::Update((&update).into()));
     }
 
     /// Sends a message on its own datagram.
-    pub(super) fn tell(&mut self, message: Outgoing<'_>) {
+    pub(super) fn tell(&mut self, message: Message) {
         let mut out = [0; DATAGRAM_MAX];
         let length = self.link.seal(self.clock.now(), message, &mut out);
         let bytes = out[..length.unwrap()].to_vec();

@@ -58,7 +58,6 @@ fn update(sequence: u32) -> Update {
         sequence,
         cause: Cause::Timer,
         answers: Time::from_millis(1),
-        newest_command: 1,
         slave_in_contact: true,
         state: state(&COUPLING),
     }

@@ -3,7 +3,7 @@
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use mmt_shared::report::Counts;
-use mmt_shared::wire::Traffic;
+use mmt_shared::stats::session::Traffic;
 
 use super::{Outcome, named};
 use crate::io::host::Shared;
@@ -57,6 +57,7 @@ fn slave_drops(finished: &Finished) -> Counts {
         ("samples_overflow", playout.overflow),
         ("samples_implausible", playout.implausible),
         ("estimates_refused", slave.refused_estimates()),
+        ("states_clamped", slave.clamped_states()),
         ("wrenches_refused", slave.environment().refused()),
         ("forces_not_finite", slave.force().rejected()),
     ])

@@ -7,18 +7,22 @@ use std::time::Duration;
 
 use bytes::Bytes;
 use mmt_shared::channel::datagram_channel::SealError;
+use mmt_shared::io::farewell::{FarewellError, ReceivedFarewell};
 use mmt_shared::io::live::LiveCell;
 use mmt_shared::io::transport::SendDatagramError;
+use mmt_shared::stats::session::MasterTotals;
 use mmt_shared::time::Time;
-use mmt_shared::wire::{Farewell, MasterTotals};
 use tokio::sync::watch;
 use tokio::time::{MissedTickBehavior, interval, sleep};
 
 use super::Session;
-use super::end::{End, SILENCE_MAX, StreamError};
+use super::end::{End, SILENCE_MAX};
 use crate::io::SlaveLive;
 use crate::io::host::stopped;
 use crate::io::worker::Arrived;
+
+/// What the read of the master's farewell gives.
+type MastersFarewell = Result<ReceivedFarewell<MasterTotals>, FarewellError>;
 
 /// Between two looks for the screen: 40 in a second.
 const LOOK: Duration = Duration::from_millis(25);
@@ -27,7 +31,7 @@ impl Session<'_> {
     /// Carries the traffic until something ends it.
     pub(super) async fn until_end(
         &mut self,
-        farewell: Pin<&mut impl Future<Output = Result<Farewell<MasterTotals>, StreamError>>>,
+        farewell: Pin<&mut impl Future<Output = MastersFarewell>>,
         stop: &mut watch::Receiver<bool>,
         live: &LiveCell<SlaveLive>,
     ) -> End {
@@ -37,7 +41,7 @@ impl Session<'_> {
 
     async fn carry(
         &mut self,
-        mut farewell: Pin<&mut impl Future<Output = Result<Farewell<MasterTotals>, StreamError>>>,
+        mut farewell: Pin<&mut impl Future<Output = MastersFarewell>>,
         stop: &mut watch::Receiver<bool>,
         live: &LiveCell<SlaveLive>,
     ) -> Result<std::convert::Infallible, End> {

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use bytes::Bytes;
-use mmt_shared::channel::datagram_channel::{LinkEnd, Outgoing};
+use mmt_shared::channel::datagram_channel::LinkEnd;
 use mmt_shared::io::clock::Clock;
 use mmt_shared::io::congestion::RateCap;
 use mmt_shared::io::connect::connect;
@@ -14,12 +14,13 @@ use mmt_shared::model::contact::Coupling;
 use mmt_shared::model::geometry::Vec2;
 use mmt_shared::model::sample::{HipCounts, HipSample};
 use mmt_shared::model::tool::HandPort;
+use mmt_shared::model::update::Update;
 use mmt_shared::pairing::{Pairing, Token};
+use mmt_shared::stats::session::{self, MasterTotals, SlaveTotals};
 use mmt_shared::time::{TICK, Time};
 use mmt_shared::wire::{
-    Architecture, Command, DATAGRAM_MAX, Ending, Farewell, Hello, Label, MasterTotals, Matter,
-    RawUpdate, RawWelcome, Refusal, Role, STREAM_MESSAGE_MAX, SampleBlock, Side, SlaveTotals,
-    StreamMessage, decode_stream_message, encode_hello, encode_master_farewell,
+    Architecture, Command, DATAGRAM_MAX, Ending, Farewell, Hello, Label, Message, RawState,
+    Refusal, Role, STREAM_MESSAGE_MAX, SampleBlock, Side, StreamMessage, Welcome,
 };
 use quinn::{Connection, Endpoint, RecvStream, SendStream};
 use tokio::time::{interval, timeout};
@@ -37,7 +38,7 @@ const TRAFFIC: Traffic = Traffic {
 pub(super) struct Master {
     pub(super) connection: Connection,
     pub(super) link: LinkEnd,
-    pub(super) updates: Vec<RawUpdate>,
+    pub(super) updates: Vec<Update<RawState>>,
     pub(super) architecture: Architecture,
     pub(super) scene_hz: u8,
     _endpoint: Endpoint,
@@ -78,13 +79,17 @@ impl Master {
     }
 
     /// Connects and is welcomed.
-    pub(super) async fn operate(pairing: &Pairing) -> (Self, RawWelcome) {
+    pub(super) async fn operate(pairing: &Pairing) -> (Self, Welcome<RawState>) {
         let mut master = Self::connect(pairing).await;
         let welcome = master.hello(pairing.token, 1000.0).await.unwrap();
         (master, welcome)
     }
 
-    pub(super) async fn hello(&mut self, token: Token, k_p: f64) -> Result<RawWelcome, Refusal> {
+    pub(super) async fn hello(
+        &mut self,
+        token: Token,
+        k_p: f64,
+    ) -> Result<Welcome<RawState>, Refusal> {
         let hello = Hello {
             token,
             role: Role::Operator,
@@ -95,14 +100,18 @@ impl Master {
             hip: self.hip,
             program: Label::clipped("test"),
         };
-        let mut out = [0; STREAM_MESSAGE_MAX];
-        let length = encode_hello(&hello, &mut out).unwrap();
-        self.say(&out[..length]).await;
-        match self.hear().await {
-            StreamMessage::Welcome(welcome) => Ok(welcome),
-            StreamMessage::Refused(refusal) => Err(refusal),
+        self.say(&encoded(&StreamMessage::Hello(hello))).await;
+        match StreamMessage::decode(&self.hear().await, Side::Slave) {
+            Ok(StreamMessage::Welcome(welcome)) => Ok(welcome),
+            Ok(StreamMessage::Refused(refusal)) => Err(refusal),
             other => panic!("{other:?}"),
         }
+    }
+
+    /// Writes bytes as they are, and ends the stream.
+    pub(super) async fn write(&mut self, bytes: &[u8]) {
+        self.send.write_all(bytes).await.unwrap();
+        self.send.finish().unwrap();
     }
 
     pub(super) async fn say(&mut self, message: &[u8]) {
@@ -111,9 +120,9 @@ impl Master {
             .unwrap();
     }
 
-    async fn hear(&mut self) -> StreamMessage {
+    async fn hear(&mut self) -> Vec<u8> {
         let frame = read_frame(&mut self.receive, STREAM_MESSAGE_MAX, PATIENCE).await;
-        decode_stream_message(&frame.unwrap(), Side::Slave).unwrap()
+        frame.unwrap()
     }
 
     /// Pushes to the right at 0.2 m/s with a command every 10 ms.
@@ -142,7 +151,7 @@ impl Master {
 
     fn take(&mut self, datagram: &Bytes) {
         let opened = self.link.open(self.clock.now(), datagram);
-        if let Some(Matter::Update(update)) = opened.map(|opened| opened.matter) {
+        if let Some(Message::Update(update)) = opened.map(|opened| opened.message) {
             self.updates.push(update);
         }
     }
@@ -161,7 +170,7 @@ impl Master {
                 })
                 .unwrap();
         }
-        let newest_update = self.updates.last().map_or(0, RawUpdate::sequence);
+        let newest_update = self.updates.last().map_or(0, |update| update.sequence);
         let command = Command {
             newest_update,
             samples,
@@ -169,7 +178,7 @@ impl Master {
         };
         let mut out = [0; DATAGRAM_MAX];
         let now = self.clock.now();
-        let length = self.link.seal(now, Outgoing::Command(&command), &mut out);
+        let length = self.link.seal(now, Message::Command(command), &mut out);
         let bytes = Bytes::copy_from_slice(&out[..length.unwrap()]);
         self.connection.send_datagram(bytes).unwrap();
     }
@@ -180,8 +189,8 @@ impl Master {
             .unwrap();
     }
 
-    /// Says farewell, and hears the slave's.
-    pub(super) async fn farewell(mut self) -> Farewell<SlaveTotals> {
+    /// Says farewell, and hears the slave's: its report.
+    pub(super) async fn farewell(mut self) -> (Ending, SlaveTotals) {
         self.say_farewell().await;
         let theirs = self.hear_farewell().await;
         self.connection.close(0u32.into(), b"");
@@ -190,22 +199,29 @@ impl Master {
     }
 
     pub(super) async fn say_farewell(&mut self) {
+        let totals = MasterTotals {
+            updates_applied: 7,
+            ..MasterTotals::default()
+        };
         let farewell = Farewell {
             ending: Ending::Finished,
-            totals: MasterTotals {
-                updates_applied: 7,
-                ..MasterTotals::default()
-            },
+            report: &session::to_report(&totals),
         };
-        let mut out = [0; STREAM_MESSAGE_MAX];
-        let length = encode_master_farewell(&farewell, &mut out).unwrap();
-        self.say(&out[..length]).await;
+        self.say(&encoded(&StreamMessage::Farewell(farewell))).await;
     }
 
-    pub(super) async fn hear_farewell(&mut self) -> Farewell<SlaveTotals> {
-        match self.hear().await {
-            StreamMessage::SlaveFarewell(farewell) => farewell,
+    pub(super) async fn hear_farewell(&mut self) -> (Ending, SlaveTotals) {
+        match StreamMessage::decode(&self.hear().await, Side::Slave) {
+            Ok(StreamMessage::Farewell(Farewell { ending, report })) => {
+                (ending, session::of_report(report).unwrap())
+            }
             other => panic!("{other:?}"),
         }
     }
+}
+
+fn encoded(message: &StreamMessage<'_>) -> Vec<u8> {
+    let mut out = [0; STREAM_MESSAGE_MAX];
+    let length = message.encode(&mut out).unwrap();
+    out[..length].to_vec()
 }

@@ -14,6 +14,10 @@ use crate::io::stream::{ReadFrameError, WriteFrameError, read_frame, write_frame
 
 /// Close code: the session is over, or none came about.
 pub const CLOSE_FINISHED: VarInt = VarInt::from_u32(0);
+/// Close code: no hello came.
+pub const CLOSE_NO_HELLO: VarInt = VarInt::from_u32(2);
+/// Close code: what came first is no hello; the reason names the fault.
+pub const CLOSE_NOT_A_HELLO: VarInt = VarInt::from_u32(3);
 /// Close code: one side sends its datagrams by QUIC, the other as raw UDP.
 pub(super) const CLOSE_OTHER_TRANSPORT: VarInt = VarInt::from_u32(1);
 

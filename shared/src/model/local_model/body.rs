@@ -7,21 +7,45 @@ use super::Rendered;
 use crate::model::contact::{Coupling, GodObject, Touch, contact_force};
 use crate::model::correction::{Correction, ROOM_M, Tank};
 use crate::model::dynamics::Motion;
-use crate::model::geometry::{Face, Vec2, rotate};
+use crate::model::geometry::{BoxFootprint, Face, Pose, Twist, Vec2, rotate};
 use crate::model::params::{ModelParams, ModelState};
 use crate::model::settings::ModelSettings;
+
+/// What a box is now. It began as an accepted [`ModelState`] and has moved since, wherever the hand took it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BodyState {
+    /// The impedance.
+    pub params: ModelParams,
+    /// One distance from the reference point to each face.
+    pub footprint: BoxFootprint,
+    /// `world_from_object`.
+    pub pose: Pose,
+    /// Velocity of the reference point and turning rate.
+    pub twist: Twist,
+}
+
+impl From<ModelState> for BodyState {
+    fn from(state: ModelState) -> Self {
+        Self {
+            params: state.params(),
+            footprint: state.footprint(),
+            pose: state.pose(),
+            twist: state.twist(),
+        }
+    }
+}
 
 /// A box and the proxy on it.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Body {
-    pub(super) state: ModelState,
+    pub(super) state: BodyState,
     pub(super) god: GodObject,
 }
 
 impl Body {
     pub(super) fn new(state: ModelState) -> Self {
         Self {
-            state,
+            state: state.into(),
             god: GodObject::default(),
         }
     }

@@ -72,7 +72,7 @@ impl Replay {
             return;
         };
         self.body = Body {
-            state: update.state,
+            state: update.state.into(),
             god: then.god,
         };
         self.progress = Progress::Behind(then.stamp);

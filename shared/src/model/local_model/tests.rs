@@ -33,14 +33,18 @@ fn model(mode: Mode, correction: PoseCorrection) -> LocalModel {
     LocalModel::new(settings, state(0.7, 3.0, 2.06))
 }
 
-fn update(cause: Cause, answers_ms: u64, state: ModelState) -> Update {
+fn accepted(state: impl Into<BodyState>) -> ModelState {
+    let state = state.into();
+    ModelState::try_new(state.params, state.footprint, state.pose, state.twist).unwrap()
+}
+
+fn update(cause: Cause, answers_ms: u64, state: impl Into<BodyState>) -> Update {
     Update {
         sequence: 1,
         cause,
         answers: Time::from_millis(answers_ms),
-        newest_command: 1,
         slave_in_contact: true,
-        state,
+        state: accepted(state),
     }
 }
 
@@ -92,7 +96,7 @@ fn smoothing_in_time_has_its_time_constant() {
 
 #[test]
 fn a_received_pose_is_never_set_on_arrival() {
-    let mut far = state(0.7, 3.0, 2.06);
+    let mut far = BodyState::from(state(0.7, 3.0, 2.06));
     far.pose = Pose::new(-0.05, 0.03, 0.3);
     let jump = |correction| {
         let mut model = model(Mode::Recommended, correction);

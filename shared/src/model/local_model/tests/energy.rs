@@ -150,7 +150,7 @@ fn setting_the_pose_on_arrival_does_and_is_seen_to() {
 
 #[test]
 fn a_heavier_box_is_paid_for_or_slowed_and_never_faster() {
-    let heavy = state(2.8, 3.0, 2.06).params;
+    let heavy = state(2.8, 3.0, 2.06).params();
     let kinetic = |body: &Body| body.energy_j(&COUPLING, None);
     let moving = || {
         let mut body = Body::new(state(0.7, 3.0, 2.06));

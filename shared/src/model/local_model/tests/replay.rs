@@ -5,12 +5,20 @@ use super::*;
 /// Answers with what `model` was at a stamp.
 fn answer(model: &LocalModel, ms: u64) -> Update {
     let then = model.history().at(Time::from_millis(ms)).unwrap();
-    let state = ModelState {
+    let state = BodyState {
         pose: then.motion.pose,
         twist: then.motion.twist,
         ..*model.state()
     };
     update(Cause::Deadband, ms, state)
+}
+
+/// The same update with another state.
+fn with(mut update: Update, change: impl FnOnce(&mut BodyState)) -> Update {
+    let mut state = update.state.into();
+    change(&mut state);
+    update.state = accepted(state);
+    update
 }
 
 /// Pushes with a wavering speed, so that mass and damping matter.
@@ -39,7 +47,7 @@ fn an_old_answer_that_the_model_was_right_corrects_nothing_to_the_bit() {
 #[test]
 fn a_replay_gets_to_where_a_right_model_is_now_to_the_bit() {
     let (mut right, mut wrong) = (replayed(), replayed());
-    wrong.body.state = state(0.4, 0.0, 1.0);
+    wrong.body.state = state(0.4, 0.0, 1.0).into();
     wrong.body.state.pose.angle = 0.1;
     wrong.target = wrong.body.state.params;
     waver(&mut right, 1..=1500);
@@ -74,16 +82,17 @@ fn an_update_that_comes_during_a_replay_waits_and_only_the_newest_does() {
     let mut model = replayed();
     waver(&mut model, 1..=2000);
     let first = answer(&model, 1001);
-    let (mut older, mut newer) = (answer(&model, 1900), answer(&model, 1990));
+    let (mut older, newer) = (answer(&model, 1900), answer(&model, 1990));
     older.state = state(2.0, 3.0, 2.06);
-    newer.state.params = state(3.0, 3.0, 2.06).params;
+    let newer = with(newer, |of| of.params = state(3.0, 3.0, 2.06).params());
     for update in [first, older, newer] {
         model.apply(&update);
     }
-    assert_eq!(model.target, first.state.params);
+    assert_eq!(model.target, first.state.params());
     waver(&mut model, 2001..=2053);
     assert_eq!(
-        model.target, newer.state.params,
+        model.target,
+        newer.state.params(),
         "the older was never applied"
     );
     waver(&mut model, 2054..=2060);
@@ -93,7 +102,7 @@ fn an_update_that_comes_during_a_replay_waits_and_only_the_newest_does() {
 #[test]
 fn with_an_update_at_every_sample_and_any_delay_the_replay_still_arrives() {
     let (mut right, mut wrong) = (replayed(), replayed());
-    wrong.body.state = state(0.4, 0.0, 1.0);
+    wrong.body.state = state(0.4, 0.0, 1.0).into();
     for n in 1..=4000 {
         waver(&mut right, n..=n);
         if n > 1000 {
@@ -109,9 +118,8 @@ fn with_an_update_at_every_sample_and_any_delay_the_replay_still_arrives() {
 fn an_answer_from_before_the_history_leaves_the_pose_alone() {
     let mut model = replayed();
     waver(&mut model, 101..=500);
-    let mut early = answer(&model, 200);
+    let mut early = with(answer(&model, 200), |of| of.pose = Pose::new(1.0, 1.0, 1.0));
     early.answers = Time::from_millis(99);
-    early.state.pose = Pose::new(1.0, 1.0, 1.0);
     model.apply(&early);
     waver(&mut model, 501..=520);
     assert_eq!(model.correction().remaining, Default::default());
@@ -121,10 +129,9 @@ fn an_answer_from_before_the_history_leaves_the_pose_alone() {
 fn a_face_that_is_not_there_goes_away_from_the_hand_without_letting_go_at_once() {
     let mut model = replayed();
     let before = push(&mut model, 1..=200);
-    let mut carved = answer(&model, 200);
+    let mut carved = with(answer(&model, 200), |of| of.footprint.west -= 0.01);
     carved.slave_in_contact = false;
     carved.cause = Cause::MasterOnlyContact;
-    carved.state.footprint.west -= 0.01;
     model.apply(&carved);
     let after = push(&mut model, 201..=201);
     assert!((after.force - before.force).norm() < 0.1, "no jolt");
@@ -145,10 +152,10 @@ fn while_an_answer_is_replayed_the_face_does_not_leave_a_resting_hand() {
     let held = (1501..=2000).map(|n| rest(&mut model, n)).last().unwrap();
     assert!(held.force.x > 0.2, "it rests lightly: {held:?}");
     // the slave met the same face on a box that is 2 cm narrower
-    let mut told = answer(&model, 600);
-    told.state.footprint = BoxFootprint::square(0.36);
-    told.state.pose.position.x -= 0.02;
-    model.apply(&told);
+    model.apply(&with(answer(&model, 600), |of| {
+        of.footprint = BoxFootprint::square(0.36);
+        of.pose.position.x -= 0.02;
+    }));
     let (mut ticks, mut softest) = (0, f64::MAX);
     for n in 2001..=2500 {
         let rendered = rest(&mut model, n);

@@ -1,14 +1,29 @@
-//! What each side counted and measured in a session, as its farewell tells the other.
+//! What each side counts and measures in a session, as its farewell reports it to the other.
 
+use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
-use super::error::{FieldError, finite};
 use crate::model::update::Cause;
+use crate::wire::Kind;
+
+/// The report of a farewell: JSON. A number that is not finite is null.
+#[must_use]
+pub fn to_report(totals: &impl Serialize) -> Vec<u8> {
+    serde_json::to_vec(totals).unwrap_or_default()
+}
+
+/// What a farewell reports; none if it cannot be read. Keys that are not known are skipped, those that are missing are 0
+/// or absent.
+#[must_use]
+pub fn of_report<T: DeserializeOwned>(report: &[u8]) -> Option<T> {
+    serde_json::from_slice(report).ok()
+}
 
 /// Messages in datagrams, by type.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default)]
 pub struct KindCounts {
-    /// Commands, with and without the hand's port.
+    /// Commands.
     pub commands: u32,
     /// Updates, repeats included.
     pub updates: u32,
@@ -21,6 +36,19 @@ pub struct KindCounts {
 }
 
 impl KindCounts {
+    /// One more of this type; what is never in a datagram is not counted.
+    pub fn count(&mut self, kind: Kind) {
+        let count = match kind {
+            Kind::Command => &mut self.commands,
+            Kind::Update => &mut self.updates,
+            Kind::Scene => &mut self.scenes,
+            Kind::Heartbeat => &mut self.heartbeats,
+            Kind::Tool => &mut self.tools,
+            Kind::Hello | Kind::Welcome | Kind::Refused | Kind::Farewell => return,
+        };
+        *count = count.saturating_add(1);
+    }
+
     /// All of them.
     #[must_use]
     pub fn total(&self) -> u64 {
@@ -34,6 +62,7 @@ impl KindCounts {
 
 /// What a side sent and received. `received` counts each datagram once.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default)]
 pub struct Traffic {
     /// Messages sent in datagrams.
     pub sent: KindCounts,
@@ -57,6 +86,7 @@ pub struct Traffic {
 
 /// The force metrics of a session (docs/metrics.md): each absent if there was nothing to judge.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
 pub struct ForceTotals {
     /// PMSE (13)–(15), both axes.
     pub pmse: Option<f64>,
@@ -74,6 +104,7 @@ pub struct ForceTotals {
 
 /// One parameter of the model: what the estimator found and what it is.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
 pub struct Identified {
     /// The last estimate; absent if it could not be seen.
     pub estimate: Option<f64>,
@@ -81,8 +112,9 @@ pub struct Identified {
     pub truth: Option<f64>,
 }
 
-/// What the slave tells in its farewell.
+/// What the slave reports in its farewell.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
 pub struct SlaveTotals {
     /// From the welcome to the farewell, ns.
     pub duration_ns: u64,
@@ -104,6 +136,7 @@ pub struct SlaveTotals {
 
 /// Updates that the master received and did not apply, by cause.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default)]
 pub struct UpdateDrops {
     /// Its sequence number had been seen: a repeat did its work, or the network duplicated.
     pub duplicate: u32,
@@ -134,6 +167,7 @@ impl UpdateDrops {
 
 /// Three quantiles of a time, µs.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
 pub struct Quantiles {
     /// Median.
     pub p50: f64,
@@ -145,6 +179,7 @@ pub struct Quantiles {
 
 /// How the master's 1 kHz loop kept its time.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
 pub struct LoopTotals {
     /// Ticks run.
     pub ticks: u64,
@@ -156,8 +191,9 @@ pub struct LoopTotals {
     pub lateness_us: Option<Quantiles>,
 }
 
-/// What the master tells in its farewell.
+/// What the master reports in its farewell.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
 pub struct MasterTotals {
     /// From the welcome to the farewell, ns.
     pub duration_ns: u64,
@@ -169,41 +205,4 @@ pub struct MasterTotals {
     pub updates_dropped: UpdateDrops,
     /// The haptic loop.
     pub haptic_loop: LoopTotals,
-}
-
-impl SlaveTotals {
-    pub(super) fn check(&self) -> Result<(), FieldError> {
-        let (force, m) = (&self.force, &self.mass_kg);
-        let (b, c) = (&self.damping_ns_per_m, &self.friction_n);
-        for (field, value) in [
-            ("pmse", force.pmse),
-            ("pmse_x", force.pmse_x),
-            ("pmse_y", force.pmse_y),
-            ("pmse_magnitude", force.pmse_magnitude),
-            ("relative_error", force.relative_error),
-            ("jnd7_share", force.jnd7_share),
-            ("mass_kg.estimate", m.estimate),
-            ("mass_kg.truth", m.truth),
-            ("damping_ns_per_m.estimate", b.estimate),
-            ("damping_ns_per_m.truth", b.truth),
-            ("friction_n.estimate", c.estimate),
-            ("friction_n.truth", c.truth),
-        ] {
-            finite(field, value.unwrap_or_default())?;
-        }
-        Ok(())
-    }
-}
-
-impl MasterTotals {
-    pub(super) fn check(&self) -> Result<(), FieldError> {
-        let quantiles = |name, quantiles: Option<Quantiles>| {
-            let Quantiles { p50, p99, p999 } = quantiles.unwrap_or_default();
-            [p50, p99, p999]
-                .into_iter()
-                .try_for_each(|value| finite(name, value))
-        };
-        quantiles("cpu_us", self.haptic_loop.cpu_us)?;
-        quantiles("lateness_us", self.haptic_loop.lateness_us)
-    }
 }
