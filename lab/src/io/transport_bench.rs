@@ -5,6 +5,7 @@
 //! and nothing here may be taken for a figure of virtual time.
 
 mod bare;
+mod config;
 mod cores;
 mod endpoint;
 mod report;
@@ -12,12 +13,10 @@ mod slice;
 #[cfg(test)]
 mod tests;
 
-use std::error::Error;
 use std::time::Duration;
 
 use mmt_shared::io::clock::Clock;
 use mmt_shared::io::transport::Transport;
-use mmt_shared::wire::DATAGRAM_MAX;
 
 use bare::BarePair;
 use cores::Placement;
@@ -25,81 +24,12 @@ use endpoint::EndpointPair;
 use report::Summaries;
 use slice::{Slice, SliceResult};
 
-pub use cores::Cores;
+pub use config::{BYTES_MAX, BYTES_MIN, BenchConfig, BenchError, Carrier, Cores, RATE_MAX};
 pub use report::BenchReport;
-pub use slice::{BYTES_MIN, Flow};
+pub use slice::Flow;
 
-/// The longest message, bytes: the longest of the protocol.
-pub const BYTES_MAX: usize = DATAGRAM_MAX;
-/// Messages a second at most.
-pub const RATE_MAX: u32 = 10_000;
 /// From the order to the first message: threads start in this time.
 const LEAD: Duration = Duration::from_millis(10);
-
-/// What is measured.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct BenchConfig {
-    /// Messages a second, 1 to [`RATE_MAX`].
-    pub rate_hz: u32,
-    /// How long, all slices together; at least one of each is measured.
-    pub duration: Duration,
-    /// Bytes of a message, [`BYTES_MIN`] to [`BYTES_MAX`].
-    pub bytes: usize,
-    /// Where the two ends run.
-    pub cores: Cores,
-}
-
-/// What carries the messages.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Carrier {
-    /// Bare sockets that block: what the operating system takes.
-    Control,
-    /// Raw UDP of mmt, on tokio, as the hosts run it.
-    RawUdp,
-    /// QUIC as mmt sets it, on tokio, as the hosts run it.
-    Quic,
-}
-
-impl Carrier {
-    /// All of them.
-    pub const ALL: [Self; 3] = [Self::Control, Self::RawUdp, Self::Quic];
-
-    /// As tables spell it.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Control => "control",
-            Self::RawUdp => "udp",
-            Self::Quic => "quic",
-        }
-    }
-}
-
-/// Why nothing was measured.
-#[derive(Debug, thiserror::Error)]
-pub enum BenchError {
-    /// Messages a second out of range.
-    #[error("a rate of {rate_hz} messages a second: 1 to {RATE_MAX} can be measured")]
-    Rate {
-        /// The rate asked for.
-        rate_hz: u32,
-    },
-    /// Bytes out of range.
-    #[error("messages of {bytes} bytes: {BYTES_MIN} to {BYTES_MAX} can be measured")]
-    Bytes {
-        /// The size asked for.
-        bytes: usize,
-    },
-    /// The ends cannot have cores of their own.
-    #[error("no core for each end: {0}; measure with --cores any")]
-    Cores(#[source] std::io::Error),
-    /// The machine gave no socket, thread or connection, or took one back.
-    #[error(transparent)]
-    Failed(#[from] Box<dyn Error + Send + Sync>),
-}
-
-/// Why an end could not go on.
-type Failure = Box<dyn Error + Send + Sync>;
 
 /// Both ends of a carrier, connected.
 enum Pair {

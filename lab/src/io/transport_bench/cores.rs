@@ -12,36 +12,7 @@ use std::thread::{self, JoinHandle};
 use mmt_shared::io::realtime::yield_to_all;
 use rustix::thread::{CpuSet, sched_getaffinity, sched_setaffinity};
 
-use super::{BenchError, Failure};
-
-/// Where the two ends run.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Cores {
-    /// Each end on a core of its own that never sleeps, as on two hosts that are set up for low latency; on a machine
-    /// with one core as [`Cores::Any`].
-    #[default]
-    Own,
-    /// Where the kernel puts them, which for two threads that wake each other is mostly one core.
-    Any,
-}
-
-impl Cores {
-    /// As the command spells it.
-    pub(super) fn name(self) -> &'static str {
-        match self {
-            Self::Own => "own",
-            Self::Any => "any",
-        }
-    }
-
-    /// In words, after "over loopback,".
-    pub(super) fn words(self) -> &'static str {
-        match self {
-            Self::Own => "each end on a core of its own that stays awake",
-            Self::Any => "each end where the kernel puts it",
-        }
-    }
-}
+use super::config::{BenchError, Cores, Failure};
 
 /// The cores of the two ends, kept awake until it is dropped.
 #[derive(Debug)]

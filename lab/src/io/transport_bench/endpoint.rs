@@ -18,9 +18,9 @@ use quinn::AsyncUdpSocket;
 use tokio::runtime::{Builder, Runtime};
 use tokio::time::{timeout, timeout_at};
 
+use super::config::{BenchConfig, BenchError, Failure};
 use super::cores::Placement;
 use super::slice::{Flow, Side, Slice};
-use super::{BenchConfig, BenchError, Failure};
 
 /// For both sides to connect.
 const CONNECT_MAX: Duration = Duration::from_secs(10);

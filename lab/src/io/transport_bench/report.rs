@@ -7,9 +7,8 @@ use std::time::Duration;
 use mmt_shared::stats::histogram::Histogram;
 use serde::Serialize;
 
-use super::cores::Cores;
+use super::config::{BenchConfig, Carrier, Cores};
 use super::slice::{Flow, SliceResult};
-use super::{BenchConfig, Carrier};
 use crate::table::{Cell, Table};
 
 /// IPv4 and UDP headers, bytes (RFC 791, RFC 768).

@@ -4,10 +4,8 @@ use std::time::Duration;
 
 use mmt_shared::time::Time;
 
-use super::BenchConfig;
+use super::config::BenchConfig;
 
-/// The shortest message, bytes: its stamp and the number of its slice.
-pub const BYTES_MIN: usize = 16;
 /// For how long messages are sent in a slice.
 const SLICE: Duration = Duration::from_millis(200);
 /// After the last message: what is still on its way, and the last acknowledgement (25 ms), belong to the slice.
