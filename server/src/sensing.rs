@@ -8,7 +8,7 @@
 use std::collections::VecDeque;
 
 use mmt_shared::model::geometry::{Pose, Vec2};
-use mmt_shared::range::{OutOfRange, in_range};
+use mmt_shared::range::{OutOfRange, all_in_range};
 use mmt_shared::rng::Substream;
 use mmt_shared::time::Time;
 use serde::{Deserialize, Serialize};
@@ -164,7 +164,7 @@ impl Sensing {
         Sensed {
             tool,
             force,
-            vision: self.look(now, object),
+            vision: self.image_due(now, object),
         }
     }
 
@@ -174,9 +174,9 @@ impl Sensing {
         self.dropped
     }
 
-    fn look(&mut self, now: Time, object: &Pose) -> Option<VisionSample> {
+    fn image_due(&mut self, now: Time, object: &Pose) -> Option<VisionSample> {
         if self.period_ns > 0 && now >= *self.next_image.get_or_insert(now) {
-            self.take(now, object);
+            self.take_image(now, object);
         }
         let mut newest = None;
         while let Some(image) = self.on_their_way.front().copied() {
@@ -189,7 +189,7 @@ impl Sensing {
         newest
     }
 
-    fn take(&mut self, now: Time, object: &Pose) {
+    fn take_image(&mut self, now: Time, object: &Pose) {
         let vision = self.config.vision;
         let period = i64::try_from(self.period_ns).unwrap_or(i64::MAX);
         // the schedule keeps its phase, unless ticks were missed for longer than a period
@@ -233,27 +233,16 @@ impl SensingConfig {
 
     fn check(&self) -> Result<(), SensingError> {
         let v = &self.vision;
-        in_range(
-            "position noise",
-            "m",
-            self.position_noise_m,
-            POSITION_NOISE_M,
-        )?;
-        in_range("force noise", "N", self.force_noise_n, FORCE_NOISE_N)?;
-        in_range("vision rate", "Hz", v.rate_hz, RATE_HZ)?;
-        in_range(
-            "vision position noise",
-            "m",
-            v.position_noise_m,
-            POSITION_NOISE_M,
-        )?;
-        in_range(
-            "vision angle noise",
-            "rad",
-            v.angle_noise_rad,
-            ANGLE_NOISE_RAD,
-        )?;
-        in_range("vision latency", "ms", v.latency_ms, LATENCY_MS)?;
+        #[rustfmt::skip]
+        let checks = [
+            ("position noise", "m", self.position_noise_m, POSITION_NOISE_M),
+            ("force noise", "N", self.force_noise_n, FORCE_NOISE_N),
+            ("vision rate", "Hz", v.rate_hz, RATE_HZ),
+            ("vision position noise", "m", v.position_noise_m, POSITION_NOISE_M),
+            ("vision angle noise", "rad", v.angle_noise_rad, ANGLE_NOISE_RAD),
+            ("vision latency", "ms", v.latency_ms, LATENCY_MS),
+        ];
+        all_in_range(checks)?;
         if v.rate_hz * v.latency_ms / 1e3 + 2.0 > IMAGES_MAX as f64 {
             return Err(SensingError::TooManyImages {
                 rate_hz: v.rate_hz,

@@ -150,19 +150,23 @@ impl Face {
     }
 }
 
-/// One value for each face.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+/// One value for each face, named by where its outward normal points in the object's frame.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct PerFace<T> {
-    east: T,
-    north: T,
-    west: T,
-    south: T,
+    /// Of the face whose outward normal is +x.
+    pub east: T,
+    /// +y.
+    pub north: T,
+    /// −x.
+    pub west: T,
+    /// −y.
+    pub south: T,
 }
 
 impl<T: Copy> PerFace<T> {
     /// The same value for all four.
     #[must_use]
-    pub fn all(value: T) -> Self {
+    pub const fn all(value: T) -> Self {
         Self {
             east: value,
             north: value,
@@ -173,7 +177,7 @@ impl<T: Copy> PerFace<T> {
 
     /// The value of a face.
     #[must_use]
-    pub fn get(&self, face: Face) -> T {
+    pub const fn get(&self, face: Face) -> T {
         match face {
             Face::East => self.east,
             Face::North => self.north,
@@ -183,7 +187,7 @@ impl<T: Copy> PerFace<T> {
     }
 
     /// The value of a face, to be changed.
-    pub fn get_mut(&mut self, face: Face) -> &mut T {
+    pub const fn get_mut(&mut self, face: Face) -> &mut T {
         match face {
             Face::East => &mut self.east,
             Face::North => &mut self.north,
@@ -193,51 +197,25 @@ impl<T: Copy> PerFace<T> {
     }
 }
 
-/// The rectangle that stands for the object: one distance from the reference point to each face.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct BoxFootprint {
-    /// Distance from the reference point to the face whose outward normal is +x, m.
-    pub east: f64,
-    /// The same for +y, m.
-    pub north: f64,
-    /// The same for −x, m.
-    pub west: f64,
-    /// The same for −y, m.
-    pub south: f64,
-}
+/// The rectangle that stands for the object: the distance from the reference point to each face, m.
+pub type BoxFootprint = PerFace<f64>;
 
 impl BoxFootprint {
     /// A square of the given side l (m), its reference point in the middle.
     #[must_use]
     pub const fn square(side: f64) -> Self {
-        let half = side / 2.0;
-        Self {
-            east: half,
-            north: half,
-            west: half,
-            south: half,
-        }
+        Self::all(side / 2.0)
     }
 
     /// Distance from the reference point to a face, m.
     #[must_use]
-    pub fn offset(&self, face: Face) -> f64 {
-        match face {
-            Face::East => self.east,
-            Face::North => self.north,
-            Face::West => self.west,
-            Face::South => self.south,
-        }
+    pub const fn offset(&self, face: Face) -> f64 {
+        self.get(face)
     }
 
     /// Sets the distance from the reference point to a face, m.
-    pub fn set_offset(&mut self, face: Face, offset: f64) {
-        match face {
-            Face::East => self.east = offset,
-            Face::North => self.north = offset,
-            Face::West => self.west = offset,
-            Face::South => self.south = offset,
-        }
+    pub const fn set_offset(&mut self, face: Face, offset: f64) {
+        *self.get_mut(face) = offset;
     }
 
     /// Mean of the two extents (x and y): the side l of the square that (8) and (9) are written for, m.
