@@ -4,9 +4,9 @@
 
 use std::path::Path;
 
+use mmt_lab::overlay::laid_over;
 use mmt_server::slave::SlaveConfig;
 use mmt_shared::model::settings::Mode;
-use toml::{Table, Value};
 
 use crate::failure::Failure;
 use crate::input::read_text;
@@ -36,26 +36,9 @@ pub(crate) fn slave_config(
 fn parse(text: &str, mode: Option<Mode>) -> Result<SlaveConfig, toml::de::Error> {
     // First as it stands, for errors with their place.
     let alone: SlaveConfig = toml::from_str(text)?;
-    let given: Table = toml::from_str(text)?;
     let mode = mode.unwrap_or(alone.mode);
-    let Ok(mut whole) = Table::try_from(SlaveConfig::of_mode(mode)) else {
-        return Ok(alone);
-    };
-    lay_over(&mut whole, given);
-    let merged: SlaveConfig = whole.try_into()?;
+    let merged = laid_over(&SlaveConfig::of_mode(mode), text)?;
     Ok(SlaveConfig { mode, ..merged })
-}
-
-/// Puts the given keys over the ones that are there, table by table.
-fn lay_over(whole: &mut Table, given: Table) {
-    for (key, value) in given {
-        match (whole.get_mut(&key), value) {
-            (Some(Value::Table(inner)), Value::Table(given)) => lay_over(inner, given),
-            (_, value) => {
-                whole.insert(key, value);
-            }
-        }
-    }
 }
 
 #[cfg(test)]

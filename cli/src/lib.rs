@@ -16,6 +16,7 @@ mod failure;
 mod input;
 mod log;
 mod output;
+mod progress;
 mod stop;
 mod view;
 

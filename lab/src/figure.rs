@@ -9,6 +9,15 @@ mod ticks;
 
 use std::ops::Range;
 
+use plotters::style::RGBColor;
+
+use crate::statistics::Interval;
+
+/// Why a figure could not be drawn, in the words of plotters.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{0}")]
+pub struct DrawError(String);
+
 /// One figure: panels side by side, in rows.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Figure {
@@ -211,16 +220,16 @@ impl Colour {
             .unwrap_or(Self::Black)
     }
 
-    fn rgb(self) -> (u8, u8, u8) {
+    fn rgb(self) -> RGBColor {
         match self {
-            Self::Blue => (0x00, 0x72, 0xB2),
-            Self::Vermilion => (0xD5, 0x5E, 0x00),
-            Self::Green => (0x00, 0x9E, 0x73),
-            Self::Purple => (0xCC, 0x79, 0xA7),
-            Self::Orange => (0xE6, 0x9F, 0x00),
-            Self::Sky => (0x56, 0xB4, 0xE9),
-            Self::Black => (0, 0, 0),
-            Self::Grey => (0x99, 0x99, 0x99),
+            Self::Blue => RGBColor(0x00, 0x72, 0xB2),
+            Self::Vermilion => RGBColor(0xD5, 0x5E, 0x00),
+            Self::Green => RGBColor(0x00, 0x9E, 0x73),
+            Self::Purple => RGBColor(0xCC, 0x79, 0xA7),
+            Self::Orange => RGBColor(0xE6, 0x9F, 0x00),
+            Self::Sky => RGBColor(0x56, 0xB4, 0xE9),
+            Self::Black => RGBColor(0, 0, 0),
+            Self::Grey => RGBColor(0x99, 0x99, 0x99),
         }
     }
 }
@@ -248,6 +257,16 @@ impl Dot {
             x,
             y,
             ..Self::default()
+        }
+    }
+
+    /// A point of means with their intervals.
+    #[must_use]
+    pub fn of_intervals(x: Interval, y: Interval) -> Self {
+        Self {
+            x_interval: Some((x.low, x.high)),
+            y_interval: Some((y.low, y.high)),
+            ..Self::at(x.mean, y.mean)
         }
     }
 }

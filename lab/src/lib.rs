@@ -19,12 +19,16 @@
 pub mod architecture;
 pub mod baselines;
 mod digest;
+pub mod experiment;
+#[cfg(feature = "io")]
+pub mod experiments;
 pub mod figure;
 #[cfg(feature = "io")]
 pub mod io;
+pub mod overlay;
 pub mod physics;
 pub mod replay;
-pub mod reproduce;
+pub mod setting;
 pub mod statistics;
 pub mod sweep;
 pub mod table;

@@ -14,13 +14,11 @@ mod reference;
 use mmt_server::environment::{Environment, EnvironmentConfig, EnvironmentError};
 use mmt_shared::model::contact::Coupling;
 use mmt_shared::model::params::{GRAVITY, friction_torque_of_square, inertia_of_square};
-use serde::{Deserialize, Serialize};
 
 use motion::{Kind, Motion, Run};
 
 /// A square body on plain ground.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Body {
     /// Mass m, kg. Default 0.7: the real cube of section IV-A.
     pub mass_kg: f64,
@@ -32,19 +30,18 @@ pub struct Body {
     pub damping_ns_per_m: f64,
 }
 
-impl Default for Body {
-    fn default() -> Self {
-        Self {
-            mass_kg: 0.7,
-            side_m: 0.36,
-            friction_coefficient: 0.3,
-            damping_ns_per_m: 0.0,
-        }
-    }
+impl Body {
+    /// The body of section IV-A.
+    pub const DEFAULT: Self = Self {
+        mass_kg: 0.7,
+        side_m: 0.36,
+        friction_coefficient: 0.3,
+        damping_ns_per_m: 0.0,
+    };
 }
 
 /// One row of the table.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct PhysicsCase {
     /// Which motion, and of which quantity.
     pub case: &'static str,
@@ -63,8 +60,7 @@ pub struct PhysicsCase {
 }
 
 /// Where a reference comes from.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Source {
     /// A closed form of (1), (7) with the friction of (9).
     ClosedForm,
@@ -73,7 +69,7 @@ pub enum Source {
 }
 
 /// One quantity over the time of a motion.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct PhysicsTrace {
     /// The case whose quantity it is.
     pub case: &'static str,
@@ -84,7 +80,7 @@ pub struct PhysicsTrace {
 }
 
 /// One instant of a trace.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TracePoint {
     /// Time since the start of the motion, s.
     pub t_s: f64,

@@ -43,10 +43,7 @@ impl Interval {
     pub fn of(values: impl IntoIterator<Item = f64>) -> Option<Self> {
         let values: Vec<f64> = values.into_iter().collect();
         let n = values.len();
-        let mean = match n {
-            0 => return None,
-            _ => values.iter().sum::<f64>() / n as f64,
-        };
+        let mean = mean(values.iter().copied())?;
         let half = if n < 2 {
             0.0
         } else {
@@ -74,6 +71,13 @@ impl Interval {
     }
 }
 
+/// The mean; none without values.
+#[must_use]
+pub fn mean(values: impl IntoIterator<Item = f64>) -> Option<f64> {
+    let values: Vec<f64> = values.into_iter().collect();
+    (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
+}
+
 /// The median; none without values.
 #[must_use]
 pub fn median(values: impl IntoIterator<Item = f64>) -> Option<f64> {
@@ -89,6 +93,41 @@ pub fn median(values: impl IntoIterator<Item = f64>) -> Option<f64> {
 pub fn quantile(sorted: &[f64], share: f64) -> Option<f64> {
     let place = (share * sorted.len() as f64) as usize;
     sorted.get(place.min(sorted.len().checked_sub(1)?)).copied()
+}
+
+/// The value that so many per cent of rising values do not exceed (nearest rank). None without values.
+#[must_use]
+pub fn nearest_rank<T: Copy>(sorted: &[T], percent: usize) -> Option<T> {
+    let rank = (sorted.len() * percent).div_ceil(100);
+    sorted.get(rank.checked_sub(1)?).copied()
+}
+
+/// Abscissae at which two curves are compared.
+const PLACES: usize = 64;
+
+/// Mean of the difference of two curves over the abscissae that both cover.
+#[must_use]
+pub fn log_ratio(first: &[(f64, f64)], second: &[(f64, f64)]) -> Option<f64> {
+    let low = first.first()?.0.max(second.first()?.0);
+    let high = first.last()?.0.min(second.last()?.0);
+    if low >= high {
+        return None;
+    }
+    let places = (0..PLACES).map(|k| low + (high - low) * (k as f64 + 0.5) / PLACES as f64);
+    let differences: Option<Vec<f64>> = places
+        .map(|x| Some(interpolated(first, x)? - interpolated(second, x)?))
+        .collect();
+    let differences = differences?;
+    Some(differences.iter().sum::<f64>() / differences.len() as f64)
+}
+
+/// A curve at an abscissa, joined by straight lines.
+fn interpolated(curve: &[(f64, f64)], x: f64) -> Option<f64> {
+    curve.windows(2).find_map(|pair| {
+        let ((x0, y0), (x1, y1)) = (*pair.first()?, *pair.last()?);
+        let inside = (x0..=x1).contains(&x) && x1 > x0;
+        inside.then(|| y0 + (y1 - y0) * (x - x0) / (x1 - x0))
+    })
 }
 
 #[cfg(test)]
@@ -142,5 +181,15 @@ mod tests {
     #[test]
     fn the_median_of_an_even_number_is_the_middle() {
         assert_eq!(median([4.0, 1.0, 3.0, 2.0]), Some(2.5));
+    }
+
+    #[test]
+    fn curves_are_compared_where_both_are() {
+        let first = [(0.0, 1.0), (2.0, 3.0)];
+        let second = [(1.0, 1.0), (3.0, 3.0)];
+        // between 1 and 2 the first is one above the second
+        assert!((log_ratio(&first, &second).unwrap() - 1.0).abs() < 1e-12);
+        assert_eq!(log_ratio(&first, &[(2.5, 0.0), (3.0, 0.0)]), None);
+        assert_eq!(log_ratio(&first, &[]), None);
     }
 }

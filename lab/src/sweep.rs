@@ -5,16 +5,16 @@
 
 mod error;
 mod measures;
-mod overlay;
 mod plan;
 mod reader;
 mod results;
 mod shard;
+mod start;
 
 pub use error::PlanError;
-pub use measures::MEASURES;
+pub use measures::columns;
 pub use plan::{Axis, Plan, ROWS_MAX, Row, Seeds, Start};
-pub use results::{Line, PartError, Results, part_header};
+pub use results::{PartError, Results, RowResult, part_header};
 pub use shard::{Shard, ShardError};
 
 #[cfg(test)]

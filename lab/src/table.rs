@@ -20,6 +20,19 @@ pub enum Cell {
     Absent,
 }
 
+impl Cell {
+    /// As a field of CSV, with every digit.
+    #[must_use]
+    pub fn csv(&self) -> String {
+        match self {
+            Self::Text(text) => text.clone(),
+            Self::Count(count) => count.to_string(),
+            Self::Number(number) => number.to_string(),
+            Self::Absent => String::new(),
+        }
+    }
+}
+
 impl From<&str> for Cell {
     fn from(text: &str) -> Self {
         Self::Text(text.to_owned())
@@ -65,13 +78,61 @@ impl Serialize for Cell {
     }
 }
 
-/// A column: its key in files and how many decimals people want to see.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Column {
-    /// The key.
+/// A column of a table whose rows are made of `Row`s.
+pub struct Column<'a, Row> {
+    /// Its name in files and on the terminal.
     pub key: &'static str,
+    /// Its unit; empty for words, counts and shares.
+    pub unit: &'static str,
     /// Decimals on the terminal.
     pub decimals: usize,
+    of: Box<dyn Fn(&Row) -> Cell + 'a>,
+}
+
+impl<'a, Row: 'a> Column<'a, Row> {
+    /// A column that shows `of` of each row.
+    pub fn new(
+        key: &'static str,
+        unit: &'static str,
+        decimals: usize,
+        of: impl Fn(&Row) -> Cell + 'a,
+    ) -> Self {
+        Self {
+            key,
+            unit,
+            decimals,
+            of: Box::new(of),
+        }
+    }
+
+    /// What it shows of a row.
+    #[must_use]
+    pub fn cell(&self, row: &Row) -> Cell {
+        (self.of)(row)
+    }
+
+    /// The same of rows that hold such a row.
+    pub fn of<Outer: 'a>(self, inner: fn(&Outer) -> &Row) -> Column<'a, Outer> {
+        let of = move |outer: &Outer| (self.of)(inner(outer));
+        Column::new(self.key, self.unit, self.decimals, of)
+    }
+}
+
+/// A column: key, unit, decimals on the terminal, and what it shows of a row.
+pub fn column<'a, Row: 'a, T: Into<Cell> + 'a>(
+    key: &'static str,
+    unit: &'static str,
+    decimals: usize,
+    of: fn(&Row) -> T,
+) -> Column<'a, Row> {
+    Column::new(key, unit, decimals, move |row: &Row| of(row).into())
+}
+
+/// What stands above a column.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Heading {
+    key: &'static str,
+    decimals: usize,
 }
 
 /// Rows under columns.
@@ -79,8 +140,7 @@ pub struct Column {
 pub struct Table {
     /// What the table shows, for people.
     pub title: String,
-    /// Its columns.
-    pub columns: Vec<Column>,
+    columns: Vec<Heading>,
     rows: Vec<Vec<Cell>>,
 }
 
@@ -88,13 +148,13 @@ impl Table {
     /// An empty table with columns of keys and decimals.
     #[must_use]
     pub fn new(title: impl Into<String>, columns: &[(&'static str, usize)]) -> Self {
-        let column = |(key, decimals): &(&'static str, usize)| Column {
+        let heading = |(key, decimals): &(&'static str, usize)| Heading {
             key,
             decimals: *decimals,
         };
         Self {
             title: title.into(),
-            columns: columns.iter().map(column).collect(),
+            columns: columns.iter().map(heading).collect(),
             rows: Vec::new(),
         }
     }
@@ -105,6 +165,25 @@ impl Table {
         debug_assert_eq!(row.len(), self.columns.len(), "{}", self.title);
         row.resize(self.columns.len(), Cell::Absent);
         self.rows.push(row);
+    }
+
+    /// What the columns show of the rows.
+    #[must_use]
+    pub fn of<'a, Row: 'a>(
+        title: impl Into<String>,
+        rows: impl IntoIterator<Item = &'a Row>,
+        columns: &[Column<Row>],
+    ) -> Self {
+        let heading = |column: &Column<Row>| Heading {
+            key: column.key,
+            decimals: column.decimals,
+        };
+        let cells = |row| columns.iter().map(|column| column.cell(row)).collect();
+        Self {
+            title: title.into(),
+            columns: columns.iter().map(heading).collect(),
+            rows: rows.into_iter().map(cells).collect(),
+        }
     }
 
     /// The same with some of its columns, in their order; keys that it does not have are passed over.
@@ -122,10 +201,17 @@ impl Table {
             title: self.title.clone(),
             columns: places
                 .iter()
-                .filter_map(|place| self.columns.get(*place).cloned())
+                .filter_map(|place| self.columns.get(*place).copied())
                 .collect(),
             rows: rows.collect(),
         }
+    }
+
+    /// The same without some of its columns.
+    #[must_use]
+    pub fn without(&self, keys: &[&str]) -> Self {
+        let all = self.columns.iter().map(|column| column.key);
+        self.selected(&all.filter(|key| !keys.contains(key)).collect::<Vec<_>>())
     }
 
     /// The rows, each as long as the columns.
@@ -136,13 +222,10 @@ impl Table {
     /// The table as CSV (RFC 4180, lines end with LF): a header of keys, then the rows.
     #[must_use]
     pub fn to_csv(&self) -> Vec<u8> {
-        let mut csv = csv::Writer::from_writer(Vec::new());
-        // writing to memory cannot fail, and every row has as many fields as there are columns
-        let _ = csv.write_record(self.columns.iter().map(|column| column.key));
-        for row in &self.rows {
-            let _ = csv.write_record(row.iter().map(csv_field));
-        }
-        csv.into_inner().unwrap_or_default()
+        let keys = self.columns.iter().map(|column| column.key.to_owned());
+        let rows = self.rows.iter();
+        let rows = rows.map(|row| row.iter().map(Cell::csv).collect());
+        csv_of(std::iter::once(keys.collect::<Vec<_>>()).chain(rows))
     }
 
     fn texts(&self) -> Vec<Vec<String>> {
@@ -159,14 +242,16 @@ impl Table {
     }
 }
 
-/// A field with every digit.
-fn csv_field(cell: &Cell) -> String {
-    match cell {
-        Cell::Text(text) => text.clone(),
-        Cell::Count(count) => count.to_string(),
-        Cell::Number(number) => number.to_string(),
-        Cell::Absent => String::new(),
+/// Records of equal length as CSV (RFC 4180, lines end with LF).
+pub(crate) fn csv_of<T: AsRef<[u8]>>(
+    records: impl IntoIterator<Item = impl IntoIterator<Item = T>>,
+) -> Vec<u8> {
+    let mut csv = csv::Writer::from_writer(Vec::new());
+    for record in records {
+        // writing to memory cannot fail
+        let _ = csv.write_record(record);
     }
+    csv.into_inner().unwrap_or_default()
 }
 
 fn shown(cell: &Cell, decimals: usize) -> String {
@@ -210,7 +295,7 @@ impl fmt::Display for Table {
 }
 
 /// A row as a map from keys to cells.
-struct Record<'a>(&'a [Column], &'a [Cell]);
+struct Record<'a>(&'a [Heading], &'a [Cell]);
 
 impl Serialize for Record<'_> {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {

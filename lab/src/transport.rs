@@ -5,16 +5,9 @@
 //! brought the message: its serialisation, propagation and jitter. Waiting counts, before the socket and at a
 //! bottleneck. Pure: who runs a case tells the log what happened, and nothing here knows QUIC.
 
-mod figure;
-mod grid;
 mod log;
-mod reproduce;
-mod runs;
-mod tables;
 
-pub use grid::cases;
 pub use log::{Log, Outcome, Sent};
-pub use reproduce::reproduce;
 
 use std::ops::Range;
 use std::time::Duration;
@@ -122,6 +115,12 @@ pub struct Conditions {
 }
 
 impl Conditions {
+    /// Share of packets lost by chance, %.
+    #[must_use]
+    pub fn loss_percent(&self) -> f64 {
+        f64::from(self.loss.parts_per_billion()) / 1e7
+    }
+
     /// The link behind the bottleneck.
     #[must_use]
     pub fn link(&self) -> LinkConfig {

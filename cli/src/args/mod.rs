@@ -28,7 +28,7 @@ use mmt_shared::wire::Architecture;
 
 pub(crate) use self::netem::EmulationArguments;
 pub(crate) use bench::{BenchArguments, BenchSubject, TransportBenchArguments};
-pub(crate) use reproduce::{BodyArguments, Experiment, ReproduceArguments};
+pub(crate) use reproduce::ReproduceArguments;
 pub(crate) use sweep::SweepArguments;
 pub(crate) use transport::TransportArguments;
 pub(crate) use values::{OperatorWords, PairingWords, Period};

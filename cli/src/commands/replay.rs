@@ -2,7 +2,6 @@
 
 use std::path::Path;
 
-use indicatif::{ProgressBar, ProgressStyle};
 use mmt_lab::replay::{ReplayConfig, replay};
 use mmt_shared::recording::Recording;
 
@@ -10,6 +9,7 @@ use crate::args::ReplayArguments;
 use crate::failure::Failure;
 use crate::input::read_text;
 use crate::output::{print, print_json};
+use crate::progress::Bar;
 
 mod document;
 
@@ -32,25 +32,22 @@ pub(crate) fn run(arguments: &ReplayArguments) -> Result<(), Failure> {
     let recordings: Vec<_> = paths
         .map(|path| Ok((path, recording(path)?)))
         .collect::<Result<_, Failure>>()?;
-    let mut replayed = Vec::new();
+    let (mut replayed, bar) = (Vec::new(), Bar::new());
     for (path, recording) in &recordings {
-        let bar = progress_bar(path);
-        let mut progress = |done: usize, whole: usize| {
-            bar.set_length(whole as u64);
-            bar.set_position(done as u64);
-        };
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        let mut progress = |done: usize, whole: usize| bar.show(&name, done, whole);
         let report = replay(recording, &config, &mut progress);
-        bar.finish_and_clear();
+        bar.clear();
         let file = path.display().to_string();
         if !arguments.json {
             print(format_args!("{file}\n{report}"))?;
         }
         replayed.push(Replayed { file, report });
     }
-    match arguments.json {
-        true => print_json(&Document::new(&config, replayed)),
-        false => Ok(()),
+    if arguments.json {
+        print_json(&Document::new(&config, replayed))?;
     }
+    Ok(())
 }
 
 fn recording(path: &Path) -> Result<Recording, Failure> {
@@ -60,14 +57,4 @@ fn recording(path: &Path) -> Result<Recording, Failure> {
         Failure::usage(what)
             .remedy("give a file of recorded pushes; shared/src/recording/mod.rs tells its grammar")
     })
-}
-
-/// A bar on stderr; nothing where stderr is no terminal.
-fn progress_bar(path: &Path) -> ProgressBar {
-    let bar = ProgressBar::new(0);
-    let name = path.file_name().unwrap_or_default().to_string_lossy();
-    let style = ProgressStyle::with_template("{msg} [{wide_bar}] {pos}/{len} {eta}");
-    bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
-    bar.set_message(name.into_owned());
-    bar
 }

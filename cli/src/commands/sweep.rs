@@ -6,14 +6,14 @@ mod summary;
 
 use std::fmt::Display;
 
-use indicatif::{ProgressBar, ProgressStyle};
-use mmt_lab::io::{Pool, SheetError, Sheets};
+use mmt_lab::io::{SweepDir, SweepError};
 use mmt_lab::sweep::{Plan, Results};
 
 use crate::args::SweepArguments;
 use crate::failure::Failure;
 use crate::input::read_text;
 use crate::output::{print, print_json};
+use crate::progress::Bar;
 use crate::stop::Stop;
 
 use summary::{Preview, Summary};
@@ -37,22 +37,19 @@ pub(crate) fn run(arguments: &SweepArguments) -> Result<(), Failure> {
         return Err(Failure::usage(what).remedy("give the folder of the shards with --out"));
     }
     let told = |error| explain(error, arguments);
-    let sheets = Sheets::open(&arguments.out).map_err(told)?;
-    let before = sheets.results(&plan).map_err(told)?;
+    let dir = SweepDir::open(&arguments.out).map_err(told)?;
+    let before = dir.results(&plan).map_err(told)?;
     // only now: the plan of a folder that holds another plan's rows stays
-    sheets.keep_plan(&text).map_err(told)?;
-    let interrupted = match arguments.merge {
-        true => false,
-        false => run_missing(arguments, &plan, &sheets, &before)?,
-    };
-    finish(arguments, &plan, &sheets, &before, interrupted)
+    dir.keep_plan(&text).map_err(told)?;
+    let interrupted = !arguments.merge && run_missing(arguments, &plan, &dir, &before)?;
+    finish(arguments, &plan, &dir, &before, interrupted)
 }
 
 /// Runs the rows of the shard that are not done, and says whether it was interrupted.
 fn run_missing(
     arguments: &SweepArguments,
     plan: &Plan,
-    sheets: &Sheets,
+    dir: &SweepDir,
     before: &Results,
 ) -> Result<bool, Failure> {
     let rows: Vec<u64> = before
@@ -60,19 +57,21 @@ fn run_missing(
         .filter(|row| arguments.shard.has(*row))
         .collect();
     let stop = Stop::on_signals()?;
-    let bar = progress_bar(rows.len());
+    let bar = Bar::new();
     let done = |done: usize| {
-        if stop.asked() {
-            bar.set_message("ending after the rows under way");
-        }
-        bar.set_position(done as u64);
+        let what = if stop.asked() {
+            "ending after the rows under way"
+        } else {
+            "sweep"
+        };
+        bar.show(what, done, rows.len());
     };
-    let pool = Pool::new(arguments.jobs);
-    let ran = sheets.run(plan, arguments.shard, &rows, pool, || stop.asked(), done);
-    bar.finish_and_clear();
+    let ended = || stop.asked();
+    let ran = dir.run(plan, arguments.shard, &rows, arguments.jobs, ended, done);
+    bar.clear();
     match ran {
         Ok(()) => Ok(false),
-        Err(SheetError::Interrupted) => Ok(true),
+        Err(SweepError::Interrupted) => Ok(true),
         Err(error) => Err(explain(error, arguments)),
     }
 }
@@ -81,14 +80,14 @@ fn run_missing(
 fn finish(
     arguments: &SweepArguments,
     plan: &Plan,
-    sheets: &Sheets,
+    dir: &SweepDir,
     before: &Results,
     interrupted: bool,
 ) -> Result<(), Failure> {
     let told = |error| explain(error, arguments);
-    let results = sheets.results(plan).map_err(told)?;
+    let results = dir.results(plan).map_err(told)?;
     let table = match results.to_csv(plan) {
-        Some(csv) => Some(sheets.keep_results(&csv).map_err(told)?),
+        Some(csv) => Some(dir.keep_results(&csv).map_err(told)?),
         None => None,
     };
     let summary = Summary::new(plan, arguments, before, &results, table.as_deref());
@@ -97,40 +96,33 @@ fn finish(
         return Ok(());
     };
     let (plan, out) = (arguments.plan.display(), arguments.out.display());
-    Err(match interrupted {
-        true => Failure::failed(format!("interrupted: {missing}"))
-            .remedy("give the same command again: what is done is kept, and it goes on from there"),
-        false => Failure::failed(missing).remedy(format!(
+    Err(if interrupted {
+        Failure::failed(format!("interrupted: {missing}"))
+            .remedy("give the same command again: what is done is kept, and it goes on from there")
+    } else {
+        Failure::failed(missing).remedy(format!(
             "copy the other shards' rows/*.csv into {out}/rows, or run what is missing: mmt sweep {plan} --out {out}"
-        )),
+        ))
     })
 }
 
 fn tell(json: bool, document: &(impl Display + serde::Serialize)) -> Result<(), Failure> {
-    match json {
-        true => print_json(document),
-        false => print(document),
+    if json {
+        print_json(document)
+    } else {
+        print(document)
     }
 }
 
-fn explain(error: SheetError, arguments: &SweepArguments) -> Failure {
+fn explain(error: SweepError, arguments: &SweepArguments) -> Failure {
     match error {
-        SheetError::Part(_) => Failure::usage(error).remedy(
+        SweepError::Part(_) => Failure::usage(error).remedy(
             "give another folder with --out, or remove that file if its rows are not wanted",
         ),
-        SheetError::File { .. } => Failure::failed(error).remedy(format!(
+        SweepError::File { .. } => Failure::failed(error).remedy(format!(
             "check the folder {}: is the disk full, may you write there? What is done is kept",
             arguments.out.display()
         )),
-        SheetError::Trial { .. } | SheetError::Interrupted => Failure::failed(error),
+        SweepError::Trial { .. } | SweepError::Interrupted => Failure::failed(error),
     }
-}
-
-/// A bar on stderr; nothing where stderr is no terminal.
-fn progress_bar(rows: usize) -> ProgressBar {
-    let bar = ProgressBar::new(rows as u64);
-    let style = ProgressStyle::with_template("{msg} [{wide_bar}] {pos}/{len} {eta}");
-    bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
-    bar.set_message("sweep");
-    bar
 }

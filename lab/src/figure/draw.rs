@@ -1,17 +1,16 @@
-//! The drawing itself, by plotters.
-//!
-//! Logarithmic axes are drawn as logarithms with their own marks, so that one kind of coordinates serves all.
+//! The drawing itself, by plotters: its axes and its error bars.
 
 use std::fmt::Display;
 use std::ops::Range;
 
-use plotters::coord::ranged1d::{KeyPointHint, NoDefaultFormatting, ValueFormatter};
+use plotters::coord::combinators::{BindKeyPoints, IntoLogRange, LogCoord, WithKeyPoints};
+use plotters::coord::ranged1d::ValueFormatter;
+use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 use super::symbol::Symbol;
-use super::{Axis, Dot, Figure, Legend, Panel, Scale, Series, Stroke, ticks};
-use crate::reproduce::ReproduceError;
+use super::{Axis, Dot, DrawError, Figure, Legend, Panel, Scale, Series, Stroke, ticks};
 
 /// Family of every text.
 const FAMILY: &str = "sans-serif";
@@ -20,181 +19,90 @@ const TITLE: u32 = 17;
 /// Size of an axis' label, of the legend and of the numbers at the marks, pixels.
 const LABEL: u32 = 15;
 const NUMBER: u32 = 13;
+/// Most marks of a linear axis.
+const MARKS: usize = 9;
 
-type Plane = Cartesian2d<View, View>;
-type Chart<'a, 'b> = ChartContext<'a, SVGBackend<'b>, Plane>;
 type Area<'a> = DrawingArea<SVGBackend<'a>, plotters::coord::Shift>;
+type Chart<'a, 'b, X, Y> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<X, Y>>;
+
+/// An axis of plotters that shows numbers.
+trait Numbers: Ranged<ValueType = f64> + ValueFormatter<f64> {}
+
+impl<T: Ranged<ValueType = f64> + ValueFormatter<f64>> Numbers for T {}
 
 impl Figure {
     /// The figure as SVG.
     ///
     /// # Errors
-    /// When plotters cannot draw it; `name` says which figure.
-    pub fn draw(&self, name: &str) -> Result<String, ReproduceError> {
+    /// When plotters cannot draw it.
+    pub fn draw(&self) -> Result<String, DrawError> {
         let columns = self.columns.clamp(1, self.panels.len().max(1));
-        let rows = self.panels.len().div_ceil(columns);
+        let rows = self.panels.len().div_ceil(columns).max(1);
         let (width, height) = self.panel_size;
-        let size = (width * columns as u32, height * rows.max(1) as u32);
+        let size = (width * columns as u32, height * rows as u32);
         let mut svg = String::new();
         {
             let root = SVGBackend::with_string(&mut svg, size).into_drawing_area();
-            let drawn = self.draw_panels(&root, rows, columns);
-            drawn.map_err(|why| ReproduceError::Draw {
-                name: name.to_owned(),
-                why,
-            })?;
+            root.fill(&WHITE).map_err(failed)?;
+            let areas = root.split_evenly((rows, columns));
+            for (area, panel) in areas.iter().zip(&self.panels) {
+                draw_panel(area, panel)?;
+            }
+            root.present().map_err(failed)?;
         }
         Ok(svg)
     }
+}
 
-    fn draw_panels(&self, root: &Area, rows: usize, columns: usize) -> Result<(), String> {
-        root.fill(&WHITE).map_err(told)?;
-        let areas = root.split_evenly((rows.max(1), columns));
-        for (area, panel) in areas.iter().zip(&self.panels) {
-            draw_panel(area, panel)?;
-        }
-        root.present().map_err(told)
+fn failed(error: impl Display) -> DrawError {
+    DrawError(error.to_string())
+}
+
+fn draw_panel(area: &Area, panel: &Panel) -> Result<(), DrawError> {
+    let seen = panel.series.iter();
+    // events reach up to a height but do not set it
+    let measured = seen
+        .clone()
+        .filter(|series| series.stroke != Stroke::Events);
+    let x = span(&panel.x, seen, |dot| (dot.x, dot.x_interval));
+    let y = span(&panel.y, measured, |dot| (dot.y, dot.y_interval));
+    match (panel.x.scale, panel.y.scale) {
+        (Scale::Linear, Scale::Linear) => draw_on(area, panel, linear(x), linear(y)),
+        (Scale::Linear, Scale::Log) => draw_on(area, panel, linear(x), log(y)),
+        (Scale::Log, Scale::Linear) => draw_on(area, panel, log(x), linear(y)),
+        (Scale::Log, Scale::Log) => draw_on(area, panel, log(x), log(y)),
     }
 }
 
-fn told(error: impl Display) -> String {
-    error.to_string()
+fn linear(span: Range<f64>) -> RangedCoordf64 {
+    span.into()
 }
 
-fn draw_panel(area: &Area, panel: &Panel) -> Result<(), String> {
-    let (x, y) = (View::of(panel, Side::X), View::of(panel, Side::Y));
-    let mut chart = ChartBuilder::on(area)
-        .caption(&panel.title, (FAMILY, TITLE))
-        .margin(12)
-        .x_label_area_size(46)
-        .y_label_area_size(64)
-        .build_cartesian_2d(x.clone(), y.clone())
-        .map_err(told)?;
-    chart
-        .configure_mesh()
-        .light_line_style(TRANSPARENT)
-        .bold_line_style(BLACK.mix(0.09))
-        .axis_style(BLACK.mix(0.6))
-        .label_style((FAMILY, NUMBER))
-        .axis_desc_style((FAMILY, LABEL))
-        .x_desc(panel.x.label.as_str())
-        .y_desc(panel.y.label.as_str())
-        .x_labels(20)
-        .y_labels(20)
-        .draw()
-        .map_err(told)?;
-    for series in &panel.series {
-        draw_series(&mut chart, series, &x, &y)?;
-    }
-    draw_legend(&mut chart, panel)
+fn log(span: Range<f64>) -> WithKeyPoints<LogCoord<f64>> {
+    let marks = ticks::log(&span);
+    span.log_scale().with_key_points(marks)
 }
 
-/// Which axis.
-#[derive(Clone, Copy)]
-enum Side {
-    X,
-    Y,
-}
+/// A number with its interval.
+type Reach = (f64, Option<(f64, f64)>);
 
-/// An axis with what it shows, in drawn numbers: logarithms on a logarithmic axis.
-#[derive(Clone)]
-struct View {
-    scale: Scale,
-    range: Range<f64>,
-}
-
-impl View {
-    fn of(panel: &Panel, side: Side) -> Self {
-        let axis = match side {
-            Side::X => &panel.x,
-            Side::Y => &panel.y,
-        };
-        let dots = panel
-            .series
-            .iter()
-            .filter(|s| s.stroke != Stroke::Events || matches!(side, Side::X));
-        let values = dots.flat_map(|series| &series.dots).flat_map(|dot| {
-            let (value, interval) = match side {
-                Side::X => (dot.x, dot.x_interval),
-                Side::Y => (dot.y, dot.y_interval),
-            };
-            let (low, high) = interval.unwrap_or((value, value));
-            [value, low, high]
-        });
-        let range = axis.range.clone().unwrap_or_else(|| range_of(axis, values));
-        Self {
-            scale: axis.scale,
-            range: drawn(axis.scale, range.start)..drawn(axis.scale, range.end),
-        }
+/// What an axis shows: the given range, or a little more than the dots. Never empty.
+fn span<'a>(
+    axis: &Axis,
+    series: impl Iterator<Item = &'a Series>,
+    of: fn(&Dot) -> Reach,
+) -> Range<f64> {
+    if let Some(range) = &axis.range {
+        return range.clone();
     }
-
-    fn at(&self, value: f64) -> Option<f64> {
-        let at = drawn(self.scale, value);
-        at.is_finite().then_some(at)
-    }
-
-    /// Within the panel, or at its edge.
-    fn clipped(&self, value: f64) -> f64 {
-        let at = drawn(self.scale, value);
-        if at.is_nan() {
-            self.range.start
-        } else {
-            at.clamp(self.range.start, self.range.end)
-        }
-    }
-
-    fn shows(&self, at: f64) -> bool {
-        let room = 1e-9 * (self.range.end - self.range.start);
-        (self.range.start - room..=self.range.end + room).contains(&at)
-    }
-}
-
-impl Ranged for View {
-    type FormatOption = NoDefaultFormatting;
-    type ValueType = f64;
-
-    fn map(&self, at: &f64, (first, last): (i32, i32)) -> i32 {
-        let share = (at - self.range.start) / (self.range.end - self.range.start);
-        first + libm::round(share * f64::from(last - first)) as i32
-    }
-
-    fn key_points<Hint: KeyPointHint>(&self, _: Hint) -> Vec<f64> {
-        match self.scale {
-            Scale::Linear => ticks::linear(&self.range),
-            Scale::Log => ticks::log(&self.range),
-        }
-    }
-
-    fn range(&self) -> Range<f64> {
-        self.range.clone()
-    }
-}
-
-impl ValueFormatter<f64> for View {
-    fn format(at: &f64) -> String {
-        ticks::written(*at)
-    }
-
-    fn format_ext(&self, at: &f64) -> String {
-        match self.scale {
-            Scale::Linear => ticks::written(*at),
-            Scale::Log => ticks::written(libm::pow(10.0, *at)),
-        }
-    }
-}
-
-fn drawn(scale: Scale, value: f64) -> f64 {
-    match scale {
-        Scale::Linear => value,
-        Scale::Log => libm::log10(value),
-    }
-}
-
-/// A little more than the data; never empty.
-fn range_of(axis: &Axis, values: impl Iterator<Item = f64>) -> Range<f64> {
-    let shown = values.filter(|v| v.is_finite() && (axis.scale == Scale::Linear || *v > 0.0));
-    let (low, high) = shown.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| {
-        (low.min(v), high.max(v))
+    let values = series.flat_map(|series| &series.dots).flat_map(|dot| {
+        let (value, interval) = of(dot);
+        let (low, high) = interval.unwrap_or((value, value));
+        [value, low, high]
+    });
+    let shown = values.filter(|value| axis.scale.shows(*value));
+    let (low, high) = shown.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {
+        (low.min(value), high.max(value))
     });
     if low > high {
         return 0.1..1.0;
@@ -209,105 +117,120 @@ fn range_of(axis: &Axis, values: impl Iterator<Item = f64>) -> Range<f64> {
     }
 }
 
-fn draw_series(chart: &mut Chart, series: &Series, x: &View, y: &View) -> Result<(), String> {
-    let colour = colour_of(series);
+impl Scale {
+    /// Whether a number has a place on it.
+    fn shows(self, value: f64) -> bool {
+        value.is_finite() && (self == Self::Linear || value > 0.0)
+    }
+}
+
+fn draw_on<X: Numbers, Y: Numbers>(
+    area: &Area,
+    panel: &Panel,
+    x: X,
+    y: Y,
+) -> Result<(), DrawError> {
+    let mut chart = ChartBuilder::on(area)
+        .caption(&panel.title, (FAMILY, TITLE))
+        .margin(12)
+        .x_label_area_size(46)
+        .y_label_area_size(64)
+        .build_cartesian_2d(x, y)
+        .map_err(failed)?;
+    let written = |value: &f64| ticks::written(*value);
+    chart
+        .configure_mesh()
+        .light_line_style(TRANSPARENT)
+        .bold_line_style(BLACK.mix(0.09))
+        .axis_style(BLACK.mix(0.6))
+        .label_style((FAMILY, NUMBER))
+        .axis_desc_style((FAMILY, LABEL))
+        .x_desc(panel.x.label.as_str())
+        .y_desc(panel.y.label.as_str())
+        .x_labels(MARKS)
+        .y_labels(MARKS)
+        .x_label_formatter(&written)
+        .y_label_formatter(&written)
+        .draw()
+        .map_err(failed)?;
+    for series in &panel.series {
+        draw_series(&mut chart, panel, series)?;
+    }
+    draw_legend(&mut chart, panel)
+}
+
+fn draw_series<X: Numbers, Y: Numbers>(
+    chart: &mut Chart<X, Y>,
+    panel: &Panel,
+    series: &Series,
+) -> Result<(), DrawError> {
+    let (x, y) = (chart.x_range(), chart.y_range());
+    let within = |range: &Range<f64>, value| (range.start..=range.end).contains(&value);
+    let (scale_x, scale_y) = (panel.x.scale, panel.y.scale);
+    let on_x = |dot: &Dot| scale_x.shows(dot.x) && within(&x, dot.x);
+    let shown = |dot: &Dot| on_x(dot) && scale_y.shows(dot.y) && within(&y, dot.y);
+    let colour = series.colour.rgb();
     if series.stroke == Stroke::Events {
-        let lines = series.dots.iter().filter_map(|dot| {
-            let at = x.at(dot.x).filter(|at| x.shows(*at))?;
-            let ends = vec![(at, y.range.start), (at, y.clipped(dot.y))];
-            Some(PathElement::new(ends, colour.stroke_width(series.width)))
+        let lines = series.dots.iter().filter(|dot| on_x(dot)).map(|dot| {
+            let top = dot.y.clamp(y.start, y.end);
+            let ends = vec![(dot.x, y.start), (dot.x, top)];
+            PathElement::new(ends, colour.stroke_width(series.width))
         });
-        return chart.draw_series(lines).map(drop).map_err(told);
+        return chart.draw_series(lines).map(drop).map_err(failed);
     }
-    let place = |dot: &Dot| {
-        let (at_x, at_y) = (x.at(dot.x)?, y.at(dot.y)?);
-        Some((at_x, at_y)).filter(|_| x.shows(at_x) && y.shows(at_y))
+    // neighbours that can both be drawn are joined
+    for run in series.dots.split(|dot| !shown(dot)) {
+        draw_line(chart, series, run)?;
+    }
+    for dot in series.dots.iter().filter(|dot| shown(dot)) {
+        let bar = colour.mix(0.75);
+        if let Some((low, high)) = dot.x_interval {
+            let (low, high) = (low.max(x.start), high.min(x.end));
+            let bar = ErrorBar::new_horizontal(dot.y, low, dot.x, high, bar, 4);
+            chart.draw_series([bar]).map_err(failed)?;
+        }
+        if let Some((low, high)) = dot.y_interval {
+            let (low, high) = (low.max(y.start), high.min(y.end));
+            let bar = ErrorBar::new_vertical(dot.x, low, dot.y, high, bar, 4);
+            chart.draw_series([bar]).map_err(failed)?;
+        }
+        let mark = Symbol::mark((dot.x, dot.y), series.mark, colour);
+        chart.draw_series([mark]).map_err(failed)?;
+        draw_note(chart, dot, colour)?;
+    }
+    Ok(())
+}
+
+fn draw_line<X: Numbers, Y: Numbers>(
+    chart: &mut Chart<X, Y>,
+    series: &Series,
+    run: &[Dot],
+) -> Result<(), DrawError> {
+    let style = series.colour.rgb().stroke_width(series.width);
+    let places = run.iter().map(|dot| (dot.x, dot.y));
+    let drawn = match series.stroke {
+        Stroke::Solid => chart.draw_series(LineSeries::new(places, style)).map(drop),
+        Stroke::Dashed => chart
+            .draw_series(DashedLineSeries::new(places, 7, 4, style))
+            .map(drop),
+        Stroke::None | Stroke::Events => Ok(()),
     };
-    draw_lines(chart, series, colour, &place)?;
-    draw_intervals(chart, series, colour, x, y)?;
-    draw_marks(chart, series, colour, &place)
+    drawn.map_err(failed)
 }
 
-fn colour_of(series: &Series) -> RGBColor {
-    let (r, g, b) = series.colour.rgb();
-    RGBColor(r, g, b)
-}
-
-/// Joins neighbours that can both be drawn.
-fn draw_lines(
-    chart: &mut Chart,
-    series: &Series,
+/// Below and to the left of its dot: a rate–error curve falls to the right.
+fn draw_note<X: Numbers, Y: Numbers>(
+    chart: &mut Chart<X, Y>,
+    dot: &Dot,
     colour: RGBColor,
-    place: &dyn Fn(&Dot) -> Option<(f64, f64)>,
-) -> Result<(), String> {
-    let style = colour.stroke_width(series.width);
-    let places: Vec<Option<(f64, f64)>> = series.dots.iter().map(place).collect();
-    for run in places.split(Option::is_none) {
-        let run = run.iter().flatten().copied();
-        let drawn = match series.stroke {
-            Stroke::Solid => chart.draw_series(LineSeries::new(run, style)).map(drop),
-            Stroke::Dashed => chart
-                .draw_series(DashedLineSeries::new(run, 7, 4, style))
-                .map(drop),
-            Stroke::None | Stroke::Events => Ok(()),
-        };
-        drawn.map_err(told)?;
-    }
-    Ok(())
-}
-
-fn draw_intervals(
-    chart: &mut Chart,
-    series: &Series,
-    colour: RGBColor,
-    x: &View,
-    y: &View,
-) -> Result<(), String> {
-    let style = colour.mix(0.75).stroke_width(1);
-    let bars = series.dots.iter().filter_map(|dot| {
-        let (at_x, at_y) = (x.at(dot.x)?, y.at(dot.y)?);
-        if !(x.shows(at_x) && y.shows(at_y)) {
-            return None;
-        }
-        let across = dot
-            .x_interval
-            .map(|(low, high)| vec![(x.clipped(low), at_y), (x.clipped(high), at_y)]);
-        let along = dot
-            .y_interval
-            .map(|(low, high)| vec![(at_x, y.clipped(low)), (at_x, y.clipped(high))]);
-        Some([across, along])
-    });
-    let paths = bars
-        .flatten()
-        .flatten()
-        .map(|ends| PathElement::new(ends, style));
-    chart.draw_series(paths).map(drop).map_err(told)
-}
-
-fn draw_marks(
-    chart: &mut Chart,
-    series: &Series,
-    colour: RGBColor,
-    place: &dyn Fn(&Dot) -> Option<(f64, f64)>,
-) -> Result<(), String> {
-    let places = series
-        .dots
-        .iter()
-        .filter_map(|dot| place(dot).map(|at| (dot, at)));
-    for (dot, at) in places {
-        let symbol = Symbol::mark(at, series.mark, colour);
-        chart.draw_series([symbol]).map(drop).map_err(told)?;
-        if let Some(note) = &dot.note {
-            let style = (FAMILY, NUMBER - 2)
-                .into_font()
-                .color(&colour)
-                .pos(Pos::new(HPos::Right, VPos::Top));
-            // below the falling front that a rate–error curve is
-            let text = EmptyElement::at(at) + Text::new(note.clone(), (-6, 6), style);
-            chart.draw_series([text]).map(drop).map_err(told)?;
-        }
-    }
-    Ok(())
+) -> Result<(), DrawError> {
+    let Some(note) = &dot.note else {
+        return Ok(());
+    };
+    let style = (FAMILY, NUMBER - 2).into_font().color(&colour);
+    let style = style.pos(Pos::new(HPos::Right, VPos::Top));
+    let text = EmptyElement::at((dot.x, dot.y)) + Text::new(note.clone(), (-6, 6), style);
+    chart.draw_series([text]).map(drop).map_err(failed)
 }
 
 /// A label with room behind it: plotters counts 0.46 of the font's size for a letter, and fonts take up to 0.55.
@@ -316,7 +239,10 @@ fn roomy(label: &str) -> String {
     format!("{label}{:room$}", "")
 }
 
-fn draw_legend<'a, 'b: 'a>(chart: &mut Chart<'a, 'b>, panel: &Panel) -> Result<(), String> {
+fn draw_legend<'a, 'b: 'a, X: Numbers + 'a, Y: Numbers + 'a>(
+    chart: &mut Chart<'a, 'b, X, Y>,
+    panel: &Panel,
+) -> Result<(), DrawError> {
     let position = match panel.legend {
         Legend::None => return Ok(()),
         Legend::UpperRight => SeriesLabelPosition::UpperRight,
@@ -324,23 +250,20 @@ fn draw_legend<'a, 'b: 'a>(chart: &mut Chart<'a, 'b>, panel: &Panel) -> Result<(
         Legend::LowerLeft => SeriesLabelPosition::LowerLeft,
         Legend::LowerRight => SeriesLabelPosition::LowerRight,
     };
-    for series in panel
-        .series
-        .iter()
-        .filter(|series| !series.label.is_empty())
-    {
-        let (colour, width, mark, stroke) =
-            (colour_of(series), series.width, series.mark, series.stroke);
-        let nobody: Vec<(f64, f64)> = Vec::new();
+    let labelled = panel.series.iter();
+    for series in labelled.filter(|series| !series.label.is_empty()) {
+        let (colour, mark) = (series.colour.rgb(), series.mark);
+        let line = Some((series.stroke, series.width));
+        let nobody: [Circle<(f64, f64), i32>; 0] = [];
         chart
-            .draw_series(LineSeries::new(nobody, colour))
-            .map_err(told)?
+            .draw_series(nobody)
+            .map_err(failed)?
             .label(roomy(&series.label))
             .legend(move |(x, y)| Symbol {
                 at: (x + 13, y),
                 mark,
                 colour,
-                line: Some((stroke, width)),
+                line,
             });
     }
     chart
@@ -352,5 +275,5 @@ fn draw_legend<'a, 'b: 'a>(chart: &mut Chart<'a, 'b>, panel: &Panel) -> Result<(
         .background_style(WHITE.mix(0.85))
         .border_style(BLACK.mix(0.25))
         .draw()
-        .map_err(told)
+        .map_err(failed)
 }

@@ -25,8 +25,8 @@ fn the_same_data_give_the_same_bytes_and_every_text_is_there() {
     let mut dots = vec![Dot::at(1.0, 2.0), Dot::at(10.0, 1.0), Dot::at(100.0, 0.5)];
     dots[1].y_interval = Some((0.8, 1.2));
     dots[1].note = Some("10 %".to_owned());
-    let svg = figure(dots.clone()).draw("a").unwrap();
-    assert_eq!(svg, figure(dots).draw("a").unwrap());
+    let svg = figure(dots.clone()).draw().unwrap();
+    assert_eq!(svg, figure(dots).draw().unwrap());
     for text in ["Title", "x, 1/s", "a curve", "dashed", "10 %", "100"] {
         assert!(svg.contains(text), "{text}");
     }
@@ -45,14 +45,14 @@ fn what_cannot_be_drawn_is_left_out_and_breaks_nothing() {
         ],
         vec![Dot::at(5.0, 5.0)],
     ] {
-        assert!(figure(dots).draw("a").unwrap().contains("</svg>"));
+        assert!(figure(dots).draw().unwrap().contains("</svg>"));
     }
     let empty = Figure {
         panels: Vec::new(),
         columns: 1,
         panel_size: (100, 100),
     };
-    assert!(empty.draw("a").unwrap().contains("</svg>"));
+    assert!(empty.draw().unwrap().contains("</svg>"));
 }
 
 #[test]
@@ -70,7 +70,7 @@ fn legend_width(label: &str) -> f64 {
     let dots = vec![Dot::at(1.0, 2.0), Dot::at(10.0, 1.0)];
     let mut figure = figure(Vec::new());
     figure.panels[0].series = vec![Series::line(label, Colour::Blue, dots)];
-    let svg = figure.draw("a").unwrap();
+    let svg = figure.draw().unwrap();
     let box_of_legend = svg.lines().find(|line| line.contains("opacity=\"0.85\""));
     let (_, width) = box_of_legend.unwrap().split_once("width=\"").unwrap();
     width.split_once('"').unwrap().0.parse().unwrap()

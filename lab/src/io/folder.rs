@@ -2,7 +2,8 @@
 
 use std::collections::BTreeMap;
 use std::fs;
-use std::io;
+use std::io::{self, Write as _};
+use std::os::unix::fs::PermissionsExt as _;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 
@@ -45,10 +46,7 @@ impl Folder {
         if let Some(parent) = path.parent() {
             fs::create_dir_all(parent)?;
         }
-        let mut beside = path.clone().into_os_string();
-        beside.push(".part");
-        fs::write(&beside, bytes)?;
-        fs::rename(&beside, &path)?;
+        write_whole(&path, bytes)?;
         let digest = hex(&Sha256::digest(bytes));
         if let Ok(mut kept) = self.kept.lock() {
             kept.insert(name.to_owned(), digest);
@@ -64,6 +62,21 @@ impl Folder {
             .map(|kept| kept.clone())
             .unwrap_or_default()
     }
+}
+
+/// Writes beside the place and moves there: who reads finds the old file or the new one, never a part.
+pub(super) fn write_whole(path: &Path, bytes: &[u8]) -> io::Result<()> {
+    let folder = path.parent().unwrap_or(Path::new(""));
+    // as any file: who may read it is the system's choice
+    let readable = fs::Permissions::from_mode(0o666);
+    let mut beside = tempfile::Builder::new()
+        .prefix(".mmt-")
+        .suffix(".part")
+        .permissions(readable)
+        .tempfile_in(folder)?;
+    beside.write_all(bytes)?;
+    beside.persist(path)?;
+    Ok(())
 }
 
 #[cfg(test)]

@@ -8,12 +8,13 @@
 
 mod cost;
 mod folder;
-mod pool;
-mod sheets;
+mod runner;
+mod sweep_dir;
+mod threads;
 pub mod transport_bench;
 pub mod virtual_time;
 
 pub use cost::estimator_tick_ms;
 pub use folder::Folder;
-pub use pool::Pool;
-pub use sheets::{SheetError, Sheets};
+pub use runner::{Progress, Runner};
+pub use sweep_dir::{SweepDir, SweepError};

@@ -45,7 +45,7 @@ fn the_study_body_moves_as_the_references_say() {
         ("hold-0.5c", 0.0),
         ("hold-0.9c", 0.0),
     ];
-    let rows = shown(&Body::default());
+    let rows = shown(&Body::DEFAULT);
     assert_eq!(rows.len(), study.len());
     for (row, (case, value)) in rows.iter().zip(study) {
         assert_eq!(row.case, case);
@@ -114,7 +114,7 @@ fn the_smallest_and_the_heaviest_body_have_every_row() {
 
 #[test]
 fn an_environment_that_is_wrong_by_a_tenth_shows() {
-    let mut dynamics = Body::default().checked().unwrap();
+    let mut dynamics = Body::DEFAULT.checked().unwrap();
     dynamics.config.friction_coefficient *= 1.1;
     for motion in Motion::all(&dynamics) {
         let run = Run::of(&motion).unwrap();

@@ -42,7 +42,7 @@ pub(super) fn fit(law: Law, start: &Surface, from: &Surface, pushes: &[Observati
                 .unwrap_or(start.friction_n),
             ..*start
         },
-        Law::LimitSurfaceTwist | Law::LimitSurface | Law::ThreePoint | Law::FourthOrder => {
+        Law::LimitSurfaceTwist | Law::LimitSurface | Law::ThreePoint => {
             Search { law, start, pushes }.run(from)
         }
     }
@@ -183,12 +183,7 @@ mod tests {
 
     #[test]
     fn without_noise_many_pushes_give_the_true_friction() {
-        for law in [
-            Law::LimitSurfaceTwist,
-            Law::LimitSurface,
-            Law::ThreePoint,
-            Law::FourthOrder,
-        ] {
+        for law in [Law::LimitSurfaceTwist, Law::LimitSurface, Law::ThreePoint] {
             let found = fit(law, &START, &START, &pushes(law, 400, 0.0));
             // the prior's pull falls with the number of pushes
             assert!(distance(&found, &TRUTH) < 0.02, "{law:?} {found:?}");

@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::ReplayConfig;
 use super::fit::{Observation, fit};
 use super::surface::Law;
-use crate::statistics::median;
+use crate::statistics::{mean, median};
 
 /// | |predicted| − |measured| | / |measured|.
 pub(super) fn relative_error(predicted: Vec2, measured: Vec2) -> f64 {
@@ -70,12 +70,10 @@ pub(super) fn summary(law: Law, repeats: &[Vec<f64>]) -> HeldOut {
         .iter()
         .filter_map(|errors| median(errors.iter().copied()));
     let median_errors: Vec<f64> = medians.collect();
-    let count = median_errors.len();
-    let mean = median_errors.iter().sum::<f64>() / count.max(1) as f64;
     HeldOut {
         law,
+        median_error: mean(median_errors.iter().copied()),
         median_errors,
-        median_error: (count > 0).then_some(mean),
         pooled_median_error: median(repeats.iter().flatten().copied()),
     }
 }

@@ -19,6 +19,7 @@ use mmt_shared::model::geometry::{Vec2, rotate};
 use mmt_shared::recording::{Push, Recording};
 use serde::Serialize;
 
+use crate::statistics::quantile;
 use fit::{Observation, fit};
 use heldout::Split;
 use trigger::{Contact, Traffic};
@@ -162,7 +163,7 @@ fn steady_force(config: &ReplayConfig, push: &Push) -> Option<Vec2> {
         .map(|sample| sample.force.norm())
         .collect();
     sizes.sort_by(f64::total_cmp);
-    let high = sizes.get(sizes.len() * 9 / 10).copied()?;
+    let high = quantile(&sizes, 0.9)?;
     if high < config.contact_on_n {
         return None;
     }

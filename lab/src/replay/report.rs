@@ -10,7 +10,7 @@ use super::ReplayConfig;
 use super::heldout::HeldOut;
 use super::surface::{Law, Surface};
 use super::trigger::Packets;
-use crate::statistics::{median, quantile};
+use crate::statistics::{mean, median, quantile};
 
 /// Median and mean of an error over pushes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
@@ -25,12 +25,10 @@ pub struct Spread {
 
 impl Spread {
     pub(super) fn of(values: impl Iterator<Item = f64> + Clone) -> Self {
-        let pushes = values.clone().count();
-        let mean = values.clone().sum::<f64>() / pushes.max(1) as f64;
         Self {
-            pushes,
-            median: median(values),
-            mean: (pushes > 0).then_some(mean),
+            pushes: values.clone().count(),
+            median: median(values.clone()),
+            mean: mean(values),
         }
     }
 }

@@ -3,7 +3,7 @@
 //! The block slides so slowly that the push equals the ground friction, so a law needs the direction of a
 //! motion only, never its speed; mass and damping cannot be seen. Held here: Coulomb friction as in (1)
 //! and (5), decoupled from turning; the ellipsoidal limit surface (Goyal), from the whole twist or for a
-//! push at one point; the same of the fourth order; friction under three equal supports. A law must never see the force it predicts.
+//! push at one point; friction under three equal supports. A law must never see the force it predicts.
 //!
 //! A push at a point is the block's motion of least resistance: with v_p the displacement of the touched
 //! point, the force is the gradient of min over omega of D(v_p, omega), D the power lost to friction
@@ -36,19 +36,15 @@ pub enum Law {
     LimitSurface,
     /// (iii): three equal supports at the corners of a right triangle; push at one point.
     ThreePoint,
-    /// (iv): a limit surface of the fourth order, |f|⁴/c⁴ + m⁴/e⁴ = 1, whose sides are flatter than the
-    /// ellipsoid's; push at one point.
-    FourthOrder,
 }
 
 impl Law {
     /// All laws, in the order of reports.
-    pub const ALL: [Self; 5] = [
+    pub const ALL: [Self; 4] = [
         Self::Decoupled,
         Self::LimitSurfaceTwist,
         Self::LimitSurface,
         Self::ThreePoint,
-        Self::FourthOrder,
     ];
 
     /// The name in tables.
@@ -59,7 +55,6 @@ impl Law {
             Self::LimitSurfaceTwist => "(ii) surface, twist",
             Self::LimitSurface => "(ii) surface, point",
             Self::ThreePoint => "(iii) three points",
-            Self::FourthOrder => "(iv) fourth order",
         }
     }
 
@@ -72,7 +67,6 @@ impl Law {
             Self::LimitSurfaceTwist => from_twist(surface, motion),
             Self::LimitSurface => at_point(surface, motion),
             Self::ThreePoint => on_three_points(surface, motion),
-            Self::FourthOrder => of_fourth_order(surface, motion),
         }
     }
 }
@@ -189,24 +183,6 @@ fn on_three_points(surface: &Surface, motion: &Motion) -> Vec2 {
     arms.iter().map(|arm| pull(omega, *arm)).sum()
 }
 
-/// The surface |f|⁴/c⁴ + m⁴/e⁴ = 1 cut by "moment = lever arm × force": of the forces at the touched point that it
-/// bears, the one that does most work on v_p. Along v_p + t v_p⊥ the work is a constant over the fourth root of
-/// (1 + t²)² + (m(t)/(c e))⁴ for |v_p| = 1, which is convex in t.
-fn of_fourth_order(surface: &Surface, motion: &Motion) -> Vec2 {
-    let along = unit(motion.at_touch());
-    let across = spin(1.0, along);
-    let p = spin(1.0, motion.touched - surface.centre_m);
-    let (a, b) = (
-        p.dot(&along) / surface.arm_m,
-        p.dot(&across) / surface.arm_m,
-    );
-    let slope = |t: f64| t * (1.0 + t * t) + b * (a + b * t).powi(3);
-    let t = root_of_increasing(slope, 1.0);
-    let lever = a + b * t;
-    let level = ((1.0 + t * t).powi(2) + lever.powi(4)).sqrt().sqrt();
-    (along + across * t) * (surface.friction_n / level)
-}
-
 /// Where an increasing function crosses zero; `scale` is a first guess of how far that is from zero.
 fn root_of_increasing(f: impl Fn(f64) -> f64, scale: f64) -> f64 {
     let (mut low, mut high) = (-scale, scale);
@@ -271,12 +247,7 @@ mod tests {
         };
         let (before, after) = sizes(Law::Decoupled);
         assert_eq!(before, after);
-        for law in [
-            Law::LimitSurfaceTwist,
-            Law::LimitSurface,
-            Law::ThreePoint,
-            Law::FourthOrder,
-        ] {
+        for law in [Law::LimitSurfaceTwist, Law::LimitSurface, Law::ThreePoint] {
             let (before, after) = sizes(law);
             assert!(after < 0.9 * before, "{law:?}");
         }
@@ -334,31 +305,6 @@ mod tests {
             .map(|k| resistance(f64::from(k) * 1e-3))
             .fold(f64::INFINITY, f64::min);
         assert!((force.dot(&v) / least - 1.0).abs() < 0.01);
-    }
-
-    #[test]
-    fn the_fourth_order_bears_most_between_pure_force_and_pure_moment_and_obeys_normality() {
-        let touched = Vec2::new(-0.05, 0.06);
-        let (c, e) = (SURFACE.friction_n, SURFACE.torque_nm());
-        let arm = touched - SURFACE.centre_m;
-        for k in 0..12 {
-            let direction = rotate(0.5 * f64::from(k), Vec2::new(1.0, 0.0));
-            let push = motion(0.01 * direction.x, 0.01 * direction.y, 0.0, touched);
-            let force = Law::FourthOrder.force(&SURFACE, &push);
-            let moment = cross(arm, force);
-            let level = (force.norm() / c).powi(4) + (moment / e).powi(4);
-            assert!((level - 1.0).abs() < 1e-9, "{level}");
-            // the ellipsoid with the same c and e lies inside
-            let inner = Law::LimitSurface.force(&SURFACE, &push);
-            assert!(force.dot(&direction) >= inner.dot(&direction) - 1e-9);
-            // no neighbour on the edge does more work
-            for step in [-1e-3, 1e-3] {
-                let to = rotate(step, force).normalize();
-                let lever = cross(arm, to) / e * c;
-                let size = c / libm::pow(1.0 + lever.powi(4), 0.25);
-                assert!((to * size).dot(&direction) <= force.dot(&direction) + 1e-12);
-            }
-        }
     }
 
     #[test]

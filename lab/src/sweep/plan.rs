@@ -22,7 +22,7 @@ pub enum Start {
     /// The live system's defaults over a perfect network: ten samples a packet, and a play-out delay.
     #[default]
     Live,
-    /// The paper's experiment, as [`crate::reproduce::paper_world`]: no delay at all.
+    /// The paper's experiment, as [`crate::setting::paper_world`]: no delay at all.
     PaperExperiment,
 }
 

@@ -11,8 +11,9 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue, Deserializer};
 
 use super::error::PlanError;
-use super::overlay::{effective, lay_at};
 use super::plan::{Axis, Plan, ROWS_MAX, Seeds, Start, steps};
+use super::start::beginning;
+use crate::overlay::{lay, lay_at};
 use crate::trial::{Change, TrialError};
 use crate::world::{World, WorldConfig};
 
@@ -208,12 +209,12 @@ impl<'i> Reader<'i> {
         }
         let sizes = self.axes.iter().map(|axis| axis.steps.len() as u64);
         let rows = sizes.fold(seeds.count, u64::saturating_mul);
-        match rows > ROWS_MAX {
-            true => refuse(format!(
+        if rows > ROWS_MAX {
+            return refuse(format!(
                 "{rows} rows are too many; a plan has at most {ROWS_MAX}"
-            )),
-            false => Ok(()),
+            ));
         }
+        Ok(())
     }
 
     /// The configuration at every point of the grid, each tried.
@@ -239,7 +240,8 @@ impl<'i> Reader<'i> {
         for (key, value) in self.assignments(steps) {
             lay_at(given.get_mut(), key.get_ref(), &key.span(), value.clone());
         }
-        effective(self.start, given, self.text.len())
+        let start = beginning(self.start, &given);
+        lay(&start, given, self.text.len())
             .map_err(|error| PlanError::of(self.text, &error).context(&self.told(steps)))
     }
 

@@ -1,54 +1,59 @@
-//! The rows that are done: lines of part files, put together to the table of results.
+//! The rows that are done: the records of part files, put together to the table of results.
 //!
-//! A line carries the key of its row, so that rows of another plan or program are never taken for this one's. A
+//! A record carries the key of its row, so that rows of another plan or program are never taken for this one's. A
 //! line without its end was torn by an interruption and counts as not there.
 
 use std::collections::BTreeMap;
 
-use super::measures::{MEASURES, measured_line};
+use super::measures::columns;
 use super::plan::{Plan, Row};
+use crate::table::csv_of;
 use crate::trial::Measured;
+
+/// The keys of the measured columns.
+fn measured_keys() -> impl Iterator<Item = &'static str> {
+    columns().into_iter().map(|column| column.key)
+}
 
 /// The first line of a part file, with its end.
 #[must_use]
-pub fn part_header() -> String {
-    format!("row,key,{}\n", MEASURES.join(","))
+pub fn part_header() -> Vec<u8> {
+    csv_of([["row", "key"].into_iter().chain(measured_keys())])
 }
 
 /// A row that is done.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Line {
+pub struct RowResult {
     row: u64,
     key: String,
-    measured: String,
+    measured: Vec<String>,
 }
 
-impl Line {
+impl RowResult {
     /// What was measured of a row.
     #[must_use]
     pub fn of(row: &Row, measured: &Measured) -> Self {
+        let columns = columns().into_iter();
         Self {
             row: row.number,
             key: row.key(),
-            measured: measured_line(measured),
+            measured: columns.map(|column| column.cell(measured).csv()).collect(),
         }
     }
 
-    /// As it stands in a part file, with its end.
+    /// As it stands in a part file, with the end of the line.
     #[must_use]
-    pub fn text(&self) -> String {
-        format!("{},{},{}\n", self.row, self.key, self.measured)
+    pub fn line(&self) -> Vec<u8> {
+        let head = [self.row.to_string(), self.key.clone()].into_iter();
+        csv_of([head.chain(self.measured.iter().cloned())])
     }
 
-    fn parse(text: &str) -> Option<Self> {
-        let (row, rest) = text.split_once(',')?;
-        let (key, measured) = rest.split_once(',')?;
-        let whole = measured.split(',').count() == MEASURES.len();
-        whole.then_some(Self {
-            row: row.parse().ok()?,
-            key: key.to_owned(),
-            measured: measured.to_owned(),
-        })
+    fn of_record(record: &csv::StringRecord) -> Option<Self> {
+        let mut fields = record.iter().map(str::to_owned);
+        let (row, key) = (fields.next()?.parse().ok()?, fields.next()?);
+        let measured: Vec<String> = fields.collect();
+        let whole = measured.len() == measured_keys().count();
+        whole.then_some(Self { row, key, measured })
     }
 }
 
@@ -67,7 +72,7 @@ pub enum PartError {
         /// The file.
         part: String,
         /// The line, from 1.
-        line: usize,
+        line: u64,
     },
     /// A row has another configuration or was made by another version.
     #[error("{part}: row {row} belongs to another plan or another version of mmt")]
@@ -90,7 +95,7 @@ pub enum PartError {
 /// The rows of a plan that are done.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Results {
-    lines: BTreeMap<u64, Line>,
+    rows: BTreeMap<u64, RowResult>,
 }
 
 impl Results {
@@ -98,22 +103,28 @@ impl Results {
     ///
     /// # Errors
     /// The file belongs to another plan or version, or contradicts what was added before.
-    pub fn add_part(&mut self, plan: &Plan, part: &str, text: &str) -> Result<(), PartError> {
+    pub fn add_part(&mut self, plan: &Plan, part: &str, bytes: &[u8]) -> Result<(), PartError> {
         let part = || part.to_owned();
         // what follows the last line end is torn
-        let (whole, _) = text.rsplit_once('\n').unwrap_or_default();
-        let mut lines = whole.lines().enumerate();
-        match lines.next() {
-            None => return Ok(()),
-            Some((_, header)) if header == part_header().trim_end() => {}
-            Some(_) => return Err(PartError::Columns { part: part() }),
-        }
-        for (n, text) in lines {
-            let line = n + 1;
-            let found =
-                Line::parse(text).ok_or_else(|| PartError::Malformed { part: part(), line })?;
+        let end = bytes.iter().rposition(|byte| *byte == b'\n');
+        let whole = end.and_then(|end| bytes.get(..=end)).unwrap_or_default();
+        let Some(records) = whole.strip_prefix(part_header().as_slice()) else {
+            let empty = whole.is_empty();
+            return if empty {
+                Ok(())
+            } else {
+                Err(PartError::Columns { part: part() })
+            };
+        };
+        let reader = csv::ReaderBuilder::new()
+            .has_headers(false)
+            .flexible(true)
+            .from_reader(records);
+        for (record, line) in reader.into_records().zip(2..) {
+            let found = record.ok().and_then(|record| RowResult::of_record(&record));
+            let found = found.ok_or_else(|| PartError::Malformed { part: part(), line })?;
             let row = found.row;
-            match self.lines.get(&row) {
+            match self.rows.get(&row) {
                 Some(known) if *known == found => continue,
                 Some(known) if known.key == found.key => {
                     return Err(PartError::Disagree { part: part(), row });
@@ -123,7 +134,7 @@ impl Results {
             if plan.row(row).is_none_or(|row| row.key() != found.key) {
                 return Err(PartError::OtherPlan { part: part(), row });
             }
-            self.lines.insert(row, found);
+            self.rows.insert(row, found);
         }
         Ok(())
     }
@@ -131,35 +142,28 @@ impl Results {
     /// Number of rows done.
     #[must_use]
     pub fn done(&self) -> u64 {
-        self.lines.len() as u64
-    }
-
-    /// Whether a row is done.
-    #[must_use]
-    pub fn has(&self, row: u64) -> bool {
-        self.lines.contains_key(&row)
+        self.rows.len() as u64
     }
 
     /// The numbers of the plan's rows that are not done.
     pub fn missing(&self, plan: &Plan) -> impl Iterator<Item = u64> {
-        (1..=plan.rows()).filter(|row| !self.has(*row))
+        (1..=plan.rows()).filter(|row| !self.rows.contains_key(row))
     }
 
     /// The table of results as CSV (RFC 4180, lines end with LF): `row`, a column per key of the axes, `seed`, what
     /// was measured; none while rows are missing.
     #[must_use]
     pub fn to_csv(&self, plan: &Plan) -> Option<Vec<u8>> {
-        let mut csv = csv::Writer::from_writer(Vec::new());
-        let header = std::iter::once("row").chain(plan.keys());
-        // writing to memory cannot fail, and every row has as many fields as there are columns
-        let _ = csv.write_record(header.chain(["seed"]).chain(MEASURES));
-        for number in 1..=plan.rows() {
-            let (row, line) = (plan.row(number)?, self.lines.get(&number)?);
-            let (number, seed) = (number.to_string(), row.seed.to_string());
-            let place =
-                std::iter::once(number.as_str()).chain(row.values.iter().map(String::as_str));
-            let _ = csv.write_record(place.chain([seed.as_str()]).chain(line.measured.split(',')));
-        }
-        csv.into_inner().ok()
+        let head = std::iter::once("row").chain(plan.keys()).chain(["seed"]);
+        let head = head.map(str::to_owned);
+        let header: Vec<String> = head.chain(measured_keys().map(str::to_owned)).collect();
+        let record = |number: u64| {
+            let (row, result) = (plan.row(number)?, self.rows.get(&number)?);
+            let place = std::iter::once(number.to_string()).chain(row.values);
+            let place = place.chain([row.seed.to_string()]);
+            Some(place.chain(result.measured.iter().cloned()).collect())
+        };
+        let records: Option<Vec<Vec<String>>> = (1..=plan.rows()).map(record).collect();
+        Some(csv_of(std::iter::once(header).chain(records?)))
     }
 }

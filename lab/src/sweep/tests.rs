@@ -4,7 +4,7 @@ use mmt_server::trigger::Scheme;
 use mmt_shared::model::settings::{Mode, PoseCorrection, Smoothing};
 
 use super::*;
-use crate::reproduce::{Curve, paper_world};
+use crate::setting::{Curve, paper_world};
 use crate::world::WorldConfig;
 
 const HEAD: &str = "duration_s = 1\nseeds = { count = 2 }\n";
@@ -267,10 +267,13 @@ fn the_key_of_a_row_tells_its_configuration_and_not_its_words() {
 }
 
 /// The part file of some rows.
-fn part(plan: &Plan, rows: impl Iterator<Item = u64>) -> String {
-    let line = |row: Row| Line::of(&row, &row.trial.run().unwrap()).text();
-    let lines: String = rows.filter_map(|n| plan.row(n)).map(line).collect();
-    part_header() + &lines
+fn part(plan: &Plan, rows: impl Iterator<Item = u64>) -> Vec<u8> {
+    let line = |row: Row| RowResult::of(&row, &row.trial.run().unwrap()).line();
+    let lines = rows.filter_map(|n| plan.row(n)).map(line);
+    std::iter::once(part_header())
+        .chain(lines)
+        .collect::<Vec<_>>()
+        .concat()
 }
 
 #[test]
@@ -308,7 +311,8 @@ fn a_torn_line_is_not_there_and_the_same_row_twice_is_one() {
         assert_eq!(results.done(), 3);
     }
     let mut results = Results::default();
-    for torn in ["", "row,k", part_header().trim_end()] {
+    let header = part_header();
+    for torn in [&b""[..], b"row,k", header.trim_ascii_end()] {
         results.add_part(&plan, "a", torn).unwrap();
     }
     assert_eq!(results.done(), 0);
@@ -317,8 +321,9 @@ fn a_torn_line_is_not_there_and_the_same_row_twice_is_one() {
 #[test]
 fn what_is_not_of_this_plan_or_contradicts_it_is_refused() {
     let (one, other) = (plan(GRID), plan(&GRID.replace("0.8", "0.9")));
-    let text = part(&one, 1..=1);
-    let add = |plan: &Plan, text: &str| Results::default().add_part(plan, "p.csv", text);
+    let text = String::from_utf8(part(&one, 1..=1)).unwrap();
+    let header = String::from_utf8(part_header()).unwrap();
+    let add = |plan: &Plan, text: &str| Results::default().add_part(plan, "p.csv", text.as_bytes());
     let part = "p.csv".to_owned();
     assert_eq!(
         add(&other, &text),
@@ -334,12 +339,9 @@ fn what_is_not_of_this_plan_or_contradicts_it_is_refused() {
         part: part.clone(),
         line,
     });
-    assert_eq!(
-        add(&one, &format!("{}nonsense\n", part_header())),
-        malformed
-    );
+    assert_eq!(add(&one, &format!("{header}nonsense\n")), malformed);
     let mut results = Results::default();
-    results.add_part(&one, "p.csv", &text).unwrap();
+    results.add_part(&one, "p.csv", text.as_bytes()).unwrap();
     let digest_end = text.len() - 2;
     let last = if text[digest_end..].starts_with('0') {
         "1\n"
@@ -348,5 +350,8 @@ fn what_is_not_of_this_plan_or_contradicts_it_is_refused() {
     };
     let changed = text[..digest_end].to_owned() + last;
     let disagree = Err(PartError::Disagree { part, row: 1 });
-    assert_eq!(results.add_part(&one, "p.csv", &changed), disagree);
+    assert_eq!(
+        results.add_part(&one, "p.csv", changed.as_bytes()),
+        disagree
+    );
 }

@@ -6,6 +6,7 @@ use mmt_shared::time::{Time, duration_nanos};
 use sha2::{Digest, Sha256};
 
 use crate::digest::hex;
+use crate::statistics::nearest_rank;
 
 use super::Case;
 
@@ -130,9 +131,9 @@ impl Log {
         Outcome {
             possible: possible as u64,
             delivered: (self.arrivals.len() - stale) as u64,
-            added_p50_ms: quantile_ms(&added, 50),
-            added_p99_ms: quantile_ms(&added, 99),
-            added_max_ms: quantile_ms(&added, 100),
+            added_p50_ms: nearest_rank(&added, 50).map(millis),
+            added_p99_ms: nearest_rank(&added, 99).map(millis),
+            added_max_ms: added.last().copied().map(millis),
             stale: stale as u64,
             fresh_ms: self.fresh().map(millis),
             up,
@@ -180,12 +181,6 @@ impl Outcome {
     pub fn share(&self) -> Option<f64> {
         (self.possible > 0).then(|| self.delivered as f64 / self.possible as f64)
     }
-}
-
-/// The value that so many percent of sorted values do not exceed (nearest rank), ms.
-fn quantile_ms(sorted: &[Duration], percent: usize) -> Option<f64> {
-    let rank = (sorted.len() * percent).div_ceil(100);
-    sorted.get(rank.checked_sub(1)?).copied().map(millis)
 }
 
 fn millis(duration: Duration) -> f64 {

@@ -1,7 +1,7 @@
 //! What a trial promises.
 
 use super::*;
-use crate::reproduce::{Curve, paper_world};
+use crate::setting::{Curve, paper_world};
 use mmt_shared::model::settings::Mode;
 
 fn trial(seconds: u64) -> Trial {

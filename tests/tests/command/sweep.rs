@@ -263,7 +263,7 @@ fn the_plan_of_the_document_is_one_with_the_rows_that_it_says() {
 #[test]
 fn the_documents_tell_every_column() {
     let text = include_str!("../../../docs/sweep.md");
-    for key in mmt_lab::sweep::MEASURES {
+    for key in mmt_lab::sweep::columns().iter().map(|column| column.key) {
         assert!(text.contains(&format!("`{key}`")), "{key} is not told");
     }
 }

@@ -147,9 +147,10 @@ impl Summary {
             return None;
         }
         let names: Vec<String> = self.first_missing.iter().map(u64::to_string).collect();
-        let more = match count > named {
-            true => format!(" and {} more", count - named),
-            false => String::new(),
+        let more = if count > named {
+            format!(" and {} more", count - named)
+        } else {
+            String::new()
         };
         let (rows, shard) = (self.rows, &self.shard);
         Some(format!(

@@ -6,7 +6,7 @@ use mmt_shared::io::tls::TlsError;
 use mmt_shared::time::Time;
 use quinn::ConnectionError;
 
-use crate::reproduce::ReproduceError;
+use crate::experiment::findings::ExperimentError;
 
 /// Why a run came to nothing.
 #[derive(Debug, thiserror::Error)]
@@ -40,7 +40,7 @@ pub enum VirtualTimeError {
     Send(#[from] quinn::SendDatagramError),
 }
 
-impl From<VirtualTimeError> for ReproduceError {
+impl From<VirtualTimeError> for ExperimentError {
     fn from(error: VirtualTimeError) -> Self {
         let why = error.to_string();
         Self::Transport { why }

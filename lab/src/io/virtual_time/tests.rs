@@ -1,21 +1,12 @@
 //! quinn in virtual time: repeatable, exact, and better than its defaults where it matters.
 
-use std::collections::BTreeMap;
 use std::process::Command;
-use std::sync::Mutex;
 use std::time::Duration;
 
 use mmt_netem::Probability;
 
 use super::*;
-use crate::architecture::DelayRow;
-use crate::io::Pool;
-use crate::reproduce::delay::Duel;
-use crate::reproduce::{Each, Extent, Laboratory, ReproduceError};
-use crate::transport::{
-    Bottleneck, Case, Conditions, Flow, Outcome, Stack, reproduce as reproduce_transport,
-};
-use crate::trial::{Measured, Trial};
+use crate::transport::{Bottleneck, Case, Conditions, Flow, Outcome, Stack};
 
 const MS: Duration = Duration::from_millis(1);
 
@@ -193,53 +184,4 @@ fn acknowledgements_are_a_tenth_of_the_packets_at_1_khz() {
     let heartbeats = 4 * 20;
     let own = outcome.down.packets - heartbeats;
     assert!(own * 100 <= outcome.up.packets * 15, "{outcome:?}");
-}
-
-/// A laboratory that keeps files in memory.
-#[derive(Default)]
-struct Shelf(Mutex<BTreeMap<String, Vec<u8>>>);
-
-impl Laboratory for Shelf {
-    fn run(&self, _: &str, _: &[Trial], _: Each) -> Result<Vec<Measured>, ReproduceError> {
-        Ok(Vec::new())
-    }
-
-    fn duel(&self, _: &str, _: &[Duel]) -> Result<Vec<DelayRow>, ReproduceError> {
-        Ok(Vec::new())
-    }
-
-    fn transfer(&self, _: &str, cases: &[Case]) -> Result<Vec<Outcome>, ReproduceError> {
-        let work = |_: usize, case: &Case| run(case).map_err(ReproduceError::from);
-        Pool::new(None).run(cases, work, |_| {})
-    }
-
-    fn keep(&self, name: &str, bytes: &[u8]) -> Result<(), ReproduceError> {
-        self.0
-            .lock()
-            .unwrap()
-            .insert(name.to_owned(), bytes.to_vec());
-        Ok(())
-    }
-
-    fn estimator_tick_ms(&self) -> Option<f64> {
-        None
-    }
-}
-
-#[test]
-fn the_experiment_prints_its_promises_and_keeps_every_run() {
-    let shelf = Shelf::default();
-    let extent = Extent {
-        seeds: 1,
-        duration: 200 * MS,
-    };
-    let findings = reproduce_transport(&shelf, extent).unwrap();
-    let files = shelf.0.into_inner().unwrap();
-    let csv = String::from_utf8_lossy(&files["transport.csv"]);
-    // header; 2 stacks × 3 flows × 3 round trips × 4 losses × 3 jitters × 2 × 2
-    assert_eq!(csv.lines().count(), 1 + 864);
-    assert!(files["transport.svg"].starts_with(b"<svg"));
-    let rows: Vec<usize> = findings.tables.iter().map(|t| t.rows().count()).collect();
-    assert_eq!(rows, [3, 14, 24]);
-    println!("{}", findings.tables[0]);
 }

@@ -3,8 +3,8 @@
 //! The trials of `mmt reproduce scenarios`, fewer and shorter.
 
 use super::super::*;
-use crate::reproduce::Curve;
-use crate::reproduce::scenarios::{SCENARIOS, Scenario};
+use crate::experiments::scenarios::{SCENARIOS, Scenario};
+use crate::setting::Curve;
 use crate::statistics::Interval;
 use crate::trial::{Measured, Trial};
 use mmt_shared::model::settings::Mode;

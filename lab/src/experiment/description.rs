@@ -1,0 +1,73 @@
+//! What the command line must know of an experiment: its name, its help, its defaults, its own arguments.
+
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+use super::findings::{ExperimentError, Extent, Findings};
+use crate::io::Runner;
+
+/// An experiment. All that there is of it stands in one file; the list of them is in `experiments`.
+#[derive(Debug)]
+pub struct Experiment {
+    /// Its name in the command line and in the manifest.
+    pub name: &'static str,
+    /// What it shows, in one line.
+    pub about: &'static str,
+    /// Seeds if no other number is asked for.
+    pub seeds: u64,
+    /// Length of a run if no other is asked for.
+    pub duration: Duration,
+    /// Arguments that it alone takes.
+    pub arguments: &'static [Argument],
+    /// Runs it and keeps its files.
+    pub run: fn(&Runner, &Request) -> Result<Findings, ExperimentError>,
+}
+
+/// Length of a run of most experiments: four or five pushes.
+pub const DURATION: Duration = Duration::from_secs(30);
+
+/// An argument of one experiment.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Argument {
+    /// Given or not.
+    Flag {
+        /// Its name, without dashes.
+        name: &'static str,
+        /// What it does.
+        help: &'static str,
+    },
+    /// A number.
+    Number {
+        /// Its name, without dashes.
+        name: &'static str,
+        /// Its unit, as help shows it.
+        unit: &'static str,
+        /// What it is.
+        help: &'static str,
+        /// What it is if it is not given.
+        default: f64,
+    },
+}
+
+/// How an experiment is to be done.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Request {
+    /// How much of it.
+    pub extent: Extent,
+    /// The numbers that were given, by name; a flag that was given is 1.
+    pub given: BTreeMap<&'static str, f64>,
+}
+
+impl Request {
+    /// Whether a flag was given.
+    #[must_use]
+    pub fn flag(&self, name: &str) -> bool {
+        self.given.contains_key(name)
+    }
+
+    /// A number, if it was given.
+    #[must_use]
+    pub fn number(&self, name: &str) -> Option<f64> {
+        self.given.get(name).copied()
+    }
+}

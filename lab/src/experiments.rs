@@ -1,0 +1,42 @@
+//! The paper's experiments and those that go beyond them, one file each, and the list of them.
+//!
+//! An experiment must never depend on the order in which its runs end, nor on the machine they run on.
+
+mod ablation;
+mod claims;
+mod congestion;
+mod delay;
+mod fig5;
+mod loss;
+mod netem;
+mod physics;
+mod recovery;
+mod repeats;
+pub mod scenarios;
+mod schemes;
+mod traces;
+mod transport;
+mod tupdate;
+
+use crate::experiment::description::Experiment;
+
+/// Every experiment, in the order in which all of them run.
+pub const ALL: [&Experiment; 14] = [
+    &physics::PHYSICS,
+    &fig5::FIG5,
+    &traces::FIG6,
+    &traces::FIG7,
+    &claims::CLAIMS,
+    &ablation::ABLATION,
+    &schemes::SCHEMES,
+    &scenarios::EXPERIMENT,
+    &tupdate::TUPDATE,
+    &repeats::REPEATS,
+    &congestion::CONGESTION,
+    &netem::NETEM,
+    &transport::TRANSPORT,
+    &delay::DELAY,
+];
+
+#[cfg(test)]
+mod tests;

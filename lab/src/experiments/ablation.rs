@@ -1,0 +1,220 @@
+//! How the paper's results depend on the choices that the paper leaves open.
+//!
+//! Each variant changes one choice of paper mode; everything else stays.
+
+use mmt_server::estimator::{EstimatorConfig, PaperConfig, Rows};
+use mmt_shared::model::contact::Coupling;
+use mmt_shared::model::settings::{Mode, ModelSettings, Smoothing};
+
+use crate::experiment::description::{DURATION, Experiment, Request};
+use crate::experiment::findings::{ExperimentError, Findings};
+use crate::experiment::grid::{self, digest, interval};
+use crate::io::Runner;
+use crate::setting::{Curve, paper_world};
+use crate::statistics::Interval;
+use crate::table::{Column, Table, column};
+use crate::trial::{Measured, Trial};
+use crate::world::WorldConfig;
+
+/// The ablation.
+pub(super) const ABLATION: Experiment = Experiment {
+    name: "ablation",
+    about: "How the paper's results depend on what the paper leaves open",
+    seeds: 10,
+    duration: DURATION,
+    arguments: &[],
+    run,
+};
+
+/// Deadbands at the ends of the knee.
+const DEADBANDS: [f64; 3] = [0.025, 0.10, 0.30];
+/// The schemes.
+const CURVES: [Curve; 3] = [Curve::Deadband, Curve::Hybrid(50), Curve::Hybrid(150)];
+
+/// One choice made otherwise.
+struct Variant {
+    name: &'static str,
+    apply: fn(&mut WorldConfig),
+}
+
+static VARIANTS: [Variant; 13] = [
+    Variant {
+        name: "as stated",
+        apply: |_| {},
+    },
+    Variant {
+        name: "window 100 ms",
+        apply: |world| paper_estimator(world, |paper| paper.window_s = 0.1),
+    },
+    Variant {
+        name: "window 500 ms",
+        apply: |world| paper_estimator(world, |paper| paper.window_s = 0.5),
+    },
+    Variant {
+        name: "window 1 s",
+        apply: |world| paper_estimator(world, |paper| paper.window_s = 1.0),
+    },
+    Variant {
+        name: "rows x and y stacked",
+        apply: |world| paper_estimator(world, |paper| paper.rows = Rows::Stacked),
+    },
+    Variant {
+        name: "timer packets carry the pose",
+        apply: |world| world.slave.trigger.timer_carries_pose = true,
+    },
+    Variant {
+        name: "timer in contact only",
+        apply: |world| world.slave.trigger.timer_in_free_space = false,
+    },
+    Variant {
+        name: "sticking is no mismatch",
+        apply: |world| world.slave.trigger.judge_sticking = false,
+    },
+    Variant {
+        name: "no sensor noise",
+        apply: |world| noise(world, 0.0),
+    },
+    Variant {
+        name: "three times the sensor noise",
+        apply: |world| noise(world, 3.0),
+    },
+    Variant {
+        name: "lambda 0.9",
+        apply: |world| {
+            settings(world, |s| {
+                s.smoothing = Smoothing::PerPacket { lambda: 0.9 }
+            })
+        },
+    },
+    Variant {
+        name: "(6) without contact damping",
+        apply: |world| {
+            settings(world, |s| {
+                s.coupling = Coupling {
+                    damping_ns_per_m: 0.0,
+                    ..s.coupling
+                };
+            });
+        },
+    },
+    Variant {
+        name: "model of the true side, 36 cm",
+        apply: |world| world.slave.start.side_m = 0.36,
+    },
+];
+
+fn paper_estimator(world: &mut WorldConfig, change: impl FnOnce(&mut PaperConfig)) {
+    let mut paper = PaperConfig::default();
+    change(&mut paper);
+    world.slave.estimator = Some(EstimatorConfig::Paper(paper));
+}
+
+fn settings(world: &mut WorldConfig, change: impl FnOnce(&mut ModelSettings)) {
+    if let Some(settings) = &mut world.settings {
+        change(settings);
+    }
+}
+
+/// Position and force noise so many times the default.
+fn noise(world: &mut WorldConfig, times: f64) {
+    world.slave.sensing.position_noise_m *= times;
+    world.slave.sensing.force_noise_n *= times;
+}
+
+/// A variant with a scheme at a deadband.
+type Case = (&'static Variant, Curve, f64);
+type Group = grid::Group<Case, Measured>;
+
+fn cases() -> Vec<Case> {
+    let mut cases = Vec::new();
+    for variant in &VARIANTS {
+        for curve in CURVES {
+            cases.extend(DEADBANDS.map(|deadband| (variant, curve, deadband)));
+        }
+    }
+    cases
+}
+
+/// Keeps `ablation.csv`.
+fn run(runner: &Runner, request: &Request) -> Result<Findings, ExperimentError> {
+    let extent = request.extent;
+    let run = |(variant, curve, deadband): &Case, seed| {
+        let mut world = paper_world(Mode::Paper, curve.at(*deadband));
+        (variant.apply)(&mut world);
+        runner.trial(&Trial::new(world.seeded(seed), extent.duration))
+    };
+    let groups = runner.grid("ablation", extent.seeds, cases(), run)?;
+    let title = format!(
+        "Ablation of paper mode, {} seeds: packets/s and PMSE at 2.5, 10 and 30 %",
+        extent.seeds
+    );
+    let table = Table::of(title, &rows(&groups), &columns());
+    runner.keep_table("ablation.csv", &table)?;
+    Ok(Findings {
+        experiment: ABLATION.name,
+        extent,
+        digest: digest(&groups),
+        configuration: vec![paper_world(Mode::Paper, Curve::Hybrid(150).at(0.10))],
+        tables: vec![table],
+    })
+}
+
+/// A variant with a scheme.
+struct Row<'a> {
+    /// At each of [`DEADBANDS`].
+    at: &'a [Group; 3],
+    /// The variant's deadband scheme at the greatest one; none for that scheme itself.
+    base: Option<&'a Group>,
+}
+
+fn rows(groups: &[Group]) -> Vec<Row<'_>> {
+    let mut rows = Vec::new();
+    for of_variant in groups.as_chunks::<3>().0.chunks(CURVES.len()) {
+        let base = of_variant.first().map(|[_, _, coarse]| coarse);
+        rows.extend(of_variant.iter().zip(0..).map(|(at, k)| Row {
+            at,
+            base: base.filter(|_| k > 0),
+        }));
+    }
+    rows
+}
+
+#[rustfmt::skip]
+fn columns<'a>() -> Vec<Column<'a, Row<'a>>> {
+    fn rate(group: &Group) -> Option<f64> {
+        group.mean(|run| run.updates.rate_hz())
+    }
+    fn pmse(group: &Group) -> Option<f64> {
+        group.mean(|run| run.force.pmse)
+    }
+    let mut columns: Vec<Column<Row>> = vec![
+        column("variant", "", 0, |row| row.at[0].case.0.name),
+        column("scheme", "", 0, |row| row.at[0].case.1.label()),
+        column("rate_2.5", "Hz", 0, |row| rate(&row.at[0])),
+        column("rate_10", "Hz", 0, |row| rate(&row.at[1])),
+        column("rate_30", "Hz", 0, |row| rate(&row.at[2])),
+        column("pmse_2.5", "", 3, |row| pmse(&row.at[0])),
+        column("pmse_10", "", 3, |row| pmse(&row.at[1])),
+        column("pmse_30", "", 3, |row| pmse(&row.at[2])),
+    ];
+    let knee = |row: &Row| knee(row.at);
+    columns.extend(interval(["knee", "knee_low", "knee_high"], "", 2, knee));
+    columns.extend(interval(
+        ["vs_deadband_30", "vs_low", "vs_high"],
+        "",
+        2,
+        |row: &Row| row.at[2].ratio(row.base?, |run| run.force.pmse),
+    ));
+    columns.push(column("mass_error", "", 2, |row| row.at[1].median(|run| Some(run.parameter_errors[0].abs()))));
+    columns
+}
+
+/// The exponent of PMSE over Delta from 30 to 10 % less that from 10 to 2.5 %, seed by seed.
+fn knee([fine, middle, coarse]: &[Group; 3]) -> Option<Interval> {
+    let seeds = fine.runs.iter().zip(&middle.runs).zip(&coarse.runs);
+    Interval::of(seeds.filter_map(|((fine, middle), coarse)| {
+        let ln = |run: &Measured| run.force.pmse.map(libm::log);
+        let (fine, middle, coarse) = (ln(fine)?, ln(middle)?, ln(coarse)?);
+        Some((coarse - middle) / libm::log(3.0) - (middle - fine) / libm::log(4.0))
+    }))
+}

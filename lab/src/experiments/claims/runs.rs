@@ -1,0 +1,83 @@
+//! The runs of the paper's schemes by scheme, deadband and seed, and which of two schemes has the lower PMSE at the
+//! same packet rate.
+//!
+//! Each scheme's runs give a curve of PMSE over rate: means over the seeds at the seven deadbands, joined on
+//! logarithmic axes. The ratio is averaged over the rates that both curves reach. Rate and PMSE of a run depend on
+//! one another, so the interval comes from leaving out one seed at a time (jackknife).
+
+use crate::experiment::grid::Group;
+use crate::setting::{Curve, DEADBANDS, Point};
+use crate::statistics::{Interval, log_ratio};
+use crate::trial::Measured;
+
+/// A curve: (ln rate, ln PMSE), by rising rate.
+type LogCurve = Vec<(f64, f64)>;
+
+/// All runs, in paper mode.
+pub(super) struct Runs<'a> {
+    pub(super) groups: &'a [Group<Point, Measured>],
+    pub(super) seeds: u64,
+}
+
+impl Runs<'_> {
+    /// The run of a scheme at a deadband with a seed.
+    pub(super) fn run(&self, curve: Curve, deadband: f64, seed: u64) -> Option<&Measured> {
+        let wanted = |point: &Point| point.curve == curve && point.deadband == deadband;
+        let group = self.groups.iter().find(|group| wanted(&group.case))?;
+        group.runs.get(usize::try_from(seed.checked_sub(1)?).ok()?)
+    }
+
+    /// A number of each seed's runs, where all of them have one.
+    pub(super) fn per_seed(&self, of: impl Fn(u64) -> Option<f64>) -> Vec<f64> {
+        (1..=self.seeds).filter_map(of).collect()
+    }
+
+    pub(super) fn pmse(&self, curve: Curve, deadband: f64, seed: u64) -> Option<f64> {
+        self.run(curve, deadband, seed)?.force.pmse
+    }
+
+    pub(super) fn rates(&self, curve: Curve, deadband: f64) -> Vec<f64> {
+        self.per_seed(|seed| self.run(curve, deadband, seed)?.updates.rate_hz())
+    }
+
+    /// Geometric mean of PMSE of one scheme over that of another at equal rates; none if no rate is reached by both.
+    pub(super) fn ratio_at_equal_rate(&self, better: Curve, worse: Curve) -> Option<Interval> {
+        let without = |left_out: Option<u64>| {
+            let seeds = (1..=self.seeds).filter(|seed| Some(*seed) != left_out);
+            let seeds: Vec<u64> = seeds.collect();
+            log_ratio(
+                &self.log_curve(better, &seeds),
+                &self.log_curve(worse, &seeds),
+            )
+        };
+        let all = without(None)?;
+        if self.seeds < 2 {
+            return Interval::of_ratios([libm::exp(all)]);
+        }
+        let left_out: Option<Vec<f64>> = (1..=self.seeds).map(|seed| without(Some(seed))).collect();
+        // pseudo-values: their mean and its deviation are the jackknife's
+        let n = self.seeds as f64;
+        let pseudo = left_out?.into_iter().map(|part| n * all - (n - 1.0) * part);
+        let interval = Interval::of(pseudo)?;
+        let half = interval.high - interval.mean;
+        Some(Interval {
+            n: interval.n,
+            mean: libm::exp(all),
+            low: libm::exp(all - half),
+            high: libm::exp(all + half),
+        })
+    }
+
+    fn log_curve(&self, curve: Curve, seeds: &[u64]) -> LogCurve {
+        let point = |deadband: &f64| {
+            let run = |seed: &u64| self.run(curve, *deadband, *seed);
+            let runs = || seeds.iter().filter_map(run);
+            let rate = Interval::of(runs().filter_map(|run| run.updates.rate_hz()))?.mean;
+            let pmse = Interval::of(runs().filter_map(|run| run.force.pmse))?.mean;
+            Some((libm::log(rate), libm::log(pmse)))
+        };
+        let mut points: LogCurve = DEADBANDS.iter().filter_map(point).collect();
+        points.sort_by(|a, b| a.0.total_cmp(&b.0));
+        points
+    }
+}

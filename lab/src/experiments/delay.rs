@@ -1,0 +1,82 @@
+//! At which delay each architecture stops being usable: one operator, one object, one network, every architecture.
+//!
+//! The plain sweep of the delay at k_p 1000 for all of them, the same at other stiffnesses up to the delays that
+//! decide there, and jitter, loss and bursts at a few delays; the full grid on request. And what the operator's
+//! picture does beyond 500 ms.
+
+mod crossing;
+mod figure;
+mod grid_point;
+mod limits;
+mod tables;
+
+use std::time::Duration;
+
+use crate::architecture::{self, DelayRow};
+use crate::experiment::description::{Argument, Experiment, Request};
+use crate::experiment::findings::{ExperimentError, Findings};
+use crate::experiment::grid;
+use crate::io::Runner;
+use crate::trial::TrialError;
+use crate::world::WorldConfig;
+use grid_point::{GridPoint, all_points, picture_points, some_points};
+
+/// The architectures over the delay.
+pub(super) const DELAY: Experiment = Experiment {
+    name: "delay",
+    about: "At which delay each architecture stops being usable",
+    seeds: 5,
+    // pushes come later
+    duration: Duration::from_secs(40),
+    arguments: &[Argument::Flag {
+        name: "full",
+        help: "The whole grid of delays, jitter, losses and stiffnesses: about an hour",
+    }],
+    run,
+};
+
+/// A point with the rows of its seeds.
+type Group = grid::Group<GridPoint, DelayRow>;
+
+/// Keeps `delay.csv`, `delay-limits.csv`, `delay-view.csv`, `delay-crossing.csv` and `delay.svg`.
+fn run(runner: &Runner, request: &Request) -> Result<Findings, ExperimentError> {
+    let points = if request.flag("full") {
+        all_points()
+    } else {
+        some_points()
+    };
+    let groups = measure(runner, request, "delay", points)?;
+    let limits = limits::table(&groups);
+    runner.keep_table("delay.csv", &tables::runs(&groups))?;
+    runner.keep_table("delay-limits.csv", &limits)?;
+    runner.keep_figure("delay.svg", &figure::figure(&groups))?;
+
+    let pictures = measure(runner, request, "delay-view", picture_points())?;
+    let views = tables::views(&pictures);
+    runner.keep_table("delay-view.csv", &views)?;
+
+    let near = measure(runner, request, "delay-crossing", crossing::points())?;
+    let [near, crossings] = crossing::tables(&near);
+    runner.keep_table("delay-crossing.csv", &near)?;
+    Ok(Findings {
+        experiment: DELAY.name,
+        extent: request.extent,
+        digest: String::new(),
+        configuration: vec![WorldConfig::default()],
+        tables: vec![tables::replayed(&groups), limits, views, near, crossings],
+    })
+}
+
+fn measure(
+    runner: &Runner,
+    request: &Request,
+    what: &str,
+    points: Vec<GridPoint>,
+) -> Result<Vec<Group>, ExperimentError> {
+    let extent = request.extent;
+    runner.grid(what, extent.seeds, points, |point, seed| {
+        let world = point.world()?.seeded(seed);
+        let row = architecture::run(point.architecture, &world, extent.duration);
+        row.map_err(|error| TrialError::from(error).into())
+    })
+}

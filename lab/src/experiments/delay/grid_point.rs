@@ -1,0 +1,176 @@
+//! The points of the delay experiment: which architecture, over which network, how stiff.
+//!
+//! Only what is run; never what came of it.
+
+use mmt_client::operator::scripted::Picture;
+use mmt_server::link::Repeats;
+use mmt_shared::channel::rate_control::StretchMax;
+use mmt_shared::model::settings::PoseCorrection;
+
+use crate::architecture::Architecture;
+use crate::experiment::findings::ExperimentError;
+use crate::experiments::loss::{Loss, link};
+use crate::world::WorldConfig;
+
+/// One-way delays, ms.
+const DELAYS_MS: [u64; 13] = [0, 1, 2, 5, 10, 14, 20, 50, 100, 250, 500, 1000, 2000];
+/// Jitter, ms.
+const JITTERS_MS: [u64; 3] = [0, 10, 30];
+/// Virtual stiffness k_p, N/m.
+pub(super) const STIFFNESSES: [u64; 3] = [500, 1000, 3000];
+/// Delays at which jitter and loss are tried in the default grid, ms.
+const IMPAIRED_MS: [u64; 3] = [50, 250, 500];
+/// Delays at which other stiffnesses are tried in the default grid, ms.
+const STIFF_MS: [u64; 8] = [0, 2, 5, 10, 14, 20, 50, 250];
+/// Delays at which the operator's picture is compared, ms.
+const PICTURE_MS: [u64; 4] = [250, 500, 1000, 2000];
+
+/// What is known of the object's size when it is first touched: the slave starts from a side of 40 cm, and it is 36.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Size {
+    /// Nothing, and the operator pushes all the same.
+    Unknown,
+    /// Nothing, and the operator nudges each new face and rests until the answer must have come.
+    Nudged,
+    /// Vision has told it.
+    Known,
+}
+
+impl Size {
+    /// As `delay-view.csv` spells it.
+    pub(super) const fn name(self) -> &'static str {
+        match self {
+            Self::Unknown => "unknown",
+            Self::Nudged => "nudged",
+            Self::Known => "known",
+        }
+    }
+}
+
+/// Where in the grid a run stands.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct GridPoint {
+    pub(super) architecture: Architecture,
+    pub(super) one_way_ms: u64,
+    pub(super) jitter_ms: u64,
+    pub(super) loss: Loss,
+    pub(super) k_p: u64,
+    pub(super) picture: Picture,
+    pub(super) size: Size,
+}
+
+impl GridPoint {
+    pub(super) const fn plain(architecture: Architecture, one_way_ms: u64) -> Self {
+        Self {
+            architecture,
+            one_way_ms,
+            jitter_ms: 0,
+            loss: Loss::None,
+            k_p: 1000,
+            picture: Picture::Model,
+            size: Size::Unknown,
+        }
+    }
+
+    /// The world at this point.
+    pub(super) fn world(&self) -> Result<WorldConfig, ExperimentError> {
+        let mut words = format!("delay {}ms", self.one_way_ms);
+        if self.jitter_ms > 0 {
+            words += &format!(" {}ms", self.jitter_ms);
+        }
+        let link = link(&words, self.loss)?;
+        let mut config = WorldConfig {
+            up: link.clone(),
+            down: link,
+            stiffness_n_per_m: Some(self.k_p as f64),
+            ..WorldConfig::default()
+        };
+        config.operator.view = self.picture;
+        match self.size {
+            Size::Unknown => {}
+            // a round trip, and a second to see what it did
+            Size::Nudged => config.operator.dwell_s = 2e-3 * self.one_way_ms as f64 + 1.0,
+            Size::Known => config.slave.start.side_m = config.slave.environment.side_m,
+        }
+        // what the other architectures do not have either
+        config.slave.repeats_ms = Repeats::NONE;
+        config.slave.stretch_max = StretchMax::OFF;
+        config.stretch_max = StretchMax::OFF;
+        Ok(config)
+    }
+
+    /// Whether nothing but delay troubles the network.
+    pub(super) fn is_clean(&self) -> bool {
+        self.jitter_ms == 0 && self.loss == Loss::None
+    }
+}
+
+/// The default grid.
+pub(super) fn some_points() -> Vec<GridPoint> {
+    let mut points = Vec::new();
+    for architecture in Architecture::ALL {
+        points.extend(DELAYS_MS.map(|ms| GridPoint::plain(architecture, ms)));
+        for k_p in STIFFNESSES.into_iter().filter(|k_p| *k_p != 1000) {
+            points.extend(STIFF_MS.map(|ms| GridPoint {
+                k_p,
+                ..GridPoint::plain(architecture, ms)
+            }));
+        }
+        let impairments = [
+            (10, Loss::None),
+            (30, Loss::None),
+            (0, Loss::TwentyPercent),
+            (10, Loss::TwentyPercent),
+            (0, Loss::Bursts30Ms),
+            (0, Loss::Bursts100Ms),
+        ];
+        for (jitter_ms, loss) in impairments {
+            points.extend(IMPAIRED_MS.map(|ms| GridPoint {
+                jitter_ms,
+                loss,
+                ..GridPoint::plain(architecture, ms)
+            }));
+        }
+    }
+    points
+}
+
+/// The whole grid: every delay, jitter, loss and stiffness.
+pub(super) fn all_points() -> Vec<GridPoint> {
+    let mut points = Vec::new();
+    for architecture in Architecture::ALL {
+        for k_p in STIFFNESSES {
+            for jitter_ms in JITTERS_MS {
+                for loss in Loss::ALL {
+                    points.extend(DELAYS_MS.map(|ms| GridPoint {
+                        jitter_ms,
+                        loss,
+                        k_p,
+                        ..GridPoint::plain(architecture, ms)
+                    }));
+                }
+            }
+        }
+    }
+    points
+}
+
+/// Replay, with the operator looking at the local model or at the delayed picture; and what the object's size does.
+pub(super) fn picture_points() -> Vec<GridPoint> {
+    let replay = Architecture::Mediated(PoseCorrection::Replay);
+    let of = |(picture, size)| {
+        PICTURE_MS.map(|ms| GridPoint {
+            picture,
+            size,
+            ..GridPoint::plain(replay, ms)
+        })
+    };
+    [
+        (Picture::Model, Size::Unknown),
+        (Picture::Model, Size::Nudged),
+        (Picture::Model, Size::Known),
+        (Picture::Delayed, Size::Unknown),
+    ]
+    .map(of)
+    .concat()
+}

@@ -1,0 +1,204 @@
+//! Fig. 5: packet rate and PMSE of the update schemes at seven deadbands, in both modes.
+//!
+//! One row per run; the figure shows means over the seeds with 95 % intervals.
+
+use std::fmt::Write as _;
+
+use mmt_shared::model::settings::Mode;
+
+use crate::experiment::description::{Argument, DURATION, Experiment, Request};
+use crate::experiment::findings::{ExperimentError, Findings};
+use crate::experiment::grid::{self, Run, digest, mean};
+use crate::figure::{Axis, Colour, Dot, Figure, Legend, Mark, Panel, Series, Stroke};
+use crate::io::Runner;
+use crate::setting::{Curve, FIG5_CURVES, Point, mode_name, paper_world};
+use crate::statistics::Interval;
+use crate::table::{Column, Table, column};
+use crate::trial::{Measured, TraceRow, Trial};
+
+/// Deadbands that are written beside their points.
+const NOTED: [f64; 4] = [0.025, 0.05, 0.10, 0.30];
+
+/// Fig. 5.
+pub(super) const FIG5: Experiment = Experiment {
+    name: "fig5",
+    about: "Fig. 5: packet rate and PMSE of the update schemes, both modes",
+    // the paper's ten repetitions
+    seeds: 10,
+    duration: DURATION,
+    arguments: &[Argument::Flag {
+        name: "samples",
+        help: "Write every run's forces and updates at 1 kHz as well, under samples/ (about 2 MB a run)",
+    }],
+    run,
+};
+
+type Group = grid::Group<Point, Measured>;
+
+/// Keeps `fig5.csv` and `fig5.svg`; with `samples`, every run's forces as well.
+fn run(runner: &Runner, request: &Request) -> Result<Findings, ExperimentError> {
+    let (extent, traced) = (request.extent, request.flag("samples"));
+    let points = Point::of(FIG5_CURVES);
+    let groups = runner.grid("fig5", extent.seeds, points, |point, seed| {
+        let trial = point.trial(seed, extent.duration);
+        let mut measured = runner.trial(&Trial { traced, ..trial })?;
+        if traced {
+            let trace = std::mem::take(&mut measured.trace);
+            runner.keep(&samples_name(point, seed), samples_csv(&trace).as_bytes())?;
+        }
+        Ok(measured)
+    })?;
+    let runs = Table::of("Runs of fig. 5", &grid::runs(&groups), &columns());
+    runner.keep_table("fig5.csv", &runs)?;
+    runner.keep_figure("fig5.svg", &figure(&groups))?;
+    Ok(Findings {
+        experiment: FIG5.name,
+        extent,
+        digest: digest(&groups),
+        configuration: vec![
+            paper_world(Mode::Paper, Curve::Hybrid(150).at(0.10)),
+            paper_world(Mode::Recommended, Curve::Useful(150).at(0.10)),
+        ],
+        tables: vec![summary(&groups)],
+    })
+}
+
+/// `samples/<mode>-<scheme>-<t_update_ms>-<deadband>-<seed>.csv`.
+fn samples_name(point: &Point, seed: u64) -> String {
+    let (mode, scheme) = (mode_name(point.mode), point.curve.at(point.deadband).name());
+    let (t_update_ms, deadband) = (point.curve.t_update_ms(), point.deadband);
+    format!("samples/{mode}-{scheme}-{t_update_ms}-{deadband}-{seed}.csv")
+}
+
+/// f_s and f_m of every sample and whether an update was sent; a lost sample's f_m is empty.
+fn samples_csv(trace: &[TraceRow]) -> String {
+    let mut csv = String::from("t_s,fs_x_n,fs_y_n,fm_x_n,fm_y_n,update\n");
+    for row in trace {
+        // writing to a string cannot fail
+        let _ = write!(csv, "{},{},{},", row.t_s, row.f_s.x, row.f_s.y);
+        let _ = match row.f_m {
+            Some(f_m) => write!(csv, "{},{},", f_m.x, f_m.y),
+            None => write!(csv, ",,"),
+        };
+        let _ = writeln!(csv, "{}", u8::from(row.update.is_some()));
+    }
+    csv
+}
+
+/// The columns of `fig5.csv`.
+#[rustfmt::skip]
+pub(super) fn columns<'a>() -> Vec<Column<'a, Run<'a, Point, Measured>>> {
+    vec![
+        column("mode", "", 0, |run| mode_name(run.case.mode)),
+        column("scheme", "", 0, |run| run.case.curve.at(run.case.deadband).name()),
+        column("t_update_ms", "ms", 0, |run| run.case.curve.t_update_ms()),
+        column("deadband", "", 3, |run| run.case.deadband),
+        column("seed", "", 0, |run| run.seed),
+        column("duration_s", "s", 1, |run| run.measured.duration_s),
+        column("packet_rate_hz", "Hz", 1, |run| run.measured.updates.rate_hz()),
+        column("contact_packet_rate_hz", "Hz", 1, |run| run.measured.updates.contact_rate_hz()),
+        column("pmse", "", 4, |run| run.measured.force.pmse),
+        column("pmse_x", "", 4, |run| run.measured.force.pmse_x),
+        column("pmse_y", "", 4, |run| run.measured.force.pmse_y),
+        column("pmse_magnitude", "", 4, |run| run.measured.force.pmse_magnitude),
+        column("relative_error", "", 4, |run| run.measured.force.relative_error),
+        column("jnd7_share", "", 3, |run| run.measured.force.jnd7_share),
+        column("packets", "", 0, |run| run.measured.updates.total()),
+        column("contact_s", "s", 1, |run| run.measured.contact_s),
+    ]
+}
+
+fn rate(group: &Group) -> Option<Interval> {
+    group.interval(|run| run.updates.rate_hz())
+}
+
+fn pmse(group: &Group) -> Option<Interval> {
+    group.interval(|run| run.force.pmse)
+}
+
+fn half(interval: Option<Interval>) -> Option<f64> {
+    interval.map(|interval| interval.high - interval.mean)
+}
+
+fn summary(groups: &[Group]) -> Table {
+    Table::of(
+        "Fig. 5: mean over the seeds, ± half of the 95 % interval",
+        groups,
+        &[
+            column("mode", "", 0, |group| mode_name(group.case.mode)),
+            column("scheme", "", 0, |group| group.case.curve.label()),
+            column("deadband", "", 3, |group| group.case.deadband),
+            column("n", "", 0, |group| rate(group).map(|rate| rate.n as u64)),
+            mean("packets_per_s", "Hz", 1, |run| run.updates.rate_hz()),
+            column("pm_rate", "Hz", 1, |group| half(rate(group))),
+            mean("pmse", "", 4, |run| run.force.pmse),
+            column("pm_pmse", "", 4, |group| half(pmse(group))),
+            mean("pmse_magnitude", "", 4, |run| run.force.pmse_magnitude),
+            mean("relative_error", "", 4, |run| run.force.relative_error),
+            mean("jnd7_share", "", 3, |run| run.force.jnd7_share),
+        ],
+    )
+}
+
+/// Left the paper's axes and curves, right both modes on logarithmic axes.
+fn figure(groups: &[Group]) -> Figure {
+    let series = |mode: Mode, notes: bool| {
+        let wanted = FIG5_CURVES.into_iter().filter(move |(of, _)| *of == mode);
+        wanted.map(move |(mode, curve)| drawn(groups, mode, curve, notes))
+    };
+    let rate = "packet rate, 1/s";
+    Figure {
+        panels: vec![
+            Panel {
+                title: "The paper's schemes".to_owned(),
+                x: Axis::linear(rate),
+                y: Axis::linear("PMSE"),
+                series: series(Mode::Paper, true).collect(),
+                legend: Legend::UpperRight,
+            },
+            Panel {
+                title: "Both modes".to_owned(),
+                x: Axis::log(rate),
+                y: Axis::log("PMSE"),
+                series: series(Mode::Paper, false)
+                    .chain(series(Mode::Recommended, false))
+                    .collect(),
+                legend: Legend::UpperLeft,
+            },
+        ],
+        columns: 2,
+        panel_size: (560, 440),
+    }
+}
+
+fn drawn(groups: &[Group], mode: Mode, curve: Curve, notes: bool) -> Series {
+    let (colour, mark) = match curve {
+        Curve::Deadband => (Colour::Blue, Mark::Circle),
+        Curve::Hybrid(50) => (Colour::Vermilion, Mark::Square),
+        Curve::Hybrid(_) => (Colour::Green, Mark::Triangle),
+        Curve::Useful(_) => (Colour::Black, Mark::Cross),
+    };
+    let of_curve = groups
+        .iter()
+        .filter(|group| (group.case.mode, group.case.curve) == (mode, curve));
+    let dots = of_curve.filter_map(|group| {
+        let deadband = group.case.deadband;
+        let noted = notes && curve == Curve::Deadband && NOTED.contains(&deadband);
+        Some(Dot {
+            note: noted.then(|| format!("{} %", deadband * 100.0)),
+            ..Dot::of_intervals(rate(group)?, pmse(group)?)
+        })
+    });
+    let stroke = match mode {
+        Mode::Paper => Stroke::Solid,
+        Mode::Recommended => Stroke::Dashed,
+    };
+    let label = if notes {
+        curve.label()
+    } else {
+        format!("{}, {}", mode_name(mode), curve.label())
+    };
+    Series::line(&label, colour, dots.collect())
+        .marked(mark)
+        .stroked(stroke, 2)
+}

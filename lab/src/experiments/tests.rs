@@ -1,0 +1,371 @@
+//! Each experiment at small extent: a law of its result, and that its columns show what their keys name.
+
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+use mmt_shared::model::settings::Mode;
+
+use super::*;
+use crate::experiment::description::Request;
+use crate::experiment::findings::{Extent, Findings};
+use crate::experiment::grid::Run;
+use crate::io::{Folder, Runner};
+use crate::setting::{Curve, Point};
+use crate::table::{Cell, Column};
+use crate::trial::{Measured, Trial};
+
+/// What an experiment found with one seed, and the folder with its files.
+struct Done {
+    findings: Findings,
+    folder: tempfile::TempDir,
+}
+
+/// A row of a file by key.
+type Row = BTreeMap<String, String>;
+
+impl Done {
+    fn of(experiment: &Experiment, milliseconds: u64) -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        let quiet = |_: &str, _: usize, _: usize| {};
+        let runner = Runner::new(Folder::open(folder.path()).unwrap(), None, &quiet);
+        let request = Request {
+            extent: Extent {
+                seeds: 1,
+                duration: Duration::from_millis(milliseconds),
+            },
+            given: BTreeMap::new(),
+        };
+        let findings = (experiment.run)(&runner, &request).unwrap();
+        assert_eq!(findings.experiment, experiment.name);
+        Self { findings, folder }
+    }
+
+    /// The rows of a file where a column holds a word.
+    fn rows(&self, file: &str, wanted: &[(&str, &str)]) -> Vec<Row> {
+        let mut csv = csv::Reader::from_path(self.folder.path().join(file)).unwrap();
+        let rows = csv.deserialize().map(|row| row.unwrap());
+        let holds = |row: &Row| wanted.iter().all(|(key, word)| row[*key] == *word);
+        let rows: Vec<Row> = rows.filter(holds).collect();
+        assert!(!rows.is_empty(), "{file} has no row with {wanted:?}");
+        rows
+    }
+
+    /// A number of the one row of a file where columns hold these words.
+    fn number(&self, file: &str, wanted: &[(&str, &str)], key: &str) -> f64 {
+        let rows = self.rows(file, wanted);
+        assert_eq!(rows.len(), 1, "{file} {wanted:?}");
+        number(&rows[0], key)
+    }
+}
+
+fn number(row: &Row, key: &str) -> f64 {
+    let text = &row[key];
+    text.parse().unwrap_or_else(|_| panic!("{key} is `{text}`"))
+}
+
+#[test]
+fn physics_meets_its_references() {
+    let done = Done::of(&physics::PHYSICS, 1);
+    for row in done.rows("physics.csv", &[]) {
+        assert!(number(&row, "relative_error") < 0.012, "{row:?}");
+    }
+}
+
+#[test]
+fn fig5_sends_less_and_errs_more_with_a_wider_deadband() {
+    let done = Done::of(&fig5::FIG5, 6000);
+    for mode in ["paper", "recommended"] {
+        let at = |delta: &str, key: &str| {
+            let wanted = [("mode", mode), ("scheme", "deadband"), ("deadband", delta)];
+            done.number("fig5.csv", &wanted, key)
+        };
+        let (fine, coarse) = ("0.025", "0.3");
+        assert!(at(fine, "packet_rate_hz") > 1.5 * at(coarse, "packet_rate_hz"));
+        assert!(at(fine, "pmse") < at(coarse, "pmse"), "{mode}");
+    }
+}
+
+#[test]
+fn fig6_and_fig7_are_of_one_run_sample_by_sample() {
+    for (experiment, timed) in [(&traces::FIG6, false), (&traces::FIG7, true)] {
+        let done = Done::of(experiment, 5000);
+        let rows = done.rows(&format!("{}.csv", experiment.name), &[]);
+        assert_eq!(rows.len(), 5000);
+        let sent: Vec<&Row> = rows
+            .iter()
+            .filter(|row| !row["update"].is_empty())
+            .collect();
+        assert!(sent.len() > 10);
+        assert_eq!(sent.iter().any(|row| row["update"] == "timer"), timed);
+        let gaps = sent
+            .windows(2)
+            .map(|pair| number(pair[1], "t_s") - number(pair[0], "t_s"));
+        let longest = gaps.fold(0.0, f64::max);
+        assert_eq!(longest < 0.1505, timed, "{longest}");
+    }
+}
+
+#[test]
+fn claims_keep_the_lower_bounds_that_the_timer_sets() {
+    let done = Done::of(&claims::CLAIMS, 3000);
+    for (claim, least) in [
+        ("lower bound, hybrid 50 ms", 19.9),
+        ("lower bound, hybrid 150 ms", 6.6),
+    ] {
+        let rows = done.rows("claims.csv", &[("claim", claim)]);
+        assert!(number(&rows[0], "value") > least, "{rows:?}");
+        assert_eq!(rows[0]["verdict"], "holds");
+    }
+    assert_eq!(done.rows("claims.csv", &[]).len(), 16);
+}
+
+#[test]
+fn ablation_without_a_timer_in_free_space_sends_less() {
+    let done = Done::of(&ablation::ABLATION, 1500);
+    let rate = |variant| {
+        let wanted = [("variant", variant), ("scheme", "hybrid 50 ms")];
+        done.number("ablation.csv", &wanted, "rate_30")
+    };
+    assert!(rate("timer in contact only") < 0.8 * rate("as stated"));
+    assert_eq!(done.rows("ablation.csv", &[]).len(), 13 * 3);
+}
+
+#[test]
+fn schemes_that_send_every_sample_send_a_thousand_a_second_and_the_others_less() {
+    let done = Done::of(&schemes::SCHEMES, 4000);
+    for row in done.rows("schemes.csv", &[]) {
+        let rate = number(&row, "packet_rate_hz");
+        assert_eq!(rate > 999.0, row["scheme"] == "every-sample", "{row:?}");
+    }
+}
+
+#[test]
+fn scenarios_with_a_wrong_side_place_the_model_worse() {
+    let done = Done::of(&scenarios::EXPERIMENT, 6000);
+    for mode in ["paper", "recommended"] {
+        let error = |scenario| {
+            let wanted = [("mode", mode), ("scenario", scenario)];
+            done.number("scenarios.csv", &wanted, "position_rms_mm")
+        };
+        assert!(error("side-0") < error("side-20"), "{mode}");
+    }
+}
+
+#[test]
+fn tupdate_sends_less_with_a_longer_period() {
+    let done = Done::of(&tupdate::TUPDATE, 2500);
+    for scheme in ["hybrid", "useful"] {
+        let rate = |ms| {
+            let wanted = [
+                ("trajectory", "default"),
+                ("ground", "plain"),
+                ("scheme", scheme),
+                ("time_ms", ms),
+            ];
+            done.number("tupdate.csv", &wanted, "packet_rate_hz")
+        };
+        assert!(
+            rate("10") > rate("100") && rate("100") >= rate("2000"),
+            "{scheme}"
+        );
+    }
+    assert_eq!(done.rows("tupdate-adaptive.csv", &[]).len(), 9);
+}
+
+#[test]
+fn repeats_change_nothing_but_the_traffic_where_nothing_is_lost() {
+    let done = Done::of(&repeats::REPEATS, 4000);
+    for row in done.rows("repeats.csv", &[("loss", "0")]) {
+        assert_eq!(number(&row, "error_ratio"), 1.0, "{row:?}");
+        assert_eq!(number(&row, "repeated") > 0.0, row["repeats"] != "none");
+    }
+}
+
+#[test]
+fn congestion_that_is_answered_leaves_the_queue_short() {
+    let done = Done::of(&congestion::CONGESTION, 16_000);
+    let longest = |answers| {
+        let rows = done.rows("congestion.csv", &[("answers", answers)]);
+        let trips = rows.iter().filter(|row| number(row, "t_s") > 13.0);
+        let trips = trips.map(|row| number(row, "round_trip_ms"));
+        trips.fold(0.0, f64::max)
+    };
+    assert!(longest("nobody") > 2.0 * longest("both"));
+    assert_eq!(done.findings.configuration.len(), 3);
+}
+
+#[test]
+fn netem_does_what_its_presets_are_configured_to_do() {
+    let done = Done::of(&netem::NETEM, 10_000);
+    // the others wait in long bursts, of which ten seconds hold too few
+    for preset in [
+        "lan",
+        "4g",
+        "5g",
+        "5g-up",
+        "5g-down",
+        "geo",
+        "transatlantic",
+    ] {
+        let of = |key| done.number("netem.csv", &[("preset", preset)], key);
+        let (configured, achieved) = (of("mean_ms"), of("mean_ms_achieved"));
+        assert!(
+            (achieved / configured - 1.0).abs() < 0.15,
+            "{preset}: {achieved} ms"
+        );
+        assert!((9000.0..=10_000.0).contains(&of("packets")));
+    }
+}
+
+#[test]
+fn transport_of_ours_adds_nothing_at_random_loss() {
+    let done = Done::of(&transport::TRANSPORT, 200);
+    let plain = [
+        ("outage_ms", "0"),
+        ("bottleneck_mbit_per_s", ""),
+        ("stack", "ours"),
+    ];
+    for row in done.rows("transport.csv", &plain) {
+        assert_eq!(number(&row, "added_max_ms"), 0.0, "{row:?}");
+    }
+    // 2 stacks × 3 flows × 3 round trips × 4 losses × 3 jitters × 2 × 2
+    assert_eq!(done.rows("transport.csv", &[]).len(), 864);
+    let rows = done
+        .findings
+        .tables
+        .iter()
+        .map(|table| table.rows().count());
+    assert_eq!(rows.collect::<Vec<_>>(), [3, 14, 24]);
+}
+
+#[test]
+fn delay_by_replay_injects_no_energy() {
+    let done = Done::of(&delay::DELAY, 2500);
+    let replay = done.rows("delay.csv", &[("architecture", "mmt-replay")]);
+    assert!(
+        replay
+            .iter()
+            .all(|row| number(row, "energy_injected_j") == 0.0)
+    );
+    let snap = done.rows("delay.csv", &[("architecture", "mmt-snap")]);
+    assert!(
+        snap.iter()
+            .any(|row| number(row, "energy_injected_j") > 0.0)
+    );
+}
+
+/// What the samples of a run of fig. 5 say that its columns must show, by (13) to (15).
+fn recomputed(run: &Run<Point, Measured>) -> BTreeMap<&'static str, Cell> {
+    let rows = &run.measured.trace;
+    let pairs = rows.iter().filter_map(|row| Some((row.f_s, row.f_m?)));
+    let pairs: Vec<_> = pairs.collect();
+    let felt = |f: f64| f > 0.04;
+    let pmse = |of: fn(&mmt_shared::model::geometry::Vec2) -> f64| {
+        let both = pairs
+            .iter()
+            .map(|(f_s, f_m)| (of(f_s).abs(), of(f_m).abs()));
+        let logs = both.filter(|(s, m)| felt(*s) && felt(*m));
+        crate::statistics::mean(logs.map(|(s, m)| libm::log(s / m).powi(2)))
+    };
+    let (x, y) = (pmse(|f| f.x), pmse(|f| f.y));
+    let touching = pairs
+        .iter()
+        .filter(|(s, m)| felt(s.norm()) || felt(m.norm()));
+    let touching: Vec<_> = touching.collect();
+    let sum = |of: fn(&(_, _)) -> f64| touching.iter().map(|pair| of(pair)).sum::<f64>();
+    type Pair = (
+        mmt_shared::model::geometry::Vec2,
+        mmt_shared::model::geometry::Vec2,
+    );
+    let error: fn(&Pair) -> f64 = |(s, m)| (s - m).norm_squared();
+    let force: fn(&Pair) -> f64 = |(s, _)| s.norm_squared();
+    let outside: fn(&Pair) -> f64 = |(s, m)| f64::from((s - m).norm() > 0.07 * s.norm());
+    let duration_s = rows.len() as f64 * 1e-3;
+    let packets = rows.iter().filter(|row| row.update.is_some()).count() as u64;
+    let contact_s = run.measured.contact_s;
+    BTreeMap::from([
+        ("mode", Cell::from("paper")),
+        ("scheme", "hybrid".into()),
+        ("t_update_ms", 150_u64.into()),
+        ("deadband", 0.15.into()),
+        ("seed", 3_u64.into()),
+        ("duration_s", duration_s.into()),
+        ("packet_rate_hz", (packets as f64 / duration_s).into()),
+        (
+            "contact_packet_rate_hz",
+            (packets as f64 / contact_s).into(),
+        ),
+        ("pmse", (x.unwrap() + y.unwrap()).into()),
+        ("pmse_x", x.into()),
+        ("pmse_y", y.into()),
+        ("pmse_magnitude", pmse(|f| f.norm()).into()),
+        ("relative_error", (sum(error) / sum(force)).sqrt().into()),
+        ("jnd7_share", (sum(outside) / touching.len() as f64).into()),
+        ("packets", packets.into()),
+        ("contact_s", contact_s.into()),
+    ])
+}
+
+/// The first column that does not show what the samples say.
+fn wrong<'a>(
+    columns: &[Column<'a, Run<'a, Point, Measured>>],
+    run: &Run<'a, Point, Measured>,
+    expected: &BTreeMap<&str, Cell>,
+) -> Option<&'static str> {
+    let same = |a: &Cell, b: &Cell| match (a, b) {
+        (Cell::Number(a), Cell::Number(b)) => (a - b).abs() < 1e-9 * b.abs().max(1.0),
+        (a, b) => a == b,
+    };
+    let differs = |column: &&Column<_>| !same(&column.cell(run), &expected[column.key]);
+    columns.iter().find(differs).map(|column| column.key)
+}
+
+#[test]
+fn columns_show_what_the_samples_say_and_two_that_are_swapped_are_seen() {
+    let point = Point {
+        mode: Mode::Paper,
+        curve: Curve::Hybrid(150),
+        deadband: 0.15,
+    };
+    let trial = Trial {
+        traced: true,
+        ..point.trial(3, Duration::from_secs(6))
+    };
+    let measured = trial.run().unwrap();
+    let run = Run {
+        case: &point,
+        seed: 3,
+        measured: &measured,
+    };
+    let expected = recomputed(&run);
+    let columns = fig5::columns();
+    assert_eq!(wrong(&columns, &run, &expected), None);
+    for k in 0..columns.len() {
+        for other in 0..k {
+            let mut swapped = fig5::columns();
+            // the functions trade places, the keys stay
+            swapped.swap(k, other);
+            let (first, second) = (columns[other].key, columns[k].key);
+            (swapped[other].key, swapped[k].key) = (first, second);
+            let seen = wrong(&swapped, &run, &expected);
+            assert!(seen.is_some(), "{first} and {second} swapped");
+        }
+    }
+}
+
+#[test]
+fn a_key_ends_with_its_unit() {
+    let ending = |unit: &str| match unit {
+        "ms" => "_ms",
+        "s" => "_s",
+        "Hz" => "_hz",
+        _ => "",
+    };
+    let columns = fig5::columns();
+    let keys = columns.iter().map(|column| (column.key, column.unit));
+    let measures = crate::sweep::columns();
+    let keys = keys.chain(measures.iter().map(|column| (column.key, column.unit)));
+    for (key, unit) in keys {
+        assert!(key.ends_with(ending(unit)), "{key} is in {unit}");
+    }
+}

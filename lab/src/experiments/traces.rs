@@ -1,0 +1,190 @@
+//! Figs. 6 and 7: the forces and the packets of one run, over time.
+
+use std::ops::RangeInclusive;
+
+use mmt_shared::model::settings::Mode;
+
+use crate::experiment::description::{DURATION, Experiment, Request};
+use crate::experiment::findings::{ExperimentError, Findings};
+use crate::experiment::grid::digest;
+use crate::figure::{Axis, Colour, Dot, Figure, Legend, Panel, Series, Stroke};
+use crate::io::Runner;
+use crate::setting::{Curve, paper_world};
+use crate::table::{Table, column};
+use crate::trial::{Measured, TraceRow, Trial};
+
+/// The deadband of both figures.
+const DEADBAND: f64 = 0.15;
+/// The opening that is shown enlarged, s.
+const OPENING_S: f64 = 6.0;
+/// A curve is drawn by the least and the largest value of so many parts of the time shown.
+const PARTS: usize = 900;
+
+/// Fig. 6.
+pub(super) const FIG6: Experiment = Experiment {
+    name: "fig6",
+    about: "Fig. 6: forces and packets over time, deadband 15 %",
+    seeds: 1,
+    duration: DURATION,
+    arguments: &[],
+    run: |runner, request| run(runner, request, &FIG6, Curve::Deadband),
+};
+
+/// Fig. 7.
+pub(super) const FIG7: Experiment = Experiment {
+    name: "fig7",
+    about: "Fig. 7: the same for hybrid 15 %, 150 ms",
+    run: |runner, request| run(runner, request, &FIG7, Curve::Hybrid(150)),
+    ..FIG6
+};
+
+/// Keeps CSV and SVG of the run with the last of the seeds.
+fn run(
+    runner: &Runner,
+    request: &Request,
+    figure: &Experiment,
+    curve: Curve,
+) -> Result<Findings, ExperimentError> {
+    let (extent, name) = (request.extent, figure.name);
+    let world = paper_world(Mode::Paper, curve.at(DEADBAND)).seeded(extent.seeds);
+    let groups = runner.grid(name, 1, vec![world.clone()], |world, _| {
+        runner.trial(&Trial {
+            traced: true,
+            ..Trial::new(world.clone(), extent.duration)
+        })
+    })?;
+    let title = format!("{} {} %, paper mode", curve.label(), DEADBAND * 100.0);
+    let mut tables = Vec::new();
+    for run in groups.iter().flat_map(|group| &group.runs) {
+        runner.keep_table(&format!("{name}.csv"), &forces(&run.trace))?;
+        runner.keep_figure(&format!("{name}.svg"), &drawn(&title, &run.trace))?;
+        tables.push(summary(format!("{name}: {title}"), run));
+    }
+    Ok(Findings {
+        experiment: name,
+        extent,
+        digest: digest(&groups),
+        configuration: vec![world],
+        tables,
+    })
+}
+
+#[rustfmt::skip]
+fn forces(trace: &[TraceRow]) -> Table {
+    Table::of(
+        "Forces",
+        trace,
+        &[
+            column("t_s", "s", 3, |row| row.t_s),
+            column("fs_n", "N", 3, |row| row.f_s.norm()),
+            column("fm_n", "N", 3, |row| row.f_m.map(|f_m| f_m.norm())),
+            column("error_n", "N", 3, |row| row.f_m.map(|f_m| (row.f_s - f_m).norm())),
+            column("update", "", 0, |row| row.update.map(|cause| cause.name())),
+        ],
+    )
+}
+
+#[rustfmt::skip]
+fn summary(title: String, run: &Measured) -> Table {
+    Table::of(
+        title,
+        [run],
+        &[
+            column("packets_per_s", "Hz", 1, |run| run.updates.rate_hz()),
+            column("contact_packets_per_s", "Hz", 1, |run| run.updates.contact_rate_hz()),
+            column("first_contact_second_per_s", "Hz", 1, |run| run.opening_rate_hz),
+            column("later_contact_per_s", "Hz", 1, |run| run.later_rate_hz),
+            column("pmse", "", 4, |run| run.force.pmse),
+            column("relative_error", "", 3, |run| run.force.relative_error),
+        ],
+    )
+}
+
+/// The whole run above, its opening below.
+fn drawn(title: &str, rows: &[TraceRow]) -> Figure {
+    let end = rows.last().map_or(1.0, |row| row.t_s);
+    let contact = rows.iter().find(|row| row.f_s.norm() > 0.1);
+    let begin = contact.map_or(0.0, |row| (row.t_s - 0.5).max(0.0));
+    let panels = [
+        panel(title, rows, 0.0..=end),
+        panel("the first push", rows, begin..=begin + OPENING_S),
+    ];
+    Figure::of_alike(panels, Legend::UpperRight, 1, (1060, 330))
+}
+
+fn panel(title: &str, rows: &[TraceRow], when: RangeInclusive<f64>) -> Panel {
+    let shown: Vec<&TraceRow> = rows.iter().filter(|row| when.contains(&row.t_s)).collect();
+    let largest = shown
+        .iter()
+        .map(|row| row.f_s.norm().max(row.f_m.map_or(0.0, |f| f.norm())));
+    let top = largest.fold(1.0, f64::max) * 1.08;
+    let curve = |label: &str, colour: Colour, width: u32, of: &dyn Fn(&TraceRow) -> Option<f64>| {
+        let line = Series::line(label, colour, envelope(&shown, of));
+        line.stroked(Stroke::Solid, width)
+    };
+    let sent = shown.iter().filter(|row| row.update.is_some());
+    // a strip of its own below the forces
+    let events = sent.map(|row| Dot::at(row.t_s, -0.03 * top)).collect();
+    let series = [
+        Series::line("packet", Colour::Sky, events).stroked(Stroke::Events, 1),
+        curve("|f_s|", Colour::Vermilion, 2, &|row| Some(row.f_s.norm())),
+        curve("|f_m|", Colour::Blue, 1, &|row| row.f_m.map(|f| f.norm())),
+        curve("|f_s − f_m|", Colour::Grey, 1, &|row| {
+            row.f_m.map(|f| (row.f_s - f).norm())
+        }),
+    ];
+    let x = Axis::linear("time, s").over(*when.start()..*when.end());
+    let y = Axis::linear("force, N").over(-0.1 * top..top);
+    Panel::new(title, x, y, series)
+}
+
+/// The least and the largest value of each part of the rows, in the order in which they came.
+fn envelope(rows: &[&TraceRow], of: &dyn Fn(&TraceRow) -> Option<f64>) -> Vec<Dot> {
+    let mut dots = Vec::new();
+    for part in rows.chunks(rows.len().div_ceil(PARTS).max(1)) {
+        let values = part
+            .iter()
+            .filter_map(|row| Some(Dot::at(row.t_s, of(row)?)));
+        let mut ends: Vec<Dot> = Vec::new();
+        for dot in values {
+            match ends.as_mut_slice() {
+                [low, high] => {
+                    if dot.y < low.y {
+                        *low = dot;
+                    } else if dot.y > high.y {
+                        *high = dot;
+                    }
+                }
+                _ => ends = vec![dot.clone(), dot],
+            }
+        }
+        ends.sort_by(|a, b| a.x.total_cmp(&b.x));
+        ends.dedup();
+        dots.append(&mut ends);
+    }
+    dots
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use mmt_shared::model::geometry::Vec2;
+
+    #[test]
+    fn the_envelope_keeps_every_peak() {
+        let peak = |k: usize| if k == 12_345 { 9.0 } else { 1.0 };
+        let rows: Vec<TraceRow> = (0..30_000)
+            .map(|k| TraceRow {
+                t_s: k as f64 * 1e-3,
+                f_s: Vec2::new(peak(k), 0.0),
+                f_m: None,
+                update: None,
+            })
+            .collect();
+        let shown: Vec<&TraceRow> = rows.iter().collect();
+        let dots = envelope(&shown, &|row| Some(row.f_s.x));
+        assert!(dots.len() <= 2 * PARTS && dots.is_sorted_by(|a, b| a.x <= b.x));
+        assert!(dots.iter().any(|dot| dot.y == 9.0));
+        assert!(envelope(&shown, &|_| None).is_empty());
+    }
+}

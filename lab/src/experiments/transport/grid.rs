@@ -1,0 +1,56 @@
+//! The grid of cases.
+
+use std::time::Duration;
+
+use mmt_netem::Probability;
+
+use crate::transport::{Bottleneck, Case, Conditions, Flow, Stack};
+
+/// Shortest round trips, ms.
+pub(super) const ROUND_TRIPS_MS: [u64; 3] = [20, 100, 200];
+/// Losses, %.
+pub(super) const LOSSES_PERCENT: [f64; 4] = [0.0, 0.1, 1.0, 5.0];
+/// Jitters J, ms.
+pub(super) const JITTERS_MS: [u64; 3] = [0, 5, 20];
+/// Lengths of the outage, ms.
+const OUTAGES_MS: [u64; 2] = [0, 1000];
+/// The bottlenecks.
+const BOTTLENECKS: [Option<Bottleneck>; 2] = [None, Some(Bottleneck::NARROW)];
+
+/// Every path of the grid.
+fn paths() -> Vec<Conditions> {
+    let mut paths = Vec::new();
+    for bottleneck in BOTTLENECKS {
+        for outage_ms in OUTAGES_MS {
+            for round_trip_ms in ROUND_TRIPS_MS {
+                for percent in LOSSES_PERCENT {
+                    paths.extend(JITTERS_MS.map(|jitter_ms| Conditions {
+                        round_trip: Duration::from_millis(round_trip_ms),
+                        loss: Probability::from_percent(percent).unwrap_or_default(),
+                        jitter: Duration::from_millis(jitter_ms),
+                        outage: Duration::from_millis(outage_ms),
+                        bottleneck,
+                    }));
+                }
+            }
+        }
+    }
+    paths
+}
+
+/// Every case of the grid: stack by stack, flow by flow, path by path.
+pub(super) fn cases(duration: Duration, seed: u64) -> Vec<Case> {
+    let mut cases = Vec::new();
+    for stack in Stack::ALL {
+        for flow in Flow::ALL {
+            cases.extend(paths().into_iter().map(|conditions| Case {
+                stack,
+                flow,
+                conditions,
+                duration,
+                seed,
+            }));
+        }
+    }
+    cases
+}

@@ -1,0 +1,149 @@
+//! The paper's experiment as a world: no delay, one sample a packet, and the choices the paper leaves open.
+//!
+//! Literal where the paper is literal: a received pose is set on arrival, which is sound without delay.
+
+use std::time::Duration;
+
+use mmt_client::device::DeviceProfile;
+use mmt_server::playout::PlayoutConfig;
+use mmt_server::slave::SlaveConfig;
+use mmt_server::trigger::{Scheme, TriggerConfig};
+use mmt_shared::model::settings::{Mode, ModelSettings, PoseCorrection};
+
+use crate::trial::Trial;
+use crate::world::WorldConfig;
+
+/// The seven deadband parameters of section IV-B, as shares.
+pub const DEADBANDS: [f64; 7] = [0.025, 0.05, 0.10, 0.15, 0.20, 0.25, 0.30];
+
+/// An update scheme whose deadband is still open: one curve of a rate–PMSE figure.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Curve {
+    /// (12) alone.
+    Deadband,
+    /// Section III-B with this T_update, ms.
+    Hybrid(u64),
+    /// The recommended scheme with this T_update, ms.
+    Useful(u64),
+}
+
+impl Curve {
+    /// The scheme at a deadband.
+    #[must_use]
+    pub fn at(self, delta: f64) -> Scheme {
+        match self {
+            Self::Deadband => Scheme::Deadband { delta },
+            Self::Hybrid(ms) => Scheme::Hybrid {
+                delta,
+                t_update: Duration::from_millis(ms),
+            },
+            Self::Useful(ms) => Scheme::Useful {
+                delta,
+                t_update: Duration::from_millis(ms),
+            },
+        }
+    }
+
+    /// T_update, ms; 0 for the scheme without a timer.
+    #[must_use]
+    pub fn t_update_ms(self) -> u64 {
+        match self {
+            Self::Deadband => 0,
+            Self::Hybrid(ms) | Self::Useful(ms) => ms,
+        }
+    }
+
+    /// For legends: `hybrid 150 ms`.
+    #[must_use]
+    pub fn label(self) -> String {
+        match self {
+            Self::Deadband => "deadband".to_owned(),
+            Self::Hybrid(ms) => format!("hybrid {ms} ms"),
+            Self::Useful(ms) => format!("useful {ms} ms"),
+        }
+    }
+}
+
+/// The curves of fig. 5: the paper's three in both modes, and the recommended scheme.
+pub const FIG5_CURVES: [(Mode, Curve); 7] = [
+    (Mode::Paper, Curve::Deadband),
+    (Mode::Paper, Curve::Hybrid(50)),
+    (Mode::Paper, Curve::Hybrid(150)),
+    (Mode::Recommended, Curve::Deadband),
+    (Mode::Recommended, Curve::Hybrid(50)),
+    (Mode::Recommended, Curve::Hybrid(150)),
+    (Mode::Recommended, Curve::Useful(150)),
+];
+
+/// A point of a rate–PMSE curve.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Point {
+    /// The mode.
+    pub mode: Mode,
+    /// The scheme.
+    pub curve: Curve,
+    /// Delta, as a share.
+    pub deadband: f64,
+}
+
+impl Point {
+    /// Every deadband of some curves, curve by curve.
+    pub fn of(curves: impl IntoIterator<Item = (Mode, Curve)>) -> Vec<Self> {
+        let points = |(mode, curve)| {
+            DEADBANDS.map(|deadband| Self {
+                mode,
+                curve,
+                deadband,
+            })
+        };
+        curves.into_iter().flat_map(points).collect()
+    }
+
+    /// The run of the paper's experiment at this point with a seed.
+    #[must_use]
+    pub fn trial(&self, seed: u64, duration: Duration) -> Trial {
+        let world = paper_world(self.mode, self.curve.at(self.deadband));
+        Trial::new(world.seeded(seed), duration)
+    }
+}
+
+/// The name of a mode in files.
+#[must_use]
+pub fn mode_name(mode: Mode) -> &'static str {
+    match mode {
+        Mode::Paper => "paper",
+        Mode::Recommended => "recommended",
+    }
+}
+
+/// The default scenario without a network: every sample is its own packet, is played at once, and an update is
+/// applied in the next tick.
+#[must_use]
+pub fn paper_world(mode: Mode, scheme: Scheme) -> WorldConfig {
+    let coupling = DeviceProfile::default().coupling();
+    let settings = mode.model_settings(coupling);
+    let settings = match mode {
+        Mode::Paper => ModelSettings {
+            correction: PoseCorrection::Snap,
+            ..settings
+        },
+        Mode::Recommended => settings,
+    };
+    WorldConfig {
+        slave: SlaveConfig {
+            playout: PlayoutConfig {
+                delay_ms: 0.0,
+                ..PlayoutConfig::default()
+            },
+            trigger: TriggerConfig {
+                scheme,
+                ..TriggerConfig::of_mode(mode)
+            },
+            ..SlaveConfig::of_mode(mode)
+        },
+        settings: Some(settings),
+        stretch_max: SlaveConfig::of_mode(mode).stretch_max,
+        samples_per_command: 1,
+        ..WorldConfig::default()
+    }
+}
