@@ -110,9 +110,10 @@ pub(crate) fn run(arguments: &NetemArguments) -> Result<(), Failure> {
             effect_down,
         },
     };
-    match arguments.json {
-        true => print_json(&report),
-        false => print(format_args!("\n{report}")),
+    if arguments.json {
+        print_json(&report)
+    } else {
+        print(format_args!("\n{report}"))
     }
 }
 

@@ -37,9 +37,10 @@ impl Viewer {
 
     /// How many scenes a second are looked at, with a dashboard or without one.
     pub(super) fn scene_hz(dashboard: bool) -> u8 {
-        match dashboard && Screen::is_there() {
-            true => SCENE_HZ,
-            false => 0,
+        if dashboard && Screen::is_there() {
+            SCENE_HZ
+        } else {
+            0
         }
     }
 

@@ -35,9 +35,10 @@ fn standard_gamma(shape: f64, p: f64) -> f64 {
     // the end of the 53-bit grid of a draw
     let p = p.min(1.0 - f64::EPSILON / 2.0);
     let start = start(shape, p);
-    match shape > SHAPE_MAX {
-        true => start,
-        false => improved(shape, p, start),
+    if shape > SHAPE_MAX {
+        start
+    } else {
+        improved(shape, p, start)
     }
 }
 
@@ -49,9 +50,10 @@ fn start(shape: f64, p: f64) -> f64 {
     }
     // a power of x near zero, an exponential beyond
     let split = 1.0 - shape * (0.253 + shape * 0.12);
-    match p < split {
-        true => libm::pow(p / split, 1.0 / shape),
-        false => 1.0 - libm::log1p(-(p - split) / (1.0 - split)),
+    if p < split {
+        libm::pow(p / split, 1.0 / shape)
+    } else {
+        1.0 - libm::log1p(-(p - split) / (1.0 - split))
     }
 }
 
@@ -80,9 +82,10 @@ fn improved(shape: f64, p: f64, mut x: f64) -> f64 {
 /// By how much the share below `x` exceeds `p`, from the smaller tail.
 fn excess(shape: f64, x: f64, p: f64, log_gamma: f64) -> f64 {
     let front = libm::exp(shape * libm::log(x) - x - log_gamma);
-    match x < shape + 1.0 {
-        true => front * series(shape, x) - p,
-        false => (1.0 - p) - front * fraction(shape, x),
+    if x < shape + 1.0 {
+        front * series(shape, x) - p
+    } else {
+        (1.0 - p) - front * fraction(shape, x)
     }
 }
 

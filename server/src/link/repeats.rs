@@ -127,9 +127,10 @@ impl FromStr for Repeats {
             digits.ok_or_else(|| RepeatsError::Time(word.to_owned()))
         };
         let times: Vec<f64> = text.split_whitespace().map(ms).collect::<Result<_, _>>()?;
-        match times.is_empty() {
-            true => Err(RepeatsError::Time(text.to_owned())),
-            false => Self::try_new(&times),
+        if times.is_empty() {
+            Err(RepeatsError::Time(text.to_owned()))
+        } else {
+            Self::try_new(&times)
         }
     }
 }

@@ -132,9 +132,10 @@ mod tests {
             let velocity = way / TICK_S;
             self.limit.moved(velocity, way != wanted);
             let coupling = self.limit.coupling;
-            let f = match self.x > 0.0 {
-                true => coupling.force(self.x, velocity.x),
-                false => 0.0,
+            let f = if self.x > 0.0 {
+                coupling.force(self.x, velocity.x)
+            } else {
+                0.0
             };
             let noise = self.noise.as_mut().map_or(0.0, |noise| noise.normal());
             let measured = Vec2::new(f + 0.01 * noise, 0.0);

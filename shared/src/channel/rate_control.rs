@@ -63,9 +63,10 @@ impl TryFrom<f64> for StretchMax {
     type Error = StretchMaxError;
 
     fn try_from(factor: f64) -> Result<Self, StretchMaxError> {
-        match (STRETCH_MAX.0..=STRETCH_MAX.1).contains(&factor) {
-            true => Ok(Self(factor)),
-            false => Err(StretchMaxError(factor.to_string())),
+        if (STRETCH_MAX.0..=STRETCH_MAX.1).contains(&factor) {
+            Ok(Self(factor))
+        } else {
+            Err(StretchMaxError(factor.to_string()))
         }
     }
 }

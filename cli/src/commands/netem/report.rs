@@ -41,9 +41,10 @@ struct DirectionReport {
 /// The file cannot be read or is no record.
 pub(super) fn run(arguments: &NetemReportArguments) -> Result<(), Failure> {
     let report = RecordReport::of_file(&arguments.file)?;
-    match arguments.json {
-        true => print_json(&report),
-        false => print(&report),
+    if arguments.json {
+        print_json(&report)
+    } else {
+        print(&report)
     }
 }
 
@@ -90,12 +91,13 @@ impl fmt::Display for RecordReport {
             writeln!(f, "\n{name}: {}", direction.words)?;
             direction.fmt(f)?;
         }
-        match self.degraded {
-            true => write!(
+        if self.degraded {
+            write!(
                 f,
                 "\ndegraded: this host was too slow for the emulation, do not trust its delays"
-            ),
-            false => Ok(()),
+            )
+        } else {
+            Ok(())
         }
     }
 }
