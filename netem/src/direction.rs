@@ -1,6 +1,6 @@
 //! Which link of a path: its direction, and which path of one seed.
 //!
-//! It says nothing of what a link does.
+//! It knows nothing of what a link does.
 
 use serde::{Deserialize, Serialize};
 

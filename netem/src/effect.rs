@@ -56,57 +56,50 @@ pub struct Effect {
     pub reordered: f64,
 }
 
-/// What `config` does to packets sent at `rate_hz`.
-///
-/// # Errors
-/// A setting out of its range.
-pub fn effect(config: &LinkConfig, rate_hz: f64) -> Result<Effect, ConfigError> {
-    let rate_hz = clamp_rate(rate_hz);
-    let stream = Stream::through(config, rate_hz)?;
-    let unordered = LinkConfig {
-        order: Order::Free,
-        ..config.clone()
-    };
-    let mean_ms = mean(&stream.delays_ms);
-    let free_mean_ms = match config.order {
-        // a wait is only that of the order where nothing else waits
-        Order::Fifo if config.profile.is_empty() => {
-            mean(&Stream::through(&unordered, rate_hz)?.delays_ms)
-        }
-        Order::Fifo | Order::Free => mean_ms,
-    };
-    let of_all = |packets: u64| packets as f64 / f64::from(sample_size(config));
-    let only_the_model = config.outages.is_empty()
-        && config.mtu.is_none()
-        && config.replay.is_none()
-        && !config.ecn
-        && config.profile.is_empty();
-    let known = config.loss.share().filter(|_| only_the_model);
-    let known_burst = config.loss.mean_burst(rate_hz).filter(|_| only_the_model);
-    let drops = &stream.drops;
-    let sampled = drops.loss.plus(drops.outage).plus(drops.mtu).packets;
-    Ok(Effect {
-        rate_hz,
-        mean_ms,
-        sd_ms: standard_deviation(&stream.delays_ms, mean_ms),
-        p99_ms: p99(&stream.delays_ms),
-        waiting_ms: (mean_ms - free_mean_ms).max(0.0),
-        loss: known.unwrap_or(of_all(sampled)),
-        burst_packets: known_burst.unwrap_or_else(|| mean_run(&runs(stream.lost.iter().copied()))),
-        queue_drops: of_all(drops.queue.plus(drops.codel).packets),
-        over_limit: of_all(drops.limit.packets),
-        marked: of_all(stream.marked),
-        reordered: stream.reordered as f64 / stream.delays_ms.len().max(1) as f64,
-    })
-}
-
 impl LinkConfig {
-    /// What these settings do to packets sent at `packet_rate_hz`: the same as [`effect`].
+    /// What these settings do to packets sent at `packet_rate_hz`.
     ///
     /// # Errors
     /// A setting out of its range.
     pub fn expected(&self, packet_rate_hz: f64) -> Result<Effect, ConfigError> {
-        effect(self, packet_rate_hz)
+        let (config, rate_hz) = (self, clamp_rate(packet_rate_hz));
+        let stream = Stream::through(config, rate_hz)?;
+        let unordered = LinkConfig {
+            order: Order::Free,
+            ..config.clone()
+        };
+        let mean_ms = mean(&stream.delays_ms);
+        let free_mean_ms = match config.order {
+            // a wait is only that of the order where nothing else waits
+            Order::Fifo if config.profile.is_empty() => {
+                mean(&Stream::through(&unordered, rate_hz)?.delays_ms)
+            }
+            Order::Fifo | Order::Free => mean_ms,
+        };
+        let of_all = |packets: u64| packets as f64 / f64::from(sample_size(config));
+        let only_the_model = config.outages.is_empty()
+            && config.mtu.is_none()
+            && config.replay.is_none()
+            && !config.ecn
+            && config.profile.is_empty();
+        let known = config.loss.share().filter(|_| only_the_model);
+        let known_burst = config.loss.mean_burst(rate_hz).filter(|_| only_the_model);
+        let drops = &stream.drops;
+        let sampled = drops.loss.plus(drops.outage).plus(drops.mtu).packets;
+        Ok(Effect {
+            rate_hz,
+            mean_ms,
+            sd_ms: standard_deviation(&stream.delays_ms, mean_ms),
+            p99_ms: p99(&stream.delays_ms),
+            waiting_ms: (mean_ms - free_mean_ms).max(0.0),
+            loss: known.unwrap_or(of_all(sampled)),
+            burst_packets: known_burst
+                .unwrap_or_else(|| mean_run(&runs(stream.lost.iter().copied()))),
+            queue_drops: of_all(drops.queue.plus(drops.codel).packets),
+            over_limit: of_all(drops.limit.packets),
+            marked: of_all(stream.marked),
+            reordered: stream.reordered as f64 / stream.delays_ms.len().max(1) as f64,
+        })
     }
 }
 

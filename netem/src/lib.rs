@@ -37,6 +37,6 @@ pub mod words;
 
 pub use config::{Delay, LinkConfig, Loss, Order, Probability};
 pub use direction::{Direction, LinkId};
-pub use effect::{Effect, effect};
+pub use effect::Effect;
 pub use link::Link;
 pub use packet::{Departure, DropCause, Fate, Packet};

@@ -1,7 +1,7 @@
 //! One direction of an emulated path, as a pure state machine: a packet goes in, and later it comes out.
 //!
 //! [`Link::offer`] takes a packet at the time of its arrival. [`Link::poll`] hands out what has left or was
-//! dropped by now, and [`Link::poll_timeout`] tells when to poll next. No departure is promised at the offer:
+//! dropped by now, and [`Link::poll_timeout`] returns when to poll next. No departure is promised at the offer:
 //! packets wait before the bottleneck and leave at the rate of the moment. The order of the stages is that of
 //! a real path: MTU, copy, loss, limit, corruption, bottleneck with its queue, propagation with jitter, order,
 //! slots. All times are theoretical: lateness of whoever polls changes none of them, so it does not add up.

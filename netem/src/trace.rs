@@ -1,7 +1,7 @@
 //! Recorded networks: text in, delays, losses and sending opportunities out.
 //!
-//! Formats: mahimahi, irtt, ping, LENS, and the CSV of our own recorder. What is wrong is told with its
-//! line. It reads no file: it is handed text.
+//! Formats: mahimahi, irtt, ping, LENS, and the CSV of our own recorder. Errors name the line. It
+//! reads no file: text goes in.
 
 use std::fmt;
 use std::time::Duration;

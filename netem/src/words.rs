@@ -1,6 +1,6 @@
 //! The words in which people write a link down: those of `tc netem`, and some of our own beside them.
 //!
-//! The arithmetic behind the words is our own; `docs/netem.md` says where it differs from tc's. What tc
+//! The arithmetic behind the words is our own; `docs/netem.md` lists where it differs from tc's. What tc
 //! knows and this crate does not is an error of its own, never ignored. No file is read here:
 //! whoever may read files hands over a function that does.
 
@@ -26,7 +26,7 @@ use number::time;
 const A_WORD: &str = "delay, loss, outage, order, reorder, duplicate, corrupt, mtu, rate, queue, codel, \
                       slot, ecn, limit, trace, seed, preset or none";
 
-/// Reads the text of a file by the name that the words give it, or says why not.
+/// Reads the text of a file by the name that the words give it, or returns why it cannot.
 pub type ReadFile<'a> = dyn FnMut(&str) -> Result<String, String> + 'a;
 
 /// Settings from words that may name files.

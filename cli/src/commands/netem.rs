@@ -17,15 +17,19 @@ use crate::failure::{Exit, Failure};
 use crate::output::{note, print, print_json};
 use crate::stop::Stop;
 
-pub(super) mod orders;
+pub(super) mod control;
 mod report;
 mod table;
 pub(super) mod wrap;
 
-use orders::Order;
+use control::Command;
 
-/// How often the relay is looked at.
-const LOOK: Duration = Duration::from_millis(50);
+/// How often the state of the relay is checked.
+const CHECK_EVERY: Duration = Duration::from_millis(50);
+
+/// The last line of a run that the host was too slow for.
+const DEGRADED: &str =
+    "degraded: this host was too slow for the emulation, do not trust its delays";
 
 /// The document of a relay.
 #[derive(Debug, Serialize)]
@@ -82,8 +86,8 @@ pub(crate) fn run(arguments: &NetemArguments) -> Result<(), Failure> {
     note(format_args!("down (to masters): {effect_down}"));
     print(local)?;
     let began = Instant::now();
-    let orders = arguments.control.then(lines_of_stdin);
-    wait(&relay, &stop, arguments, orders.as_ref());
+    let commands = arguments.control.then(lines_of_stdin);
+    wait(&relay, &stop, arguments, commands.as_ref());
     let duration_s = began.elapsed().as_secs_f64();
     let ending = if stop.asked() {
         "interrupted"
@@ -139,41 +143,41 @@ fn record_file(path: &Path, heading: &Heading) -> Result<RecordFile, Failure> {
 /// The lines of stdin as they come, until it ends.
 fn lines_of_stdin() -> Receiver<String> {
     let (sender, lines) = channel();
-    orders::from_stdin(move |line| sender.send(line.to_owned()).is_ok());
+    control::from_stdin(move |line| sender.send(line.to_owned()).is_ok());
     lines
 }
 
-/// Until the time is over, somebody asks for the end, or the relay breaks; obeys orders meanwhile.
+/// Until the time is over, somebody asks for the end, or the relay breaks; applies commands meanwhile.
 fn wait(
     relay: &RelayHandle,
     stop: &Stop,
     arguments: &NetemArguments,
-    orders: Option<&Receiver<String>>,
+    commands: Option<&Receiver<String>>,
 ) {
     let (began, duration) = (Instant::now(), arguments.duration);
     let mut links = (arguments.up.clone(), arguments.down.clone());
     let over = || duration.is_some_and(|duration| began.elapsed() >= duration);
     while !stop.asked() && !over() && relay.is_running() {
-        for line in orders.into_iter().flat_map(Receiver::try_iter) {
-            if let Err(what) = obey(&line, relay, &mut links) {
+        for line in commands.into_iter().flat_map(Receiver::try_iter) {
+            if let Err(what) = apply(&line, relay, &mut links) {
                 note(what);
             }
         }
         let left = duration.map(|duration| duration.saturating_sub(began.elapsed()));
-        std::thread::sleep(left.map_or(LOOK, |left| left.min(LOOK)));
+        std::thread::sleep(left.map_or(CHECK_EVERY, |left| left.min(CHECK_EVERY)));
     }
 }
 
-fn obey(
+fn apply(
     line: &str,
     relay: &RelayHandle,
     links: &mut (LinkConfig, LinkConfig),
 ) -> Result<(), String> {
-    match Order::parse(line)? {
+    match Command::parse(line)? {
         None => return Ok(()),
-        Some(Order::Link(Direction::Up, link)) => links.0 = *link,
-        Some(Order::Link(Direction::Down, link)) => links.1 = *link,
-        Some(Order::Rebind) => {
+        Some(Command::Link(Direction::Up, link)) => links.0 = *link,
+        Some(Command::Link(Direction::Down, link)) => links.1 = *link,
+        Some(Command::Rebind) => {
             relay.rebind();
             return Ok(());
         }

@@ -3,7 +3,11 @@
 use super::*;
 
 fn at_1_khz(words: &str) -> Effect {
-    effect(&words.parse().unwrap(), 1000.0).unwrap()
+    words
+        .parse::<LinkConfig>()
+        .unwrap()
+        .expected(1000.0)
+        .unwrap()
 }
 
 #[test]
@@ -40,12 +44,12 @@ fn free_jitter_has_the_moments_of_its_distribution_and_fifo_raises_the_mean() {
 #[test]
 fn the_share_reordered_is_the_one_known_of_tc_and_falls_with_the_rate() {
     // re-running the kernel's own arithmetic gave 72 % at 1 kHz
-    let config = "delay 50ms 5ms distribution normal order free"
+    let config: LinkConfig = "delay 50ms 5ms distribution normal order free"
         .parse()
         .unwrap();
-    let fast = effect(&config, 1000.0).unwrap().reordered;
+    let fast = config.expected(1000.0).unwrap().reordered;
     assert!((fast - 0.72).abs() < 0.02, "{fast}");
-    assert_eq!(effect(&config, 7.0).unwrap().reordered, 0.0);
+    assert_eq!(config.expected(7.0).unwrap().reordered, 0.0);
 }
 
 #[test]
@@ -66,7 +70,7 @@ fn rates_without_sense_are_taken_to_the_nearest_with_sense() {
         (0.0, low),
         (f64::INFINITY, high),
     ] {
-        assert_eq!(effect(&config, asked).unwrap().rate_hz, used);
+        assert_eq!(config.expected(asked).unwrap().rate_hz, used);
     }
 }
 

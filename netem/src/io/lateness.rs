@@ -34,7 +34,7 @@ impl Lateness {
         self.p99_us > P99_DEGRADED_US || self.max_us > MAX_DEGRADED_US
     }
 
-    /// What the report of a run says of it; nothing if no packet was released.
+    /// The form that the report of a run has; empty if no packet was released.
     #[must_use]
     pub fn report(&self) -> EmulationReport {
         if self.count == 0 {

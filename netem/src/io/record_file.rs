@@ -105,7 +105,7 @@ impl RecordFile {
     }
 
     fn end(&mut self) -> io::Result<()> {
-        // It fails only when the thread has ended with an error, which joining it tells.
+        // It fails only when the thread has ended with an error, which joining it returns.
         let _ = self.writer.sender.send(None);
         match self.thread.take().map(JoinHandle::join) {
             None => Ok(()),

@@ -61,7 +61,7 @@ pub enum RelayError {
     Listen {
         /// The address given.
         listen: SocketAddr,
-        /// What the system says.
+        /// The system's answer.
         source: io::Error,
     },
     /// The system gave no event descriptor or no thread.

@@ -4,18 +4,17 @@
 //! settings in force at each moment, so that a change of rate or trace applies to what waits.
 
 use std::collections::VecDeque;
-use std::sync::Arc;
 use std::time::Duration;
+
+mod wire;
 
 use super::codel::CodelState;
 use super::stages::ROOM;
 use super::timeline::Timeline;
 use crate::config::{LinkConfig, Queue, Rate, Service};
 use crate::packet::DropCause;
-use crate::trace::mahimahi::{OPPORTUNITY_BYTES, Opportunities};
-
-/// A packet that is heavier than this does not make `CoDel` wait longer: the usual MTU.
-const MTU_BYTES: u64 = 1500;
+use crate::trace::mahimahi::OPPORTUNITY_BYTES;
+use wire::{Opportunity, TimeLeft, mtu_time, sending_time};
 
 /// The state of the bottleneck. Times are counted from the origin of the link.
 #[derive(Clone, Debug)]
@@ -62,22 +61,6 @@ pub(super) struct Sent<P> {
     pub(super) marked: bool,
     /// Why it was dropped, if it was.
     pub(super) dropped: Option<DropCause>,
-}
-
-/// How long sending takes what waits, at the rate asked for last.
-#[derive(Clone, Copy, Debug, Default)]
-struct TimeLeft {
-    /// Zero: not known.
-    bits_per_second: u64,
-    total: Duration,
-}
-
-/// The opportunity in use of a trace.
-#[derive(Clone, Debug, Default)]
-struct Opportunity {
-    trace: Option<Arc<Opportunities>>,
-    number: u64,
-    bytes_left: u64,
 }
 
 /// What the bottleneck does next.
@@ -312,71 +295,6 @@ impl<P> Bottleneck<P> {
     }
 }
 
-impl TimeLeft {
-    fn add(&mut self, bytes: u64) {
-        if self.bits_per_second > 0 {
-            let time = sending_time(self.bits_per_second, bytes);
-            self.total = self.total.saturating_add(time);
-        }
-    }
-
-    fn remove(&mut self, bytes: u64) {
-        if self.bits_per_second > 0 {
-            let time = sending_time(self.bits_per_second, bytes);
-            self.total = self.total.saturating_sub(time);
-        }
-    }
-}
-
-impl Opportunity {
-    /// The first opportunity of `trace` from `ready` on, and the bytes that are left in it. One that was used
-    /// up, or that passed unused, is gone.
-    fn at(&self, trace: &Arc<Opportunities>, ready: Duration) -> (u64, u64) {
-        let first = trace.first_from(ready);
-        if !self
-            .trace
-            .as_ref()
-            .is_some_and(|own| Arc::ptr_eq(own, trace))
-        {
-            return (first, OPPORTUNITY_BYTES);
-        }
-        if first > self.number || self.bytes_left == 0 {
-            return (first.max(self.number), OPPORTUNITY_BYTES);
-        }
-        (self.number, self.bytes_left)
-    }
-
-    /// Uses the next opportunity for `bytes` bytes; returns how many of them it carries.
-    fn send(&mut self, trace: &Arc<Opportunities>, ready: Duration, bytes: u64) -> u64 {
-        let (number, left) = self.at(trace, ready);
-        let sent = bytes.min(left);
-        *self = Self {
-            trace: Some(Arc::clone(trace)),
-            number: number.saturating_add(u64::from(sent == left)),
-            bytes_left: left - sent,
-        };
-        sent
-    }
-}
-
 fn service(settings: &LinkConfig) -> Option<&Service> {
     settings.rate.as_ref().map(|rate| &rate.service)
-}
-
-/// How long `bytes` bytes take on the wire.
-fn sending_time(bits_per_second: u64, bytes: u64) -> Duration {
-    let rate = u128::from(bits_per_second.max(1));
-    let nanos = (u128::from(bytes) * 8_000_000_000 + rate / 2) / rate;
-    Duration::from_nanos(u64::try_from(nanos).unwrap_or(u64::MAX))
-}
-
-/// How long a packet of one MTU takes; on a trace, on average.
-fn mtu_time(service: &Service) -> Duration {
-    match service {
-        Service::Constant { bits_per_second } => sending_time(*bits_per_second, MTU_BYTES),
-        Service::Opportunities(trace) => {
-            let nanos = MTU_BYTES as f64 * 8e9 / trace.mean_bit_s();
-            Duration::from_nanos(nanos as u64)
-        }
-    }
 }

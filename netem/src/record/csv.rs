@@ -68,11 +68,10 @@ pub fn read(text: &str) -> Result<(Heading, Vec<Entry>), TraceError> {
             return Err(wrong("a record of mmt begins with: # mmt netem record 1"));
         }
     }
-    if opened {
-        Ok((heading, entries))
-    } else {
-        Err(TraceError::at(1, "the file is empty"))
+    if !opened {
+        return Err(TraceError::at(1, "the file is empty"));
     }
+    Ok((heading, entries))
 }
 
 fn entry(line: &str) -> Result<Entry, &'static str> {

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use crate::direction::Direction;
 use crate::packet::{Departure, DropCause, Fate};
 
-/// What a record says of the run it is of.
+/// What a record knows of its run.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Heading {
     /// The seed of both links.

@@ -97,7 +97,7 @@ fn sent(trip: &RoundTrip) -> Option<i64> {
     stamp.monotonic.or(stamp.wall)
 }
 
-/// The line on which round trip `number` says its sequence number.
+/// The line with the sequence number of round trip `number`.
 fn line_of(text: &str, number: usize) -> usize {
     let named = text
         .lines()

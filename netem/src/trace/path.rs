@@ -26,7 +26,7 @@ pub struct PathTrace {
 pub struct Replay {
     /// The file, as the settings call it.
     pub name: String,
-    /// Which direction of it, if the file tells them apart.
+    /// Which direction of it, if the file has both.
     pub direction: Option<Direction>,
     /// The path.
     pub path: Arc<PathTrace>,
@@ -62,7 +62,7 @@ impl PathTrace {
         })
     }
 
-    /// Reads a path in any of the formats known, told apart by their first line: irtt JSON, `ping -D`,
+    /// Reads a path in any of the formats known, recognised by their first line: irtt JSON, `ping -D`,
     /// LENS CSV, the CSV of our own recorder. `direction` picks one where the file has both.
     ///
     /// # Errors

@@ -1,4 +1,4 @@
-//! What is wrong with a text that is no link, said so that a person can mend it.
+//! What is wrong with a text that is no link, and what would have been right.
 
 use std::fmt;
 

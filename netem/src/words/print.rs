@@ -19,10 +19,10 @@ impl From<LinkConfig> for String {
 impl fmt::Display for LinkConfig {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let sentences: Vec<String> = self.sentences().into_iter().flatten().collect();
-        match sentences.is_empty() {
-            true => f.write_str("none")?,
-            false => f.write_str(&sentences.join(" "))?,
+        if sentences.is_empty() {
+            f.write_str("none")?;
         }
+        f.write_str(&sentences.join(" "))?;
         self.profile.fmt(f)
     }
 }
@@ -30,7 +30,7 @@ impl fmt::Display for LinkConfig {
 impl LinkConfig {
     fn sentences(&self) -> Vec<Option<String>> {
         let chance = |name, chance: Chance| {
-            (chance != Chance::default()).then(|| format!("{name} {}", Said(chance)))
+            (chance != Chance::default()).then(|| format!("{name} {}", InWords(chance)))
         };
         let gap = |gap| match gap {
             1 => String::new(),
@@ -47,7 +47,7 @@ impl LinkConfig {
         sentences.extend([
             (self.order == Order::Free).then(|| "order free".to_owned()),
             self.reorder
-                .map(|reorder| format!("reorder {}{}", Said(reorder.chance), gap(reorder.gap))),
+                .map(|reorder| format!("reorder {}{}", InWords(reorder.chance), gap(reorder.gap))),
             chance("duplicate", self.duplicate),
             chance("corrupt", self.corrupt),
             self.mtu.map(|mtu| format!("mtu {mtu}")),
@@ -169,9 +169,11 @@ fn loss(loss: &Loss) -> Option<String> {
         ),
         Loss::Every(n) => format!("loss every {n}"),
         Loss::Listed(list) => {
-            let range = |(first, last): &(u64, u64)| match first == last {
-                true => first.to_string(),
-                false => format!("{first}-{last}"),
+            let range = |(first, last): &(u64, u64)| {
+                if first == last {
+                    return first.to_string();
+                }
+                format!("{first}-{last}")
             };
             let ranges: Vec<String> = list.ranges().iter().map(range).collect();
             format!("loss list {}", ranges.join(","))
@@ -234,22 +236,22 @@ fn queue(queue: &Queue) -> Option<String> {
 }
 
 fn codel(codel: Codel) -> String {
-    match codel == Codel::default() {
-        true => "codel".to_owned(),
-        false => format!("codel {} {}", Exact(codel.target), Exact(codel.interval)),
+    if codel == Codel::default() {
+        return "codel".to_owned();
     }
+    format!("codel {} {}", Exact(codel.target), Exact(codel.interval))
 }
 
 /// A chance in words: its share, and its correlation if it has one.
-struct Said(Chance);
+struct InWords(Chance);
 
-impl fmt::Display for Said {
+impl fmt::Display for InWords {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}", self.0.probability)?;
-        match self.0.correlation == Probability::ZERO {
-            true => Ok(()),
-            false => write!(f, " {}", self.0.correlation),
+        if self.0.correlation != Probability::ZERO {
+            write!(f, " {}", self.0.correlation)?;
         }
+        Ok(())
     }
 }
 

@@ -8,6 +8,7 @@ use mmt_netem::record::{self, Heading};
 use mmt_netem::{Direction, Effect};
 use serde::Serialize;
 
+use super::DEGRADED;
 use crate::args::{NetemReportArguments, network};
 use crate::failure::Failure;
 use crate::input::read_bytes;
@@ -92,13 +93,9 @@ impl fmt::Display for RecordReport {
             direction.fmt(f)?;
         }
         if self.degraded {
-            write!(
-                f,
-                "\ndegraded: this host was too slow for the emulation, do not trust its delays"
-            )
-        } else {
-            Ok(())
+            write!(f, "\n{DEGRADED}")?;
         }
+        Ok(())
     }
 }
 
@@ -135,9 +132,9 @@ impl fmt::Display for DirectionReport {
             ),
         ];
         for (label, configured, achieved) in rows {
-            let said = self.configured.as_ref().map(configured);
-            let said = said.map_or_else(|| "-".to_owned(), |said| format!("{said:.3}"));
-            writeln!(f, "  {label:22} {said:>12} {achieved:>12.3}")?;
+            let configured = self.configured.as_ref().map(configured);
+            let shown = configured.map_or_else(|| "-".to_owned(), |value| format!("{value:.3}"));
+            writeln!(f, "  {label:22} {shown:>12} {achieved:>12.3}")?;
         }
         let [p50, p99, max] = seen.lateness_us;
         writeln!(

@@ -5,7 +5,7 @@ use std::fmt;
 use mmt_netem::counters::Tally;
 use mmt_netem::io::driver::DirectionCounters;
 
-use super::NetemReport;
+use super::{DEGRADED, NetemReport};
 
 /// What a row counts in a direction.
 type Count = fn(&DirectionCounters) -> Tally;
@@ -82,12 +82,9 @@ impl NetemReport {
             "released late        p50 {:.0} us, p99 {:.0} us, max {:.0} us",
             late.p50_us, late.p99_us, late.max_us
         )?;
-        match late.degraded() {
-            true => write!(
-                f,
-                "\ndegraded: this host was too slow for the emulation, do not trust its delays"
-            ),
-            false => Ok(()),
+        if late.degraded() {
+            write!(f, "\n{DEGRADED}")?;
         }
+        Ok(())
     }
 }

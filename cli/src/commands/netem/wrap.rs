@@ -1,4 +1,4 @@
-//! The emulated network in front of a host's own socket: its record, its orders, what it will do.
+//! The emulated network in front of a host's own socket: its record, its commands, what it will do.
 
 use std::path::PathBuf;
 
@@ -7,15 +7,15 @@ use mmt_netem::io::socket::{SocketControl, SocketExtras};
 use mmt_netem::record::Heading;
 use mmt_netem::{Direction, LinkConfig};
 
-use super::orders::{self, Order};
+use super::control::{self, Command};
 use super::record_file;
 use crate::args::EmulationArguments;
 use crate::failure::Failure;
 use crate::output::note;
 
-/// Commands a second, for which the effect of a network up is told.
+/// Commands a second, for which the effect of a network up is printed.
 const UP_HZ: f64 = 100.0;
-/// Heartbeats, updates and QUIC's acknowledgements a second, for which that of a network down is told.
+/// Heartbeats, updates and QUIC's acknowledgements a second, for which that of a network down is printed.
 const DOWN_HZ: f64 = 40.0;
 
 /// Record and control of the emulated networks of a run.
@@ -26,7 +26,7 @@ pub(crate) struct Emulation {
 }
 
 impl Emulation {
-    /// Opens the record and begins to take orders. `up` and `down`: the networks of this run; none where
+    /// Opens the record and begins to take commands. `up` and `down`: the networks of this run; none where
     /// this process sends nothing.
     ///
     /// # Errors
@@ -55,8 +55,8 @@ impl Emulation {
         if let Some([control_up, control_down]) = emulation.controls.clone() {
             let up = up.map(|_| control_up);
             let down = down.map(|_| control_down);
-            orders::from_stdin(move |line| {
-                if let Err(what) = obey(line, up.as_ref(), down.as_ref()) {
+            control::from_stdin(move |line| {
+                if let Err(what) = apply(line, up.as_ref(), down.as_ref()) {
                     note(what);
                 }
                 true
@@ -77,7 +77,7 @@ impl Emulation {
         }
     }
 
-    /// Whether orders come from stdin: then a live view would take the keys away.
+    /// Whether commands come from stdin: then a live view would take the keys away.
     pub(crate) fn takes_orders(&self) -> bool {
         self.controls.is_some()
     }
@@ -102,15 +102,15 @@ impl Emulation {
     }
 }
 
-fn obey(
+fn apply(
     line: &str,
     up: Option<&SocketControl>,
     down: Option<&SocketControl>,
 ) -> Result<(), String> {
-    let (direction, link) = match Order::parse(line)? {
+    let (direction, link) = match Command::parse(line)? {
         None => return Ok(()),
-        Some(Order::Rebind) => return Err("only the relay (mmt netem) can rebind".to_owned()),
-        Some(Order::Link(direction, link)) => (direction, link),
+        Some(Command::Rebind) => return Err("only the relay (mmt netem) can rebind".to_owned()),
+        Some(Command::Link(direction, link)) => (direction, link),
     };
     let control = match direction {
         Direction::Up => up,
@@ -119,7 +119,7 @@ fn obey(
     let Some(control) = control else {
         let name = direction.name();
         return Err(format!(
-            "nothing is sent {name} from here: give the order at the other end"
+            "nothing is sent {name} from here: give the command at the other end"
         ));
     };
     let effect = effect(direction, &link).map_err(|error| error.to_string())?;
@@ -130,7 +130,7 @@ fn obey(
     Ok(())
 }
 
-/// The line that says what a network will really do.
+/// The line with what a network will really do.
 ///
 /// # Errors
 /// A setting out of its range.
@@ -151,18 +151,18 @@ mod tests {
     use super::*;
 
     #[test]
-    fn orders_reach_the_direction_that_this_end_sends_and_no_other() {
+    fn commands_reach_the_direction_that_this_end_sends_and_no_other() {
         let up = SocketControl::default();
-        assert_eq!(obey("up delay 5ms", Some(&up), None), Ok(()));
-        assert_eq!(obey("", Some(&up), None), Ok(()));
-        let down = obey("down delay 5ms", Some(&up), None).unwrap_err();
+        assert_eq!(apply("up delay 5ms", Some(&up), None), Ok(()));
+        assert_eq!(apply("", Some(&up), None), Ok(()));
+        let down = apply("down delay 5ms", Some(&up), None).unwrap_err();
         assert!(down.contains("the other end"), "{down}");
-        let rebind = obey("rebind", Some(&up), None).unwrap_err();
+        let rebind = apply("rebind", Some(&up), None).unwrap_err();
         assert!(rebind.contains("relay"), "{rebind}");
     }
 
     #[test]
-    fn a_record_that_cannot_be_written_is_told_before_anything_runs() {
+    fn a_record_that_cannot_be_written_is_refused_before_anything_runs() {
         let arguments = EmulationArguments {
             netem_record: Some("/no/such/folder/run.csv".into()),
             netem_control: false,

@@ -171,7 +171,7 @@ pub(super) fn ends(
     })
 }
 
-/// What quinn is told: nothing, or all that mmt tells it.
+/// The settings of quinn: its own, or those that mmt gives it.
 fn transport(case: &Case) -> TransportConfig {
     match case.stack {
         Stack::Stock => TransportConfig::default(),

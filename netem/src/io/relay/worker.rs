@@ -138,7 +138,7 @@ impl Worker {
         wait(&mut fds, until.into_iter().flatten().min())?;
         self.shared.alarm.silence();
 
-        // an error is a reason to read, too: reading tells and clears it
+        // an error is a reason to read, too: reading returns and clears it
         let readable = |fd: &PollFd<'_>| fd.revents() != PollFlags::empty();
         let numbers = self.clients.iter().map(|(number, _)| number);
         Ok(Ready {

@@ -1,4 +1,4 @@
-//! Orders to an emulated network at work, a line each. It parses and hands over; it changes no network.
+//! Commands to an emulated network at work, a line each. It parses and hands over; it changes no network.
 
 use std::io::BufRead;
 
@@ -8,36 +8,38 @@ use crate::args::network;
 
 /// What a line asks for.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) enum Order {
+pub(crate) enum Command {
     /// New settings for a direction.
     Link(Direction, Box<LinkConfig>),
     /// New ports toward the target.
     Rebind,
 }
 
-impl Order {
-    /// The order in a line; none in an empty one.
+impl Command {
+    /// The command in a line; none in an empty one.
     ///
     /// # Errors
     /// What is wrong with the line.
     pub(crate) fn parse(line: &str) -> Result<Option<Self>, String> {
         let line = line.trim();
-        let (order, words) = line.split_once(' ').unwrap_or((line, ""));
-        match order {
+        let (command, words) = line.split_once(' ').unwrap_or((line, ""));
+        match command {
             "" => Ok(None),
             "up" => Ok(Some(Self::Link(Direction::Up, Box::new(network(words)?)))),
             "down" => Ok(Some(Self::Link(Direction::Down, Box::new(network(words)?)))),
             "rebind" if words.is_empty() => Ok(Some(Self::Rebind)),
-            _ => Err(format!("no order {line:?}: up WORDS, down WORDS or rebind")),
+            _ => Err(format!(
+                "no command {line:?}: up WORDS, down WORDS or rebind"
+            )),
         }
     }
 }
 
-/// Hands the lines of stdin to `obey` on a thread of their own, until stdin ends or `obey` says to stop.
-pub(crate) fn from_stdin(mut obey: impl FnMut(&str) -> bool + Send + 'static) {
+/// Hands the lines of stdin to `apply` on a thread of their own, until stdin ends or `apply` returns false.
+pub(crate) fn from_stdin(mut apply: impl FnMut(&str) -> bool + Send + 'static) {
     std::thread::spawn(move || {
         for line in std::io::stdin().lock().lines().map_while(Result::ok) {
-            if !obey(&line) {
+            if !apply(&line) {
                 break;
             }
         }
@@ -49,15 +51,15 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_line_is_an_order_or_is_told_what_is_wrong() {
-        let parse = Order::parse;
+    fn a_line_is_a_command_or_is_refused_with_what_is_wrong() {
+        let parse = Command::parse;
         assert_eq!(parse("  "), Ok(None));
         let link = "delay 5ms loss 1%".parse().unwrap();
-        let order = Order::Link(Direction::Down, Box::new(link));
-        assert_eq!(parse("down delay 5ms loss 1%\n"), Ok(Some(order)));
-        let none = Order::Link(Direction::Up, Box::default());
+        let command = Command::Link(Direction::Down, Box::new(link));
+        assert_eq!(parse("down delay 5ms loss 1%\n"), Ok(Some(command)));
+        let none = Command::Link(Direction::Up, Box::default());
         assert_eq!(parse("up"), Ok(Some(none)));
-        assert_eq!(parse("rebind"), Ok(Some(Order::Rebind)));
+        assert_eq!(parse("rebind"), Ok(Some(Command::Rebind)));
         assert!(parse("up delay 5").unwrap_err().contains("unit"));
         assert!(parse("sideways").unwrap_err().contains("up WORDS"));
     }
