@@ -83,18 +83,14 @@ impl SharedSocket {
         flow
     }
 
-    /// Hands a packet to its flow; false if it is QUIC's.
-    fn deliver(&self, packet: &[u8]) -> bool {
-        let Some((header, message)) = packet.split_first_chunk() else {
-            return false;
-        };
-        let Some(flow) = self.flows().get(header).and_then(Weak::upgrade) else {
-            return false;
-        };
+    /// Hands a packet to its flow; none if it is QUIC's.
+    fn deliver(&self, packet: &[u8]) -> Option<()> {
+        let (header, message) = packet.split_first_chunk()?;
+        let flow = self.flows().get(header).and_then(Weak::upgrade)?;
         flow.received.fetch_add(1, Ordering::Relaxed);
         // the flow holds a receiver itself
         let _ = flow.arrived.send(Bytes::copy_from_slice(message));
-        true
+        Some(())
     }
 
     /// Takes the raw datagrams out of a buffer, which may hold several packets of one sender (GRO).
@@ -102,7 +98,8 @@ impl SharedSocket {
         let (mut start, mut kept) = (0, 0);
         while start < meta.len {
             let end = (start + meta.stride.max(1)).min(meta.len);
-            if !self.deliver(buffer.get(start..end).unwrap_or_default()) {
+            let packet = buffer.get(start..end).unwrap_or_default();
+            if self.deliver(packet).is_none() {
                 buffer.copy_within(start..end, kept);
                 kept += end - start;
             }
@@ -212,6 +209,6 @@ mod tests {
         assert_eq!(flow.received.load(Ordering::Relaxed), 1);
         assert_eq!(flow.waiting.lock().await.try_recv().unwrap(), "a");
         drop(flow);
-        assert!(!socket.deliver(&[KIND, 2, 3, 4, 5, 6]));
+        assert_eq!(socket.deliver(&[KIND, 2, 3, 4, 5, 6]), None);
     }
 }

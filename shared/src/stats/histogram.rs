@@ -18,7 +18,8 @@ const BUCKETS: usize = (PER_OCTAVE * (OCTAVES + 1)) as usize;
 /// How often each duration occurred. 69 s and longer share the last bucket.
 #[derive(Clone, Debug)]
 pub struct Histogram {
-    counts: [u32; BUCKETS],
+    /// On the heap: 8 kB are much for the stack of a thread that moves what holds them.
+    counts: Box<[u32]>,
     total: u64,
     max: Duration,
 }
@@ -45,11 +46,11 @@ impl Default for Histogram {
 }
 
 impl Histogram {
-    /// Nothing counted.
+    /// Nothing counted. Allocates, and nothing does afterwards but a clone.
     #[must_use]
     pub fn new() -> Self {
         Self {
-            counts: [0; BUCKETS],
+            counts: vec![0; BUCKETS].into(),
             total: 0,
             max: Duration::ZERO,
         }

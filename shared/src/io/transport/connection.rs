@@ -24,9 +24,9 @@ pub(super) const CLOSE_OTHER_TRANSPORT: VarInt = VarInt::from_u32(1);
 /// A connection; clones are the same one.
 #[derive(Clone, Debug)]
 pub struct Connection {
-    quic: quinn::Connection,
+    pub(super) quic: quinn::Connection,
     /// Its datagrams, if they are raw UDP.
-    raw: Option<Arc<Flow>>,
+    pub(super) raw: Option<Arc<Flow>>,
 }
 
 /// Datagrams that passed the transport itself: not what the application offered it or took from it.
@@ -39,10 +39,6 @@ pub struct DatagramCounts {
 }
 
 impl Connection {
-    pub(super) fn new(quic: quinn::Connection, raw: Option<Arc<Flow>>) -> Self {
-        Self { quic, raw }
-    }
-
     /// Who is at the other end.
     #[must_use]
     pub fn remote_address(&self) -> SocketAddr {

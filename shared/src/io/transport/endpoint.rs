@@ -38,25 +38,21 @@ fn share(transport: Transport, socket: Arc<dyn AsyncUdpSocket>) -> (Arc<dyn Asyn
 }
 
 /// What QUIC has to carry of a side's traffic.
-fn by_quic(raw: &Raw, traffic: Traffic) -> Traffic {
-    let datagram_max = raw.as_ref().map_or(traffic.datagram_max, |_| 0);
-    Traffic {
-        datagram_max,
-        ..traffic
+fn by_quic(raw: &Raw, mut traffic: Traffic) -> Traffic {
+    if raw.is_some() {
+        traffic.datagram_max = 0;
     }
+    traffic
 }
 
 /// The connection, if both sides use the same transport: one that has its datagrams beside QUIC takes none by QUIC.
 fn join(quic: quinn::Connection, raw: &Raw) -> Option<Connection> {
     if quic.max_datagram_size().is_some() == raw.is_some() {
-        quic.close(
-            CLOSE_OTHER_TRANSPORT,
-            b"--transport is not the same on both sides",
-        );
+        quic.close(CLOSE_OTHER_TRANSPORT, b"the transports differ");
         return None;
     }
-    let flow = raw.as_ref().map(|socket| socket.flow(&quic));
-    Some(Connection::new(quic, flow))
+    let raw = raw.as_ref().map(|socket| socket.flow(&quic));
+    Some(Connection { quic, raw })
 }
 
 impl Endpoint {
