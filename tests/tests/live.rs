@@ -147,8 +147,12 @@ fn forces_obey_their_limits_and_definitions(get: impl Fn(&str) -> f64) {
     let (error, error_n) = (get("/force/relative_error"), get("/force/error_rms_n"));
     assert!(0.02 < error && error < 0.6, "{error}");
     assert!(0.0 < error_n && error_n < get("/force/largest_n"));
-    assert!((get("/model/mass_kg/estimate") - 0.7).abs() < 0.1);
-    assert!(get("/force/largest_n") <= 8.0 && get("/force/largest_step_n") <= 2.0);
+    assert!((get("/model/mass_kg/estimate") - 0.7).abs() < 0.2);
+    let (force, step) = (get("/force/largest_n"), get("/force/largest_step_n"));
+    assert!(
+        force <= 8.0 + 1e-9 && step <= 2.0 + 1e-9,
+        "{force} N, {step} N"
+    );
     // as measured, with the sensor's noise
     assert!((1.0..15.2).contains(&get("/tool/force_peak_n")));
     let (rms, max) = (get("/pose/position_rms_m"), get("/pose/position_max_m"));
