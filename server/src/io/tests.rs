@@ -164,12 +164,10 @@ async fn what_is_no_hello_is_told_apart_by_the_code_of_the_close() {
         assert_eq!(code, 3, "{reason}");
         assert!(reason.contains(fault), "{fault}: {reason}");
     }
-    let drops = host
-        .end()
-        .await
-        .unwrap_or_else(|| panic!("no report"))
-        .drops;
-    assert_eq!(drops.unwrap().get("masters_no_hello"), Some(&7));
+    let (master, _) = patiently(Master::operate(&host.pairing)).await;
+    patiently(master.farewell()).await;
+    let drops = host.end().await.unwrap().drops.unwrap();
+    assert_eq!(drops.get("masters_no_hello"), Some(&7));
 }
 
 #[tokio::test]
