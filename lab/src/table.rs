@@ -145,28 +145,6 @@ pub struct Table {
 }
 
 impl Table {
-    /// An empty table with columns of keys and decimals.
-    #[must_use]
-    pub fn new(title: impl Into<String>, columns: &[(&'static str, usize)]) -> Self {
-        let heading = |(key, decimals): &(&'static str, usize)| Heading {
-            key,
-            decimals: *decimals,
-        };
-        Self {
-            title: title.into(),
-            columns: columns.iter().map(heading).collect(),
-            rows: Vec::new(),
-        }
-    }
-
-    /// Adds a row; missing cells are absent, superfluous ones are dropped.
-    pub fn push(&mut self, cells: impl IntoIterator<Item = Cell>) {
-        let mut row: Vec<Cell> = cells.into_iter().collect();
-        debug_assert_eq!(row.len(), self.columns.len(), "{}", self.title);
-        row.resize(self.columns.len(), Cell::Absent);
-        self.rows.push(row);
-    }
-
     /// What the columns show of the rows.
     #[must_use]
     pub fn of<'a, Row: 'a>(
@@ -319,45 +297,4 @@ impl Serialize for Table {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn table() -> Table {
-        let mut table = Table::new("Three", &[("name", 0), ("rate_hz", 1), ("n", 0)]);
-        table.push(["plain".into(), 0.1.into(), 10_u64.into()]);
-        table.push(["a, \"b\"".into(), Cell::from(None::<f64>), 2_u64.into()]);
-        table.push(["c".into(), f64::NAN.into(), 3_u64.into()]);
-        table
-    }
-
-    #[test]
-    fn csv_keeps_every_digit_quotes_what_it_must_and_leaves_absent_fields_empty() {
-        let csv = "name,rate_hz,n\nplain,0.1,10\n\"a, \"\"b\"\"\",,2\nc,,3\n";
-        assert_eq!(table().to_csv(), csv.as_bytes());
-    }
-
-    #[test]
-    fn the_terminal_sees_columns() {
-        let text = "Three\n  name     rate_hz    n\n  plain        0.1   10\n  a, \"b\"         -    2\n  c              -    3\n";
-        assert_eq!(table().to_string(), text);
-    }
-
-    #[test]
-    fn some_columns_can_be_selected() {
-        let some = table().selected(&["n", "nothing", "name"]);
-        assert_eq!(
-            some.to_string(),
-            "Three\n   n   name\n  10   plain\n   2   a, \"b\"\n   3   c\n"
-        );
-    }
-
-    #[test]
-    fn json_is_a_list_of_records() {
-        let json = serde_json::to_string(&table()).unwrap();
-        assert!(
-            json.starts_with(r#"[{"name":"plain","rate_hz":0.1,"n":10},"#),
-            "{json}"
-        );
-        assert!(json.contains(r#""rate_hz":null"#));
-    }
-}
+mod tests;

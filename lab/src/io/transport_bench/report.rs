@@ -4,12 +4,12 @@ use std::collections::BTreeMap;
 use std::fmt;
 use std::time::Duration;
 
-use mmt_shared::stats::histogram::Histogram;
+use mmt_shared::stats::histogram::{Histogram, Quantiles};
 use serde::Serialize;
 
 use super::config::{BenchConfig, Carrier, Cores};
 use super::slice::{Flow, SliceResult};
-use crate::table::{Cell, Table};
+use crate::table::{Column, Table, column};
 
 /// IPv4 and UDP headers, bytes (RFC 791, RFC 768).
 const HEADERS: u64 = 28;
@@ -21,23 +21,6 @@ const MEDIAN_MAX_US: f64 = 40.0;
 const OWN_PACKETS_MAX: f64 = 0.15;
 /// The rate for which that is promised, messages a second.
 const OWN_PACKETS_HZ: u32 = 1000;
-
-/// The columns: latencies in us; `ratio` is p50 in that of the control; cpu, packets and bytes are for each message
-/// that either side sent, over both sides, bytes with IP and UDP headers.
-const COLUMNS: [(&str, usize); 12] = [
-    ("carrier", 0),
-    ("flow", 0),
-    ("messages", 0),
-    ("lost", 0),
-    ("p50_us", 1),
-    ("p99_us", 1),
-    ("p999_us", 1),
-    ("max_us", 1),
-    ("ratio", 2),
-    ("cpu_us", 1),
-    ("packets", 3),
-    ("bytes", 1),
-];
 
 /// All slices of a carrier in a flow.
 #[derive(Debug, Default)]
@@ -72,27 +55,46 @@ impl Summary {
     fn per_message(&self, total: f64) -> Option<f64> {
         (self.sent > 0).then(|| total / self.sent as f64)
     }
+}
 
-    fn row(&self, carrier: Carrier, flow: Flow, control_us: Option<f64>) -> [Cell; COLUMNS.len()] {
-        let took = self.took.quantiles();
-        let us = |duration| Cell::from((took.count > 0).then(|| micros(duration)));
-        let ratio = self.median_us().zip(control_us);
-        let bytes = self.bytes + HEADERS * self.packets;
-        [
-            carrier.name().into(),
-            flow.name().into(),
-            self.messages.into(),
-            self.messages.saturating_sub(took.count).into(),
-            us(took.p50),
-            us(took.p99),
-            us(took.p999),
-            us(took.max),
-            ratio.map(|(own, control)| own / control).into(),
-            self.per_message(micros(self.cpu)).into(),
-            self.per_message(self.packets as f64).into(),
-            self.per_message(bytes as f64).into(),
-        ]
+/// A row of the table.
+struct Row<'a> {
+    carrier: Carrier,
+    flow: Flow,
+    summary: &'a Summary,
+    /// The median of the control in the same flow, us.
+    control_us: Option<f64>,
+}
+
+impl Row<'_> {
+    fn took_us(&self, of: fn(&Quantiles) -> Duration) -> Option<f64> {
+        let took = self.summary.took.quantiles();
+        (took.count > 0).then(|| micros(of(&took)))
     }
+
+    fn per_message(&self, of: fn(&Summary) -> f64) -> Option<f64> {
+        self.summary.per_message(of(self.summary))
+    }
+}
+
+/// The columns: latencies in us; `ratio` is p50 in that of the control; cpu, packets and bytes are for each message
+/// that either side sent, over both sides, bytes with IP and UDP headers.
+#[rustfmt::skip]
+fn columns<'a>() -> [Column<'a, Row<'a>>; 12] {
+    [
+        column("carrier", "", 0, |row| row.carrier.name()),
+        column("flow", "", 0, |row| row.flow.name()),
+        column("messages", "", 0, |row| row.summary.messages),
+        column("lost", "", 0, |row| row.summary.messages.saturating_sub(row.summary.took.quantiles().count)),
+        column("p50_us", "us", 1, |row| row.took_us(|took| took.p50)),
+        column("p99_us", "us", 1, |row| row.took_us(|took| took.p99)),
+        column("p999_us", "us", 1, |row| row.took_us(|took| took.p999)),
+        column("max_us", "us", 1, |row| row.took_us(|took| took.max)),
+        column("ratio", "", 2, |row| Some(row.summary.median_us()? / row.control_us?)),
+        column("cpu_us", "us", 1, |row| row.per_message(|sum| micros(sum.cpu))),
+        column("packets", "", 3, |row| row.per_message(|sum| sum.packets as f64)),
+        column("bytes", "B", 1, |row| row.per_message(|sum| (sum.bytes + HEADERS * sum.packets) as f64)),
+    ]
 }
 
 fn micros(duration: Duration) -> f64 {
@@ -117,19 +119,19 @@ impl Summaries {
     }
 
     pub(super) fn report(&self, config: &BenchConfig, cores: Cores) -> BenchReport {
-        let mut rows = Table::new(
-            format!(
-                "{} messages a second of {} bytes over loopback, {}; cpu, packets and bytes for each message, both sides",
-                config.rate_hz,
-                config.bytes,
-                cores.words()
-            ),
-            &COLUMNS,
+        let title = format!(
+            "{} messages a second of {} bytes over loopback, {}; cpu, packets and bytes for each message, both sides",
+            config.rate_hz,
+            config.bytes,
+            cores.words()
         );
-        for ((flow, carrier), summary) in &self.0 {
-            let control = self.median_us(Carrier::Control, *flow);
-            rows.push(summary.row(*carrier, *flow, control));
-        }
+        let rows = self.0.iter().map(|((flow, carrier), summary)| Row {
+            carrier: *carrier,
+            flow: *flow,
+            summary,
+            control_us: self.median_us(Carrier::Control, *flow),
+        });
+        let rows = Table::of(title, &rows.collect::<Vec<_>>(), &columns());
         BenchReport {
             rate_hz: config.rate_hz,
             bytes: config.bytes,
@@ -153,11 +155,7 @@ impl Summaries {
             let packets = summary.per_message(summary.packets as f64);
             packets.map(|packets| packets - 1.0)
         });
-        let mut targets = Table::new(
-            "Targets, which are for a quiet machine",
-            &[("target", 0), ("most", 2), ("measured", 2), ("met", 0)],
-        );
-        for (name, most, measured) in [
+        let targets = [
             ("p50 one way, quic / udp", RATIO_MAX, ratio),
             ("p50 one way, quic, us", MEDIAN_MAX_US, quic),
             (
@@ -165,15 +163,21 @@ impl Summaries {
                 OWN_PACKETS_MAX,
                 own,
             ),
-        ] {
-            let met = match measured {
-                None => "not measured",
-                Some(measured) if measured <= most => "yes",
-                Some(_) => "no",
-            };
-            targets.push([name.into(), most.into(), measured.into(), met.into()]);
-        }
-        targets
+        ];
+        Table::of(
+            "Targets, which are for a quiet machine",
+            &targets,
+            &[
+                column("target", "", 0, |(name, _, _)| *name),
+                column("most", "", 2, |(_, most, _)| *most),
+                column("measured", "", 2, |(_, _, measured)| *measured),
+                column("met", "", 0, |(_, most, measured)| match measured {
+                    None => "not measured",
+                    Some(measured) if measured <= most => "yes",
+                    Some(_) => "no",
+                }),
+            ],
+        )
     }
 }
 
