@@ -78,18 +78,13 @@ pub fn friction_radius(c: f64, drag: f64, speed: f64, omega: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use mmt_shared::model::contact::Coupling;
+    use mmt_shared::fixtures::COUPLING;
     use mmt_shared::model::dynamics::Motion;
     use mmt_shared::model::geometry::{Twist, Vec2};
     use mmt_shared::model::params::friction_torque_of_square;
     use mmt_shared::model::settings::FrictionLaw;
 
     const SIDE: f64 = 0.36;
-    const COUPLING: Coupling = Coupling {
-        stiffness_n_per_m: 1000.0,
-        damping_ns_per_m: 10.0,
-    };
-
     /// Force and torque of friction by a grid of 60 × 60 places.
     fn by_grid(speed: f64, omega: f64) -> (f64, f64) {
         let place = |k: u32| ((f64::from(k) + 0.5) / 60.0 - 0.5) * SIDE;

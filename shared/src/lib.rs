@@ -21,6 +21,8 @@
 )]
 
 pub mod channel;
+#[cfg(any(test, feature = "fixtures"))]
+pub mod fixtures;
 #[cfg(feature = "io")]
 pub mod io;
 pub mod metrics;

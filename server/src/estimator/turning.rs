@@ -90,17 +90,12 @@ pub(super) fn creeping(motion: &SurfaceMotion, normal: Vec2, seen: &Seen) -> Row
 mod tests {
     use super::*;
     use crate::estimator::{Estimator, EstimatorConfig, Measured, RecommendedConfig};
-    use mmt_shared::model::contact::Coupling;
+    use mmt_shared::fixtures::COUPLING;
     use mmt_shared::model::geometry::{Pose, Twist, rotate};
     use mmt_shared::time::TICK_S;
 
     const SIDE: f64 = 0.36;
     const TRUTH: [f64; 3] = [0.7, 3.0, 2.06];
-    const COUPLING: Coupling = Coupling {
-        stiffness_n_per_m: 1000.0,
-        damping_ns_per_m: 10.0,
-    };
-
     /// A box on a ground of 16 × 16 places, pushed by a tool that moves along x.
     struct Box {
         pose: Pose,

@@ -2,13 +2,10 @@
 
 use super::*;
 use crate::sensing::VisionSample;
+use mmt_shared::fixtures::COUPLING;
 use mmt_shared::model::params::friction_torque_of_square;
 use mmt_shared::time::TICK;
 
-const COUPLING: Coupling = Coupling {
-    stiffness_n_per_m: 1000.0,
-    damping_ns_per_m: 10.0,
-};
 /// The box as it really is: 0.36 m wide, pushed in x at its west face.
 const HALF: f64 = 0.18;
 

@@ -1,21 +1,12 @@
 //! What the shadow promises: an update counts for the master's when the master says so, and not before.
 
 use super::*;
-use mmt_shared::model::contact::Coupling;
-use mmt_shared::model::geometry::{BoxFootprint, Pose, Twist};
-use mmt_shared::model::params::ModelParams;
+use mmt_shared::fixtures::{self, COUPLING, square_at_rest};
 use mmt_shared::model::sample::{ForceCounts, HipCounts};
 use mmt_shared::model::settings::Mode;
 
-const COUPLING: Coupling = Coupling {
-    stiffness_n_per_m: 1000.0,
-    damping_ns_per_m: 10.0,
-};
-
 fn state(m: f64) -> ModelState {
-    let params = ModelParams::of_square(m, 3.0, 2.06, 0.4, &COUPLING).unwrap();
-    let (footprint, pose) = (BoxFootprint::square(0.4), Pose::default());
-    ModelState::try_new(params, footprint, pose, Twist::default()).unwrap()
+    square_at_rest(m, 3.0, 2.06, 0.4)
 }
 
 fn shadow() -> Shadow {
@@ -25,11 +16,8 @@ fn shadow() -> Shadow {
 
 fn update(sequence: u32, answers_ms: u64, m: f64) -> Update {
     Update {
-        sequence,
-        cause: Cause::Deadband,
-        answers: Time::from_millis(answers_ms),
         slave_in_contact: false,
-        state: state(m),
+        ..fixtures::update(sequence, Cause::Deadband, answers_ms, state(m))
     }
 }
 

@@ -141,11 +141,7 @@ pub fn contact_force(
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    const COUPLING: Coupling = Coupling {
-        stiffness_n_per_m: 1000.0,
-        damping_ns_per_m: 10.0,
-    };
+    use crate::fixtures::COUPLING;
 
     fn follow(path: &[(f64, f64)]) -> Option<Touch> {
         let (footprint, pose) = (BoxFootprint::square(0.4), Pose::default());

@@ -202,13 +202,10 @@ fn turn_about(pose: &Pose, pivot: Vec2, turn: f64) -> PoseChange {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::fixtures::COUPLING;
     use crate::model::contact::GodObject;
     use crate::model::geometry::BoxFootprint;
 
-    const COUPLING: Coupling = Coupling {
-        stiffness_n_per_m: 1000.0,
-        damping_ns_per_m: 10.0,
-    };
     const HIP: Vec2 = Vec2::new(-0.198, 0.02);
 
     fn touch(pose: &Pose) -> Option<Touch> {

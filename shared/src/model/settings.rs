@@ -132,11 +132,7 @@ impl Mode {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    const COUPLING: Coupling = Coupling {
-        stiffness_n_per_m: 1000.0,
-        damping_ns_per_m: 10.0,
-    };
+    use crate::fixtures::COUPLING;
 
     #[test]
     fn both_modes_are_accepted_at_every_accepted_stiffness() {

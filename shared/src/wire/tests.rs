@@ -1,5 +1,6 @@
 //! Promises of the whole format: what is written reads back, and nothing else reads.
 
+use crate::fixtures::COUPLING;
 use proptest::prelude::*;
 
 use super::*;
@@ -12,11 +13,6 @@ use crate::model::tool::{HandPort, Scene, Tool};
 use crate::model::update::{Cause, Update};
 use crate::pairing::Token;
 use crate::time::Time;
-
-const COUPLING: Coupling = Coupling {
-    stiffness_n_per_m: 1000.0,
-    damping_ns_per_m: 10.0,
-};
 
 const ENVELOPE: Envelope = Envelope {
     number: 1,

@@ -3,7 +3,7 @@
 //! Semi-implicit Euler with an exact stick test: f_n from tool and box before the step,
 //! v_n = v_{n−1} + T (f_n − b v_n − c sign v_n)/m, p_n = p_{n−1} + T v_n.
 
-use mmt_shared::model::contact::Coupling;
+pub(super) use mmt_shared::fixtures::COUPLING;
 use mmt_shared::model::geometry::{Vec2, rotate};
 use mmt_shared::rng::Substream;
 use mmt_shared::time::TICK_S;
@@ -11,10 +11,6 @@ use std::f64::consts::TAU;
 
 use crate::estimator::Measured;
 
-pub(super) const COUPLING: Coupling = Coupling {
-    stiffness_n_per_m: 1000.0,
-    damping_ns_per_m: 10.0,
-};
 pub(super) const TRUTH: [f64; 3] = [0.7, 3.0, 0.3 * 0.7 * 9.81];
 
 /// How the tool moves: mean speed and two modulations, or a rest.

@@ -1,12 +1,7 @@
 //! The promises of `dynamics`.
 
 use super::*;
-use crate::model::contact::Coupling;
-
-const COUPLING: Coupling = Coupling {
-    stiffness_n_per_m: 1000.0,
-    damping_ns_per_m: 10.0,
-};
+use crate::fixtures::COUPLING;
 
 fn params(b: f64) -> ModelParams {
     ModelParams::of_square(0.7, b, 2.06, 0.36, &COUPLING).unwrap()

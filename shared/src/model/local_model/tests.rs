@@ -1,28 +1,16 @@
 //! What the local model promises: forces, smoothing, and corrections without a jolt.
 
 use super::*;
-use crate::model::contact::Coupling;
+use crate::fixtures::{self, COUPLING, square_at_rest};
 use crate::model::correction::ROOM_M;
-use crate::model::geometry::{BoxFootprint, Pose, Twist};
+use crate::model::geometry::{BoxFootprint, Pose};
 use crate::model::settings::Mode;
 
 mod energy;
 mod replay;
 
-const COUPLING: Coupling = Coupling {
-    stiffness_n_per_m: 1000.0,
-    damping_ns_per_m: 10.0,
-};
-
 fn state(m: f64, b: f64, c: f64) -> ModelState {
-    let params = ModelParams::of_square(m, b, c, 0.4, &COUPLING).unwrap();
-    ModelState::try_new(
-        params,
-        BoxFootprint::square(0.4),
-        Pose::default(),
-        Twist::default(),
-    )
-    .unwrap()
+    square_at_rest(m, b, c, 0.4)
 }
 
 fn model(mode: Mode, correction: PoseCorrection) -> LocalModel {
@@ -39,13 +27,7 @@ fn accepted(state: impl Into<BodyState>) -> ModelState {
 }
 
 fn update(cause: Cause, answers_ms: u64, state: impl Into<BodyState>) -> Update {
-    Update {
-        sequence: 1,
-        cause,
-        answers: Time::from_millis(answers_ms),
-        slave_in_contact: true,
-        state: accepted(state),
-    }
+    fixtures::update(1, cause, answers_ms, accepted(state))
 }
 
 /// Pushes the west face at 0.1 m/s from a stand-off of 1 cm; ticks from 1 to `until`.

@@ -1,11 +1,7 @@
 //! The promises of `params`.
 
 use super::*;
-
-const COUPLING: Coupling = Coupling {
-    stiffness_n_per_m: 1000.0,
-    damping_ns_per_m: 10.0,
-};
+use crate::fixtures::COUPLING;
 
 #[test]
 fn inertia_8_and_torque_9_have_their_closed_forms() {

@@ -1,7 +1,7 @@
 //! No update gives the hand energy that the model has not dissipated before.
 
 use super::*;
-use crate::model::geometry::Face;
+use crate::model::geometry::{Face, Twist};
 use crate::rng::Substream;
 use proptest::prelude::*;
 
