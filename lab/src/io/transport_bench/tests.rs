@@ -37,7 +37,11 @@ fn every_carrier_sends_what_it_was_given_in_as_many_packets_and_bytes_as_it_must
         let (packets, bytes) = (number("packets"), number("bytes"));
         match row["carrier"].as_str().unwrap() {
             "control" => assert_eq!((packets, bytes), (1.0, 128.0), "{row}"),
-            "udp" => assert_eq!((packets, bytes), (1.0, 133.0), "{row}"),
+            // and the QUIC connection beside it keeps itself alive every 5 s
+            "udp" => assert!(
+                (1.0..1.1).contains(&packets) && (133.0..145.0).contains(&bytes),
+                "{row}"
+            ),
             // header, connection id, packet number, frame, tag
             _ => assert!(packets >= 1.0 && bytes > 150.0, "{row}"),
         }
