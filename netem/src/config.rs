@@ -54,7 +54,7 @@ pub struct LinkConfig {
     /// Loss on the way.
     pub loss: Loss,
     /// What `loss` or `CoDel` would drop is marked instead if its sender understands that
-    /// ([`crate::PacketMeta::ecn_capable`]).
+    /// ([`crate::Packet::ecn_capable`]).
     pub ecn: bool,
     /// Times at which everything is lost, at most [`STEPS_MAX`].
     pub outages: Vec<Outage>,
