@@ -8,24 +8,26 @@ use std::hint::black_box;
 use std::time::Duration;
 
 use criterion::{Criterion, criterion_group, criterion_main};
+use mmt_client::commands::CommandConfig;
 use mmt_client::device::DeviceProfile;
+use mmt_client::end::MasterEnd;
 use mmt_client::limiter::ForceLimiter;
-use mmt_client::link::{CommandConfig, MasterLink};
 use mmt_client::master::Master;
 use mmt_client::operator::Operator;
 use mmt_client::operator::scripted::{Scripted, ScriptedConfig};
+use mmt_shared::channel::datagram_channel::DatagramChannel;
 use mmt_shared::model::geometry::{BoxFootprint, Pose, Twist, Vec2};
 use mmt_shared::model::local_model::BodyState;
 use mmt_shared::model::params::{ModelParams, ModelState};
 use mmt_shared::model::settings::Mode;
 use mmt_shared::model::update::{Cause, Update};
 use mmt_shared::time::{TICK, Time};
-use mmt_shared::wire::{DATAGRAM_MAX, Label, Welcome};
+use mmt_shared::wire::{DATAGRAM_MAX, Label, Message, Side, Welcome};
 
 /// A master and an operator who pushes its model: no slave is needed for the hand to feel something.
 struct Haptic {
-    master: Master,
-    link: MasterLink,
+    end: MasterEnd,
+    slave: DatagramChannel,
     operator: Operator,
     hand_force: Vec2,
     now: Time,
@@ -33,17 +35,6 @@ struct Haptic {
 }
 
 impl Haptic {
-    /// What the model is, as an update would tell it.
-    fn state(&self) -> ModelState {
-        let BodyState {
-            params,
-            footprint,
-            pose,
-            twist,
-        } = *self.master.model().state();
-        ModelState::try_new(params, footprint, pose, twist).unwrap()
-    }
-
     fn new(mode: Mode) -> Self {
         let device = DeviceProfile::default();
         let coupling = device.coupling();
@@ -60,8 +51,8 @@ impl Haptic {
         let master = Master::new(&welcome, limiter);
         let scripted = Scripted::try_new(ScriptedConfig::default(), master.view()).unwrap();
         Self {
-            master,
-            link: MasterLink::new(Time::ZERO, coupling, CommandConfig::default()),
+            end: MasterEnd::new(Time::ZERO, master, CommandConfig::default()),
+            slave: DatagramChannel::new(Side::Slave, Time::ZERO),
             operator: Operator::Scripted(Box::new(scripted)),
             hand_force: Vec2::zeros(),
             now: Time::ZERO,
@@ -69,17 +60,38 @@ impl Haptic {
         }
     }
 
+    /// A message of the slave arrives.
+    fn hear(&mut self, message: Message) {
+        let mut out = [0; DATAGRAM_MAX];
+        let length = self.slave.encode(self.now, message, &mut out).unwrap();
+        self.end
+            .handle_datagram(self.now, out.get(..length).unwrap());
+    }
+
+    /// What the model is, as an update would tell it.
+    fn state(&self) -> ModelState {
+        let BodyState {
+            params,
+            footprint,
+            pose,
+            twist,
+        } = *self.end.master().model().state();
+        ModelState::try_new(params, footprint, pose, twist).unwrap()
+    }
+
     fn tick(&mut self, out: &mut [u8]) -> Option<usize> {
         self.now += TICK;
         let elapsed = self.now.saturating_since(Time::ZERO);
-        let view = self.master.view();
+        let view = self.end.update_model();
         let reading = self.operator.step(elapsed, &view, self.hand_force);
-        let tick = self.master.tick(self.now, reading, Duration::ZERO);
+        if self.now.as_nanos().is_multiple_of(100_000_000) {
+            // a silent link would release the hand
+            self.hear(Message::Heartbeat);
+        }
+        let tick = self.end.tick(self.now, reading);
         self.hand_force = tick.hand_force;
         self.contact += u64::from(tick.rendered.in_contact());
-        self.link
-            .send(self.now, tick.sample, tick.port, out)
-            .unwrap()
+        self.end.poll_transmit(self.now, out).unwrap()
     }
 }
 
@@ -112,8 +124,9 @@ fn apply(criterion: &mut Criterion) {
             slave_in_contact: true,
             state: haptic.state(),
         };
+        let mut master = haptic.end.master().clone();
         criterion.bench_function(&format!("haptic/apply/{name}"), |bencher| {
-            bencher.iter(|| haptic.master.apply(black_box(&update)));
+            bencher.iter(|| master.apply(black_box(&update)));
         });
     }
 }
@@ -127,19 +140,20 @@ fn replay(criterion: &mut Criterion) {
         haptic.tick(&mut out);
     }
     assert!(haptic.contact > 0, "nothing was touched");
-    let mut ticks = 0_u64;
+    let (mut ticks, mut sequence) = (0_u64, 0);
     criterion.bench_function("haptic/replay/one second with its ticks", |bencher| {
         bencher.iter(|| {
+            sequence += 1;
             let update = Update {
-                sequence: 1,
+                sequence,
                 cause: Cause::Deadband,
                 answers: haptic.now - Duration::from_secs(1),
                 slave_in_contact: true,
                 state: haptic.state(),
             };
-            haptic.master.apply(black_box(&update));
+            haptic.hear(Message::Update(black_box(&update).into()));
             haptic.tick(&mut out);
-            while !haptic.master.model().is_replayed() {
+            while !haptic.end.master().model().is_replayed() {
                 haptic.tick(&mut out);
                 ticks += 1;
             }

@@ -18,10 +18,11 @@
     )
 )]
 
+pub mod commands;
 pub mod device;
+pub mod end;
 pub mod failsafe;
 pub mod limiter;
-pub mod link;
 pub mod master;
 pub mod operator;
 pub mod path;

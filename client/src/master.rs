@@ -147,14 +147,16 @@ impl Master {
         self.limiter.release();
     }
 
-    /// Takes in an accepted update, unless the link has been taken for dead.
-    pub fn apply(&mut self, update: &Update) {
-        if self.link < LinkState::Released {
+    /// Applies an accepted update, unless the link has been taken for dead; says whether it did.
+    pub fn apply(&mut self, update: &Update) -> bool {
+        let alive = self.link < LinkState::Released;
+        if alive {
             self.model.apply(update);
             self.applied = self.applied.saturating_add(1);
         } else {
             self.frozen = self.frozen.saturating_add(1);
         }
+        alive
     }
 
     /// Takes in the tool's state that arrived at `now`, no older than the one before. Only with TDPA it changes anything.

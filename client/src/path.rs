@@ -23,6 +23,15 @@ pub struct PathRecorder {
 }
 
 impl PathRecorder {
+    /// A recorder that never allocates: all samples have their room from the start.
+    #[must_use]
+    pub fn with_room() -> Self {
+        Self {
+            samples: Vec::with_capacity(SAMPLES_MAX),
+            ..Self::default()
+        }
+    }
+
     /// Looks at what the newest message brought; `now` is its arrival.
     pub fn note(&mut self, now: Time, peer: &Peer) {
         self.note_missing(now, peer.incoming().lost());

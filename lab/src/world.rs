@@ -8,8 +8,8 @@ use std::time::Duration;
 
 use crate::baselines::message::OVERHEAD_BYTES;
 use mmt_client::device::DeviceProfile;
+use mmt_client::end::MasterEnd;
 use mmt_client::limiter::ForceLimiter;
-use mmt_client::link::{FromSlave, MasterLink};
 use mmt_client::master::{Master, MasterTick};
 use mmt_client::operator::Operator;
 use mmt_client::operator::scripted::{Picture, Scripted, View};
@@ -17,15 +17,14 @@ use mmt_netem::config::LinkConfig;
 use mmt_netem::counters::Tally;
 use mmt_netem::link::{Direction, LinkId};
 use mmt_netem::{Link, Packet};
+use mmt_server::end::SlaveEnd;
 use mmt_server::environment::Environment;
-use mmt_server::link::SlaveLink;
 use mmt_server::slave::{Slave, SlaveTick};
 use mmt_shared::metrics::{
     AgeOfInformation, ContactBreaks, ForcePeak, ForceSummary, PoseError, Staleness, UpdateCounts,
 };
 use mmt_shared::model::contact::Coupling;
 use mmt_shared::model::geometry::Vec2;
-use mmt_shared::model::update::Update;
 use mmt_shared::report::{MessagesReport, UpDown, WireReport};
 use mmt_shared::time::{TICK, Time};
 use mmt_shared::wire::{DATAGRAM_MAX, Label, Welcome};
@@ -65,10 +64,8 @@ pub struct Traffic {
 /// The world.
 pub struct World {
     now: Time,
-    slave: Slave,
-    slave_link: SlaveLink,
-    master: Master,
-    master_link: MasterLink,
+    slave: SlaveEnd,
+    master: MasterEnd,
     operator: Operator,
     hand_force: Vec2,
     /// The remote scene on its way to the operator's eyes, if that is what it looks at.
@@ -78,7 +75,8 @@ pub struct World {
     /// The delay of `down`, without jitter.
     down_delay: Duration,
     slave_clock: SlaveClock,
-    outcome: Outcome,
+    staleness: Staleness,
+    pose: PoseError,
     log: Sha256,
 }
 
@@ -104,13 +102,13 @@ struct Datagram {
 }
 
 /// What a run came to.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub struct Outcome {
     /// Updates by cause, per second and per second of contact.
     pub updates: UpdateCounts,
     /// Updates that a newer one overtook before a tick could apply them.
-    pub superseded: u32,
-    /// Age of the news that the master's model rests on.
+    pub superseded: u64,
+    /// Age of the update that the master's model rests on.
     pub age: AgeOfInformation,
     /// How long updates took to become known at the master.
     pub staleness: Staleness,
@@ -126,9 +124,6 @@ pub struct Outcome {
     pub observer_min_j: f64,
     /// Packets with a force of the tool.
     pub forces: u64,
-    newest_answer: Option<Time>,
-    /// Number of the newest update that the master has.
-    newest_update: u32,
 }
 
 impl World {
@@ -161,15 +156,9 @@ impl World {
         };
         Ok(Self {
             now: Time::ZERO,
-            slave,
-            slave_link: SlaveLink::new(Time::ZERO + SLAVE_EPOCH, config.slave_link()),
-            master,
+            slave: SlaveEnd::new(Time::ZERO + SLAVE_EPOCH, slave, config.slave_end()),
             // a session begins with the slave's welcome, which takes its time as well
-            master_link: MasterLink::new(
-                Time::ZERO + down_delay,
-                settings.coupling,
-                config.commands(),
-            ),
+            master: MasterEnd::new(Time::ZERO + down_delay, master, config.commands()),
             operator,
             hand_force: Vec2::zeros(),
             picture: (config.operator.view == Picture::Delayed)
@@ -181,7 +170,8 @@ impl World {
                 ahead: SLAVE_EPOCH,
                 drift_ppm: 0,
             },
-            outcome: Outcome::default(),
+            staleness: Staleness::default(),
+            pose: PoseError::default(),
             log: Sha256::new(),
         })
     }
@@ -189,30 +179,24 @@ impl World {
     /// The slave.
     #[must_use]
     pub fn slave(&self) -> &Slave {
-        &self.slave
+        self.slave.slave()
     }
 
     /// The real object, to be changed in mid-run.
     pub fn environment_mut(&mut self) -> &mut Environment {
-        self.slave.environment_mut()
+        self.slave.slave_mut().environment_mut()
     }
 
     /// The master.
     #[must_use]
     pub fn master(&self) -> &Master {
-        &self.master
+        self.master.master()
     }
 
-    /// The master's end of the link.
+    /// The slave's end.
     #[must_use]
-    pub fn master_link(&self) -> &MasterLink {
-        &self.master_link
-    }
-
-    /// The slave's end of the link.
-    #[must_use]
-    pub fn slave_link(&self) -> &SlaveLink {
-        &self.slave_link
+    pub fn slave_end(&self) -> &SlaveEnd {
+        &self.slave
     }
 
     /// What was sent: messages by kind, and datagrams with bits per second. Every message is a datagram of its own
@@ -220,11 +204,11 @@ impl World {
     #[must_use]
     pub fn traffic(&self) -> Traffic {
         let duration_s = self.now.as_secs_f64();
-        let repeats = self.slave_link.repeated();
+        let repeats = &self.slave.counts().repeated;
         let wire =
             |of: Tally| WireReport::new(of.packets, of.bytes, OVERHEAD_BYTES as u64, duration_s);
         let [up, down] = self.sent();
-        let (master, slave) = (self.master_link.end(), self.slave_link.end());
+        let (master, slave) = (self.master.channel(), self.slave.channel());
         Traffic {
             messages: UpDown {
                 up: MessagesReport::up(&master.traffic().sent, duration_s),
@@ -270,14 +254,26 @@ impl World {
 
     /// What the run has come to so far.
     #[must_use]
-    pub fn outcome(&self) -> &Outcome {
-        &self.outcome
+    pub fn outcome(&self) -> Outcome {
+        let (master, counts) = (self.master(), self.master.counts());
+        Outcome {
+            updates: self.slave.counts().updates,
+            superseded: counts.updates_superseded,
+            age: counts.age,
+            staleness: self.staleness.clone(),
+            pose: self.pose,
+            breaks: counts.breaks,
+            on_hand: counts.on_hand,
+            energy_injected_j: master.energy_injected_j(),
+            observer_min_j: master.port().least_j(),
+            forces: self.slave.channel().traffic().sent.tools.into(),
+        }
     }
 
     /// The force metrics so far.
     #[must_use]
     pub fn force(&self) -> ForceSummary {
-        self.slave.force().summary()
+        self.slave().force().summary()
     }
 
     /// SHA-256 of the event log so far, in hexadecimal digits: equal for equal configurations.
@@ -313,31 +309,19 @@ impl World {
     }
 
     fn deliver_down(&mut self) {
-        let mut newest: Option<Update> = None;
         while let Some(packet) = self.down.poll_delivered(self.now) {
             // QUIC drops what does not authenticate
-            if packet.is_corrupted() {
-                continue;
-            }
-            let Datagram { bytes, length } = packet.payload;
-            let bytes = bytes.get(..length).unwrap_or_default();
-            match self.master_link.handle(packet.due, bytes) {
-                Some(FromSlave::Update(update)) => {
-                    self.outcome.superseded += u32::from(newest.is_some());
-                    newest = Some(update);
-                }
-                Some(FromSlave::Tool(tool)) => self.master.handle_tool_state(packet.due, &tool),
-                Some(FromSlave::Scene(_)) | None => {}
+            if !packet.is_corrupted() {
+                let Datagram { bytes, length } = packet.payload;
+                let bytes = bytes.get(..length).unwrap_or_default();
+                self.master.handle_datagram(packet.due, bytes);
             }
         }
-        if let Some(update) = newest {
-            self.master.apply(&update);
-            self.outcome.newest_answer = Some(update.answers);
-            self.outcome.newest_update = update.sequence;
-            self.outcome.staleness.known(self.now, update.sequence);
-        }
-        if let Some(answers) = self.outcome.newest_answer {
-            self.outcome.age.push(self.now, answers);
+        let before = self.master.counts().newest_applied;
+        self.master.update_model();
+        let newest = self.master.counts().newest_applied;
+        if newest != before {
+            self.staleness.known(self.now, newest);
         }
     }
 
@@ -345,23 +329,10 @@ impl World {
         let elapsed = self.now.saturating_since(Time::ZERO + TICK);
         let view = self.seen();
         let reading = self.operator.step(elapsed, &view, self.hand_force);
-        let silence = self.master_link.end().silence(self.now);
-        let tick = self.master.tick(self.now, reading, silence);
+        let tick = self.master.tick(self.now, reading);
         self.hand_force = tick.hand_force;
-        self.outcome.on_hand.push(tick.hand_force);
-        self.outcome.energy_injected_j = self.master.energy_injected_j();
-        self.outcome.observer_min_j = self.master.port().least_j();
-        self.outcome.breaks.push(self.master.view().in_contact);
         let mut bytes = [0; DATAGRAM_MAX];
-        // a message that cannot be sealed is as good as lost; the ends count what they sent
-        let sent = self
-            .master_link
-            .send(self.now, tick.sample, tick.port, &mut bytes);
-        if let Ok(Some(length)) = sent {
-            self.up
-                .offer(self.now, Packet::new(length, Datagram { bytes, length }));
-        }
-        if let Ok(Some(length)) = self.master_link.heartbeat(self.now, &mut bytes) {
+        while let Ok(Some(length)) = self.master.poll_transmit(self.now, &mut bytes) {
             self.up
                 .offer(self.now, Packet::new(length, Datagram { bytes, length }));
         }
@@ -370,7 +341,7 @@ impl World {
 
     /// What the operator sees; contact is felt, not seen.
     fn seen(&mut self) -> View {
-        let model = self.master.view();
+        let model = self.master().view();
         let Some(picture) = &mut self.picture else {
             return model;
         };
@@ -386,7 +357,7 @@ impl World {
     /// The scene as it is now leaves for the operator's eyes, without loss or jitter.
     fn show(&mut self, in_contact: bool) {
         if let Some(picture) = &mut self.picture {
-            let environment = self.slave.environment();
+            let environment = self.slave.slave().environment();
             let scene = View {
                 pose: environment.pose(),
                 footprint: environment.footprint(),
@@ -398,20 +369,11 @@ impl World {
 
     fn deliver_up(&mut self) {
         while let Some(packet) = self.up.poll_delivered(self.now) {
-            if packet.is_corrupted() {
-                continue;
-            }
-            let Datagram { bytes, length } = packet.payload;
-            let bytes = bytes.get(..length).unwrap_or_default();
-            let arrived = self.slave_clock.at(packet.due);
-            if let Some(command) = self.slave_link.handle(arrived, bytes) {
-                for (sample, newest_update) in self.slave_link.samples(&command) {
-                    self.slave.handle_sample(arrived, &sample, newest_update);
-                }
-                self.slave.stretch(self.slave_link.end().stretch());
-                if let Some(port) = &command.port {
-                    self.slave.handle_hand_port(port);
-                }
+            if !packet.is_corrupted() {
+                let Datagram { bytes, length } = packet.payload;
+                let bytes = bytes.get(..length).unwrap_or_default();
+                let arrived = self.slave_clock.at(packet.due);
+                self.slave.handle_datagram(arrived, bytes);
             }
         }
     }
@@ -419,45 +381,22 @@ impl World {
     fn slave_tick(&mut self) -> Option<SlaveTick> {
         let now = self.slave_clock.at(self.now);
         let tick = self.slave.tick(now);
-        let mut bytes = [0; DATAGRAM_MAX];
         if let Some(tick) = &tick {
-            self.outcome.updates.tick(tick.in_contact);
             self.show(tick.in_contact);
-            if let Some(then) = self.master.model().history().at(tick.stamp) {
-                self.outcome.pose.push(&then.motion.pose, &tick.truth);
+            if let Some(then) = self.master().model().history().at(tick.stamp) {
+                let model = then.motion.pose;
+                self.pose.push(&model, &tick.truth);
             }
             if let Some(update) = &tick.update {
-                self.outcome.updates.sent(update.cause);
-                self.outcome.staleness.sent(self.now, update.sequence);
-                if let Ok(length) = self.slave_link.send_update(now, update, &mut bytes) {
-                    self.down
-                        .offer(self.now, Packet::new(length, Datagram { bytes, length }));
-                }
+                self.staleness.sent(self.now, update.sequence);
             }
         }
-        self.send_tool(now, tick.as_ref());
-        if let Ok(Some(length)) = self.slave_link.repeat(now, &mut bytes) {
-            self.down
-                .offer(self.now, Packet::new(length, Datagram { bytes, length }));
-        }
-        if let Ok(Some(length)) = self.slave_link.heartbeat(now, &mut bytes) {
+        let mut bytes = [0; DATAGRAM_MAX];
+        while let Ok(Some(length)) = self.slave.poll_transmit(now, &mut bytes) {
             self.down
                 .offer(self.now, Packet::new(length, Datagram { bytes, length }));
         }
         tick
-    }
-
-    /// The tool's state goes out every tick where the hand feels it.
-    fn send_tool(&mut self, now: Time, tick: Option<&SlaveTick>) {
-        let Some(tool) = tick.and_then(|tick| self.slave.tool_state(tick)) else {
-            return;
-        };
-        self.outcome.forces += 1;
-        let mut bytes = [0; DATAGRAM_MAX];
-        if let Ok(length) = self.slave_link.send_tool(now, &tool, &mut bytes) {
-            self.down
-                .offer(self.now, Packet::new(length, Datagram { bytes, length }));
-        }
     }
 
     /// Every number that either side felt or said goes into the log, bit by bit.

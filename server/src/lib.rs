@@ -20,11 +20,12 @@
 )]
 
 pub mod contact;
+pub mod end;
 pub mod environment;
 pub mod estimator;
-pub mod link;
 pub mod playout;
 pub mod pose_observer;
+pub mod repeats;
 pub mod sensing;
 pub mod shadow;
 pub mod slave;

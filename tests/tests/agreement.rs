@@ -81,7 +81,7 @@ fn virtual_row(seed: u64, playout: PlayoutConfig) -> Row {
         breaks_per_push: outcome.breaks.per_push(pushes),
         force_peak_n: outcome.on_hand.largest_n(),
         playout_ms: delay.map(|delay| delay.as_secs_f64() * 1e3),
-        loss: world.slave_link().end().peer().incoming().share(),
+        loss: world.slave_end().channel().peer().incoming().share(),
     }
 }
 

@@ -13,25 +13,34 @@
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 use std::hint::black_box;
+use std::time::Duration;
 
+use mmt_client::commands::CommandConfig;
 use mmt_client::device::DeviceProfile;
+use mmt_client::end::MasterEnd;
+use mmt_client::io::MasterLive;
+use mmt_client::io::haptic::HapticLoop;
 use mmt_client::limiter::ForceLimiter;
-use mmt_client::link::{CommandConfig, FromSlave, MasterLink};
 use mmt_client::master::Master;
 use mmt_client::operator::Operator;
 use mmt_client::operator::scripted::{Scripted, ScriptedConfig};
+use mmt_client::path::PathRecorder;
+use mmt_server::end::{SlaveEnd, SlaveEndConfig};
 use mmt_server::estimator::{Estimator, EstimatorConfig, Measured, Seen};
-use mmt_server::link::{Repeats, SlaveLink, SlaveLinkConfig};
 use mmt_server::playout::{PlayoutBuffer, PlayoutConfig};
+use mmt_server::repeats::Repeats;
 use mmt_server::shadow::Shadow;
 use mmt_server::slave::{Slave, SlaveConfig, SlaveTick};
 use mmt_server::trigger::{Trigger, TriggerConfig, TriggerInput};
+use mmt_shared::channel::datagram_channel::DatagramChannel;
 use mmt_shared::channel::rate_control::StretchMax;
+use mmt_shared::io::loop_thread::{self, Frame, LoopHandle, LoopSide};
+use mmt_shared::io::schedule::Tick;
 use mmt_shared::model::geometry::Vec2;
 use mmt_shared::model::sample::HipSample;
 use mmt_shared::model::settings::Mode;
 use mmt_shared::time::{TICK, Time};
-use mmt_shared::wire::{Architecture, Command, DATAGRAM_MAX, Label, Welcome};
+use mmt_shared::wire::{Architecture, DATAGRAM_MAX, Label, Message, Side, Welcome};
 
 /// The system's allocator, with a count of every call that takes memory.
 struct Counting;
@@ -90,25 +99,6 @@ fn counted<T>(work: impl FnOnce() -> T) -> (T, u64) {
 
 const TICKS: u64 = 10_000;
 
-/// A datagram in a buffer of its own.
-#[derive(Clone, Copy)]
-struct Packet {
-    bytes: [u8; DATAGRAM_MAX],
-    length: usize,
-}
-
-impl Packet {
-    fn as_slice(&self) -> &[u8] {
-        &self.bytes[..self.length]
-    }
-
-    /// What `write` wrote, if it wrote anything.
-    fn of(write: impl FnOnce(&mut [u8]) -> Option<usize>) -> Option<Self> {
-        let mut bytes = [0; DATAGRAM_MAX];
-        write(&mut bytes).map(|length| Self { bytes, length })
-    }
-}
-
 /// Commands with everything that can be switched on.
 fn commands() -> CommandConfig {
     CommandConfig {
@@ -118,59 +108,33 @@ fn commands() -> CommandConfig {
 }
 
 /// The slave's end with everything that can be switched on.
-fn slave_link() -> SlaveLinkConfig {
-    SlaveLinkConfig {
+fn slave_end() -> SlaveEndConfig {
+    SlaveEndConfig {
         repeats: Repeats::recommended(),
         stretch_max: StretchMax::RECOMMENDED,
         samples_per_command: commands().samples_per_command,
-        architecture: Architecture::Tdpa,
-        scene_hz: 0,
+        architecture: Architecture::Mmt,
+        scene_hz: 50,
     }
 }
 
-/// What the haptic thread runs.
-struct Haptic {
-    master: Master,
-    link: MasterLink,
-    operator: Operator,
-    hand_force: Vec2,
-    applied: u64,
-    contact: u64,
-}
-
-impl Haptic {
-    /// One tick: the update that came, the operator, the tick, the sample and what it fills.
-    fn tick(&mut self, now: Time, down: Option<&Packet>) -> Option<Packet> {
-        match down.and_then(|packet| self.link.handle(now, packet.as_slice())) {
-            Some(FromSlave::Update(update)) => {
-                self.master.apply(&update);
-                self.applied += 1;
-            }
-            Some(FromSlave::Tool(tool)) => self.master.handle_tool_state(now, &tool),
-            Some(FromSlave::Scene(_)) | None => {}
-        }
-        let elapsed = now.saturating_since(Time::ZERO);
-        let view = self.master.view();
-        let reading = self.operator.step(elapsed, &view, self.hand_force);
-        let silence = self.link.end().silence(now);
-        let tick = self.master.tick(now, reading, silence);
-        self.hand_force = tick.hand_force;
-        self.contact += u64::from(tick.rendered.in_contact());
-        let link = &mut self.link;
-        Packet::of(|out| link.send(now, tick.sample, tick.port, out).unwrap())
-            .or_else(|| Packet::of(|out| link.heartbeat(now, out).unwrap()))
-    }
-}
-
-/// Both sides, over a link that delivers at once.
+/// Both sides over a link that delivers at once: the master's loop with the rings and frames of a live session.
 struct Loop {
-    haptic: Haptic,
-    slave: Slave,
-    slave_link: SlaveLink,
+    haptic: HapticLoop,
+    side: LoopSide<MasterLive>,
+    network: LoopHandle<MasterLive, ()>,
+    slave: SlaveEnd,
+    /// What the master has sent in this tick.
+    up: Vec<Frame>,
+    contact: u64,
+    _runtime: tokio::runtime::Runtime,
 }
 
 impl Loop {
-    fn new(mode: Mode) -> Self {
+    fn new(mode: Mode, architecture: Architecture) -> Self {
+        let mut runtime = tokio::runtime::Builder::new_current_thread();
+        let runtime = runtime.enable_io().build().unwrap();
+        let entered = runtime.enter();
         let device = DeviceProfile::default();
         let mut slave = Slave::try_new(&SlaveConfig::of_mode(mode), device.coupling()).unwrap();
         let welcome = Welcome {
@@ -180,61 +144,61 @@ impl Loop {
             program: Label::clipped("test"),
         };
         let limiter = ForceLimiter::try_new(device.limits()).unwrap();
-        let master = Master::with_architecture(&welcome, limiter, Architecture::Tdpa);
+        let master = Master::with_architecture(&welcome, limiter, architecture);
         let scripted = Scripted::try_new(ScriptedConfig::default(), master.view()).unwrap();
         let operator = Operator::Scripted(Box::new(scripted));
         slave.start_at(operator.start());
-        let haptic = Haptic {
+        let end = MasterEnd::new(
+            Time::ZERO,
             master,
-            link: MasterLink::new(Time::ZERO, device.coupling(), commands()),
-            operator,
-            hand_force: Vec2::zeros(),
-            applied: 0,
-            contact: 0,
+            commands().for_architecture(architecture),
+        );
+        let (network, side, _) = loop_thread::pair(&MasterLive::default()).unwrap();
+        drop(entered);
+        let config = SlaveEndConfig {
+            architecture,
+            ..slave_end()
         };
         Self {
-            haptic,
-            slave,
-            slave_link: SlaveLink::new(Time::ZERO, slave_link()),
+            haptic: HapticLoop::new(end, operator, None)
+                .observed_by(None, Some(PathRecorder::with_room())),
+            side,
+            network,
+            slave: SlaveEnd::new(Time::ZERO, slave, config),
+            up: Vec::new(),
+            contact: 0,
+            _runtime: runtime,
         }
     }
 
-    /// The slave's tick: what it read, what it did, what it sends.
-    fn slave_tick(&mut self, now: Time, up: Option<&Packet>) -> Slaved {
-        let command = up.and_then(|packet| self.slave_link.handle(now, packet.as_slice()));
-        if let Some(command) = &command {
-            for (sample, newest) in self.slave_link.samples(command) {
-                self.slave.handle_sample(now, &sample, newest);
-            }
-            self.slave.stretch(self.slave_link.end().stretch());
-            if let Some(port) = &command.port {
-                self.slave.handle_hand_port(port);
-            }
+    /// The haptic tick: frames in, the operator, the tick, frames out.
+    fn haptic_tick(&mut self, now: Time) {
+        let tick = Tick {
+            index: now.as_nanos() / 1_000_000,
+            deadline: now,
+            skipped: 0,
+            lateness: Duration::ZERO,
+        };
+        let ended = self.haptic.tick(tick, &mut self.side, || now).is_break();
+        assert!(!ended, "nobody ends it");
+        let model = self.haptic.end().master().model();
+        self.contact += u64::from(model.rendered().in_contact());
+    }
+
+    /// The slave's tick: what it read, what it did; what it sends is on its way to the haptic loop.
+    fn slave_tick(&mut self, now: Time) -> Option<SlaveTick> {
+        self.up.clear();
+        while let Some(frame) = self.network.next_departure() {
+            self.slave.handle_datagram(now, frame.bytes());
+            self.up.push(frame);
         }
         let tick = self.slave.tick(now);
-        let update = tick.and_then(|tick| tick.update);
-        let tool = tick.and_then(|tick| self.slave.tool_state(&tick));
-        let link = &mut self.slave_link;
-        let down = update
-            .and_then(|update| Packet::of(|out| link.send_update(now, &update, out).ok()))
-            .or_else(|| {
-                tool.and_then(|tool| Packet::of(|out| link.send_tool(now, &tool, out).ok()))
-            })
-            .or_else(|| Packet::of(|out| link.repeat(now, out).unwrap()))
-            .or_else(|| Packet::of(|out| link.heartbeat(now, out).unwrap()));
-        Slaved {
-            command,
-            tick,
-            down,
+        let mut out = [0; DATAGRAM_MAX];
+        while let Some(length) = self.slave.poll_transmit(now, &mut out).unwrap() {
+            self.network.deliver(now, &out[..length]);
         }
+        tick
     }
-}
-
-/// What a tick of the slave came to.
-struct Slaved {
-    command: Option<Command>,
-    tick: Option<SlaveTick>,
-    down: Option<Packet>,
 }
 
 #[test]
@@ -248,31 +212,36 @@ fn the_counter_catches_planted_allocations() {
     assert_eq!(counted(|| black_box(7)).1, 0, "nothing is nothing");
 
     // one in a haptic tick is seen as well
-    let mut sides = Loop::new(Mode::Recommended);
+    let mut sides = Loop::new(Mode::Recommended, Architecture::Mmt);
     let (_, planted) = counted(|| {
-        let packet = sides.haptic.tick(Time::ZERO, None);
-        black_box(format!("{:?}", sides.haptic.hand_force));
-        packet.map(|packet| packet.length)
+        sides.haptic_tick(Time::from_millis(1));
+        black_box(format!("{:?}", sides.contact));
     });
     assert!(planted > 0);
 }
 
 #[test]
 fn the_haptic_tick_never_allocates() {
-    for mode in [Mode::Recommended, Mode::Paper] {
-        let mut sides = Loop::new(mode);
-        let (mut now, mut down) = (Time::ZERO, None);
+    for (mode, architecture) in [
+        (Mode::Recommended, Architecture::Mmt),
+        (Mode::Paper, Architecture::Mmt),
+        (Mode::Recommended, Architecture::Tdpa),
+    ] {
+        let mut sides = Loop::new(mode, architecture);
+        let mut now = Time::ZERO;
         for tick in 0..TICKS {
             now += TICK;
-            let (up, calls) = counted(|| sides.haptic.tick(now, down.as_ref()));
+            let ((), calls) = counted(|| sides.haptic_tick(now));
             assert_eq!(calls, 0, "{mode:?}: allocator called in tick {tick}");
-            down = sides.slave_tick(now, up.as_ref()).down;
+            sides.slave_tick(now);
         }
-        let haptic = &sides.haptic;
-        let (contact, applied) = (haptic.contact, haptic.applied);
+        let applied = sides.haptic.end().master().applied();
+        let contact = sides.contact;
         assert!(contact > TICKS / 5, "{mode:?}: {contact} ticks of contact");
         assert!(applied > 15, "{mode:?}: {applied} updates applied");
-        assert!(haptic.operator.pushes_completed() >= Some(1), "{mode:?}");
+        assert!(sides.haptic.end().scene().is_some());
+        let pushes = sides.network.snapshot().pushes;
+        assert!(pushes >= Some(1), "{mode:?}: {pushes:?}");
     }
 }
 
@@ -282,7 +251,7 @@ struct Parts {
     trigger: Trigger,
     shadow: Shadow,
     playout: PlayoutBuffer,
-    link: SlaveLink,
+    channel: DatagramChannel,
     decided: u64,
 }
 
@@ -295,13 +264,15 @@ impl Parts {
             trigger: Trigger::new(TriggerConfig::of_mode(Mode::Recommended)),
             shadow: Shadow::new(*slave.settings(), *slave.state()),
             playout: PlayoutBuffer::try_new(PlayoutConfig::default()).unwrap(),
-            link: SlaveLink::new(Time::ZERO, slave_link()),
+            channel: DatagramChannel::new(Side::Slave, Time::ZERO),
             decided: 0,
         }
     }
 
-    fn take_in(&mut self, now: Time, up: Option<&Packet>) -> Option<HipSample> {
-        let command = up.and_then(|packet| self.link.handle(now, packet.as_slice()))?;
+    fn take_in(&mut self, now: Time, up: &Frame) -> Option<HipSample> {
+        let Message::Command(command) = self.channel.handle(now, up.bytes())?.message else {
+            return None;
+        };
         let samples = command.samples.as_slice();
         for sample in samples {
             self.playout.push(now, sample);
@@ -310,7 +281,7 @@ impl Parts {
         command.samples.last().copied()
     }
 
-    fn step(&mut self, now: Time, met: &SlaveTick, measured: &Measured) -> Option<Packet> {
+    fn step(&mut self, now: Time, met: &SlaveTick, measured: &Measured) -> Option<usize> {
         self.playout.advance(now).unwrap();
         let [_, estimate] = self.estimators.each_mut().map(|e| e.step(measured));
         self.shadow.step(met.stamp, met.stamp, |_| Some(met.tool));
@@ -329,34 +300,33 @@ impl Parts {
             turn: 0.0,
         };
         self.decided += u64::from(self.trigger.step(now, &input).is_some());
-        let link = &mut self.link;
-        let Some(update) = met.update else {
-            return Packet::of(|out| link.repeat(now, out).unwrap());
-        };
+        let update = met.update?;
         self.shadow.send(&update);
-        Packet::of(|out| link.send_update(now, &update, out).ok())
+        let mut out = [0; DATAGRAM_MAX];
+        let sent = self
+            .channel
+            .encode(now, Message::Update((&update).into()), &mut out);
+        sent.ok()
     }
 }
 
 #[test]
 fn the_slaves_own_parts_never_allocate() {
-    let mut sides = Loop::new(Mode::Recommended);
-    let mut parts = Parts::of(&sides.slave);
-    let (mut now, mut down) = (Time::ZERO, None);
+    let mut sides = Loop::new(Mode::Recommended, Architecture::Tdpa);
+    let mut parts = Parts::of(sides.slave.slave());
+    let mut now = Time::ZERO;
     let (mut samples, mut updates) = (0, 0);
     for tick in 0..TICKS {
         now += TICK;
-        let up = sides.haptic.tick(now, down.as_ref());
-        let slaved = sides.slave_tick(now, up.as_ref());
-        let (sample, calls) = counted(|| parts.take_in(now, up.as_ref()));
-        assert_eq!(calls, 0, "allocator called when tick {tick} read a command");
-        assert_eq!(
-            sample,
-            slaved.command.and_then(|c| c.samples.last().copied())
-        );
-        samples += u64::from(sample.is_some());
-        if let Some(met) = slaved.tick {
-            let observer = sides.slave.observer();
+        sides.haptic_tick(now);
+        let met = sides.slave_tick(now);
+        for frame in &sides.up {
+            let (sample, calls) = counted(|| parts.take_in(now, frame));
+            assert_eq!(calls, 0, "allocator called when tick {tick} read a command");
+            samples += u64::from(sample.is_some());
+        }
+        if let Some(met) = met {
+            let observer = sides.slave.slave().observer();
             let seen = Seen {
                 centre: observer.pose().position,
                 turning: observer.twist().angular,
@@ -366,14 +336,13 @@ fn the_slaves_own_parts_never_allocate() {
             let measured = Measured {
                 tool: met.tool,
                 force: met.f_s,
-                normal: sides.slave.observer().contact().map(|t| t.inward),
+                normal: observer.contact().map(|t| t.inward),
                 seen: Some(seen),
             };
             let (sent, calls) = counted(|| parts.step(now, &met, &measured));
             assert_eq!(calls, 0, "allocator called in tick {tick}");
             updates += u64::from(sent.is_some());
         }
-        down = slaved.down;
     }
     assert_eq!(samples, TICKS, "every command was read, each with a sample");
     assert!(updates > 15, "{updates} updates written");

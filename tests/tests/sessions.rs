@@ -4,4 +4,5 @@ mod agreement;
 mod harness;
 mod independent_client;
 mod live;
+mod run_again;
 mod two_hosts;

@@ -15,11 +15,11 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use clap::{Args, Parser, Subcommand};
+use mmt_client::commands::CommandConfig;
 use mmt_client::device::DeviceProfile;
-use mmt_client::link::CommandConfig;
 use mmt_lab::replay::ReplayConfig;
 use mmt_netem::LinkConfig;
-use mmt_server::link::Repeats;
+use mmt_server::repeats::Repeats;
 use mmt_server::trigger::Scheme;
 use mmt_shared::channel::rate_control::StretchMax;
 use mmt_shared::model::settings::Mode;

@@ -3,9 +3,9 @@
 use std::net::{Ipv4Addr, SocketAddr};
 use std::time::{Duration, Instant};
 
+use mmt_client::commands::CommandConfig;
 use mmt_client::device::DeviceProfile;
 use mmt_client::io::{MasterOptions, OperatorChoice};
-use mmt_client::link::CommandConfig;
 use mmt_client::operator::scripted::ScriptedConfig;
 use mmt_netem::{Direction, LinkConfig};
 use mmt_server::io::SlaveOptions;
@@ -161,6 +161,7 @@ fn slave_options(
         netem_extras: emulation.extras(Direction::Down),
         once: true,
         truth: Some(truth),
+        record: None,
     })
 }
 
@@ -192,6 +193,7 @@ fn master_options(
         netem_extras: emulation.extras(Direction::Up),
         path: None,
         truth: Some(truth),
+        record: None,
     }
 }
 

@@ -4,11 +4,11 @@ use std::io::BufRead;
 use std::path::Path;
 use std::sync::PoisonError;
 
+use mmt_client::commands::CommandConfig;
 use mmt_client::io::{
     MasterHostError, MasterLive, MasterOptions, MasterReport, OperatorChoice, SessionEnd,
     SharedPath,
 };
-use mmt_client::link::CommandConfig;
 use mmt_client::operator::scripted::ScriptedConfig;
 use mmt_client::operator::trace::Trace;
 use mmt_netem::Direction;
@@ -131,6 +131,7 @@ fn options(arguments: &MasterArguments) -> Result<MasterOptions, Failure> {
         netem: arguments.netem.clone(),
         netem_seed: arguments.seed,
         netem_extras: SocketExtras::default(),
+        record: None,
         path: arguments.record_path.is_some().then(SharedPath::default),
         truth: None,
     })

@@ -137,6 +137,7 @@ fn options(arguments: &SlaveArguments) -> Result<SlaveOptions, Failure> {
         netem_extras: SocketExtras::default(),
         once: arguments.once,
         truth: None,
+        record: None,
     })
 }
 

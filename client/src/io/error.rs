@@ -157,9 +157,6 @@ pub enum MasterHostError {
     /// The system gave no descriptor or no thread.
     #[error("no thread for the haptic loop: {0}")]
     Thread(io::Error),
-    /// The haptic loop could not be set up.
-    #[error("the haptic loop could not be set up: {0}")]
-    Loop(String),
     /// A defect of this program.
     #[error(
         "the haptic loop panicked, the force is off and the session has ended: this is a defect of \

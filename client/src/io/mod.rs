@@ -1,6 +1,6 @@
 //! The master as a host on the network: QUIC endpoint and the haptic thread.
 //!
-//! Nothing is decided here that `master` or `link` could decide.
+//! Nothing is decided here that the master's end could decide.
 
 #![allow(
     clippy::disallowed_methods,
@@ -12,12 +12,10 @@ mod end;
 mod error;
 pub mod haptic;
 mod open;
-mod pump;
 mod report;
 mod session;
 #[cfg(test)]
 mod tests;
-mod thread;
 
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
@@ -34,9 +32,9 @@ use mmt_shared::report::RunReport;
 use mmt_shared::wire::Architecture;
 use serde::Serialize;
 
+use crate::commands::CommandConfig;
 use crate::device::DeviceProfile;
 use crate::failsafe::LinkState;
-use crate::link::CommandConfig;
 use crate::operator::Operator;
 use crate::operator::scripted::{Scripted, ScriptedConfig, View};
 use crate::operator::trace::Trace;
@@ -44,6 +42,7 @@ use crate::path::PathRecorder;
 
 pub use end::SessionEnd;
 pub use error::MasterHostError;
+use haptic::MasterRecord;
 pub use session::run;
 
 /// Who operates.
@@ -84,6 +83,15 @@ impl OperatorChoice {
 /// A record of the path that a session fills and whoever started it reads.
 pub type SharedPath = Arc<Mutex<PathRecorder>>;
 
+/// How many inputs of the haptic loop are to be kept, and where a session leaves them at its end.
+#[derive(Clone, Debug)]
+pub struct RecordWanted {
+    /// So many of the first inputs.
+    pub inputs: usize,
+    /// Where they are left.
+    pub kept: Arc<Mutex<Option<MasterRecord>>>,
+}
+
 /// How a master host runs.
 #[derive(Debug)]
 pub struct MasterOptions {
@@ -111,6 +119,8 @@ pub struct MasterOptions {
     pub netem_extras: SocketExtras,
     /// Where the path of the session is kept, if anybody wants it.
     pub path: Option<SharedPath>,
+    /// A record of the loop's inputs, if anybody wants to run them again.
+    pub record: Option<RecordWanted>,
     /// The object's true pose, where the slave lives in this process: for the report.
     pub truth: Option<TruthReceiver>,
 }

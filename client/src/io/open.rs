@@ -21,14 +21,14 @@ use mmt_shared::wire::{
 use tokio::time::timeout;
 
 use super::{MasterHostError, MasterOptions};
-use crate::link::CommandConfig;
+use crate::commands::CommandConfig;
 
 /// How the program names itself to the slave.
 pub(super) const PROGRAM: &str = concat!("mmt ", env!("CARGO_PKG_VERSION"));
 
 /// How long the host waits, for what.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Patience {
+pub(super) struct Timeouts {
     /// For a name to be looked up.
     pub(super) lookup: Duration,
     /// For a handshake.
@@ -43,7 +43,7 @@ pub(super) struct Patience {
 
 /// Three round trips of 2 s and a lost packet for all that opens a session; what ends one must not keep
 /// a person waiting (1 s, docs/protocol.md section 2).
-pub(super) const PATIENCE: Patience = Patience {
+pub(super) const TIMEOUTS: Timeouts = Timeouts {
     lookup: Duration::from_secs(10),
     connect: Duration::from_secs(10),
     welcome: Duration::from_secs(10),
@@ -53,14 +53,14 @@ pub(super) const PATIENCE: Patience = Patience {
 
 /// A connection, with all that is below it.
 #[derive(Debug)]
-pub(super) struct Line {
+pub(super) struct Connected {
     pub(super) endpoint: Endpoint,
     pub(super) connection: Connection,
     pub(super) meter: SocketMeter,
     pub(super) address: SocketAddr,
 }
 
-impl Line {
+impl Connected {
     /// Closes with a reason for people, and waits until that has gone out, at most `limit`.
     pub(super) async fn close(&self, reason: &str, limit: Duration) {
         self.connection.close(CLOSE_FINISHED, reason.as_bytes());
@@ -72,7 +72,7 @@ impl Line {
 /// A session that the slave has welcomed.
 #[derive(Debug)]
 pub(super) struct Opened {
-    pub(super) line: Line,
+    pub(super) connected: Connected,
     pub(super) send: SendStream,
     pub(super) receive: RecvStream,
     pub(super) welcome: Welcome,
@@ -82,12 +82,12 @@ pub(super) struct Opened {
 pub(super) async fn open(
     options: &MasterOptions,
     hip: Vec2,
-    patience: &Patience,
+    timeouts: &Timeouts,
 ) -> Result<Opened, MasterHostError> {
-    let addresses = look_up(options, patience.lookup).await?;
+    let addresses = look_up(options, timeouts.lookup).await?;
     let mut first_error = None;
     for address in addresses {
-        match open_at(options, address, hip, patience).await {
+        match open_at(options, address, hip, timeouts).await {
             Ok(opened) => return Ok(opened),
             // a name can have an address that leads nowhere: the next may be the one
             Err(error) if leads_nowhere(&error) => {
@@ -137,7 +137,7 @@ async fn open_at(
     options: &MasterOptions,
     address: SocketAddr,
     hip: Vec2,
-    patience: &Patience,
+    timeouts: &Timeouts,
 ) -> Result<Opened, MasterHostError> {
     options.transport.permit(address)?;
     let local: SocketAddr = match address {
@@ -152,24 +152,24 @@ async fn open_at(
     let endpoint = Endpoint::of_master(options.transport, Arc::new(wrapped))?;
     let traffic = traffic(&options.commands, options.architecture);
     let connection = endpoint
-        .connect(address, options.pairing.pin, traffic, patience.connect)
+        .connect(address, options.pairing.pin, traffic, timeouts.connect)
         .await?;
-    let line = Line {
+    let connected = Connected {
         endpoint,
         connection,
         meter,
         address,
     };
-    match greet(options, &line.connection, hip, patience.welcome).await {
+    match greet(options, &connected.connection, hip, timeouts.welcome).await {
         Ok((send, receive, welcome)) => Ok(Opened {
-            line,
+            connected,
             send,
             receive,
             welcome,
         }),
         Err(error) => {
             // the slave must not take this master for one that went silent
-            line.close("no session", patience.idle).await;
+            connected.close("no session", timeouts.idle).await;
             Err(error)
         }
     }

@@ -9,6 +9,7 @@ use mmt_netem::io::driver::DirectionCounters;
 use mmt_netem::io::lateness::Lateness;
 use mmt_netem::io::socket::SocketCounters;
 use mmt_shared::io::farewell::ReceivedFarewell;
+use mmt_shared::io::network_task::NetworkCounts;
 use mmt_shared::io::transport::DatagramCounts;
 use mmt_shared::model::update::Cause;
 use mmt_shared::report::{
@@ -22,22 +23,23 @@ use mmt_shared::stats::session::{
 };
 use mmt_shared::wire::Architecture;
 
-use super::haptic::HapticOutcome;
-use super::pump::PumpCounts;
+use super::haptic::HapticLoop;
 use super::{MasterConfiguration, MasterOptions, MasterReport, OperatorChoice, SessionEnd};
-use crate::link::MasterLink;
+use crate::end::MasterEnd;
+use crate::tdpa::TdpaHand;
 
 /// A session that has ended.
 #[derive(Debug)]
 pub(super) struct Ended {
-    pub(super) end: SessionEnd,
-    pub(super) haptic: HapticOutcome,
+    pub(super) why: SessionEnd,
+    pub(super) haptic: HapticLoop,
     /// From the welcome to the farewell.
     pub(super) duration: Duration,
-    /// Updates that arrived and were not applied.
-    pub(super) updates: UpdateDrops,
-    pub(super) counts: PumpCounts,
-    pub(super) told: Option<ReceivedFarewell<SlaveTotals>>,
+    pub(super) counts: NetworkCounts,
+    /// Datagrams that found no room before the haptic loop.
+    pub(super) arrivals_dropped: u64,
+    /// The slave's, if it came.
+    pub(super) farewell: Option<ReceivedFarewell<SlaveTotals>>,
     pub(super) sockets: SocketCounters,
     /// Of the emulated network on what the master sent.
     pub(super) lateness: Lateness,
@@ -46,8 +48,12 @@ pub(super) struct Ended {
 }
 
 impl Ended {
+    fn end(&self) -> &MasterEnd {
+        &self.haptic.end
+    }
+
     /// What the master reports to the slave.
-    pub(super) fn totals(&self, link: &MasterLink) -> MasterTotals {
+    pub(super) fn totals(&self) -> MasterTotals {
         let timing = &self.haptic.timing;
         MasterTotals {
             duration_ns: u64::try_from(self.duration.as_nanos()).unwrap_or(u64::MAX),
@@ -56,10 +62,10 @@ impl Ended {
                 udp_bytes_sent: self.sockets.outgoing.sent.bytes,
                 udp_datagrams_received: self.sockets.received.packets,
                 udp_bytes_received: self.sockets.received.bytes,
-                ..link.end().traffic()
+                ..self.end().channel().traffic()
             },
-            updates_applied: self.haptic.applied,
-            updates_dropped: self.updates,
+            updates_applied: self.end().master().applied(),
+            updates_dropped: self.end().update_drops(),
             haptic_loop: LoopTotals {
                 ticks: timing.ticks,
                 skipped: timing.skipped,
@@ -70,18 +76,19 @@ impl Ended {
     }
 
     /// The report.
-    pub(super) fn report(&self, options: &MasterOptions, link: &MasterLink) -> MasterReport {
+    pub(super) fn report(&self, options: &MasterOptions) -> MasterReport {
+        let (end, master) = (self.end(), self.end().master());
         let version = env!("CARGO_PKG_VERSION");
         let mut report = MasterReport::new(version, "master", configuration(options));
         report.seed = Some(options.netem_seed);
-        report.duration_s = self.haptic.duration.as_secs_f64().into();
-        report.ending = Some(ending_name(self.end.ending()).to_owned());
+        report.duration_s = self.haptic.elapsed.as_secs_f64().into();
+        report.ending = Some(ending_name(self.why.ending()).to_owned());
         report.architecture = self.architecture(options.architecture);
-        if let Some(completed) = self.haptic.pushes {
-            report.pushes = PushesReport::new(completed, &self.haptic.breaks);
+        if let Some(completed) = self.haptic.operator.pushes_completed() {
+            report.pushes = PushesReport::new(completed, &end.counts().breaks);
         }
         report.updates = self.updates();
-        report.messages = messages(link, self.duration.as_secs_f64());
+        report.messages = messages(end, self.duration.as_secs_f64());
         report.wire = self.wire();
         report.force = self.force();
         if let Some(slave) = self.slave() {
@@ -93,10 +100,10 @@ impl Ended {
         }
         report.pose = PoseReport::from(&self.haptic.pose);
         report.passivity = PassivityReport {
-            energy_injected_j: self.haptic.energy_injected_j.into(),
-            observer_min_j: self.haptic.observer_min_j.into(),
+            energy_injected_j: master.energy_injected_j().into(),
+            observer_min_j: master.port().least_j().into(),
         };
-        report.link = link_report(link);
+        report.link = link_report(end);
         report.emulation.up = self.lateness.report();
         report.haptic_loop = LoopReport {
             ticks: Some(self.haptic.timing.ticks),
@@ -104,26 +111,28 @@ impl Ended {
             cpu_us: quantiles(&self.haptic.timing.cpu),
             lateness_us: quantiles(&self.haptic.timing.lateness),
         };
-        report.drops = Some(self.drops(link));
+        report.drops = Some(self.drops());
         report
     }
 
     fn architecture(&self, architecture: Architecture) -> ArchitectureReport {
+        let tdpa = self.end().master().tdpa();
+        let round_trip_s = tdpa.and_then(TdpaHand::round_trip_s);
         ArchitectureReport {
-            round_trip_ms: self.haptic.round_trip_s.map(|s| s * 1e3).into(),
+            round_trip_ms: round_trip_s.map(|s| s * 1e3).into(),
             ..ArchitectureReport::named(architecture)
         }
     }
 
     fn slave(&self) -> Option<&SlaveTotals> {
-        self.told.as_ref()?.report.as_ref()
+        self.farewell.as_ref()?.report.as_ref()
     }
 
     fn updates(&self) -> UpdatesReport {
         let mut report = UpdatesReport {
-            applied: Some(u64::from(self.haptic.applied)),
-            dropped: Some(update_counts(&self.updates)),
-            age_ms: (&self.haptic.age).into(),
+            applied: Some(self.end().master().applied().into()),
+            dropped: Some(update_counts(&self.end().update_drops())),
+            age_ms: (&self.end().counts().age).into(),
             ..UpdatesReport::default()
         };
         if let Some(slave) = self.slave() {
@@ -166,18 +175,21 @@ impl Ended {
             pmse_magnitude: judged.pmse_magnitude.into(),
             relative_error: judged.relative_error.into(),
             jnd7_share: judged.jnd7_share.into(),
-            largest_n: self.haptic.on_hand.largest_n().into(),
-            largest_step_n: self.haptic.on_hand.largest_step_n().into(),
+            largest_n: self.end().counts().on_hand.largest_n().into(),
+            largest_step_n: self.end().counts().on_hand.largest_step_n().into(),
             ..ForceReport::default()
         }
     }
 
-    fn drops(&self, link: &MasterLink) -> Counts {
-        let (traffic, peer) = (link.end().traffic(), link.end().peer());
-        let queued = self.counts.given;
+    fn drops(&self) -> Counts {
+        let (end, network) = (self.end(), &self.counts);
+        let (traffic, peer) = (end.channel().traffic(), end.channel().peer());
+        let [off_grid, skipped, unsent] = end.samples_unsent();
+        let queued = network.given;
+        let unsent_datagrams = network.too_large + network.unsupported + network.disconnected;
         [
             ("bad_echoes", u64::from(peer.bad_echoes())),
-            ("bad_readings", self.haptic.bad_readings),
+            ("bad_readings", end.master().bad_readings()),
             ("datagrams_duplicate", u64::from(traffic.duplicates)),
             ("datagrams_malformed", u64::from(traffic.malformed)),
             (
@@ -189,13 +201,16 @@ impl Ended {
                 "datagrams_unread",
                 self.passed.received.saturating_sub(self.counts.read),
             ),
-            ("datagrams_unsealed", self.counts.unsealed),
-            ("datagrams_unsent", self.counts.unsent),
-            ("forces_not_finite", self.haptic.forces_rejected),
-            ("samples_off_grid", u64::from(link.samples_refused())),
-            ("samples_ring_full", self.haptic.samples_dropped),
-            ("samples_skipped", u64::from(link.samples_skipped())),
-            ("samples_unsent", link.pending() as u64),
+            (
+                "datagrams_ring_full",
+                self.arrivals_dropped + self.haptic.departures_dropped,
+            ),
+            ("datagrams_unsealed", end.counts().unsendable),
+            ("datagrams_unsent", unsent_datagrams),
+            ("forces_not_finite", end.master().limiter().rejected()),
+            ("samples_off_grid", off_grid),
+            ("samples_skipped", skipped),
+            ("samples_unsent", unsent),
         ]
         .into_iter()
         .chain(
@@ -238,17 +253,17 @@ fn update_counts(drops: &UpdateDrops) -> Counts {
 }
 
 /// An update that was seen before is a repeat, whether the slave or the network repeated it.
-fn messages(link: &MasterLink, duration_s: f64) -> UpDown<MessagesReport> {
-    let traffic = link.end().traffic();
-    let repeats = u64::from(link.drops().duplicate);
+fn messages(end: &MasterEnd, duration_s: f64) -> UpDown<MessagesReport> {
+    let traffic = end.channel().traffic();
+    let repeats = u64::from(end.update_drops().duplicate);
     UpDown {
         up: MessagesReport::up(&traffic.sent, duration_s),
         down: MessagesReport::down(&traffic.received, repeats, duration_s),
     }
 }
 
-fn link_report(link: &MasterLink) -> LinkReport {
-    let peer = link.end().peer();
+fn link_report(end: &MasterEnd) -> LinkReport {
+    let peer = end.channel().peer();
     LinkReport {
         rtt_ms: DelayReport::of(peer.round_trip().histogram()),
         loss_up: peer.outgoing().share().into(),

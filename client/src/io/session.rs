@@ -1,31 +1,34 @@
 //! A session from the first packet to the report.
 
-use std::pin::pin;
-use std::thread::JoinHandle;
+use std::pin::{Pin, pin};
+use std::sync::PoisonError;
 
 use mmt_shared::io::clock::Clock;
 use mmt_shared::io::farewell::{FarewellError, ReceivedFarewell, receive_farewell, send_farewell};
-use mmt_shared::io::realtime::RealTime;
-use mmt_shared::io::wake;
+use mmt_shared::io::loop_thread;
+use mmt_shared::io::network_task::{Event, NetworkTask, asked_to_stop};
 use mmt_shared::model::geometry::{BoxFootprint, Pose};
-use mmt_shared::stats::session::{SlaveTotals, UpdateDrops};
+use mmt_shared::stats::session::SlaveTotals;
 use mmt_shared::wire::Side;
-use tokio::sync::{oneshot, watch};
+use tokio::sync::watch;
 use tokio::time::{Instant, error::Elapsed, timeout_at};
 
-use super::haptic::{HapticLoop, HapticOutcome, HapticParts, HapticPort};
-use super::open::{Line, Opened, PATIENCE, Patience, open};
-use super::pump::{Pump, stopped};
+use super::haptic::HapticLoop;
+use super::open::{Opened, TIMEOUTS, Timeouts, open};
 use super::report::Ended;
-use super::thread::Finished;
-use super::{MasterHostError, MasterLive, MasterOptions, MasterReport, SessionEnd, thread};
+use super::{MasterHostError, MasterLive, MasterOptions, MasterReport, SessionEnd};
+use crate::end::MasterEnd;
+use crate::failsafe::LinkState;
 use crate::limiter::ForceLimiter;
-use crate::link::MasterLink;
 use crate::master::Master;
 use crate::operator::scripted::View;
+use crate::path::PathRecorder;
+
+/// The loop's thread.
+const THREAD: &str = "mmt-haptic";
 
 /// Runs a master against the slave of a pairing string until its duration is over, its operator has
-/// finished, `stop` becomes true, or the other side or the link ends it. `live` gets a look 25 times a
+/// finished, `stop` becomes true, or the other side or the link ends it. `live` gets a snapshot 25 times a
 /// second; the last one says why the session ended.
 ///
 /// A session that began always gives a report: one that the link or the slave broke has the ending
@@ -40,7 +43,7 @@ pub async fn run(
     stop: watch::Receiver<bool>,
     live: watch::Sender<MasterLive>,
 ) -> Result<MasterReport, MasterHostError> {
-    run_with(options, stop, live, PATIENCE).await
+    run_with(options, stop, live, TIMEOUTS).await
 }
 
 /// The box as every slave of this project shows it at first; what the hello's start goes by.
@@ -56,156 +59,184 @@ pub(super) async fn run_with(
     mut options: MasterOptions,
     mut stop: watch::Receiver<bool>,
     live: watch::Sender<MasterLive>,
-    patience: Patience,
+    timeouts: Timeouts,
 ) -> Result<MasterReport, MasterHostError> {
     options.commands = options.commands.for_architecture(options.architecture);
     let limiter = ForceLimiter::try_new(options.device.limits())?;
     let start = options.operator.begin(first_view())?.start();
     let opened = tokio::select! {
-        opened = open(&options, start, &patience) => opened?,
-        () = stopped(&mut stop) => return Err(MasterHostError::Interrupted),
+        opened = open(&options, start, &timeouts) => opened?,
+        () = asked_to_stop(&mut stop) => return Err(MasterHostError::Interrupted),
     };
     let welcome = &opened.welcome;
     tracing::info!(
-        slave = %opened.line.address, program = %welcome.program, scheme = %welcome.scheme,
+        slave = %opened.connected.address, program = %welcome.program, scheme = %welcome.scheme,
         "the session begins"
     );
     let master = Master::with_architecture(welcome, limiter, options.architecture);
     let operator = options.operator.begin(master.view())?;
-    let parts = HapticParts {
-        master,
-        operator,
-        duration: options.duration,
-        samples_per_wake: options.commands.samples_per_command,
-        truth: options.truth.take(),
-    };
-    operate(&options, opened, parts, stop, live, &patience).await
+    let clock = Clock::start();
+    let end = MasterEnd::new(clock.now(), master, options.commands);
+    let path = options.path.is_some().then(PathRecorder::with_room);
+    let mut haptic =
+        HapticLoop::new(end, operator, options.duration).observed_by(options.truth.take(), path);
+    if let Some(wanted) = &options.record {
+        haptic = haptic.recorded(wanted.inputs);
+    }
+    let body = move |side, ticker| haptic.run(side, ticker, clock);
+    operate(&options, opened, clock, body, stop, live, &timeouts).await
 }
 
-async fn operate(
+/// Runs a session whose haptic thread does `body`.
+pub(super) async fn operate(
     options: &MasterOptions,
     opened: Opened,
-    parts: HapticParts,
+    clock: Clock,
+    body: impl FnOnce(loop_thread::LoopSide<MasterLive>, mmt_shared::io::ticker::Ticker) -> HapticLoop
+    + Send
+    + 'static,
     mut stop: watch::Receiver<bool>,
     live: watch::Sender<MasterLive>,
-    patience: &Patience,
+    timeouts: &Timeouts,
 ) -> Result<MasterReport, MasterHostError> {
     let Opened {
-        line,
+        connected,
         mut send,
         mut receive,
         ..
     } = opened;
-    let clock = Clock::start();
-    let began = clock.now();
-    let (waker, mut wakeup) = wake::pair().map_err(MasterHostError::Thread)?;
-    let (haptic, port) = HapticLoop::new(parts, began, waker);
-    let thread = start(haptic, clock)?;
-    let coupling = options.device.coupling();
-    let link = MasterLink::new(began, coupling, options.commands);
-    let mut pump = Pump::new(
-        clock,
-        &line.connection,
-        link,
-        port,
-        &live,
-        options.path.clone(),
-    );
-    let mut farewell = pin!(receive_farewell(&mut receive, Side::Slave));
-    pump.run(&mut wakeup, &mut stop, farewell.as_mut()).await;
-    let haptic = join(thread, &line, patience).await?;
-    let mut ended = Ended {
-        end: first_cause(&haptic, pump.end),
-        haptic,
-        duration: clock.now().saturating_since(began),
-        updates: update_drops(&pump.link, &pump.port, &haptic),
-        counts: pump.counts,
-        told: pump.told,
-        sockets: line.meter.snapshot(),
-        lateness: line.meter.lateness(),
-        passed: line.connection.datagrams(),
-        address: line.address,
+    let handle = loop_thread::spawn(THREAD, clock, &MasterLive::default(), body)
+        .map_err(MasterHostError::Thread)?;
+    let mut session = Session {
+        task: NetworkTask::new(clock, connected.connection.clone(), handle),
+        live: &live,
+        why: None,
+        farewell: None,
+        shown: LinkState::default(),
     };
-    tracing::info!("the session ends: {}", ended.end);
-    if pump.connected {
-        let deadline = Instant::now() + patience.farewell;
-        let (ending, report) = (ended.end.ending(), ended.totals(&pump.link));
-        let sent = send_farewell(&mut send, ending, &report, patience.farewell).await;
+    let mut farewell = pin!(receive_farewell(&mut receive, Side::Slave));
+    let Some(haptic) = session.run(farewell.as_mut(), &mut stop).await else {
+        connected
+            .close("the master's haptic loop failed", timeouts.idle)
+            .await;
+        return Err(MasterHostError::Panicked);
+    };
+    let began = haptic.end.channel().began();
+    let mut ended = Ended {
+        // the loop knows its own reasons, the network task the others; one without a reason was asked to end
+        why: haptic.why.or(session.why).unwrap_or(SessionEnd::Stopped),
+        duration: clock.now().saturating_since(began),
+        counts: *session.task.counts(),
+        arrivals_dropped: session.task.handle().arrivals_dropped(),
+        farewell: session.farewell,
+        sockets: connected.meter.snapshot(),
+        lateness: connected.meter.lateness(),
+        passed: connected.connection.datagrams(),
+        address: connected.address,
+        haptic,
+    };
+    tracing::info!("the session ends: {}", ended.why);
+    if session.task.is_connected() {
+        let deadline = Instant::now() + timeouts.farewell;
+        let (ending, report) = (ended.why.ending(), ended.totals());
+        let sent = send_farewell(&mut send, ending, &report, timeouts.farewell).await;
         if let Err(error) = sent {
             tracing::warn!(%error, "the farewell did not reach the slave");
         }
-        if pump.listening {
-            ended.told = answer(timeout_at(deadline, farewell).await);
+        if session.task.awaits_farewell() {
+            ended.farewell = answer(timeout_at(deadline, farewell).await);
         } else {
             send.delivered(deadline.saturating_duration_since(Instant::now()))
                 .await;
         }
     }
-    ended.passed = line.connection.datagrams();
-    line.close(&ended.end.to_string(), patience.idle).await;
-    ended.sockets = line.meter.snapshot();
-    ended.lateness = line.meter.lateness();
-    pump.show(Some(ended.end));
-    Ok(ended.report(options, &pump.link))
+    ended.passed = connected.connection.datagrams();
+    connected.close(&ended.why.to_string(), timeouts.idle).await;
+    ended.sockets = connected.meter.snapshot();
+    ended.lateness = connected.meter.lateness();
+    session.show(Some(ended.why));
+    if let (Some(kept), Some(path)) = (&options.path, ended.haptic.path.take()) {
+        *kept.lock().unwrap_or_else(PoisonError::into_inner) = path;
+    }
+    if let Some(wanted) = &options.record {
+        *wanted.kept.lock().unwrap_or_else(PoisonError::into_inner) = ended.haptic.record.take();
+    }
+    Ok(ended.report(options))
 }
 
-/// Starts the haptic thread, and has logged what the host granted it.
-fn start(haptic: HapticLoop, clock: Clock) -> Result<JoinHandle<Finished>, MasterHostError> {
-    let (granted, granted_to) = oneshot::channel();
-    let thread = thread::spawn(haptic, clock, granted).map_err(MasterHostError::Thread)?;
-    tokio::spawn(tell(granted_to));
-    Ok(thread)
+/// What a session knows outside of its haptic loop.
+struct Session<'a> {
+    task: NetworkTask<MasterLive, HapticLoop>,
+    live: &'a watch::Sender<MasterLive>,
+    /// Why the session ends, if this task noticed first.
+    why: Option<SessionEnd>,
+    /// The slave's farewell, if it came.
+    farewell: Option<ReceivedFarewell<SlaveTotals>>,
+    shown: LinkState,
 }
 
-/// What the haptic thread came to. It has left its loop, so this does not wait for it; without an
-/// outcome the connection is closed.
-pub(super) async fn join(
-    thread: JoinHandle<Finished>,
-    line: &Line,
-    patience: &Patience,
-) -> Result<HapticOutcome, MasterHostError> {
-    let error = match thread.join() {
-        Ok(Ok(outcome)) => return Ok(outcome),
-        Ok(Err(reason)) => MasterHostError::Loop(reason),
-        Err(_) => MasterHostError::Panicked,
-    };
-    line.close("the master's haptic loop failed", patience.idle)
-        .await;
-    Err(error)
-}
+type FarewellRead = Result<ReceivedFarewell<SlaveTotals>, FarewellError>;
 
-/// Logs what the host granted the haptic thread.
-async fn tell(granted: oneshot::Receiver<RealTime>) {
-    if let Ok(granted) = granted.await {
-        let all = granted.fifo.granted() && granted.memory.granted() && granted.slack.granted();
-        match all {
-            true => tracing::info!("haptic loop: {granted}"),
-            false => tracing::warn!("haptic loop: {granted}"),
+impl Session<'_> {
+    /// Runs until the haptic loop has ended; none if it panicked.
+    async fn run<F: Future<Output = FarewellRead>>(
+        &mut self,
+        mut farewell: Pin<&mut F>,
+        stop: &mut watch::Receiver<bool>,
+    ) -> Option<HapticLoop> {
+        loop {
+            match self.task.next(farewell.as_mut(), stop).await {
+                Event::LoopEnded(ended) => return ended,
+                Event::Beat => self.show(None),
+                Event::Stopped => self.end(SessionEnd::Stopped),
+                Event::Farewell(read) => self.handle_farewell(read),
+                Event::Disconnected(error) => {
+                    if self.farewell.is_none() {
+                        tracing::warn!(%error, "the connection to the slave is gone");
+                    }
+                    self.end(SessionEnd::ConnectionLost);
+                }
+            }
+        }
+    }
+
+    /// Shows the newest snapshot.
+    fn show(&mut self, ended: Option<SessionEnd>) {
+        let snapshot = *self.task.handle().snapshot();
+        if snapshot.link != self.shown {
+            self.shown = snapshot.link;
+            tracing::info!(link = snapshot.link.name(), "the link");
+        }
+        self.live.send_replace(MasterLive {
+            ended: ended.or(snapshot.ended),
+            ..snapshot
+        });
+    }
+
+    /// Asks the loop to release the hand and to end; the first reason counts.
+    fn end(&mut self, why: SessionEnd) {
+        self.why.get_or_insert(why);
+        self.task.handle().stop();
+    }
+
+    fn handle_farewell(&mut self, read: FarewellRead) {
+        match read {
+            Ok(farewell) => {
+                self.farewell = Some(farewell);
+                self.end(SessionEnd::SlaveEnded(farewell.ending));
+            }
+            Err(error) if error.is_loss() => self.end(SessionEnd::ConnectionLost),
+            Err(error) => {
+                tracing::error!(%error, "the slave's farewell");
+                self.end(SessionEnd::StreamBroken);
+            }
         }
     }
 }
 
-/// What ended the session: the loop knows its own reasons, the network task the others.
-fn first_cause(haptic: &HapticOutcome, noticed: Option<SessionEnd>) -> SessionEnd {
-    // a loop that ended without a reason of its own was asked to
-    haptic.end.or(noticed).unwrap_or(SessionEnd::Stopped)
-}
-
-/// Updates that arrived and were not applied. One that still waits when the loop has ended came too
-/// late for any tick.
-fn update_drops(link: &MasterLink, port: &HapticPort, haptic: &HapticOutcome) -> UpdateDrops {
-    UpdateDrops {
-        superseded: port.superseded(),
-        frozen: haptic.frozen.saturating_add(u32::from(port.untaken())),
-        ..link.drops()
-    }
-}
-
 /// The slave's answer to the master's farewell, if it came in time and could be read.
-fn answer(
-    said: Result<Result<ReceivedFarewell<SlaveTotals>, FarewellError>, Elapsed>,
-) -> Option<ReceivedFarewell<SlaveTotals>> {
-    match said {
+fn answer(read: Result<FarewellRead, Elapsed>) -> Option<ReceivedFarewell<SlaveTotals>> {
+    match read {
         Ok(Ok(farewell)) => Some(farewell),
         Ok(Err(error)) => {
             tracing::warn!(%error, "the slave gave no farewell: the report lacks what it counted");

@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use mmt_netem::LinkConfig;
+use mmt_shared::io::clock::Clock;
 use mmt_shared::io::connect::ConnectError;
 use mmt_shared::io::transport::Transport;
 use mmt_shared::model::contact::Coupling;
@@ -16,8 +17,8 @@ use mmt_shared::wire::{Architecture, Ending, Message, Refusal};
 use tokio::sync::watch;
 use tokio::time::{Instant, sleep, timeout};
 
-use super::open::{PATIENCE, Patience, open};
-use super::session::{join, run_with};
+use super::open::{TIMEOUTS, Timeouts, open};
+use super::session::{operate, run_with};
 use super::*;
 use fake::{Fake, Session};
 
@@ -41,6 +42,7 @@ fn scripted(fake: &Fake) -> MasterOptions {
         netem_seed: 1,
         netem_extras: SocketExtras::default(),
         path: None,
+        record: None,
         truth: None,
     }
 }
@@ -52,10 +54,10 @@ struct Running {
     live: watch::Receiver<MasterLive>,
 }
 
-fn start(options: MasterOptions, patience: Patience) -> Running {
+fn start(options: MasterOptions, timeouts: Timeouts) -> Running {
     let (stop, stop_to) = watch::channel(false);
     let (live_from, live) = watch::channel(MasterLive::default());
-    let done = tokio::spawn(run_with(options, stop_to, live_from, patience));
+    let done = tokio::spawn(run_with(options, stop_to, live_from, timeouts));
     Running { done, stop, live }
 }
 
@@ -90,7 +92,7 @@ fn totals() -> SlaveTotals {
 #[tokio::test]
 async fn a_session_goes_from_hello_to_farewell_and_both_sides_are_in_the_report() {
     let fake = Fake::new();
-    let mut master = start(scripted(&fake), PATIENCE);
+    let mut master = start(scripted(&fake), TIMEOUTS);
     let mut slave = Session::welcomed(&fake).await;
     let told = slave.serve().await;
     slave.say_farewell(Ending::Finished, totals()).await;
@@ -129,7 +131,7 @@ async fn a_session_goes_from_hello_to_farewell_and_both_sides_are_in_the_report(
     assert!(report.link.rtt_ms.p50.get().unwrap() > 0.0);
     let drops = report.drops.as_ref().unwrap();
     let sent = stamps.len() as u64;
-    let kept = drops["samples_unsent"] + drops["samples_ring_full"];
+    let kept = drops["samples_unsent"] + drops["samples_skipped"];
     assert!(sent + kept <= ticks, "a sample a tick and no more");
 
     let last = *master.live.borrow_and_update();
@@ -147,8 +149,8 @@ async fn each_refusal_has_its_own_error() {
         Refusal::Ending,
     ] {
         let fake = Fake::new();
-        let mut master = start(scripted(&fake), PATIENCE);
-        let mut slave = Session::knocked(&fake).await;
+        let mut master = start(scripted(&fake), TIMEOUTS);
+        let mut slave = Session::connected(&fake).await;
         slave.refuse(refusal).await;
         let error = master.error().await;
         let right = match refusal {
@@ -168,8 +170,8 @@ async fn no_error_shows_the_token() {
     let fake = Fake::new();
     let options = scripted(&fake);
     let secret = options.pairing.token.reveal().to_string();
-    let mut master = start(options, PATIENCE);
-    let mut slave = Session::knocked(&fake).await;
+    let mut master = start(options, TIMEOUTS);
+    let mut slave = Session::connected(&fake).await;
     slave.refuse(Refusal::WrongToken).await;
     let error = master.error().await;
     assert!(!format!("{error} {error:?}").contains(&secret[..8]));
@@ -180,7 +182,7 @@ async fn another_slaves_key_is_refused_before_the_token_is_sent() {
     let fake = Fake::new();
     let mut options = scripted(&fake);
     options.pairing.pin = Pin::new([7; 32]);
-    let mut master = start(options, PATIENCE);
+    let mut master = start(options, TIMEOUTS);
     let handshake = timeout(FOR_EVER, fake.listener.next()).await.unwrap();
     assert!(handshake.unwrap().finish().await.is_err());
     let error = master.error().await;
@@ -197,11 +199,11 @@ async fn nobody_there_is_said_within_the_limit() {
     let fake = Fake::new();
     let mut options = scripted(&fake);
     options.pairing.address.port = deaf.local_addr().unwrap().port();
-    let patience = Patience {
+    let timeouts = Timeouts {
         connect: Duration::from_millis(300),
-        ..PATIENCE
+        ..TIMEOUTS
     };
-    let error = start(options, patience).error().await;
+    let error = start(options, timeouts).error().await;
     let no_answer = matches!(
         error,
         MasterHostError::Connect(ConnectError::NoAnswer { .. })
@@ -215,31 +217,31 @@ async fn a_name_is_looked_up_and_one_that_nobody_has_is_named_in_the_error() {
     let port = fake.address.port();
     let mut options = scripted(&fake);
     options.pairing.address = format!("localhost:{port}").parse().unwrap();
-    let mut master = start(options, PATIENCE);
-    let mut slave = Session::knocked(&fake).await;
+    let mut master = start(options, TIMEOUTS);
+    let mut slave = Session::connected(&fake).await;
     slave.refuse(Refusal::Ending).await;
     let error = master.error().await;
     assert!(matches!(error, MasterHostError::Ending { .. }), "{error}");
 
     let mut options = scripted(&fake);
     options.pairing.address = "nobody.invalid:1".parse().unwrap();
-    let patience = Patience {
+    let timeouts = Timeouts {
         lookup: Duration::from_secs(2),
-        ..PATIENCE
+        ..TIMEOUTS
     };
-    let error = start(options, patience).error().await;
+    let error = start(options, timeouts).error().await;
     assert!(error.to_string().contains("nobody.invalid:1"), "{error}");
 }
 
 #[tokio::test]
 async fn a_slave_that_accepts_and_says_nothing_is_given_up() {
     let fake = Fake::new();
-    let patience = Patience {
+    let timeouts = Timeouts {
         welcome: Duration::from_millis(200),
-        ..PATIENCE
+        ..TIMEOUTS
     };
-    let mut master = start(scripted(&fake), patience);
-    let _silent = Session::knocked(&fake).await;
+    let mut master = start(scripted(&fake), timeouts);
+    let _silent = Session::connected(&fake).await;
     let error = master.error().await;
     assert!(
         matches!(error, MasterHostError::NoWelcome { .. }),
@@ -250,8 +252,8 @@ async fn a_slave_that_accepts_and_says_nothing_is_given_up() {
 #[tokio::test]
 async fn a_welcome_for_another_device_is_refused() {
     let fake = Fake::new();
-    let mut master = start(scripted(&fake), PATIENCE);
-    let mut slave = Session::knocked(&fake).await;
+    let mut master = start(scripted(&fake), TIMEOUTS);
+    let mut slave = Session::connected(&fake).await;
     slave.welcome(Coupling::for_stiffness(2000.0)).await;
     let error = master.error().await;
     assert!(matches!(error, MasterHostError::Welcome { .. }), "{error}");
@@ -260,7 +262,7 @@ async fn a_welcome_for_another_device_is_refused() {
 #[tokio::test]
 async fn a_stop_before_the_session_ends_the_attempt() {
     let fake = Fake::new();
-    let mut master = start(scripted(&fake), PATIENCE);
+    let mut master = start(scripted(&fake), TIMEOUTS);
     master.stop.send_replace(true);
     let error = master.error().await;
     assert!(matches!(error, MasterHostError::Interrupted), "{error}");
@@ -271,7 +273,7 @@ async fn a_stop_in_the_session_releases_the_hand_and_says_farewell() {
     let fake = Fake::new();
     let mut options = scripted(&fake);
     options.duration = None;
-    let mut master = start(options, PATIENCE);
+    let mut master = start(options, TIMEOUTS);
     let mut slave = Session::welcomed(&fake).await;
     slave.serve_for(Duration::from_millis(100)).await;
     master.stop.send_replace(true);
@@ -291,7 +293,7 @@ async fn who_asks_for_scenes_sees_the_last_that_came_and_how_old_it_is() {
     let mut options = scripted(&fake);
     options.duration = None;
     options.scene_hz = 20;
-    let mut master = start(options, PATIENCE);
+    let mut master = start(options, TIMEOUTS);
     let mut slave = Session::welcomed(&fake).await;
     assert_eq!(slave.hello.scene_hz, 20);
     assert_eq!(master.live.borrow_and_update().scene, None);
@@ -319,7 +321,7 @@ async fn a_slave_that_ends_first_gets_the_masters_farewell() {
     let fake = Fake::new();
     let mut options = scripted(&fake);
     options.duration = None;
-    let mut master = start(options, PATIENCE);
+    let mut master = start(options, TIMEOUTS);
     let mut slave = Session::welcomed(&fake).await;
     slave.serve_for(Duration::from_millis(100)).await;
     slave.say_farewell(Ending::Interrupted, totals()).await;
@@ -337,11 +339,11 @@ async fn a_silent_slave_releases_the_hand_and_what_it_counted_stays_unknown() {
     let fake = Fake::new();
     let mut options = scripted(&fake);
     options.duration = None;
-    let patience = Patience {
+    let timeouts = Timeouts {
         farewell: Duration::from_millis(100),
-        ..PATIENCE
+        ..TIMEOUTS
     };
-    let mut master = start(options, patience);
+    let mut master = start(options, timeouts);
     let mut slave = Session::welcomed(&fake).await;
     slave.serve_for(Duration::from_millis(100)).await;
     let silent_since = Instant::now();
@@ -364,7 +366,7 @@ async fn a_lost_connection_ends_the_session_with_a_report() {
     let fake = Fake::new();
     let mut options = scripted(&fake);
     options.duration = None;
-    let mut master = start(options, PATIENCE);
+    let mut master = start(options, TIMEOUTS);
     let mut slave = Session::welcomed(&fake).await;
     slave.serve_for(Duration::from_millis(50)).await;
     slave.connection.close(9u32.into(), b"gone");
@@ -381,7 +383,7 @@ async fn a_second_welcome_breaks_the_protocol_and_ends_the_session() {
     let fake = Fake::new();
     let mut options = scripted(&fake);
     options.duration = None;
-    let mut master = start(options, PATIENCE);
+    let mut master = start(options, TIMEOUTS);
     let mut slave = Session::welcomed(&fake).await;
     slave.welcome(slave.hello.coupling).await;
     slave.serve().await;
@@ -401,7 +403,7 @@ async fn a_trace_ends_the_session_when_it_is_over() {
         trace: path,
         name: "a path".to_owned(),
     };
-    let mut master = start(options, PATIENCE);
+    let mut master = start(options, TIMEOUTS);
     let mut slave = Session::welcomed(&fake).await;
     assert!((slave.hello.hip - Vec2::new(-0.3, 0.1)).norm() < 1e-9);
     slave.serve().await;
@@ -420,7 +422,7 @@ async fn the_emulated_link_loses_what_it_is_told_to_and_says_so() {
     let mut options = scripted(&fake);
     options.commands.samples_per_command = 1;
     options.netem = "loss 20%".parse().unwrap();
-    let mut master = start(options, PATIENCE);
+    let mut master = start(options, TIMEOUTS);
     let mut slave = Session::welcomed(&fake).await;
     slave.serve().await;
     slave.say_farewell(Ending::Finished, totals()).await;
@@ -435,12 +437,24 @@ async fn a_panic_in_the_haptic_thread_is_an_error_and_closes_the_connection() {
     let fake = Fake::new();
     let options = scripted(&fake);
     let (opened, slave) = tokio::join!(
-        open(&options, Vec2::new(-0.45, 0.0), &PATIENCE),
+        open(&options, Vec2::new(-0.45, 0.0), &TIMEOUTS),
         Session::welcomed(&fake)
     );
-    let thread = std::thread::spawn(|| panic!("meant to happen in this test"));
-    let error = join(thread, &opened.unwrap().line, &PATIENCE).await;
-    assert!(matches!(error, Err(MasterHostError::Panicked)));
+    let (_stop, stop) = watch::channel(false);
+    let (live, _shown) = watch::channel(MasterLive::default());
+    let clock = Clock::start();
+    let opened = opened.unwrap();
+    let ended = operate(
+        &options,
+        opened,
+        clock,
+        |_, _| panic!("meant to happen in this test"),
+        stop,
+        live,
+        &TIMEOUTS,
+    )
+    .await;
+    assert!(matches!(ended, Err(MasterHostError::Panicked)));
     timeout(FOR_EVER, slave.connection.closed()).await.unwrap();
 }
 

@@ -6,7 +6,7 @@
 use std::time::Duration;
 
 use mmt_netem::config::LinkConfig;
-use mmt_server::link::Repeats;
+use mmt_server::repeats::Repeats;
 use mmt_shared::channel::rate_control::StretchMax;
 use mmt_shared::metrics::Staleness;
 

@@ -2,11 +2,11 @@
 //!
 //! Numbers only: it builds nothing and runs nothing.
 
+use mmt_client::commands::CommandConfig;
 use mmt_client::device::DeviceError;
-use mmt_client::link::CommandConfig;
 use mmt_client::operator::scripted::ScriptedConfig;
 use mmt_netem::config::{ConfigError, LinkConfig};
-use mmt_server::link::SlaveLinkConfig;
+use mmt_server::end::SlaveEndConfig;
 use mmt_server::slave::{SlaveConfig, SlaveError};
 use mmt_shared::channel::rate_control::StretchMax;
 use mmt_shared::model::settings::ModelSettings;
@@ -97,8 +97,8 @@ impl WorldConfig {
     }
 
     /// How the slave sends.
-    pub(super) fn slave_link(&self) -> SlaveLinkConfig {
-        SlaveLinkConfig {
+    pub(super) fn slave_end(&self) -> SlaveEndConfig {
+        SlaveEndConfig {
             repeats: self.slave.repeats_ms,
             stretch_max: self.slave.stretch_max,
             samples_per_command: self.commands().samples_per_command,

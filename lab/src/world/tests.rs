@@ -191,8 +191,8 @@ fn one_configuration_is_one_run_to_the_bit_and_another_seed_is_another() {
 #[test]
 fn every_datagram_that_an_end_sent_was_received_or_lost_or_is_in_flight() {
     let world = run(&over("delay 50ms 5ms loss 5%", 3), 10);
-    let up = (&world.up, world.master_link.end(), world.slave_link.end());
-    let down = (&world.down, world.slave_link.end(), world.master_link.end());
+    let up = (&world.up, world.master.channel(), world.slave.channel());
+    let down = (&world.down, world.slave.channel(), world.master.channel());
     for (path, from, to) in [up, down] {
         let (sent, received) = (from.traffic(), to.traffic());
         let counters = path.counters();
@@ -245,3 +245,35 @@ fn loss_on_the_way_up_changes_no_draw_on_the_way_down() {
 mod delay;
 mod hard;
 mod sight;
+
+#[test]
+fn what_the_master_refuses_the_slaves_confirmed_shadow_never_takes_and_both_sides_count() {
+    let config = over(WAN, 1);
+    let mut world = World::try_new(&config).unwrap();
+    // a device so stiff in damping that no estimate of the box is stable for it
+    let coupling = Coupling {
+        stiffness_n_per_m: 1000.0,
+        damping_ns_per_m: 150.0,
+    };
+    let welcome = Welcome {
+        settings: config.slave.mode.model_settings(coupling),
+        state: *world.slave().state(),
+        scheme: Label::clipped("any"),
+        program: Label::clipped("test"),
+    };
+    let limiter = ForceLimiter::try_new(DeviceProfile::default().limits()).unwrap();
+    let master = Master::new(&welcome, limiter);
+    world.master = MasterEnd::new(Time::ZERO, master, config.commands());
+    world.run(Duration::from_secs(6), |_| {});
+    let sent = world.outcome().updates.total();
+    let drops = world.master.update_drops();
+    assert!(sent > 5, "{sent} updates sent");
+    assert!(drops.rejected > 5, "{drops:?}");
+    assert_eq!((world.master().applied(), drops.duplicate), (0, 0));
+    let shadow = world.slave().shadow();
+    assert_eq!(shadow.newest_confirmed(), 0, "never acknowledged");
+    assert!(shadow.ahead().state() != shadow.confirmed().state());
+    // the slave repeats what is not acknowledged
+    let repeated = world.slave_end().counts().repeated.total();
+    assert!(repeated > 0, "{repeated} repeats");
+}

@@ -1,4 +1,4 @@
-//! The host: an endpoint, the door, and one session after the other.
+//! The host: an endpoint, the acceptor, and one session after the other.
 
 use std::io;
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr, UdpSocket};
@@ -10,6 +10,7 @@ use mmt_netem::link::LinkId;
 use mmt_shared::io::clock::Clock;
 use mmt_shared::io::congestion::RateCap;
 use mmt_shared::io::live::LiveCell;
+use mmt_shared::io::network_task::asked_to_stop;
 use mmt_shared::io::quic::{EndpointError, Traffic};
 use mmt_shared::io::socket::{self, BindError};
 use mmt_shared::io::transport::{CLOSE_FINISHED, Endpoint, Insecure, Listener, Transport};
@@ -19,9 +20,9 @@ use mmt_shared::pairing::{Address, Host, Pairing};
 use tokio::sync::{mpsc, watch};
 use tokio::time::timeout;
 
-use super::door::{Admitted, Door, Refusals};
+use super::acceptor::{Acceptor, Admitted, Refusals};
 use super::session;
-use super::{SlaveConfiguration, SlaveLive, SlaveOptions, SlaveReport};
+use super::{RecordWanted, SlaveConfiguration, SlaveLive, SlaveOptions, SlaveReport};
 use crate::slave::{Slave, SlaveConfig, SlaveError};
 
 /// Updates are the longest datagrams of a slave, 196 bytes at most, and what the tool feels takes 92: at one of each
@@ -92,6 +93,7 @@ pub(super) struct Shared {
     pub(super) refusals: Arc<Refusals>,
     /// Until a session has taken it.
     pub(super) truth: Mutex<Option<TruthSender>>,
+    pub(super) record: Option<RecordWanted>,
 }
 
 impl Shared {
@@ -150,6 +152,7 @@ impl SlaveHost {
             listener: Arc::new(Listener::new(endpoint.clone())),
             refusals: Arc::new(Refusals::default()),
             truth: Mutex::new(options.truth),
+            record: options.record,
         };
         Ok(Self {
             endpoint,
@@ -189,7 +192,7 @@ impl SlaveHost {
         live: Arc<LiveCell<SlaveLive>>,
     ) -> Result<Option<SlaveReport>, SlaveHostError> {
         let (token, refusals) = (self.pairing.token, Arc::clone(&self.shared.refusals));
-        let (door, masters) = Door::new(token, refusals, stop.clone());
+        let (acceptor, masters) = Acceptor::new(token, refusals, stop.clone());
         let listener = Arc::clone(&self.shared.listener);
         let (served, ()) = tokio::join!(
             async {
@@ -197,7 +200,7 @@ impl SlaveHost {
                 self.endpoint.close(CLOSE_FINISHED, b"the slave has ended");
                 served
             },
-            door.keep(listener),
+            acceptor.run(listener),
         );
         live.set(SlaveLive::default());
         // Whoever does not answer is left alone.
@@ -216,7 +219,7 @@ impl SlaveHost {
         loop {
             let admitted = tokio::select! {
                 biased;
-                () = stopped(stop) => return Ok(last),
+                () = asked_to_stop(stop) => return Ok(last),
                 admitted = masters.recv() => admitted,
             };
             let Some(admitted) = admitted else {
@@ -232,12 +235,6 @@ impl SlaveHost {
             }
         }
     }
-}
-
-/// Returns once the host is asked to stop. Cancel-safe.
-pub(super) async fn stopped(stop: &mut watch::Receiver<bool>) {
-    // An error means that nobody can ask any more.
-    let _ = stop.wait_for(|stop| *stop).await;
 }
 
 fn host_of(address: IpAddr) -> Host {

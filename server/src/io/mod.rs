@@ -1,6 +1,6 @@
 //! The slave as a host on the network: QUIC endpoint, one session at a time, the 1 kHz thread.
 //!
-//! Nothing is decided here that `slave` or `link` could decide.
+//! Nothing is decided here that the slave's end could decide.
 
 #![allow(
     clippy::disallowed_methods,
@@ -8,15 +8,16 @@
     reason = "the shell: clocks, threads and sockets are its business"
 )]
 
-mod door;
+mod acceptor;
 mod host;
 mod report;
 mod session;
+mod slave_loop;
 #[cfg(test)]
 mod tests;
-mod worker;
 
 use std::net::SocketAddr;
+use std::sync::{Arc, Mutex};
 
 use mmt_netem::LinkConfig;
 use mmt_netem::io::socket::SocketExtras;
@@ -31,6 +32,16 @@ use serde::Serialize;
 use crate::slave::SlaveConfig;
 
 pub use host::{SlaveHost, SlaveHostError};
+pub use slave_loop::SlaveRecord;
+
+/// How many inputs of the slave's loop are to be kept, and where a session leaves them at its end.
+#[derive(Clone, Debug)]
+pub struct RecordWanted {
+    /// So many of the first inputs.
+    pub inputs: usize,
+    /// Where they are left.
+    pub kept: Arc<Mutex<Option<SlaveRecord>>>,
+}
 
 /// Name and version of this program, as it tells them to the other side.
 const PROGRAM: &str = concat!("mmt ", env!("CARGO_PKG_VERSION"));
@@ -56,6 +67,8 @@ pub struct SlaveOptions {
     pub once: bool,
     /// Takes the object's true pose to a master of this process, for its report; of the first session only.
     pub truth: Option<TruthSender>,
+    /// A record of the loop's inputs, if anybody wants to run them again.
+    pub record: Option<RecordWanted>,
 }
 
 /// A look at a running slave, for a screen.

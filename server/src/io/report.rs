@@ -9,7 +9,8 @@ mod drops;
 use std::time::Duration;
 
 use mmt_netem::io::socket::SocketCounters;
-use mmt_shared::metrics::{ForceSummary, UpdateCounts};
+use mmt_shared::io::network_task::NetworkCounts;
+use mmt_shared::metrics::ForceSummary;
 use mmt_shared::report::{
     ArchitectureReport, Counts, DelayReport, EstimateReport, ForceReport, LinkReport, LoopReport,
     MessagesReport, ModelReport, QuantilesReport, ToolReport, UpDown, UpdatesReport, WireReport,
@@ -23,9 +24,8 @@ use mmt_shared::wire::Ending;
 
 use super::SlaveReport;
 use super::host::Shared;
-use super::session::Lost;
-use super::worker::Finished;
-use crate::link::SlaveLink;
+use super::slave_loop::Finished;
+use crate::end::SlaveEnd;
 use crate::slave::{Slave, SlaveConfig};
 use crate::tool::force::ToolForce;
 
@@ -40,10 +40,9 @@ pub(super) struct Outcome {
     pub(super) duration: Duration,
     /// None if the thread panicked.
     pub(super) finished: Option<Finished>,
-    /// Updates sent, by cause.
-    pub(super) sent: UpdateCounts,
-    pub(super) link: SlaveLink,
-    pub(super) lost: Lost,
+    pub(super) counts: NetworkCounts,
+    /// Datagrams that found no room before the loop.
+    pub(super) arrivals_dropped: u64,
     /// Datagrams that QUIC displaced by newer ones, or still held at the end.
     pub(super) unsent: u64,
     /// Datagrams that QUIC received and nobody read.
@@ -57,10 +56,12 @@ pub(super) struct Outcome {
 impl Outcome {
     /// What the farewell tells.
     pub(super) fn totals(&self) -> SlaveTotals {
-        let slave = self.finished.as_ref().map(|finished| &finished.slave);
+        let end = self.finished.as_ref().map(|finished| &finished.end);
+        let slave = end.map(SlaveEnd::slave);
+        let counts = end.map(|end| *end.counts()).unwrap_or_default();
         let [mass_kg, damping_ns_per_m, friction_n] = slave.map(identified).unwrap_or_default();
         let mut updates_by_cause = SlaveTotals::default().updates_by_cause;
-        for (slot, (_, count)) in updates_by_cause.iter_mut().zip(self.sent.by_cause()) {
+        for (slot, (_, count)) in updates_by_cause.iter_mut().zip(counts.updates.by_cause()) {
             *slot = u32::try_from(count).unwrap_or(u32::MAX);
         }
         let force = slave.map(|slave| force_totals(&slave.force().summary()));
@@ -68,7 +69,7 @@ impl Outcome {
             duration_ns: u64::try_from(self.duration.as_nanos()).unwrap_or(u64::MAX),
             traffic: self.traffic(),
             updates_by_cause,
-            samples_received: self.link.samples_received(),
+            samples_received: counts.samples,
             force: force.unwrap_or_default(),
             mass_kg,
             damping_ns_per_m,
@@ -78,13 +79,14 @@ impl Outcome {
 
     fn traffic(&self) -> Traffic {
         let (before, after) = (&self.before, &self.after);
+        let end = self.finished.as_ref().map(|finished| &finished.end);
         let since = |after: u64, before| after.saturating_sub(before);
         Traffic {
             udp_datagrams_sent: since(after.outgoing.sent.packets, before.outgoing.sent.packets),
             udp_bytes_sent: since(after.outgoing.sent.bytes, before.outgoing.sent.bytes),
             udp_datagrams_received: since(after.received.packets, before.received.packets),
             udp_bytes_received: since(after.received.bytes, before.received.bytes),
-            ..self.link.end().traffic()
+            ..end.map(|end| end.channel().traffic()).unwrap_or_default()
         }
     }
 }
@@ -94,6 +96,7 @@ pub(super) fn report(
     shared: &Shared,
     config: &SlaveConfig,
     outcome: &Outcome,
+    finished: &Finished,
     theirs: Option<&MasterTotals>,
 ) -> SlaveReport {
     let version = env!("CARGO_PKG_VERSION");
@@ -102,31 +105,28 @@ pub(super) fn report(
     report.seed = Some(config.seed);
     report.duration_s = outcome.duration.as_secs_f64().into();
     report.ending = Some(ending_name(outcome.ending).to_owned());
-    report.architecture = ArchitectureReport::named(outcome.link.architecture());
-    report.updates = updates(outcome, theirs);
-    report.messages = messages(outcome, &traffic);
+    report.architecture = ArchitectureReport::named(finished.end.architecture());
+    report.updates = updates(&finished.end, theirs);
+    report.messages = messages(outcome, &finished.end, &traffic);
     report.wire = wire(outcome, &traffic);
-    let slave = outcome.finished.as_ref().map(|finished| &finished.slave);
-    report.link = link(&outcome.link, slave);
+    let slave = finished.end.slave();
+    report.link = link(&finished.end);
     report.emulation.down = shared.meter.lateness().report();
-    report.drops = Some(drops::drops(shared, outcome, &traffic));
+    report.drops = Some(drops::drops(shared, outcome, finished, &traffic));
     if let Some(theirs) = theirs {
         report.haptic_loop = loop_of_master(&theirs.haptic_loop);
     }
-    if let Some(finished) = &outcome.finished {
-        report.force = ForceReport::new(&finished.slave.force().summary(), None);
-        report.model = model(&finished.slave);
-        report.tool = tool(finished.slave.tool_force());
-        report.slave_loop = slave_loop(finished);
-    }
+    report.force = ForceReport::new(&slave.force().summary(), None);
+    report.model = model(slave);
+    report.tool = tool(slave.tool_force());
+    report.slave_loop = slave_loop(finished);
     report
 }
 
-fn updates(outcome: &Outcome, theirs: Option<&MasterTotals>) -> UpdatesReport {
-    let ticks = outcome.finished.as_ref().map(|finished| finished.ticks);
+fn updates(end: &SlaveEnd, theirs: Option<&MasterTotals>) -> UpdatesReport {
     let mut updates = UpdatesReport::default();
-    updates.set_sent(&outcome.sent.plus(&ticks.unwrap_or_default()));
-    updates.set_repeated(outcome.link.repeated());
+    updates.set_sent(&end.counts().updates);
+    updates.set_repeated(&end.counts().repeated);
     if let Some(totals) = theirs {
         updates.applied = Some(totals.updates_applied.into());
         updates.dropped = Some(dropped(&totals.updates_dropped));
@@ -144,9 +144,9 @@ fn dropped(drops: &UpdateDrops) -> Counts {
     ])
 }
 
-fn messages(outcome: &Outcome, traffic: &Traffic) -> UpDown<MessagesReport> {
+fn messages(outcome: &Outcome, end: &SlaveEnd, traffic: &Traffic) -> UpDown<MessagesReport> {
     let duration_s = outcome.duration.as_secs_f64();
-    let repeats = outcome.link.repeated().total();
+    let repeats = end.counts().repeated.total();
     UpDown {
         up: MessagesReport::up(&traffic.received, duration_s),
         down: MessagesReport::down(&traffic.sent, repeats, duration_s),
@@ -167,14 +167,13 @@ fn wire(outcome: &Outcome, traffic: &Traffic) -> UpDown<WireReport> {
     }
 }
 
-fn link(link: &SlaveLink, slave: Option<&Slave>) -> LinkReport {
-    let peer = link.end().peer();
-    let playout = slave.map(|slave| DelayReport::of(slave.playout().delays()));
+fn link(end: &SlaveEnd) -> LinkReport {
+    let peer = end.channel().peer();
     LinkReport {
         rtt_ms: DelayReport::of(peer.round_trip().histogram()),
         loss_up: peer.incoming().share().into(),
         loss_down: peer.outgoing().share().into(),
-        playout_delay_ms: playout.unwrap_or_default(),
+        playout_delay_ms: DelayReport::of(end.slave().playout().delays()),
     }
 }
 

@@ -1,82 +1,65 @@
 //! One session: from the welcome to the farewells, on tokio's side.
 //!
-//! Begins with the slave that the hello asks for, ends with the report; what happens in between is
-//! `traffic`'s. It decides nothing about the model.
+//! Begins with the slave that the hello asks for, ends with the report. It decides nothing about the model.
 
 mod end;
-mod traffic;
 
-use std::io;
+use std::pin::Pin;
+use std::sync::PoisonError;
 use std::time::Duration;
 
-use bytes::Bytes;
 use mmt_netem::io::socket::SocketCounters;
+use mmt_shared::channel::peer::NumbersSpent;
 use mmt_shared::io::clock::Clock;
-use mmt_shared::io::farewell::{FAREWELL_WAIT, answer, receive_farewell, send_farewell};
+use mmt_shared::io::farewell::{
+    FAREWELL_WAIT, FarewellError, ReceivedFarewell, answer, receive_farewell, send_farewell,
+};
 use mmt_shared::io::live::LiveCell;
+use mmt_shared::io::loop_thread::{self, LoopSide};
+use mmt_shared::io::network_task::{Event, NetworkTask, WAITING_MAX};
 use mmt_shared::io::stream::WriteFrameError;
+use mmt_shared::io::ticker::Ticker;
 use mmt_shared::io::transport::{CLOSE_FINISHED, Connection, RecvStream, SendStream};
-use mmt_shared::io::truth::TruthSender;
-use mmt_shared::metrics::UpdateCounts;
 use mmt_shared::model::contact::Coupling;
+use mmt_shared::stats::session::MasterTotals;
 use mmt_shared::wire::{
-    DATAGRAM_MAX, Ending, Hello, Label, Refusal, STREAM_MESSAGE_MAX, Side, StreamMessage, Welcome,
+    Ending, Hello, Label, Refusal, STREAM_MESSAGE_MAX, Side, StreamMessage, Welcome,
 };
 use tokio::sync::watch;
 use tokio::time::{sleep, timeout};
 
-use super::door::{Admitted, refuse};
+use super::acceptor::{Admitted, refuse};
 use super::host::{Shared, SlaveHostError};
 use super::report::{self, Outcome};
-use super::worker::{Finished, Worker};
+use super::slave_loop::{Finished, SlaveLoop, Snapshot};
 use super::{PROGRAM, SlaveLive, SlaveReport};
-use crate::link::{SlaveLink, SlaveLinkConfig};
+use crate::end::{SlaveEnd, session_config};
 use crate::slave::{Slave, SlaveConfig};
 
-use end::End;
+use end::{End, SILENCE_MAX};
+
+/// What the read of the master's farewell gives.
+type MastersFarewell = Result<ReceivedFarewell<MasterTotals>, FarewellError>;
 
 /// How long the stream may take to take a message of ours.
 const WRITE_WAIT: Duration = Duration::from_secs(2);
-/// More datagrams than QUIC's queue holds.
-const WAITING_MAX: usize = 4096;
-/// How long the thread may take to end: a tick, or what a stopped or crowded host makes of it.
-const WORKER_WAIT: Duration = Duration::from_secs(5);
-
-/// What was lost on tokio's side of a session, by name.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Lost {
-    /// The 1 kHz thread did not take its samples.
-    pub(super) samples: u64,
-    /// Updates that break a rule of the wire.
-    pub(super) unsealed: u64,
-    /// Longer than the path takes.
-    pub(super) too_large: u64,
-    /// The peer takes no datagrams, or QUIC sends none.
-    pub(super) unsupported: u64,
-    /// The connection was gone.
-    pub(super) disconnected: u64,
-    /// Not lost, but read from the connection: tells what it dropped unread.
-    pub(super) read: u64,
-    /// Not lost, but given to the connection: tells what it dropped unsent.
-    pub(super) given: u64,
-}
+/// How long the loop may take to end: a tick, or what a stopped or crowded host makes of it.
+const LOOP_WAIT: Duration = Duration::from_secs(5);
+/// The loop's thread.
+const THREAD: &str = "mmt-slave";
 
 /// A session that has begun.
-pub(super) struct Session<'a> {
+struct Session<'a> {
     shared: &'a Shared,
     config: SlaveConfig,
     connection: Connection,
     send: SendStream,
-    worker: Worker,
-    link: SlaveLink,
-    sent: UpdateCounts,
-    lost: Lost,
+    task: NetworkTask<Snapshot, Finished>,
     socket_before: SocketCounters,
-    buffer: [u8; DATAGRAM_MAX],
 }
 
 /// Serves an admitted master. No report if no session came about. `socket_before` is what the socket had
-/// counted when nobody had knocked for this session yet: the handshake is part of what a session costs.
+/// counted when nobody had connected for this session yet: the handshake is part of what a session costs.
 pub(super) async fn serve(
     shared: &Shared,
     admitted: Admitted,
@@ -84,17 +67,18 @@ pub(super) async fn serve(
     stop: &mut watch::Receiver<bool>,
     live: &LiveCell<SlaveLive>,
 ) -> Result<Option<SlaveReport>, SlaveHostError> {
-    serve_with(shared, admitted, socket_before, stop, live, Worker::start).await
+    let body = |slave_loop: SlaveLoop, side, ticker, clock| slave_loop.run(side, ticker, clock);
+    serve_with(shared, admitted, socket_before, stop, live, body).await
 }
 
-/// Serves with a thread of the caller's making.
+/// Serves with a loop of the caller's making.
 pub(super) async fn serve_with(
     shared: &Shared,
     admitted: Admitted,
     socket_before: SocketCounters,
     stop: &mut watch::Receiver<bool>,
     live: &LiveCell<SlaveLive>,
-    start: impl FnOnce(Clock, Slave, Option<TruthSender>) -> io::Result<Worker>,
+    body: impl FnOnce(SlaveLoop, LoopSide<Snapshot>, Ticker, Clock) -> Finished + Send + 'static,
 ) -> Result<Option<SlaveReport>, SlaveHostError> {
     let Admitted {
         connection,
@@ -103,25 +87,18 @@ pub(super) async fn serve_with(
         hello,
         lease: _lease,
     } = admitted;
-    let config = SlaveConfig {
-        playout: shared
-            .config
-            .playout
-            .for_session(hello.samples_per_command, hello.architecture),
-        ..shared.config.clone()
-    };
-    let mut slave = match Slave::try_new(&config, hello.coupling) {
-        Ok(slave) => slave,
+    let clock = shared.clock;
+    let end = match SlaveEnd::of_session(clock.now(), &shared.config, &hello) {
+        Ok(end) => end,
         Err(error) => {
             tracing::warn!("no slave for a device of {:?}: {error}", hello.coupling);
             refuse(&connection, send, Refusal::BadHello).await;
             return Ok(None);
         }
     };
-    slave.start_at(hello.hip);
     // Datagrams from before the welcome belong to no session.
-    drain(&connection, |_| ()).await;
-    if let Err(error) = welcome(&mut send, &config, &slave).await {
+    discard(&connection).await;
+    if let Err(error) = welcome(&mut send, &shared.config, end.slave()).await {
         tracing::warn!(
             "{} left before its welcome: {error}",
             connection.remote_address()
@@ -129,33 +106,31 @@ pub(super) async fn serve_with(
         return Ok(None);
     }
     announce(&connection, &hello);
-    let worker = start(shared.clock, slave, shared.take_truth())?;
-    let link = SlaveLinkConfig {
-        repeats: config.repeats_ms,
-        stretch_max: config.stretch_max,
-        samples_per_command: hello.samples_per_command,
-        architecture: hello.architecture,
-        scene_hz: hello.scene_hz,
-    };
-    let link = SlaveLink::new(shared.clock.now(), link);
-    let session = Session::new(
+    let mut slave_loop = SlaveLoop::new(end, shared.take_truth());
+    if let Some(wanted) = &shared.record {
+        slave_loop = slave_loop.recorded(wanted.inputs, hello);
+    }
+    let body = move |side, ticker| body(slave_loop, side, ticker, clock);
+    let handle = loop_thread::spawn(THREAD, clock, &Snapshot::default(), body)?;
+    let session = Session {
         shared,
-        config,
+        config: session_config(&shared.config, &hello),
+        task: NetworkTask::new(clock, connection.clone(), handle),
         connection,
         send,
-        worker,
-        link,
         socket_before,
-    );
+    };
     session.operate(receive, stop, live).await.map(Some)
 }
 
 /// Takes the datagrams that have arrived and were not read, without waiting for more.
-async fn drain(connection: &Connection, mut take: impl FnMut(&Bytes)) {
+async fn discard(connection: &Connection) {
     for _ in 0..WAITING_MAX {
-        match timeout(Duration::ZERO, connection.read_datagram()).await {
-            Ok(Ok(datagram)) => take(&datagram),
-            _ => break,
+        if !matches!(
+            timeout(Duration::ZERO, connection.read_datagram()).await,
+            Ok(Ok(_))
+        ) {
+            break;
         }
     }
 }
@@ -191,51 +166,31 @@ fn announce(connection: &Connection, hello: &Hello) {
     );
 }
 
-impl<'a> Session<'a> {
-    pub(super) fn new(
-        shared: &'a Shared,
-        config: SlaveConfig,
-        connection: Connection,
-        send: SendStream,
-        worker: Worker,
-        link: SlaveLink,
-        socket_before: SocketCounters,
-    ) -> Self {
-        Self {
-            link,
-            shared,
-            config,
-            connection,
-            send,
-            worker,
-            sent: UpdateCounts::default(),
-            lost: Lost::default(),
-            socket_before,
-            buffer: [0; DATAGRAM_MAX],
-        }
-    }
-
-    /// Goes on until somebody ends it; then says farewell and reports.
-    pub(super) async fn operate(
+impl Session<'_> {
+    /// Goes on until somebody ends it; then sends the farewell and reports.
+    async fn operate(
         mut self,
         mut receive: RecvStream,
         stop: &mut watch::Receiver<bool>,
         live: &LiveCell<SlaveLive>,
     ) -> Result<SlaveReport, SlaveHostError> {
+        let began = self.shared.clock.now();
         let farewell = receive_farewell(&mut receive, Side::Master);
         tokio::pin!(farewell);
         let end = self.until_end(farewell.as_mut(), stop, live).await;
         tracing::info!("{}: {end}", self.connection.remote_address());
-        // What came before the end counts.
-        drain(&self.connection.clone(), |datagram| self.take(datagram)).await;
-        let finished = self.end_worker(&end).await;
+        let finished = match end {
+            End::Panicked => None,
+            _ => self.task.stop_loop(LOOP_WAIT).await,
+        };
         let ending = match &end {
             _ if finished.is_none() => Ending::Failed,
             End::Asked => Ending::Interrupted,
             End::Farewell(theirs) => theirs.ending,
             _ => Ending::Failed,
         };
-        let outcome = self.outcome(ending, finished);
+        let duration = self.shared.clock.now().saturating_since(began);
+        let mut outcome = self.outcome(ending, duration, finished);
         let totals = outcome.totals();
         let sent = send_farewell(&mut self.send, ending, &totals, FAREWELL_WAIT).await;
         let theirs = async {
@@ -251,39 +206,78 @@ impl<'a> Session<'a> {
         let theirs = answer(theirs, self.connection.closed(), sleep(FAREWELL_WAIT)).await;
         self.connection
             .close(CLOSE_FINISHED, b"the session is over");
-        match outcome.finished {
-            Some(_) => Ok(report::report(
+        if let (Some(wanted), Some(finished)) = (&self.shared.record, &mut outcome.finished) {
+            *wanted.kept.lock().unwrap_or_else(PoisonError::into_inner) = finished.record.take();
+        }
+        match &outcome.finished {
+            Some(finished) => Ok(report::report(
                 self.shared,
                 &self.config,
                 &outcome,
+                finished,
                 theirs.and_then(|theirs| theirs.report).as_ref(),
             )),
             None => Err(SlaveHostError::Panicked),
         }
     }
 
-    /// Ends the thread and takes what it hands back; none if it panicked.
-    async fn end_worker(&mut self, end: &End) -> Option<Finished> {
-        self.worker.stop();
-        if matches!(end, End::Panicked) {
-            return None;
+    /// Moves datagrams until something ends the session.
+    async fn until_end<F>(
+        &mut self,
+        mut farewell: Pin<&mut F>,
+        stop: &mut watch::Receiver<bool>,
+        live: &LiveCell<SlaveLive>,
+    ) -> End
+    where
+        F: Future<Output = MastersFarewell>,
+    {
+        loop {
+            match self.task.next(farewell.as_mut(), stop).await {
+                Event::Farewell(Ok(farewell)) => return End::Farewell(Box::new(farewell)),
+                Event::Farewell(Err(error)) => return End::Stream(error),
+                Event::Stopped => return End::Asked,
+                Event::LoopEnded(_) => return End::Panicked,
+                Event::Disconnected(error) => return End::Disconnected(error),
+                Event::Beat => {
+                    if let Some(end) = self.beat(live) {
+                        return end;
+                    }
+                }
+            }
         }
-        let finished = timeout(WORKER_WAIT, &mut self.worker.finished).await;
-        finished.ok().and_then(Result::ok)
     }
 
-    fn outcome(&self, ending: Ending, finished: Option<Finished>) -> Outcome {
+    /// Shows the newest snapshot; whether it ends the session.
+    fn beat(&mut self, live: &LiveCell<SlaveLive>) -> Option<End> {
         let now = self.shared.clock.now();
+        let snapshot = *self.task.handle().snapshot();
+        live.set(snapshot.live);
+        let silent = |heard| now.saturating_since(heard) > SILENCE_MAX;
+        if snapshot.numbers_spent {
+            Some(End::Numbers(NumbersSpent))
+        } else if snapshot.last_heard.is_some_and(silent) {
+            Some(End::Silence)
+        } else {
+            None
+        }
+    }
+
+    fn outcome(
+        &mut self,
+        ending: Ending,
+        duration: Duration,
+        finished: Option<Finished>,
+    ) -> Outcome {
         let passed = self.connection.datagrams();
+        let counts = *self.task.counts();
         Outcome {
             ending,
-            duration: now.saturating_since(self.link.end().began()),
+            duration,
             finished,
-            sent: self.sent,
-            link: self.link.clone(),
-            lost: self.lost,
-            unsent: self.lost.given.saturating_sub(passed.sent),
-            unread: passed.received.saturating_sub(self.lost.read),
+            unsent: counts.given.saturating_sub(passed.sent),
+            unread: passed.received.saturating_sub(counts.read),
+            counts,
+            arrivals_dropped: self.task.handle().arrivals_dropped(),
             before: self.socket_before,
             after: self.shared.meter.snapshot(),
             over_ipv4: self

@@ -16,8 +16,7 @@ use tokio::sync::watch;
 use tokio::task::JoinHandle;
 use tokio::time::sleep;
 
-use super::door::Door;
-use super::worker::Worker;
+use super::acceptor::Acceptor;
 use super::*;
 use master::{Master, patiently};
 
@@ -41,6 +40,7 @@ fn options() -> SlaveOptions {
         netem_extras: SocketExtras::default(),
         once: false,
         truth: None,
+        record: None,
     }
 }
 
@@ -301,12 +301,12 @@ async fn a_panic_of_the_thread_ends_the_session_as_failed_and_is_an_error() {
     let host = SlaveHost::bind(options()).unwrap();
     let (stop, mut stopped) = watch::channel(false);
     let shared = &host.shared;
-    let (door, mut masters) = Door::new(
+    let (acceptor, mut masters) = Acceptor::new(
         host.pairing(None).token,
         Arc::clone(&shared.refusals),
         stop.subscribe(),
     );
-    let keeper = tokio::spawn(door.keep(Arc::clone(&shared.listener)));
+    let keeper = tokio::spawn(acceptor.run(Arc::clone(&shared.listener)));
     let pairing = host.pairing(None);
     let master = tokio::spawn(async move {
         let (mut master, _) = Master::operate(&pairing).await;
@@ -315,7 +315,6 @@ async fn a_panic_of_the_thread_ends_the_session_as_failed_and_is_an_error() {
         ending
     });
     let admitted = patiently(masters.recv()).await.unwrap();
-    let start = |_, _, _| Worker::start_with(|_| panic!("on purpose"));
     let live = LiveCell::default();
     let served = session::serve_with(
         shared,
@@ -323,7 +322,7 @@ async fn a_panic_of_the_thread_ends_the_session_as_failed_and_is_an_error() {
         shared.meter.snapshot(),
         &mut stopped,
         &live,
-        start,
+        |_, _, _, _| panic!("on purpose"),
     );
     let served = patiently(served).await;
     assert!(matches!(served, Err(SlaveHostError::Panicked)));

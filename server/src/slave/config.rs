@@ -8,8 +8,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::environment::{EnvironmentConfig, EnvironmentError};
 use crate::estimator::EstimatorConfig;
-use crate::link::Repeats;
 use crate::playout::PlayoutConfig;
+use crate::repeats::Repeats;
 use crate::sensing::{SensingConfig, SensingError};
 use crate::shadow::TriggerReference;
 use crate::tool::force::TOOL_FORCE_MAX_N;

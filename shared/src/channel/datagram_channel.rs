@@ -1,4 +1,4 @@
-//! One end of the session's datagram link, the same on both sides: seal what goes out, open what comes in.
+//! One end of the session's datagrams, the same on both sides: numbers, echoes, loss, round trip, rate control, counts.
 //!
 //! Pure: bytes and the time are arguments, so that the lab's link and QUIC's datagrams pass through the
 //! same code. Everything is counted where it happens.
@@ -17,16 +17,16 @@ pub const HEARTBEAT: Duration = Duration::from_millis(50);
 
 /// What a datagram brought.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Opened {
+pub struct Received {
     /// What it is about.
     pub message: Message,
     /// Whether no later datagram had arrived before it.
     pub is_newest: bool,
 }
 
-/// Why nothing could be sealed.
+/// Why nothing could be sent.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-pub enum SealError {
+pub enum SendError {
     /// The session has used up its datagram numbers.
     #[error(transparent)]
     Numbers(#[from] NumbersSpent),
@@ -35,9 +35,9 @@ pub enum SealError {
     Encode(#[from] EncodeError),
 }
 
-/// One end of the link.
+/// One end of the channel.
 #[derive(Clone, Debug)]
-pub struct LinkEnd {
+pub struct DatagramChannel {
     side: Side,
     peer: Peer,
     sent: KindCounts,
@@ -48,7 +48,7 @@ pub struct LinkEnd {
     rate: RateController,
 }
 
-impl LinkEnd {
+impl DatagramChannel {
     /// The end of `side`, from `now` on, that never says less because of congestion.
     #[must_use]
     pub fn new(side: Side, now: Time) -> Self {
@@ -72,7 +72,7 @@ impl LinkEnd {
 
     /// Reads a datagram that arrived at `now`. None, and counted, if it does not decode, was seen before
     /// or is too old to tell.
-    pub fn open(&mut self, now: Time, bytes: &[u8]) -> Option<Opened> {
+    pub fn handle(&mut self, now: Time, bytes: &[u8]) -> Option<Received> {
         let Ok(Datagram { envelope, message }) = Datagram::decode(bytes, self.side.other()) else {
             self.malformed = self.malformed.saturating_add(1);
             return None;
@@ -87,7 +87,7 @@ impl LinkEnd {
             self.control_rate(now);
         }
         self.received.count(message.kind());
-        Some(Opened { message, is_newest })
+        Some(Received { message, is_newest })
     }
 
     fn control_rate(&mut self, now: Time) {
@@ -107,12 +107,12 @@ impl LinkEnd {
     ///
     /// # Errors
     /// When no number is left or the message breaks a rule of the wire.
-    pub fn seal(
+    pub fn encode(
         &mut self,
         now: Time,
         message: Message,
         out: &mut [u8],
-    ) -> Result<usize, SealError> {
+    ) -> Result<usize, SendError> {
         let envelope = self.peer.stamp(now)?;
         let length = Datagram { envelope, message }.encode(out)?;
         self.sent.count(message.kind());
@@ -170,35 +170,35 @@ mod tests {
     use crate::wire::DATAGRAM_MAX;
 
     #[test]
-    fn what_one_end_seals_the_other_opens_once_and_counts() {
+    fn what_one_end_sends_the_other_receives_once_and_counts() {
         let (mut up, mut down) = (
-            LinkEnd::new(Side::Master, Time::ZERO),
-            LinkEnd::new(Side::Slave, Time::ZERO),
+            DatagramChannel::new(Side::Master, Time::ZERO),
+            DatagramChannel::new(Side::Slave, Time::ZERO),
         );
         let mut buffer = [0; DATAGRAM_MAX];
         let now = Time::from_millis(5);
-        let length = up.seal(now, Message::Heartbeat, &mut buffer).unwrap();
-        let opened = down.open(now, &buffer[..length]).unwrap();
+        let length = up.encode(now, Message::Heartbeat, &mut buffer).unwrap();
+        let opened = down.handle(now, &buffer[..length]).unwrap();
         assert_eq!(
             (opened.message, opened.is_newest),
             (Message::Heartbeat, true)
         );
-        assert_eq!(down.open(now, &buffer[..length]), None, "a duplicate");
-        assert_eq!(down.open(now, &buffer[..length - 1]), None, "cut short");
+        assert_eq!(down.handle(now, &buffer[..length]), None, "a duplicate");
+        assert_eq!(down.handle(now, &buffer[..length - 1]), None, "cut short");
         let traffic = down.traffic();
         assert_eq!(traffic.received.heartbeats, 1);
         assert_eq!((traffic.duplicates, traffic.malformed), (1, 1));
         assert_eq!(up.traffic().sent.heartbeats, 1);
         // the master's own messages do not open at the master
-        assert_eq!(up.open(now, &buffer[..length - 1]), None);
+        assert_eq!(up.handle(now, &buffer[..length - 1]), None);
     }
 
     #[test]
     fn a_heartbeat_is_due_fifty_milliseconds_after_anything_was_sent() {
-        let mut end = LinkEnd::new(Side::Slave, Time::from_millis(100));
+        let mut end = DatagramChannel::new(Side::Slave, Time::from_millis(100));
         assert_eq!(end.heartbeat_due(), Time::from_millis(150));
         let mut buffer = [0; DATAGRAM_MAX];
-        end.seal(Time::from_millis(120), Message::Heartbeat, &mut buffer)
+        end.encode(Time::from_millis(120), Message::Heartbeat, &mut buffer)
             .unwrap();
         assert_eq!(end.heartbeat_due(), Time::from_millis(170));
         assert_eq!(

@@ -2,7 +2,7 @@
 
 use std::net::SocketAddr;
 
-use mmt_shared::channel::datagram_channel::LinkEnd;
+use mmt_shared::channel::datagram_channel::DatagramChannel;
 use mmt_shared::io::clock::Clock;
 use mmt_shared::io::congestion::RateCap;
 use mmt_shared::io::farewell::ReceivedFarewell;
@@ -67,7 +67,7 @@ pub(super) struct Session {
     pub(super) stamps: Vec<u64>,
     send: SendStream,
     receive: Option<RecvStream>,
-    link: LinkEnd,
+    link: DatagramChannel,
     clock: Clock,
     sequence: u32,
 }
@@ -89,7 +89,7 @@ pub(super) fn welcome_for(coupling: Coupling) -> Welcome {
 
 impl Session {
     /// A master that has said hello.
-    pub(super) async fn knocked(fake: &Fake) -> Self {
+    pub(super) async fn connected(fake: &Fake) -> Self {
         let handshake = timeout(FOR_EVER, fake.listener.next()).await.unwrap();
         let connection = handshake.unwrap().finish().await.unwrap();
         let (send, mut receive) = connection.accept_bi().await.unwrap();
@@ -108,7 +108,7 @@ impl Session {
             stamps: Vec::new(),
             send,
             receive: Some(receive),
-            link: LinkEnd::new(Side::Slave, clock.now()),
+            link: DatagramChannel::new(Side::Slave, clock.now()),
             clock,
             sequence: 0,
         }
@@ -116,7 +116,7 @@ impl Session {
 
     /// A master that has been welcomed.
     pub(super) async fn welcomed(fake: &Fake) -> Self {
-        let mut session = Self::knocked(fake).await;
+        let mut session = Self::connected(fake).await;
         session.welcome(session.hello.coupling).await;
         session
     }
@@ -183,7 +183,7 @@ impl Session {
         while let Ok(Ok(bytes)) =
             tokio::time::timeout_at(end, self.connection.read_datagram()).await
         {
-            let opened = self.link.open(self.clock.now(), &bytes);
+            let opened = self.link.handle(self.clock.now(), &bytes);
             if let Some(Message::Command(command)) = opened.map(|opened| opened.message) {
                 let stamps = command.samples.as_slice().iter();
                 self.stamps
@@ -209,7 +209,7 @@ impl Session {
     /// Sends a message on its own datagram.
     pub(super) fn tell(&mut self, message: Message) {
         let mut out = [0; DATAGRAM_MAX];
-        let length = self.link.seal(self.clock.now(), message, &mut out);
+        let length = self.link.encode(self.clock.now(), message, &mut out);
         let bytes = out[..length.unwrap()].to_vec();
         // a master that has gone does not matter here
         let _ = self.connection.send_datagram(bytes.into());

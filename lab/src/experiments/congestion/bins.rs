@@ -110,7 +110,7 @@ impl Bin {
 
     fn close(&mut self, now: Time, world: &World, before: &Totals) -> Totals {
         let totals = totals(world);
-        let peer = world.slave_link().end().peer();
+        let peer = world.slave_end().channel().peer();
         let latest = peer.round_trip().latest();
         (self.delta, self.t_update_ms) = scheme_numbers(world.slave().scheme_now());
         self.t_s = now.as_secs_f64();

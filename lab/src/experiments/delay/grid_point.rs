@@ -3,7 +3,7 @@
 //! Only what is run; never what came of it.
 
 use mmt_client::operator::scripted::Picture;
-use mmt_server::link::Repeats;
+use mmt_server::repeats::Repeats;
 use mmt_shared::channel::rate_control::StretchMax;
 use mmt_shared::model::settings::PoseCorrection;
 

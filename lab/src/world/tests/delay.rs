@@ -3,7 +3,7 @@
 
 use super::*;
 use mmt_client::operator::scripted::Picture;
-use mmt_server::link::Repeats;
+use mmt_server::repeats::Repeats;
 use mmt_server::shadow::TriggerReference;
 use mmt_shared::model::local_model::LocalModel;
 use mmt_shared::model::settings::{ModelSettings, PoseCorrection};
@@ -169,15 +169,15 @@ impl Apart {
         let (mut had, mut quiet, mut apart) = (Vec::new(), 0, Self::default());
         for _ in 0..40_000 {
             world.step();
-            had.push(world.outcome.newest_update);
-            let shadow = world.slave.shadow();
+            had.push(world.master.counts().newest_applied);
+            let shadow = world.slave().shadow();
             let flying = !shadow.nothing_in_flight();
             quiet = if flying { 0 } else { quiet + 1 };
             let Some(moment) = shadow.confirmed().history().newest() else {
                 continue;
             };
             let place = moment.stamp.saturating_since(Time::ZERO + TICK).as_millis();
-            let difference = |copy| difference(copy, world.master.model());
+            let difference = |copy| difference(copy, world.master().model());
             if had[place as usize] == shadow.newest_confirmed() {
                 apart.confirmed.push(difference(shadow.confirmed()));
             } else {
@@ -187,7 +187,7 @@ impl Apart {
                 apart.ahead.push(difference(shadow.ahead()));
             }
         }
-        apart.lost = world.slave.shadow().lost();
+        apart.lost = world.slave().shadow().lost();
         apart
     }
 

@@ -14,7 +14,7 @@ struct Turned {
 
 impl Turned {
     fn look(&mut self, world: &World) {
-        self.angles.push(world.slave.environment().pose().angle);
+        self.angles.push(world.slave().environment().pose().angle);
         let newest = self.angles[self.angles.len() - 1];
         let then = self.angles[self.angles.len().saturating_sub(2000)];
         self.most = self.most.max((newest - then).abs());
@@ -77,7 +77,7 @@ fn is_pushing(world: &World) -> bool {
     let Operator::Scripted(scripted) = world.operator() else {
         return false;
     };
-    scripted.phase() == Phase::Push && world.master.model().rendered().in_contact()
+    scripted.phase() == Phase::Push && world.master().model().rendered().in_contact()
 }
 
 #[test]

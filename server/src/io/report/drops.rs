@@ -7,12 +7,17 @@ use mmt_shared::stats::session::Traffic;
 
 use super::{Outcome, named};
 use crate::io::host::Shared;
-use crate::io::worker::Finished;
+use crate::io::slave_loop::Finished;
 
 /// Every drop of the session by name; who was turned away at the door is counted from the host's start on.
-pub(super) fn drops(shared: &Shared, outcome: &Outcome, traffic: &Traffic) -> Counts {
+pub(super) fn drops(
+    shared: &Shared,
+    outcome: &Outcome,
+    finished: &Finished,
+    traffic: &Traffic,
+) -> Counts {
     let read = |counter: &AtomicU64| counter.load(Ordering::Relaxed);
-    let (lost, refusals) = (&outcome.lost, &shared.refusals);
+    let (network, refusals) = (&outcome.counts, &shared.refusals);
     let away = shared.listener.turned_away();
     let mut drops = named([
         ("datagrams_malformed", traffic.malformed.into()),
@@ -22,13 +27,16 @@ pub(super) fn drops(shared: &Shared, outcome: &Outcome, traffic: &Traffic) -> Co
         ("datagrams_displaced", outcome.unsent),
         (
             "echoes_implausible",
-            outcome.link.end().peer().bad_echoes().into(),
+            finished.end.channel().peer().bad_echoes().into(),
         ),
-        ("samples_dropped", lost.samples),
-        ("updates_unsealed", lost.unsealed),
-        ("send_too_large", lost.too_large),
-        ("send_unsupported", lost.unsupported),
-        ("send_disconnected", lost.disconnected),
+        (
+            "datagrams_ring_full",
+            outcome.arrivals_dropped + finished.departures_dropped,
+        ),
+        ("updates_unsealed", finished.end.counts().unsendable),
+        ("send_too_large", network.too_large),
+        ("send_unsupported", network.unsupported),
+        ("send_disconnected", network.disconnected),
         ("masters_busy", read(&refusals.busy)),
         ("masters_wrong_token", read(&refusals.wrong_token)),
         ("masters_bad_hello", read(&refusals.bad_hello)),
@@ -41,17 +49,18 @@ pub(super) fn drops(shared: &Shared, outcome: &Outcome, traffic: &Traffic) -> Co
     ]);
     let (socket, before) = (&outcome.after.outgoing, &outcome.before.outgoing);
     drops.extend(named(socket.drops_since(before)));
-    if let Some(finished) = &outcome.finished {
-        drops.extend(slave_drops(finished));
-    }
+    drops.extend(slave_drops(finished));
     drops
 }
 
 fn slave_drops(finished: &Finished) -> Counts {
-    let slave = &finished.slave;
+    let slave = finished.end.slave();
     let playout = slave.playout().counts();
     named([
-        ("updates_superseded", finished.superseded),
+        (
+            "updates_superseded",
+            finished.end.counts().updates_superseded,
+        ),
         ("samples_late", playout.late),
         ("samples_duplicate", playout.duplicate),
         ("samples_overflow", playout.overflow),

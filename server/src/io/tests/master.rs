@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use bytes::Bytes;
-use mmt_shared::channel::datagram_channel::LinkEnd;
+use mmt_shared::channel::datagram_channel::DatagramChannel;
 use mmt_shared::io::clock::Clock;
 use mmt_shared::io::congestion::RateCap;
 use mmt_shared::io::connect::connect;
@@ -37,7 +37,7 @@ const TRAFFIC: Traffic = Traffic {
 
 pub(super) struct Master {
     pub(super) connection: Connection,
-    pub(super) link: LinkEnd,
+    pub(super) link: DatagramChannel,
     pub(super) updates: Vec<Update<RawState>>,
     pub(super) architecture: Architecture,
     pub(super) scene_hz: u8,
@@ -65,7 +65,7 @@ impl Master {
         let clock = Clock::start();
         Self {
             connection,
-            link: LinkEnd::new(Side::Master, clock.now()),
+            link: DatagramChannel::new(Side::Master, clock.now()),
             updates: Vec::new(),
             architecture: Architecture::Mmt,
             scene_hz: 0,
@@ -150,7 +150,7 @@ impl Master {
     }
 
     fn take(&mut self, datagram: &Bytes) {
-        let opened = self.link.open(self.clock.now(), datagram);
+        let opened = self.link.handle(self.clock.now(), datagram);
         if let Some(Message::Update(update)) = opened.map(|opened| opened.message) {
             self.updates.push(update);
         }
@@ -178,7 +178,7 @@ impl Master {
         };
         let mut out = [0; DATAGRAM_MAX];
         let now = self.clock.now();
-        let length = self.link.seal(now, Message::Command(command), &mut out);
+        let length = self.link.encode(now, Message::Command(command), &mut out);
         let bytes = Bytes::copy_from_slice(&out[..length.unwrap()]);
         self.connection.send_datagram(bytes).unwrap();
     }

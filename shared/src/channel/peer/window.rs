@@ -127,8 +127,11 @@ impl SequenceWindow {
         }
     }
 
-    /// Judges an update's sequence number. Only [`Freshness::Fresh`] may go on.
-    pub fn offer(&mut self, sequence: u32) -> Freshness {
+    /// Judges an update's sequence number. Only [`Freshness::Fresh`] may go on, to be [accepted](Self::accept) or not.
+    pub fn judge(&mut self, sequence: u32) -> Freshness {
+        if sequence > self.window.newest() {
+            return Freshness::Fresh;
+        }
         match self.window.note(sequence) {
             Place::Ahead => Freshness::Fresh,
             Place::Taken => {
@@ -142,7 +145,12 @@ impl SequenceWindow {
         }
     }
 
-    /// The greatest sequence number let through, 0 before the first.
+    /// Takes note of an update that was accepted: nothing up to its number is fresh any more.
+    pub fn accept(&mut self, sequence: u32) {
+        self.window.note(sequence);
+    }
+
+    /// The greatest sequence number accepted, 0 before the first.
     #[must_use]
     pub fn newest(&self) -> u32 {
         self.window.newest()
@@ -166,6 +174,27 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
     use std::collections::BTreeSet;
+
+    impl SequenceWindow {
+        /// Judges, and accepts what is fresh.
+        fn offer(&mut self, sequence: u32) -> Freshness {
+            let freshness = self.judge(sequence);
+            if freshness == Freshness::Fresh {
+                self.accept(sequence);
+            }
+            freshness
+        }
+    }
+
+    #[test]
+    fn what_is_not_accepted_stays_fresh() {
+        let mut window = SequenceWindow::new();
+        window.accept(3);
+        assert_eq!(window.judge(5), Freshness::Fresh);
+        assert_eq!((window.judge(5), window.newest()), (Freshness::Fresh, 3));
+        window.accept(5);
+        assert_eq!(window.judge(5), Freshness::Duplicate);
+    }
 
     #[test]
     fn a_window_forgets_exactly_after_its_length() {

@@ -150,15 +150,15 @@ impl fmt::Display for Repeats {
 
 /// The newest update, as long as it has repeats to come.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Repeating {
-    pub(super) update: Update,
+pub(crate) struct Repeating {
+    pub(crate) update: Update,
     sent: Time,
     done: usize,
 }
 
 impl Repeating {
     /// An update that was sent at `now`; it takes the place of the one before.
-    pub(super) fn new(now: Time, update: Update) -> Self {
+    pub(crate) fn new(now: Time, update: Update) -> Self {
         Self {
             update,
             sent: now,
@@ -167,7 +167,7 @@ impl Repeating {
     }
 
     /// When the next repeat is due; none after the last.
-    pub(super) fn due(&self, repeats: &Repeats) -> Option<Time> {
+    pub(crate) fn due(&self, repeats: &Repeats) -> Option<Time> {
         repeats
             .after()
             .get(self.done)
@@ -175,7 +175,7 @@ impl Repeating {
     }
 
     /// Whether a repeat is due at `now`. One that is asked for late takes the ones before it along.
-    pub(super) fn take_due(&mut self, now: Time, repeats: &Repeats) -> bool {
+    pub(crate) fn take_due(&mut self, now: Time, repeats: &Repeats) -> bool {
         let before = self.done;
         while self.due(repeats).is_some_and(|due| due <= now) {
             self.done += 1;

@@ -1,4 +1,4 @@
-//! The door: who knocks is judged here, beside the session that may be going on.
+//! The acceptor: who connects is judged here, beside the session that may be going on.
 //!
 //! The order is the protocol's: token, ranges, whether another master operates. Who is refused is told why and
 //! counted; nobody waits for anybody else. No session begins here.
@@ -52,7 +52,7 @@ pub(super) struct Refusals {
 
 /// What the judges share.
 #[derive(Clone)]
-pub(super) struct Door {
+pub(super) struct Acceptor {
     token: Token,
     lease: Arc<Semaphore>,
     refusals: Arc<Refusals>,
@@ -62,7 +62,7 @@ pub(super) struct Door {
 
 /// Why somebody who connected was not let in.
 #[derive(Debug, thiserror::Error)]
-enum Unwelcome {
+enum HandshakeError {
     #[error("it opened no stream: {0}")]
     NoStream(#[from] ConnectionError),
     #[error("no hello came within {HELLO_WAIT:?}")]
@@ -75,26 +75,26 @@ enum Unwelcome {
     NoHello,
 }
 
-impl Door {
-    /// A door that hands admitted masters to the receiver, one at a time.
+impl Acceptor {
+    /// An acceptor that hands admitted masters to the receiver, one at a time.
     pub(super) fn new(
         token: Token,
         refusals: Arc<Refusals>,
         stop: watch::Receiver<bool>,
     ) -> (Self, mpsc::Receiver<Admitted>) {
         let (admitted, receiver) = mpsc::channel(1);
-        let door = Self {
+        let acceptor = Self {
             token,
             lease: Arc::new(Semaphore::new(1)),
             refusals,
             stop,
             admitted,
         };
-        (door, receiver)
+        (acceptor, receiver)
     }
 
-    /// Judges everybody who knocks until the endpoint is closed. Dropping it drops who is being judged.
-    pub(super) async fn keep(self, listener: Arc<Listener>) {
+    /// Judges everybody who connects until the endpoint is closed. Dropping it drops who is being judged.
+    pub(super) async fn run(self, listener: Arc<Listener>) {
         let mut judged = JoinSet::new();
         while let Some(handshake) = listener.next().await {
             while judged.try_join_next().is_some() {}
@@ -122,22 +122,22 @@ impl Door {
                     .await;
             }
             Ok(Err(error)) => self.no_hello(address, &connection, &error),
-            Err(_) => self.no_hello(address, &connection, &Unwelcome::Silent),
+            Err(_) => self.no_hello(address, &connection, &HandshakeError::Silent),
         }
     }
 
-    fn no_hello(&self, address: SocketAddr, connection: &Connection, why: &Unwelcome) {
+    fn no_hello(&self, address: SocketAddr, connection: &Connection, why: &HandshakeError) {
         count(&self.refusals.no_hello);
         tracing::warn!("{address} was not let in: {why}");
         let code = match why {
-            Unwelcome::NoStream(_)
-            | Unwelcome::Silent
-            | Unwelcome::Unread(
+            HandshakeError::NoStream(_)
+            | HandshakeError::Silent
+            | HandshakeError::Unread(
                 ReadFrameError::Finished | ReadFrameError::Slow { .. } | ReadFrameError::Stream(_),
             ) => CLOSE_NO_HELLO,
-            Unwelcome::Unread(ReadFrameError::Truncated | ReadFrameError::TooLong { .. })
-            | Unwelcome::Malformed(_)
-            | Unwelcome::NoHello => CLOSE_NOT_A_HELLO,
+            HandshakeError::Unread(ReadFrameError::Truncated | ReadFrameError::TooLong { .. })
+            | HandshakeError::Malformed(_)
+            | HandshakeError::NoHello => CLOSE_NOT_A_HELLO,
         };
         connection.close(code, why.to_string().as_bytes());
     }
@@ -209,12 +209,14 @@ pub(super) async fn refuse(connection: &Connection, mut send: SendStream, refusa
     connection.close(CLOSE_FINISHED, b"refused");
 }
 
-async fn hello_of(connection: &Connection) -> Result<(SendStream, RecvStream, Hello), Unwelcome> {
+async fn hello_of(
+    connection: &Connection,
+) -> Result<(SendStream, RecvStream, Hello), HandshakeError> {
     let (send, mut receive) = connection.accept_bi().await?;
     let frame = receive.read_frame(STREAM_MESSAGE_MAX, HELLO_WAIT).await?;
     match StreamMessage::decode(&frame, Side::Master)? {
         StreamMessage::Hello(hello) => Ok((send, receive, hello)),
-        _ => Err(Unwelcome::NoHello),
+        _ => Err(HandshakeError::NoHello),
     }
 }
 

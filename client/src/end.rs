@@ -1,0 +1,231 @@
+//! The master's end of a session: datagrams and device readings in, forces and datagrams out.
+//!
+//! Pure: it reads no clock and touches no socket, so that a live session and an experiment run the same code, and a
+//! record of its inputs runs again to the same bits. An update is accepted before it is acknowledged.
+
+use mmt_shared::channel::datagram_channel::{DatagramChannel, SendError};
+use mmt_shared::channel::peer::{Freshness, NumbersSpent, SequenceWindow};
+use mmt_shared::metrics::{AgeOfInformation, ContactBreaks, ForcePeak};
+use mmt_shared::model::geometry::Vec2;
+use mmt_shared::model::tool::{HandPort, Scene};
+use mmt_shared::model::update::Update;
+use mmt_shared::stats::session::UpdateDrops;
+use mmt_shared::time::Time;
+use mmt_shared::wire::{Command, Message, RawState, Side};
+
+use crate::commands::{CommandConfig, CommandPacker};
+use crate::master::{Master, MasterTick};
+use crate::operator::scripted::View;
+
+/// What the master's end counts.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct MasterCounts {
+    /// Age of the update that the model rests on.
+    pub age: AgeOfInformation,
+    /// Breaks of contact.
+    pub breaks: ContactBreaks,
+    /// Force on the hand.
+    pub on_hand: ForcePeak,
+    /// Number of the newest update that reached the model, 0 before the first.
+    pub newest_applied: u32,
+    /// Updates whose numbers were not accepted.
+    pub updates_rejected: u64,
+    /// Updates that a newer one overtook before a tick could apply them.
+    pub updates_superseded: u64,
+    /// Messages that break a rule of the wire and were not sent.
+    pub unsendable: u64,
+}
+
+/// The master's end.
+#[derive(Clone, Debug)]
+pub struct MasterEnd {
+    master: Master,
+    channel: DatagramChannel,
+    window: SequenceWindow,
+    commands: CommandPacker,
+    /// Goes with the next command.
+    port: Option<HandPort>,
+    /// Accepted, for the next tick.
+    update: Option<Update>,
+    /// Stamp of the HIP sample that the newest applied update answers.
+    answers: Option<Time>,
+    scene: Option<Scene>,
+    counts: MasterCounts,
+}
+
+impl MasterEnd {
+    /// An end from `now` on.
+    #[must_use]
+    pub fn new(now: Time, master: Master, config: CommandConfig) -> Self {
+        Self {
+            master,
+            channel: DatagramChannel::with_rate_control(Side::Master, now, config.stretch_max),
+            window: SequenceWindow::new(),
+            commands: CommandPacker::new(config),
+            port: None,
+            update: None,
+            answers: None,
+            scene: None,
+            counts: MasterCounts::default(),
+        }
+    }
+
+    /// The core.
+    #[must_use]
+    pub fn master(&self) -> &Master {
+        &self.master
+    }
+
+    /// The datagram channel: round trip, loss, counts.
+    #[must_use]
+    pub fn channel(&self) -> &DatagramChannel {
+        &self.channel
+    }
+
+    /// What it counted.
+    #[must_use]
+    pub fn counts(&self) -> &MasterCounts {
+        &self.counts
+    }
+
+    /// Updates that arrived and were not applied, by cause. One that waits for a tick counts as frozen: at the end of a
+    /// session none will come.
+    #[must_use]
+    pub fn update_drops(&self) -> UpdateDrops {
+        UpdateDrops {
+            duplicate: self.window.duplicate(),
+            stale: self.window.stale(),
+            rejected: count(self.counts.updates_rejected),
+            superseded: count(self.counts.updates_superseded),
+            frozen: count(u64::from(self.master.frozen()) + u64::from(self.update.is_some())),
+        }
+    }
+
+    /// Samples that were not sent: stamps that did not increase, left out under congestion, still waiting for a packet.
+    #[must_use]
+    pub fn samples_unsent(&self) -> [u64; 3] {
+        let packer = &self.commands;
+        let (refused, skipped) = (packer.refused(), packer.skipped());
+        [refused.into(), skipped.into(), packer.pending() as u64]
+    }
+
+    /// The newest scene; none where nobody asked for scenes.
+    #[must_use]
+    pub fn scene(&self) -> Option<&Scene> {
+        self.scene.as_ref()
+    }
+
+    /// Begins to ramp the force out: the session ends.
+    pub fn release(&mut self) {
+        self.master.release();
+    }
+
+    /// Takes in a datagram that arrived at `at`.
+    pub fn handle_datagram(&mut self, at: Time, bytes: &[u8]) {
+        let Some(received) = self.channel.handle(at, bytes) else {
+            return;
+        };
+        match received.message {
+            Message::Update(update) => self.handle_update(&update),
+            Message::Scene(scene) if received.is_newest => self.scene = Some(scene),
+            Message::Tool(tool) if received.is_newest => self.master.handle_tool_state(at, &tool),
+            Message::Scene(_) | Message::Tool(_) | Message::Command(_) | Message::Heartbeat => {}
+        }
+    }
+
+    fn handle_update(&mut self, update: &Update<RawState>) {
+        if self.window.judge(update.sequence) != Freshness::Fresh {
+            return;
+        }
+        let coupling = &self.master.model().settings().coupling;
+        match update.accept(coupling) {
+            Ok(update) => {
+                // only what was accepted is acknowledged by the next command
+                self.window.accept(update.sequence);
+                let overtaken = self.update.replace(update).is_some();
+                self.counts.updates_superseded += u64::from(overtaken);
+            }
+            Err(_) => self.counts.updates_rejected += 1,
+        }
+    }
+
+    /// Applies the newest accepted update, as the next tick would; returns what the operator sees of the model then.
+    pub fn update_model(&mut self) -> View {
+        if let Some(update) = self.update.take()
+            && self.master.apply(&update)
+        {
+            self.answers = Some(update.answers);
+            self.counts.newest_applied = update.sequence;
+        }
+        self.master.view()
+    }
+
+    /// One sample period. `now` is the tick's deadline, the stamp of its sample; `reading` the device's HIP (m, world).
+    pub fn tick(&mut self, now: Time, reading: Vec2) -> MasterTick {
+        self.update_model();
+        if let Some(answers) = self.answers {
+            self.counts.age.push(now, answers);
+        }
+        let silence = self.channel.silence(now);
+        let tick = self.master.tick(now, reading, silence);
+        self.counts.on_hand.push(tick.hand_force);
+        self.counts.breaks.push(self.master.view().in_contact);
+        self.commands.push(tick.sample, self.channel.stretch());
+        self.port = tick.port;
+        tick
+    }
+
+    /// Writes the next datagram that is to be sent at `now` to `out` and returns its length; none if there is nothing
+    /// to send. To be called until there is none.
+    ///
+    /// # Errors
+    /// The session has used up its datagram numbers.
+    pub fn poll_transmit(
+        &mut self,
+        now: Time,
+        out: &mut [u8],
+    ) -> Result<Option<usize>, NumbersSpent> {
+        if let Some(samples) = self.commands.take_full(self.channel.stretch()) {
+            let command = Command {
+                newest_update: self.window.newest(),
+                samples,
+                port: self.port,
+            };
+            return self.send(now, Message::Command(command), out);
+        }
+        if self.poll_timeout() <= now {
+            return self.send(now, Message::Heartbeat, out);
+        }
+        Ok(None)
+    }
+
+    /// When a heartbeat must go out if nothing else does before.
+    #[must_use]
+    pub fn poll_timeout(&self) -> Time {
+        self.channel.heartbeat_due()
+    }
+
+    fn send(
+        &mut self,
+        now: Time,
+        message: Message,
+        out: &mut [u8],
+    ) -> Result<Option<usize>, NumbersSpent> {
+        match self.channel.encode(now, message, out) {
+            Ok(length) => Ok(Some(length)),
+            Err(SendError::Numbers(spent)) => Err(spent),
+            Err(SendError::Encode(_)) => {
+                self.counts.unsendable += 1;
+                Ok(None)
+            }
+        }
+    }
+}
+
+/// As the wire counts.
+fn count(n: u64) -> u32 {
+    u32::try_from(n).unwrap_or(u32::MAX)
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,191 @@
+//! What the master's end accepts, acknowledges and sends, datagram by datagram.
+
+use super::*;
+use crate::limiter::{ForceLimiter, Limits};
+use mmt_shared::model::contact::Coupling;
+use mmt_shared::model::geometry::{BoxFootprint, Pose, Twist};
+use mmt_shared::model::params::{ModelParams, ModelState};
+use mmt_shared::model::sample::ForceCounts;
+use mmt_shared::model::settings::Mode;
+use mmt_shared::model::tool::Tool;
+use mmt_shared::model::update::Cause;
+use mmt_shared::time::TICK;
+use mmt_shared::wire::{Architecture, DATAGRAM_MAX, Label, Welcome};
+
+const AT: fn(u64) -> Time = Time::from_millis;
+
+fn state(mass_kg: f64, coupling: &Coupling) -> ModelState {
+    let params = ModelParams::of_square(mass_kg, 3.0, 2.06, 0.4, coupling).unwrap();
+    let footprint = BoxFootprint::square(0.4);
+    ModelState::try_new(params, footprint, Pose::default(), Twist::default()).unwrap()
+}
+
+fn end(config: CommandConfig, architecture: Architecture) -> MasterEnd {
+    let coupling = Coupling::for_stiffness(1000.0);
+    let welcome = Welcome {
+        settings: Mode::Recommended.model_settings(coupling),
+        state: state(0.7, &coupling),
+        scheme: Label::clipped("timer 150ms"),
+        program: Label::clipped("test"),
+    };
+    let limiter = ForceLimiter::try_new(Limits::default()).unwrap();
+    let master = Master::with_architecture(&welcome, limiter, architecture);
+    MasterEnd::new(Time::ZERO, master, config.for_architecture(architecture))
+}
+
+fn update(sequence: u32, mass_kg: f64) -> Update {
+    let soft = Coupling {
+        stiffness_n_per_m: 50.0,
+        damping_ns_per_m: 0.0,
+    };
+    Update {
+        sequence,
+        cause: Cause::Timer,
+        answers: AT(1),
+        slave_in_contact: true,
+        state: state(mass_kg, &soft),
+    }
+}
+
+/// What a slave's channel sends of `what` at `now`.
+fn datagram(slave: &mut DatagramChannel, now: Time, what: Message) -> Vec<u8> {
+    let mut out = [0; DATAGRAM_MAX];
+    let length = slave.encode(now, what, &mut out).unwrap();
+    out[..length].to_vec()
+}
+
+/// Ticks once and returns what the end sends, as the slave reads it.
+fn tick(end: &mut MasterEnd, slave: &mut DatagramChannel, ms: u64) -> Vec<Message> {
+    end.tick(AT(ms), Vec2::new(-0.3, 0.0));
+    let mut out = [0; DATAGRAM_MAX];
+    let mut all = Vec::new();
+    while let Some(length) = end.poll_transmit(AT(ms), &mut out).unwrap() {
+        all.push(slave.handle(AT(ms), &out[..length]).unwrap().message);
+    }
+    all
+}
+
+/// The acknowledgement in the next command.
+fn acknowledged(end: &mut MasterEnd, slave: &mut DatagramChannel, from_ms: u64) -> u32 {
+    (from_ms..from_ms + 10)
+        .flat_map(|ms| tick(end, slave, ms))
+        .find_map(|matter| match matter {
+            Message::Command(command) => Some(command.newest_update),
+            _ => None,
+        })
+        .unwrap()
+}
+
+#[test]
+fn an_update_is_accepted_before_it_is_acknowledged() {
+    let mut end = end(CommandConfig::default(), Architecture::Mmt);
+    let mut slave = DatagramChannel::new(Side::Slave, Time::ZERO);
+    // stable under a soft coupling, not under the master's
+    let light = datagram(
+        &mut slave,
+        AT(1),
+        Message::Update((&update(1, 0.05)).into()),
+    );
+    end.handle_datagram(AT(1), &light);
+    assert_eq!(acknowledged(&mut end, &mut slave, 2), 0);
+    let drops = end.update_drops();
+    assert_eq!((drops.rejected, drops.duplicate), (1, 0));
+    assert_eq!(end.master().applied(), 0);
+    // the same number with numbers that are accepted is no duplicate
+    let good = datagram(
+        &mut slave,
+        AT(20),
+        Message::Update((&update(1, 0.7)).into()),
+    );
+    end.handle_datagram(AT(20), &good);
+    assert_eq!(acknowledged(&mut end, &mut slave, 21), 1);
+    assert_eq!(
+        (end.master().applied(), end.counts().newest_applied),
+        (1, 1)
+    );
+}
+
+#[test]
+fn of_the_updates_between_two_ticks_the_newest_is_applied_and_the_others_are_counted() {
+    let mut end = end(CommandConfig::default(), Architecture::Mmt);
+    let mut slave = DatagramChannel::new(Side::Slave, Time::ZERO);
+    let all =
+        [1, 2, 3].map(|n| datagram(&mut slave, AT(1), Message::Update((&update(n, 0.7)).into())));
+    for n in [0, 2, 1, 2] {
+        end.handle_datagram(AT(1), &all[n]);
+    }
+    tick(&mut end, &mut slave, 2);
+    let drops = end.update_drops();
+    assert_eq!(
+        (end.counts().newest_applied, end.master().applied()),
+        (3, 1)
+    );
+    assert_eq!((drops.superseded, drops.stale, drops.duplicate), (1, 1, 0));
+    assert_eq!(end.channel().traffic().duplicates, 1, "a datagram's number");
+}
+
+#[test]
+fn scenes_and_the_tools_state_count_only_if_newer_than_all_before() {
+    let scene = |x: f64| Scene {
+        answers: Time::ZERO,
+        object: Pose::default(),
+        tool: Vec2::new(x, 0.0),
+        force: Vec2::zeros(),
+    };
+    let tool = |in_contact| Tool {
+        answers: Time::ZERO,
+        force: ForceCounts::default(),
+        in_contact,
+        in_j: 0.0,
+    };
+    let mut end = end(CommandConfig::default(), Architecture::Tdpa);
+    let mut slave = DatagramChannel::new(Side::Slave, Time::ZERO);
+    let (old, new) = (scene(0.1), scene(0.2));
+    let all = [
+        datagram(&mut slave, AT(1), Message::Scene(old)),
+        datagram(&mut slave, AT(1), Message::Tool(tool(true))),
+        datagram(&mut slave, AT(1), Message::Scene(new)),
+        datagram(&mut slave, AT(1), Message::Tool(tool(false))),
+    ];
+    for n in [2, 0, 3, 1] {
+        end.handle_datagram(AT(2), &all[n]);
+    }
+    assert_eq!(end.scene(), Some(&new));
+    assert!(!end.update_model().in_contact);
+}
+
+#[test]
+fn with_tdpa_each_tick_sends_its_sample_with_the_hands_port() {
+    let mut end = end(CommandConfig::default(), Architecture::Tdpa);
+    let mut slave = DatagramChannel::new(Side::Slave, Time::ZERO);
+    for ms in 1..=20 {
+        let sent = tick(&mut end, &mut slave, ms);
+        let [Message::Command(command)] = &sent[..] else {
+            panic!("{sent:?}");
+        };
+        assert!(command.port.is_some() && command.samples.len() == 1);
+    }
+}
+
+#[test]
+fn a_heartbeat_goes_out_when_nothing_else_did() {
+    let config = CommandConfig {
+        samples_per_command: 32,
+        ..CommandConfig::default()
+    };
+    let mut end = end(config, Architecture::Mmt);
+    let mut slave = DatagramChannel::new(Side::Slave, Time::ZERO);
+    assert_eq!(end.poll_timeout(), AT(50));
+    // the stamps stand: no command is ever full
+    let mut sent = Vec::new();
+    for ms in 1..=120 {
+        let mut out = [0; DATAGRAM_MAX];
+        let now = Time::ZERO + TICK * ms;
+        end.tick(AT(1), Vec2::zeros());
+        while let Some(length) = end.poll_transmit(now, &mut out).unwrap() {
+            sent.push((ms, slave.handle(now, &out[..length]).unwrap().message));
+        }
+    }
+    assert_eq!(sent, [(50, Message::Heartbeat), (100, Message::Heartbeat)]);
+    assert_eq!(end.samples_unsent(), [119, 0, 1]);
+}

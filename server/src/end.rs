@@ -1,0 +1,293 @@
+//! The slave's end of a session: datagrams in, the slave's ticks, datagrams out.
+//!
+//! Pure: it reads no clock and touches no socket, so that a live session and an experiment run the same code, and a
+//! record of its inputs runs again to the same bits.
+
+use std::time::Duration;
+
+use mmt_shared::channel::datagram_channel::{DatagramChannel, SendError};
+use mmt_shared::channel::peer::NumbersSpent;
+use mmt_shared::channel::rate_control::StretchMax;
+use mmt_shared::metrics::UpdateCounts;
+use mmt_shared::model::tool::{Scene, Tool};
+use mmt_shared::model::update::Update;
+use mmt_shared::time::Time;
+use mmt_shared::wire::{Architecture, Command, Hello, Message, Side};
+
+use crate::repeats::{Repeating, Repeats};
+use crate::slave::{Slave, SlaveConfig, SlaveError, SlaveTick};
+
+const SECOND: Duration = Duration::from_secs(1);
+
+/// How the slave's end of a session works.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SlaveEndConfig {
+    /// When an update is repeated.
+    pub repeats: Repeats,
+    /// By how much congestion may stretch the times between messages.
+    pub stretch_max: StretchMax,
+    /// How many samples of a command are new, by the master's hello; those before them are repeats.
+    pub samples_per_command: u8,
+    /// What the master's hand feels, by its hello.
+    pub architecture: Architecture,
+    /// Scenes that the master wants, 1/s, by its hello.
+    pub scene_hz: u8,
+}
+
+/// What the slave's end counts.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct SlaveCounts {
+    /// Updates sent by cause, repeats not included, and ticks with and without contact.
+    pub updates: UpdateCounts,
+    /// Repeats sent, by the cause of what they repeat.
+    pub repeated: UpdateCounts,
+    /// Updates that a newer one overtook before they could be sent.
+    pub updates_superseded: u64,
+    /// HIP samples received, repeated ones included.
+    pub samples: u64,
+    /// Messages that break a rule of the wire and were not sent.
+    pub unsendable: u64,
+}
+
+/// The slave of a session that a master opens with `hello`: play-out waits as long as its packing needs.
+#[must_use]
+pub fn session_config(config: &SlaveConfig, hello: &Hello) -> SlaveConfig {
+    let playout = config.playout;
+    SlaveConfig {
+        playout: playout.for_session(hello.samples_per_command, hello.architecture),
+        ..config.clone()
+    }
+}
+
+/// The slave's end.
+pub struct SlaveEnd {
+    slave: Slave,
+    channel: DatagramChannel,
+    config: SlaveEndConfig,
+    newest_acknowledged: u32,
+    /// To be sent.
+    update: Option<Update>,
+    repeating: Option<Repeating>,
+    /// To be sent, where the hand feels the tool.
+    tool: Option<Tool>,
+    /// As the newest tick saw it.
+    scene: Option<Scene>,
+    scene_sent: Time,
+    counts: SlaveCounts,
+}
+
+impl SlaveEnd {
+    /// An end from `now` on.
+    #[must_use]
+    pub fn new(now: Time, slave: Slave, config: SlaveEndConfig) -> Self {
+        Self {
+            slave,
+            channel: DatagramChannel::with_rate_control(Side::Slave, now, config.stretch_max),
+            config,
+            newest_acknowledged: 0,
+            update: None,
+            repeating: None,
+            tool: None,
+            scene: None,
+            scene_sent: now,
+            counts: SlaveCounts::default(),
+        }
+    }
+
+    /// The end of a session from `now` on that a master opens with `hello`: the tool starts at its HIP.
+    ///
+    /// # Errors
+    /// When the configuration's numbers are not accepted for the master's device.
+    pub fn of_session(now: Time, config: &SlaveConfig, hello: &Hello) -> Result<Self, SlaveError> {
+        let config = session_config(config, hello);
+        let mut slave = Slave::try_new(&config, hello.coupling)?;
+        slave.start_at(hello.hip);
+        let config = SlaveEndConfig {
+            repeats: config.repeats_ms,
+            stretch_max: config.stretch_max,
+            samples_per_command: hello.samples_per_command,
+            architecture: hello.architecture,
+            scene_hz: hello.scene_hz,
+        };
+        Ok(Self::new(now, slave, config))
+    }
+
+    /// The core.
+    #[must_use]
+    pub fn slave(&self) -> &Slave {
+        &self.slave
+    }
+
+    /// The core, to be changed in mid-run: scenarios do, sessions never.
+    pub fn slave_mut(&mut self) -> &mut Slave {
+        &mut self.slave
+    }
+
+    /// The datagram channel: round trip, loss, counts.
+    #[must_use]
+    pub fn channel(&self) -> &DatagramChannel {
+        &self.channel
+    }
+
+    /// What it counted.
+    #[must_use]
+    pub fn counts(&self) -> &SlaveCounts {
+        &self.counts
+    }
+
+    /// What the master's hand feels, by its hello.
+    #[must_use]
+    pub fn architecture(&self) -> Architecture {
+        self.config.architecture
+    }
+
+    /// Takes in a datagram that arrived at `at`. The hand's port counts only where the hello has spoken of one and no
+    /// newer datagram has been there: an older one knows nothing that counts.
+    pub fn handle_datagram(&mut self, at: Time, bytes: &[u8]) {
+        let Some(received) = self.channel.handle(at, bytes) else {
+            return;
+        };
+        let Message::Command(command) = received.message else {
+            return;
+        };
+        self.newest_acknowledged = self.newest_acknowledged.max(command.newest_update);
+        self.handle_samples(at, &command);
+        self.slave.stretch(self.channel.stretch());
+        let counts = received.is_newest && self.config.architecture.feels_tool();
+        if let Some(port) = command.port.filter(|_| counts) {
+            self.slave.handle_hand_port(&port);
+        }
+    }
+
+    /// A command's samples, oldest first, each with the newest update that the master had by then as far as the
+    /// command says: none (0) of a sample that is repeated from an earlier command.
+    fn handle_samples(&mut self, at: Time, command: &Command) {
+        let new = usize::from(self.config.samples_per_command).max(1);
+        let repeated = command.samples.len().saturating_sub(new);
+        for (n, sample) in command.samples.as_slice().iter().enumerate() {
+            let newest_update = if n < repeated {
+                0
+            } else {
+                command.newest_update
+            };
+            self.slave.handle_sample(at, sample, newest_update);
+            self.counts.samples += 1;
+        }
+    }
+
+    /// One sample period; `now` is the tick's deadline. None before the first HIP sample is due.
+    pub fn tick(&mut self, now: Time) -> Option<SlaveTick> {
+        let tick = self.slave.tick(now)?;
+        self.counts.updates.tick(tick.in_contact);
+        if let Some(update) = tick.update {
+            let overtaken = self.update.replace(update).is_some();
+            self.counts.updates_superseded += u64::from(overtaken);
+        }
+        self.tool = self.slave.tool_state(&tick);
+        let looks = self.config.scene_hz > 0;
+        self.scene = looks.then(|| self.slave.scene(&tick));
+        Some(tick)
+    }
+
+    /// Writes the next datagram that is to be sent at `now` to `out` and returns its length; none if there is nothing
+    /// to send. To be called until there is none.
+    ///
+    /// # Errors
+    /// The session has used up its datagram numbers.
+    pub fn poll_transmit(
+        &mut self,
+        now: Time,
+        out: &mut [u8],
+    ) -> Result<Option<usize>, NumbersSpent> {
+        if let Some(update) = self.update.take() {
+            return self.send_update(now, &update, out);
+        }
+        if let Some(tool) = self.tool.take() {
+            return self.send(now, Message::Tool(tool), out);
+        }
+        if let Some(scene) = self.take_due_scene(now) {
+            return self.send(now, Message::Scene(scene), out);
+        }
+        if let Some(update) = self.take_due_repeat(now) {
+            let sent = self.send(now, Message::Update((&update).into()), out);
+            if let Ok(Some(_)) = sent {
+                self.counts.repeated.sent(update.cause);
+            }
+            return sent;
+        }
+        if self.channel.heartbeat_due() <= now {
+            return self.send(now, Message::Heartbeat, out);
+        }
+        Ok(None)
+    }
+
+    /// When something must go out if no tick gives a reason before: a scene, a repeat or a heartbeat.
+    #[must_use]
+    pub fn poll_timeout(&self) -> Time {
+        let others = [self.repeat_due(), self.scene_due()];
+        let heartbeat = self.channel.heartbeat_due();
+        others.into_iter().flatten().fold(heartbeat, Time::min)
+    }
+
+    /// Sends a new update. Its repeats are due from now on, and those of the update before no more.
+    fn send_update(
+        &mut self,
+        now: Time,
+        update: &Update,
+        out: &mut [u8],
+    ) -> Result<Option<usize>, NumbersSpent> {
+        self.repeating = Some(Repeating::new(now, *update));
+        let sent = self.send(now, Message::Update(update.into()), out);
+        if let Ok(Some(_)) = sent {
+            self.counts.updates.sent(update.cause);
+        }
+        sent
+    }
+
+    /// When the next repeat is due: never while the path is congested, nor once the master has the update.
+    fn repeat_due(&self) -> Option<Time> {
+        let repeating = self.repeating.as_ref()?;
+        let wanted = repeating.update.sequence > self.newest_acknowledged;
+        let due = repeating.due(&self.config.repeats)?;
+        (wanted && self.channel.stretch() <= 1.0).then_some(due)
+    }
+
+    fn take_due_repeat(&mut self, now: Time) -> Option<Update> {
+        self.repeat_due().filter(|due| *due <= now)?;
+        let repeating = self.repeating.as_mut()?;
+        let due = repeating.take_due(now, &self.config.repeats);
+        due.then_some(repeating.update)
+    }
+
+    /// When the next scene is due, seldomer under congestion; never where nobody wants scenes.
+    fn scene_due(&self) -> Option<Time> {
+        let hz = self.config.scene_hz;
+        let period = SECOND.checked_div(hz.into())?;
+        Some(self.scene_sent + period.mul_f64(self.channel.stretch()))
+    }
+
+    fn take_due_scene(&mut self, now: Time) -> Option<Scene> {
+        self.scene_due().filter(|due| *due <= now)?;
+        self.scene_sent = now;
+        self.scene
+    }
+
+    fn send(
+        &mut self,
+        now: Time,
+        message: Message,
+        out: &mut [u8],
+    ) -> Result<Option<usize>, NumbersSpent> {
+        match self.channel.encode(now, message, out) {
+            Ok(length) => Ok(Some(length)),
+            Err(SendError::Numbers(spent)) => Err(spent),
+            Err(SendError::Encode(_)) => {
+                self.counts.unsendable += 1;
+                Ok(None)
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

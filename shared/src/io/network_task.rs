@@ -1,0 +1,195 @@
+//! The network task of a session, the same on both sides: it moves bytes and time between a connection and a 1 kHz loop.
+//!
+//! It decides nothing about the model and never waits for the network to take a datagram: what cannot be sent now is
+//! dropped and counted. What ends a session it reports as an event; what follows is its caller's affair.
+
+use std::pin::Pin;
+use std::time::Duration;
+
+use bytes::Bytes;
+use tokio::sync::watch;
+use tokio::time::{Interval, MissedTickBehavior, interval, timeout};
+
+use super::clock::Clock;
+use super::loop_thread::LoopHandle;
+use super::transport::{Connection, ConnectionError, SendDatagramError};
+
+/// Between two beats, at which a caller looks at the loop's snapshot: 25 a second.
+pub const BEAT: Duration = Duration::from_millis(40);
+/// More datagrams than QUIC's queue holds.
+pub const WAITING_MAX: usize = 4096;
+
+/// What the task counts besides what the ends count.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct NetworkCounts {
+    /// Datagrams read from the connection; what it received and nobody read it dropped itself.
+    pub read: u64,
+    /// Datagrams that the connection took; what it did not send it dropped itself.
+    pub given: u64,
+    /// Longer than the path takes.
+    pub too_large: u64,
+    /// The peer takes no datagrams, or the connection sends none.
+    pub unsupported: u64,
+    /// The connection was gone.
+    pub disconnected: u64,
+}
+
+/// What happened that a session must know. Each of the first four happens once at most.
+#[derive(Debug)]
+pub enum Event<T, F> {
+    /// The read of the other side's farewell has ended.
+    Farewell(F),
+    /// Somebody here wants the session to end.
+    Stopped,
+    /// The connection is gone.
+    Disconnected(ConnectionError),
+    /// The loop has ended, by itself or by a panic (none).
+    LoopEnded(Option<T>),
+    /// It is time to look at the snapshot.
+    Beat,
+}
+
+/// The network task of a session.
+#[derive(Debug)]
+pub struct NetworkTask<S: Send, T> {
+    clock: Clock,
+    connection: Connection,
+    handle: LoopHandle<S, T>,
+    counts: NetworkCounts,
+    beat: Interval,
+    connected: bool,
+    /// Whether the read of the farewell still waits; once it has ended it must not be polled again.
+    awaits_farewell: bool,
+    stopped: bool,
+    wakes: bool,
+}
+
+/// Returns once `stop` becomes true or its sender is gone. Cancel-safe.
+pub async fn asked_to_stop(stop: &mut watch::Receiver<bool>) {
+    // an error means that nobody can ask any more
+    let _ = stop.wait_for(|stop| *stop).await;
+}
+
+impl<S: Send, T> NetworkTask<S, T> {
+    /// The task of a session that begins. Call it inside of a tokio runtime with time.
+    #[must_use]
+    pub fn new(clock: Clock, connection: Connection, handle: LoopHandle<S, T>) -> Self {
+        let mut beat = interval(BEAT);
+        beat.set_missed_tick_behavior(MissedTickBehavior::Delay);
+        Self {
+            clock,
+            connection,
+            handle,
+            counts: NetworkCounts::default(),
+            beat,
+            connected: true,
+            awaits_farewell: true,
+            stopped: false,
+            wakes: true,
+        }
+    }
+
+    /// What it counted.
+    #[must_use]
+    pub fn counts(&self) -> &NetworkCounts {
+        &self.counts
+    }
+
+    /// The loop's handle.
+    pub fn handle(&mut self) -> &mut LoopHandle<S, T> {
+        &mut self.handle
+    }
+
+    /// Whether the connection is up.
+    #[must_use]
+    pub fn is_connected(&self) -> bool {
+        self.connected
+    }
+
+    /// Whether the read of the other side's farewell still waits.
+    #[must_use]
+    pub fn awaits_farewell(&self) -> bool {
+        self.awaits_farewell
+    }
+
+    /// Moves datagrams until something else happens. `farewell` is the read of the other side's farewell.
+    pub async fn next<F: Future>(
+        &mut self,
+        mut farewell: Pin<&mut F>,
+        stop: &mut watch::Receiver<bool>,
+    ) -> Event<T, F::Output> {
+        loop {
+            // in this order, so that a flood of datagrams holds up nothing else
+            tokio::select! {
+                biased;
+                read = farewell.as_mut(), if self.awaits_farewell => {
+                    self.awaits_farewell = false;
+                    return Event::Farewell(read);
+                }
+                () = asked_to_stop(stop), if !self.stopped => {
+                    self.stopped = true;
+                    return Event::Stopped;
+                }
+                ended = &mut self.handle.finished => {
+                    self.send_departures();
+                    return Event::LoopEnded(ended.ok());
+                }
+                woken = self.handle.wakeup.wait(), if self.wakes => {
+                    // only a runtime that shuts down fails here
+                    self.wakes = woken.is_ok();
+                    self.send_departures();
+                }
+                _ = self.beat.tick() => return Event::Beat,
+                datagram = self.connection.read_datagram(), if self.connected => match datagram {
+                    Ok(bytes) => self.take(&bytes),
+                    Err(error) => {
+                        self.connected = false;
+                        return Event::Disconnected(error);
+                    }
+                },
+            }
+        }
+    }
+
+    /// Takes the datagrams that have arrived and were not read, stops the loop and waits for what it ends with, at most
+    /// `limit`; none if it panicked.
+    pub async fn stop_loop(&mut self, limit: Duration) -> Option<T> {
+        self.drain().await;
+        self.handle.stop();
+        let ended = timeout(limit, &mut self.handle.finished).await;
+        self.send_departures();
+        ended.ok()?.ok()
+    }
+
+    async fn drain(&mut self) {
+        for _ in 0..WAITING_MAX {
+            match timeout(Duration::ZERO, self.connection.read_datagram()).await {
+                Ok(Ok(datagram)) => self.take(&datagram),
+                _ => break,
+            }
+        }
+    }
+
+    /// Hands a datagram to the loop; its arrival is this moment.
+    fn take(&mut self, datagram: &Bytes) {
+        self.counts.read += 1;
+        self.handle.deliver(self.clock.now(), datagram);
+    }
+
+    fn send_departures(&mut self) {
+        while let Some(frame) = self.handle.next_departure() {
+            let given = self
+                .connection
+                .send_datagram(Bytes::copy_from_slice(frame.bytes()));
+            let counter = match &given {
+                Ok(()) => &mut self.counts.given,
+                Err(SendDatagramError::TooLarge) => &mut self.counts.too_large,
+                Err(SendDatagramError::ConnectionLost(_)) => &mut self.counts.disconnected,
+                Err(SendDatagramError::UnsupportedByPeer | SendDatagramError::Disabled) => {
+                    &mut self.counts.unsupported
+                }
+            };
+            *counter += 1;
+        }
+    }
+}
