@@ -84,9 +84,10 @@ pub(crate) fn run(arguments: &DemoArguments, messages: &Messages) -> Result<(), 
     let (master, slave) = (master.join(), slave.join());
     emulation.finish()?;
     let report = joined::join(&master?, slave?.as_ref())?;
-    match arguments.json {
-        true => print_json(&report)?,
-        false => print(&report)?,
+    if arguments.json {
+        print_json(&report)?
+    } else {
+        print(&report)?
     }
     master::judge(master_live.borrow().ended)
 }

@@ -73,9 +73,10 @@ pub(crate) fn run(arguments: MasterArguments, messages: &Messages) -> Result<(),
     if let (Some(file), Some(path)) = (&arguments.record_path, &path) {
         keep_path(file, path)?;
     }
-    match arguments.json {
-        true => print_json(&report)?,
-        false => print(&report)?,
+    if arguments.json {
+        print_json(&report)?
+    } else {
+        print(&report)?
     }
     judge(live.borrow().ended)
 }
@@ -189,9 +190,10 @@ fn trace(path: &Path, push: Option<usize>) -> Result<Trace, Failure> {
                 .remedy("leave --push out"),
         );
     }
-    let trace = match is_csv {
-        true => Trace::from_csv(&text),
-        false => Trace::from_cmu(&text, push),
+    let trace = if is_csv {
+        Trace::from_csv(&text)
+    } else {
+        Trace::from_cmu(&text, push)
     };
     let (x, y) = TRACE_START_M;
     trace

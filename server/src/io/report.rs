@@ -154,9 +154,10 @@ fn messages(outcome: &Outcome, end: &SlaveEnd, traffic: &Traffic) -> UpDown<Mess
 }
 
 fn wire(outcome: &Outcome, traffic: &Traffic) -> UpDown<WireReport> {
-    let headers = match outcome.over_ipv4 {
-        true => HEADERS_IPV4,
-        false => HEADERS_IPV6,
+    let headers = if outcome.over_ipv4 {
+        HEADERS_IPV4
+    } else {
+        HEADERS_IPV6
     };
     let of = |datagrams, bytes| {
         WireReport::new(datagrams, bytes, headers, outcome.duration.as_secs_f64())
