@@ -111,7 +111,7 @@ fn master_again(record: &MasterRecord, with_frames: bool) -> Vec<String> {
     ticks
 }
 
-/// What the slave's end gives for the record's inputs; without the last sample's frame if it is to be left out.
+/// What the slave's end gives for the record's inputs; without a hundred of the frames if they are to be left out.
 fn slave_again(record: &SlaveRecord, with_all_frames: bool) -> Vec<String> {
     let end = SlaveEnd::of_session(record.began, &SlaveConfig::default(), &record.hello);
     let (mut end, mut out) = (end.unwrap(), [0; DATAGRAM_MAX]);
@@ -120,7 +120,7 @@ fn slave_again(record: &SlaveRecord, with_all_frames: bool) -> Vec<String> {
         match input {
             Input::Frame(frame) => {
                 frames += 1;
-                if with_all_frames || frames != 50 {
+                if with_all_frames || !(50..150).contains(&frames) {
                     end.handle_datagram(frame.at, frame.bytes());
                 }
             }
@@ -155,10 +155,10 @@ fn a_live_session_runs_again_to_the_same_bits_at_each_tick_of_both_ends() {
         let live = texts(master.log.ticks());
         assert!(live.len() > 2000, "{} ticks of the master", live.len());
         same(&master_again(&master, true), &live);
-        assert_ne!(master_again(&master, false), live, "frames count");
+        assert!(master_again(&master, false) != live, "frames count");
         let live = texts(slave.log.ticks());
         assert!(live.len() > 2000, "{} ticks of the slave", live.len());
         same(&slave_again(&slave, true), &live);
-        assert_ne!(slave_again(&slave, false), live, "each frame counts");
+        assert!(slave_again(&slave, false) != live, "frames count");
     }
 }
