@@ -107,7 +107,6 @@ fn the_dashboard_shows_every_label_and_number_on_a_small_terminal() {
         "c N",
         "pushes",
         "link: late",
-        "felt of the model     25 %",
         "101.5 ms",
         "loss up 1.1 %",
         "loss down 0.9 %",

@@ -283,7 +283,9 @@ fn the_live_master_feels_the_tool_from_the_first_sample_and_makes_no_energy() {
             let tick = world.step();
             let touches = tick.slave.is_some_and(|slave| slave.in_contact);
             touched_ms = touched_ms.or(touches.then_some(ms));
-            felt_ms = felt_ms.or((tick.master.felt.norm() > 0.1).then_some(ms));
+            // before, the hand feels the drag that pays its port's reserve
+            let felt = touched_ms.is_some() && tick.master.felt.norm() > 0.1;
+            felt_ms = felt_ms.or(felt.then_some(ms));
         }
         let outcome = world.outcome();
         let least_mj = outcome.observer_min_j * 1e3;
