@@ -219,7 +219,8 @@ fn scenes_are_due_as_often_as_somebody_wants_to_see_them() {
     }
     assert_eq!(end.scene_due(), Some(AT(100)));
     let scene = sent(&mut end, &mut master, AT(100));
-    assert!(matches!(scene[..], [Message::Scene(_)]), "{scene:?}");
+    let scenes = scene.iter().filter(|m| matches!(m, Message::Scene(_)));
+    assert_eq!(scenes.count(), 1, "{scene:?}");
     assert_eq!(end.scene_due(), Some(AT(150)));
     let nobody = self::end("none", Architecture::Mmt, 0);
     assert_eq!(nobody.scene_due(), None);
