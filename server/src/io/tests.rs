@@ -263,7 +263,12 @@ async fn a_lost_connection_ends_the_session_and_the_next_master_is_served() {
     drop(master);
     let mut next = patiently(eventually_welcome(&host.pairing)).await;
     patiently(next.push(5)).await;
-    assert!(host.live.get().connected);
+    patiently(async {
+        while !host.live.get().connected {
+            sleep(Duration::from_millis(1)).await;
+        }
+    })
+    .await;
     patiently(next.farewell()).await;
     let report = host.end().await.unwrap();
     assert_eq!(report.ending.as_deref(), Some("finished"));
