@@ -95,7 +95,7 @@ fn a_demo_at_work_takes_new_networks_from_stdin() {
     writeln!(orders, "sideways\nrebind\nup loss every 4").unwrap();
     let output = child.wait_with_output().unwrap();
     let told = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert!(told.contains("no order \"sideways\""), "{told}");
+    assert!(told.contains("no command \"sideways\""), "{told}");
     assert!(told.contains("only the relay"), "{told}");
     assert!(told.contains("loss 25.000 %"), "{told}");
     let report = document(&output);
