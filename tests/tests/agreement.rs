@@ -13,6 +13,7 @@
 
 use std::time::Duration;
 
+use crate::harness::alone;
 use crate::harness::hosts::{Hosts, HostsError};
 use crate::harness::process::{Running, did_not_run, number, warn_loudly};
 use mmt_lab::statistics::median;
@@ -184,6 +185,7 @@ fn agree(name: &str, playout: PlayoutConfig, live: impl Fn(u64) -> (Value, Value
 
 #[test]
 fn the_live_system_agrees_with_virtual_time_in_one_process_and_on_two_hosts() {
+    let _turn = alone();
     let in_one_process = |seed: u64| {
         let (seconds, seed) = (format!("{SECONDS}s"), seed.to_string());
         let arguments = [
