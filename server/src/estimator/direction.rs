@@ -8,7 +8,7 @@ use mmt_shared::model::geometry::{Vec2, wrap_angle};
 use mmt_shared::time::TICK_S;
 use serde::{Deserialize, Serialize};
 
-/// Settings of [`ForceDirection`].
+/// Settings of `ForceDirection`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct DirectionConfig {
     /// Time constant of the critically damped filter, s. 20 ms: a 10 mN noise on 2 N becomes 1.2 mrad.

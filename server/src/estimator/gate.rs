@@ -5,7 +5,7 @@
 
 use serde::{Deserialize, Serialize};
 
-/// Settings of [`Gate`].
+/// Settings of `Gate`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct GateConfig {
     /// Least force along the normal, N. 0.15 N: 15 times the default force noise.

@@ -9,7 +9,7 @@ use mmt_shared::time::TICK_S;
 use nalgebra::{Matrix3, Matrix3x2, Vector3};
 use serde::{Deserialize, Serialize};
 
-/// Settings of [`MotionFilter`].
+/// Settings of `MotionFilter`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct KalmanConfig {

@@ -12,7 +12,7 @@ use super::kalman::{KalmanConfig, MotionFilter};
 use super::windowed::{Rows, WindowedLeastSquares};
 use super::{Estimate, Measured, STICK_SPEED};
 
-/// Settings of [`PaperEstimator`].
+/// Settings of `PaperEstimator`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct PaperConfig {

@@ -23,7 +23,7 @@ use super::{Estimate, Measured, STICK_SPEED};
 /// the object ran up against it is no friction.
 const COPY_ROWS: u64 = 250;
 
-/// Settings of [`RecommendedEstimator`].
+/// Settings of `RecommendedEstimator`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RecommendedConfig {
     /// k_p and k_d between the tool and the object, as the slave's contact has them.

@@ -60,7 +60,7 @@ pub(super) enum Verdict {
     Changed,
 }
 
-/// Settings of [`RecursiveLeastSquares`].
+/// Settings of `RecursiveLeastSquares`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RecursiveConfig {
     /// Weight that a row keeps from tick to tick. 0.998, a memory of 500 ms: half the error in b and c of

@@ -17,7 +17,7 @@ use quinn::udp::{RecvMeta, Transmit};
 use quinn::{AsyncUdpSocket, Connection, ConnectionError, SendDatagramError, UdpPoller};
 use tokio::sync::broadcast::{self, Receiver, Sender};
 
-/// What stands before each message, bytes: [`KIND`], then 4 that the connection's secrets give.
+/// What stands before each message, bytes: `KIND`, then 4 that the connection's secrets give.
 pub const HEADER: usize = 5;
 /// The longest packet, bytes of UDP payload: what every IPv6 path carries (RFC 8200, section 5), as in QUIC.
 pub const PACKET_MAX: usize = 1200;
