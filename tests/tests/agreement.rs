@@ -2,7 +2,7 @@
 //! real sockets with real clocks.
 //!
 //! A live run is compared with the median over seeds of virtual time, and repeated if it does not agree. A host that is
-//! too busy for 1 kHz shows it by its own loops: if no run kept its time the tolerances are doubled and a loud line tells so.
+//! too busy for 1 kHz shows it by its own loops. Such a run says nothing about the two, so the test fails if each is such.
 
 #![allow(
     clippy::disallowed_methods,
@@ -13,14 +13,15 @@
 
 use std::time::Duration;
 
-use crate::harness::alone;
-use crate::harness::hosts::{Hosts, HostsError};
-use crate::harness::process::{Running, did_not_run, number, warn_loudly};
+use harness::hosts::{Hosts, HostsError};
+use harness::process::{Running, did_not_run, number};
 use mmt_lab::statistics::median;
 use mmt_lab::world::{World, WorldConfig};
 use mmt_netem::LinkConfig;
 use mmt_server::playout::PlayoutConfig;
 use serde_json::Value;
+
+mod harness;
 
 /// Half a second there and back, with jitter and loss.
 const LINK: &str = "delay 250ms 10ms loss 5%";
@@ -29,7 +30,7 @@ const SECONDS: u64 = 15;
 /// Seeds of virtual time.
 const SEEDS: std::ops::RangeInclusive<u64> = 1..=5;
 /// Live runs until one has kept its time and agrees.
-const ATTEMPTS: u64 = 3;
+const ATTEMPTS: u64 = 8;
 /// A loop that skipped more than this share of its periods did not keep its time.
 const SKIPPED_MAX: f64 = 0.02;
 
@@ -120,8 +121,8 @@ impl Attempt {
         self.skipped <= SKIPPED_MAX
     }
 
-    /// Writes every measure beside the virtual one; returns those that are further apart than `room` tolerances.
-    fn apart(&self, name: &str, rows: &[Row], room: f64) -> Vec<String> {
+    /// Writes every measure beside the virtual one; returns those that are further apart than their tolerances.
+    fn apart(&self, name: &str, rows: &[Row]) -> Vec<String> {
         let mut apart = Vec::new();
         let mut table = format!("Agreement of {name} with virtual time\n");
         table += "  measure                 virtual      live    within\n";
@@ -136,7 +137,7 @@ impl Attempt {
                 table += &format!("  {measure:20}   {expected:8.3}         -         -\n");
                 continue;
             };
-            let most = room * (share * expected + absolute);
+            let most = share * expected + absolute;
             let line = format!("  {measure:20}   {expected:8.3}  {got:8.3}  {most:8.3}\n");
             table += &line;
             if (got - expected).abs() > most {
@@ -160,7 +161,7 @@ fn agree(name: &str, playout: PlayoutConfig, live: impl Fn(u64) -> (Value, Value
             skipped: skipped(&master, &slave),
             row: live_row(&master, &slave),
         };
-        if attempt.kept_its_time() && attempt.apart(name, &rows, 1.0).is_empty() {
+        if attempt.kept_its_time() && attempt.apart(name, &rows).is_empty() {
             return;
         }
         attempts.push(attempt);
@@ -169,23 +170,17 @@ fn agree(name: &str, playout: PlayoutConfig, live: impl Fn(u64) -> (Value, Value
         .iter()
         .min_by(|a, b| a.skipped.total_cmp(&b.skipped));
     let best = best.unwrap();
-    let room = if best.kept_its_time() { 1.0 } else { 2.0 };
-    if !best.kept_its_time() {
-        warn_loudly(&format!(
-            "DEGRADED: {name}: this host skipped {:.1} % of the periods; tolerances are doubled",
-            100.0 * best.skipped
-        ));
-    }
-    let apart = best.apart(name, &rows, room);
     assert!(
-        apart.is_empty(),
-        "{apart:#?} in each of {ATTEMPTS} runs\nvirtual: {rows:#.3?}"
+        best.kept_its_time(),
+        "{name}: this host skipped at least {:.1} % of the periods in each of {ATTEMPTS} runs: use one that keeps 1 kHz",
+        100.0 * best.skipped
     );
+    let apart = best.apart(name, &rows);
+    panic!("{apart:#?} in each of {ATTEMPTS} runs\nvirtual: {rows:#.3?}");
 }
 
 #[test]
 fn the_live_system_agrees_with_virtual_time_in_one_process_and_on_two_hosts() {
-    let _turn = alone();
     let in_one_process = |seed: u64| {
         let (seconds, seed) = (format!("{SECONDS}s"), seed.to_string());
         let arguments = [
