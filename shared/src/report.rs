@@ -5,6 +5,7 @@
 
 mod number;
 mod table;
+pub mod totals;
 
 use std::collections::BTreeMap;
 
@@ -13,7 +14,7 @@ use serde::{Deserialize, Serialize};
 use crate::metrics::{
     AgeOfInformation, ContactBreaks, ForcePeak, ForceSummary, PoseError, UpdateCounts,
 };
-use crate::stats::histogram::Histogram;
+use crate::stats::histogram::{Histogram, Quantiles};
 use crate::stats::session::KindCounts;
 use crate::wire::{Architecture, Ending};
 
@@ -196,6 +197,13 @@ impl UpdatesReport {
     }
 }
 
+/// Counts by name.
+#[must_use]
+pub fn named<'a>(counts: impl IntoIterator<Item = (&'a str, u64)>) -> Counts {
+    let counts = counts.into_iter();
+    counts.map(|(name, n)| (name.to_owned(), n)).collect()
+}
+
 fn named_causes(counts: &UpdateCounts) -> Counts {
     let named = counts.by_cause().map(|(cause, n)| (cause.name().into(), n));
     named.collect()
@@ -297,7 +305,8 @@ impl WireReport {
 }
 
 /// The force metrics; each is defined in `docs/metrics.md` under its name.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
 pub struct ForceReport {
     /// Pairs of f_s and f_m.
     pub samples: Option<u64>,
@@ -347,7 +356,8 @@ impl ForceReport {
 }
 
 /// What the estimator found, beside the truth where it is known.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
 pub struct ModelReport {
     /// Mass m, kg.
     pub mass_kg: EstimateReport,
@@ -358,7 +368,8 @@ pub struct ModelReport {
 }
 
 /// An estimate and the truth.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
 pub struct EstimateReport {
     /// The last estimate; absent if the data could not show it.
     pub estimate: Number,
@@ -483,7 +494,8 @@ pub struct LateReport {
 }
 
 /// A 1 kHz loop.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
 pub struct LoopReport {
     /// Ticks run.
     pub ticks: Option<u64>,
@@ -495,8 +507,22 @@ pub struct LoopReport {
     pub lateness_us: QuantilesReport,
 }
 
+impl LoopReport {
+    /// From what the loop counted, and how long its ticks took and how late they began.
+    #[must_use]
+    pub fn new(ticks: u64, skipped: u64, cpu: &Quantiles, lateness: &Quantiles) -> Self {
+        Self {
+            ticks: Some(ticks),
+            skipped: Some(skipped),
+            cpu_us: cpu.into(),
+            lateness_us: lateness.into(),
+        }
+    }
+}
+
 /// Quantiles of a distribution.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
 pub struct QuantilesReport {
     /// Median.
     pub p50: Number,
@@ -504,6 +530,19 @@ pub struct QuantilesReport {
     pub p99: Number,
     /// 99.9 % were at most this.
     pub p999: Number,
+}
+
+impl From<&Quantiles> for QuantilesReport {
+    /// µs; absent if nothing was counted.
+    fn from(of: &Quantiles) -> Self {
+        let us =
+            |time: std::time::Duration| (of.count > 0).then_some(time.as_secs_f64() * 1e6).into();
+        Self {
+            p50: us(of.p50),
+            p99: us(of.p99),
+            p999: us(of.p999),
+        }
+    }
 }
 
 #[cfg(test)]

@@ -12,15 +12,13 @@ use mmt_shared::io::farewell::ReceivedFarewell;
 use mmt_shared::io::network_task::NetworkCounts;
 use mmt_shared::io::transport::DatagramCounts;
 use mmt_shared::model::update::Cause;
+use mmt_shared::report::totals::{MasterTotals, SlaveTotals};
 use mmt_shared::report::{
-    ArchitectureReport, Counts, DelayReport, EstimateReport, ForceReport, LinkReport, LoopReport,
-    MessagesReport, ModelReport, Number, PassivityReport, PoseReport, PushesReport,
-    QuantilesReport, UpDown, UpdatesReport, WireReport, ending_name,
+    ArchitectureReport, Counts, DelayReport, ForceReport, LinkReport, LoopReport, MessagesReport,
+    Number, PassivityReport, PoseReport, PushesReport, UpDown, UpdatesReport, WireReport,
+    ending_name, named,
 };
-use mmt_shared::stats::histogram::Quantiles as Spread;
-use mmt_shared::stats::session::{
-    Identified, LoopTotals, MasterTotals, Quantiles, SlaveTotals, Traffic, UpdateDrops,
-};
+use mmt_shared::stats::session::Traffic;
 use mmt_shared::wire::Architecture;
 
 use super::haptic::HapticLoop;
@@ -54,7 +52,6 @@ impl Ended {
 
     /// What the master reports to the slave.
     pub(super) fn totals(&self) -> MasterTotals {
-        let timing = &self.haptic.timing;
         MasterTotals {
             duration_ns: u64::try_from(self.duration.as_nanos()).unwrap_or(u64::MAX),
             traffic: Traffic {
@@ -66,12 +63,7 @@ impl Ended {
             },
             updates_applied: self.end().master().applied(),
             updates_dropped: self.end().update_drops(),
-            haptic_loop: LoopTotals {
-                ticks: timing.ticks,
-                skipped: timing.skipped,
-                cpu_us: microseconds(&timing.cpu),
-                lateness_us: microseconds(&timing.lateness),
-            },
+            haptic_loop: self.haptic_loop(),
         }
     }
 
@@ -92,11 +84,7 @@ impl Ended {
         report.wire = self.wire();
         report.force = self.force();
         if let Some(slave) = self.slave() {
-            report.model = ModelReport {
-                mass_kg: estimate(&slave.mass_kg),
-                damping_ns_per_m: estimate(&slave.damping_ns_per_m),
-                friction_n: estimate(&slave.friction_n),
-            };
+            report.model = slave.model;
         }
         report.pose = PoseReport::from(&self.haptic.pose);
         report.passivity = PassivityReport {
@@ -105,14 +93,14 @@ impl Ended {
         };
         report.link = link_report(end);
         report.emulation.up = self.lateness.report();
-        report.haptic_loop = LoopReport {
-            ticks: Some(self.haptic.timing.ticks),
-            skipped: Some(self.haptic.timing.skipped),
-            cpu_us: quantiles(&self.haptic.timing.cpu),
-            lateness_us: quantiles(&self.haptic.timing.lateness),
-        };
+        report.haptic_loop = self.haptic_loop();
         report.drops = Some(self.drops());
         report
+    }
+
+    fn haptic_loop(&self) -> LoopReport {
+        let of = &self.haptic.timing;
+        LoopReport::new(of.ticks, of.skipped, &of.cpu, &of.lateness)
     }
 
     fn architecture(&self, architecture: Architecture) -> ArchitectureReport {
@@ -131,19 +119,18 @@ impl Ended {
     fn updates(&self) -> UpdatesReport {
         let mut report = UpdatesReport {
             applied: Some(self.end().master().applied().into()),
-            dropped: Some(update_counts(&self.end().update_drops())),
+            dropped: Some(named(self.end().update_drops().by_name())),
             age_ms: (&self.end().counts().age).into(),
             ..UpdatesReport::default()
         };
         if let Some(slave) = self.slave() {
             let by_cause = Cause::ALL.iter().zip(slave.updates_by_cause);
-            let named = by_cause.map(|(cause, n)| (cause.name().to_owned(), u64::from(n)));
-            let named: Counts = named.collect();
-            let sent: u64 = named.values().sum();
+            let by_cause = named(by_cause.map(|(cause, n)| (cause.name(), u64::from(n))));
+            let sent: u64 = by_cause.values().sum();
             let duration_s = Duration::from_nanos(slave.duration_ns).as_secs_f64();
             report.sent = Some(sent);
             report.rate_hz = Number::rate(sent as f64, duration_s);
-            report.by_cause = Some(named);
+            report.by_cause = Some(by_cause);
             let all = u64::from(slave.traffic.sent.updates);
             report.repeated = Some(all.saturating_sub(sent));
         }
@@ -167,17 +154,10 @@ impl Ended {
     }
 
     fn force(&self) -> ForceReport {
-        let judged = self.slave().map(|slave| slave.force).unwrap_or_default();
         ForceReport {
-            pmse: judged.pmse.into(),
-            pmse_x: judged.pmse_x.into(),
-            pmse_y: judged.pmse_y.into(),
-            pmse_magnitude: judged.pmse_magnitude.into(),
-            relative_error: judged.relative_error.into(),
-            jnd7_share: judged.jnd7_share.into(),
             largest_n: self.end().counts().on_hand.largest_n().into(),
             largest_step_n: self.end().counts().on_hand.largest_step_n().into(),
-            ..ForceReport::default()
+            ..self.slave().map(|slave| slave.force).unwrap_or_default()
         }
     }
 
@@ -187,13 +167,12 @@ impl Ended {
         let [off_grid, skipped, unsent] = end.samples_unsent();
         let queued = network.given;
         let unsent_datagrams = network.too_large + network.unsupported + network.disconnected;
-        [
-            ("bad_echoes", u64::from(peer.bad_echoes())),
+        let own = [
             ("bad_readings", end.master().bad_readings()),
             ("datagrams_duplicate", u64::from(traffic.duplicates)),
             ("datagrams_malformed", u64::from(traffic.malformed)),
             (
-                "datagrams_overtaken_in_queue",
+                "datagrams_displaced",
                 queued.saturating_sub(self.passed.sent),
             ),
             ("datagrams_too_old", u64::from(traffic.too_old)),
@@ -207,19 +186,15 @@ impl Ended {
             ),
             ("datagrams_unsealed", end.counts().unsendable),
             ("datagrams_unsent", unsent_datagrams),
+            ("echoes_implausible", u64::from(peer.echoes_implausible())),
             ("forces_not_finite", end.master().limiter().rejected()),
             ("samples_off_grid", off_grid),
             ("samples_skipped", skipped),
             ("samples_unsent", unsent),
-        ]
-        .into_iter()
-        .chain(
-            self.sockets
-                .outgoing
-                .drops_since(&DirectionCounters::default()),
-        )
-        .map(|(name, n)| (name.to_owned(), n))
-        .collect()
+        ];
+        let socket = &self.sockets.outgoing;
+        let socket = socket.drops_since(&DirectionCounters::default());
+        named(own.into_iter().chain(socket))
     }
 }
 
@@ -239,19 +214,6 @@ fn configuration(options: &MasterOptions) -> MasterConfiguration {
     }
 }
 
-fn update_counts(drops: &UpdateDrops) -> Counts {
-    [
-        ("duplicate", drops.duplicate),
-        ("stale", drops.stale),
-        ("rejected", drops.rejected),
-        ("superseded", drops.superseded),
-        ("frozen", drops.frozen),
-    ]
-    .into_iter()
-    .map(|(name, n)| (name.to_owned(), u64::from(n)))
-    .collect()
-}
-
 /// An update that was seen before is a repeat, whether the slave or the network repeated it.
 fn messages(end: &MasterEnd, duration_s: f64) -> UpDown<MessagesReport> {
     let traffic = end.channel().traffic();
@@ -269,27 +231,5 @@ fn link_report(end: &MasterEnd) -> LinkReport {
         loss_up: peer.outgoing().share().into(),
         loss_down: peer.incoming().share().into(),
         ..LinkReport::default()
-    }
-}
-
-fn estimate(found: &Identified) -> EstimateReport {
-    EstimateReport::new(found.estimate, found.truth)
-}
-
-fn microseconds(spread: &Spread) -> Option<Quantiles> {
-    let us = |time: Duration| time.as_secs_f64() * 1e6;
-    (spread.count > 0).then(|| Quantiles {
-        p50: us(spread.p50),
-        p99: us(spread.p99),
-        p999: us(spread.p999),
-    })
-}
-
-fn quantiles(spread: &Spread) -> QuantilesReport {
-    let found = microseconds(spread);
-    QuantilesReport {
-        p50: found.map(|q| q.p50).into(),
-        p99: found.map(|q| q.p99).into(),
-        p999: found.map(|q| q.p999).into(),
     }
 }

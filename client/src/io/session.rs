@@ -8,7 +8,7 @@ use mmt_shared::io::farewell::{FarewellError, ReceivedFarewell, receive_farewell
 use mmt_shared::io::loop_thread;
 use mmt_shared::io::network_task::{Event, NetworkTask, asked_to_stop};
 use mmt_shared::model::geometry::{BoxFootprint, Pose};
-use mmt_shared::stats::session::SlaveTotals;
+use mmt_shared::report::totals::SlaveTotals;
 use mmt_shared::wire::Side;
 use tokio::sync::watch;
 use tokio::time::{Instant, error::Elapsed, timeout_at};

@@ -11,7 +11,8 @@ use mmt_shared::model::geometry::{Pose, Twist, Vec2};
 use mmt_shared::model::params::{ModelParams, ModelState};
 use mmt_shared::model::update::Cause;
 use mmt_shared::pairing::{Pin, Token};
-use mmt_shared::stats::session::{ForceTotals, Identified, SlaveTotals};
+use mmt_shared::report::totals::SlaveTotals;
+use mmt_shared::report::{EstimateReport, ForceReport, ModelReport};
 use mmt_shared::time::{TICK, Time};
 use mmt_shared::wire::{Architecture, Ending, Message, Refusal};
 use tokio::sync::watch;
@@ -75,15 +76,15 @@ fn totals() -> SlaveTotals {
     SlaveTotals {
         duration_ns: 2_000_000_000,
         updates_by_cause: [3, 5, 0, 0, 1, 0],
-        force: ForceTotals {
-            pmse: Some(0.125),
-            pmse_x: Some(0.25),
-            relative_error: Some(0.1),
-            ..ForceTotals::default()
+        force: ForceReport {
+            pmse: 0.125.into(),
+            pmse_x: 0.25.into(),
+            relative_error: 0.1.into(),
+            ..ForceReport::default()
         },
-        mass_kg: Identified {
-            estimate: Some(0.75),
-            truth: Some(0.7),
+        model: ModelReport {
+            mass_kg: EstimateReport::new(0.75, 0.7),
+            ..ModelReport::default()
         },
         ..SlaveTotals::default()
     }
@@ -121,7 +122,7 @@ async fn a_session_goes_from_hello_to_farewell_and_both_sides_are_in_the_report(
     assert_eq!(report.model.mass_kg.estimate.get(), Some(0.75));
     assert!(report.force.largest_n.get().is_some());
     let ticks = report.haptic_loop.ticks.unwrap();
-    assert_eq!(totals.haptic_loop.ticks, ticks);
+    assert_eq!(totals.haptic_loop.ticks, Some(ticks));
     assert!(report.duration_s.get().unwrap() >= 0.4);
     assert!(report.haptic_loop.cpu_us.p50.get().unwrap() > 0.0);
     assert_eq!(report.slave_loop, Default::default());

@@ -10,15 +10,12 @@ use std::time::Duration;
 
 use mmt_netem::io::socket::SocketCounters;
 use mmt_shared::io::network_task::NetworkCounts;
-use mmt_shared::metrics::ForceSummary;
+use mmt_shared::report::totals::{MasterTotals, SlaveTotals};
 use mmt_shared::report::{
-    ArchitectureReport, Counts, DelayReport, EstimateReport, ForceReport, LinkReport, LoopReport,
-    MessagesReport, ModelReport, QuantilesReport, ToolReport, UpDown, UpdatesReport, WireReport,
-    ending_name,
+    ArchitectureReport, DelayReport, EstimateReport, ForceReport, LinkReport, LoopReport,
+    MessagesReport, ModelReport, ToolReport, UpDown, UpdatesReport, WireReport, ending_name, named,
 };
-use mmt_shared::stats::session::{
-    ForceTotals, Identified, LoopTotals, MasterTotals, SlaveTotals, Traffic, UpdateDrops,
-};
+use mmt_shared::stats::session::Traffic;
 use mmt_shared::time::TICK_S;
 use mmt_shared::wire::Ending;
 
@@ -54,26 +51,23 @@ pub(super) struct Outcome {
 }
 
 impl Outcome {
-    /// What the farewell tells.
+    /// What the farewell reports.
     pub(super) fn totals(&self) -> SlaveTotals {
         let end = self.finished.as_ref().map(|finished| &finished.end);
         let slave = end.map(SlaveEnd::slave);
         let counts = end.map(|end| *end.counts()).unwrap_or_default();
-        let [mass_kg, damping_ns_per_m, friction_n] = slave.map(identified).unwrap_or_default();
         let mut updates_by_cause = SlaveTotals::default().updates_by_cause;
         for (slot, (_, count)) in updates_by_cause.iter_mut().zip(counts.updates.by_cause()) {
             *slot = u32::try_from(count).unwrap_or(u32::MAX);
         }
-        let force = slave.map(|slave| force_totals(&slave.force().summary()));
+        let force = slave.map(|slave| ForceReport::new(&slave.force().summary(), None));
         SlaveTotals {
             duration_ns: u64::try_from(self.duration.as_nanos()).unwrap_or(u64::MAX),
             traffic: self.traffic(),
             updates_by_cause,
             samples_received: counts.samples,
             force: force.unwrap_or_default(),
-            mass_kg,
-            damping_ns_per_m,
-            friction_n,
+            model: slave.map(model).unwrap_or_default(),
         }
     }
 
@@ -114,12 +108,13 @@ pub(super) fn report(
     report.emulation.down = shared.meter.lateness().report();
     report.drops = Some(drops::drops(shared, outcome, finished, &traffic));
     if let Some(theirs) = theirs {
-        report.haptic_loop = loop_of_master(&theirs.haptic_loop);
+        report.haptic_loop = theirs.haptic_loop;
     }
     report.force = ForceReport::new(&slave.force().summary(), None);
     report.model = model(slave);
     report.tool = tool(slave.tool_force());
-    report.slave_loop = slave_loop(finished);
+    let of = &finished.ticker;
+    report.slave_loop = LoopReport::new(of.ticks, of.skipped, &of.cpu, &of.lateness);
     report
 }
 
@@ -129,19 +124,9 @@ fn updates(end: &SlaveEnd, theirs: Option<&MasterTotals>) -> UpdatesReport {
     updates.set_repeated(&end.counts().repeated);
     if let Some(totals) = theirs {
         updates.applied = Some(totals.updates_applied.into());
-        updates.dropped = Some(dropped(&totals.updates_dropped));
+        updates.dropped = Some(named(totals.updates_dropped.by_name()));
     }
     updates
-}
-
-fn dropped(drops: &UpdateDrops) -> Counts {
-    named([
-        ("duplicate", drops.duplicate.into()),
-        ("stale", drops.stale.into()),
-        ("rejected", drops.rejected.into()),
-        ("superseded", drops.superseded.into()),
-        ("frozen", drops.frozen.into()),
-    ])
 }
 
 fn messages(outcome: &Outcome, end: &SlaveEnd, traffic: &Traffic) -> UpDown<MessagesReport> {
@@ -179,24 +164,14 @@ fn link(end: &SlaveEnd) -> LinkReport {
 }
 
 /// m, b, c: absent as long as the estimator has seen nothing that counts.
-fn identified(slave: &Slave) -> [Identified; 3] {
+fn model(slave: &Slave) -> ModelReport {
     let (estimate, truth) = (slave.estimate(), slave.environment().truth());
     let [m, b, c, ..] = truth.to_array();
-    [(estimate.m, m), (estimate.b, b), (estimate.c, c)].map(|(estimated, truth)| Identified {
-        estimate: (slave.estimate().samples > 0)
-            .then_some(estimated)
-            .filter(|x| x.is_finite()),
-        truth: Some(truth),
-    })
-}
-
-fn model(slave: &Slave) -> ModelReport {
-    let [mass_kg, damping_ns_per_m, friction_n] =
-        identified(slave).map(|of| EstimateReport::new(of.estimate, of.truth));
+    let seen = |estimated: f64| (estimate.samples > 0).then_some(estimated);
     ModelReport {
-        mass_kg,
-        damping_ns_per_m,
-        friction_n,
+        mass_kg: EstimateReport::new(seen(estimate.m), m),
+        damping_ns_per_m: EstimateReport::new(seen(estimate.b), b),
+        friction_n: EstimateReport::new(seen(estimate.c), c),
     }
 }
 
@@ -205,55 +180,4 @@ fn tool(force: &ToolForce) -> ToolReport {
         held_s: (force.held_ticks() as f64 * TICK_S).into(),
         force_peak_n: force.peak_n().into(),
     }
-}
-
-fn force_totals(summary: &ForceSummary) -> ForceTotals {
-    let finite = |value: Option<f64>| value.filter(|value| value.is_finite());
-    ForceTotals {
-        pmse: finite(summary.pmse),
-        pmse_x: finite(summary.pmse_x),
-        pmse_y: finite(summary.pmse_y),
-        pmse_magnitude: finite(summary.pmse_magnitude),
-        relative_error: finite(summary.relative_error),
-        jnd7_share: finite(summary.jnd7_share),
-    }
-}
-
-fn slave_loop(finished: &Finished) -> LoopReport {
-    let us = |duration: Duration| (duration.as_secs_f64() * 1e6).into();
-    let quantiles = |spread: &mmt_shared::stats::histogram::Quantiles| QuantilesReport {
-        p50: us(spread.p50),
-        p99: us(spread.p99),
-        p999: us(spread.p999),
-    };
-    let ticker = &finished.ticker;
-    LoopReport {
-        ticks: Some(ticker.ticks),
-        skipped: Some(ticker.skipped),
-        cpu_us: quantiles(&ticker.cpu),
-        lateness_us: quantiles(&ticker.lateness),
-    }
-}
-
-fn loop_of_master(totals: &LoopTotals) -> LoopReport {
-    let quantiles = |of: Option<mmt_shared::stats::session::Quantiles>| {
-        of.map_or_else(QuantilesReport::default, |of| QuantilesReport {
-            p50: of.p50.into(),
-            p99: of.p99.into(),
-            p999: of.p999.into(),
-        })
-    };
-    LoopReport {
-        ticks: Some(totals.ticks),
-        skipped: Some(totals.skipped),
-        cpu_us: quantiles(totals.cpu_us),
-        lateness_us: quantiles(totals.lateness_us),
-    }
-}
-
-fn named<const N: usize>(counts: [(&str, u64); N]) -> Counts {
-    let named = counts
-        .into_iter()
-        .map(|(name, count)| (name.to_owned(), count));
-    named.collect()
 }

@@ -21,7 +21,7 @@ use mmt_shared::io::stream::WriteFrameError;
 use mmt_shared::io::ticker::Ticker;
 use mmt_shared::io::transport::{CLOSE_FINISHED, Connection, RecvStream, SendStream};
 use mmt_shared::model::contact::Coupling;
-use mmt_shared::stats::session::MasterTotals;
+use mmt_shared::report::totals::MasterTotals;
 use mmt_shared::wire::{
     Ending, Hello, Label, Refusal, STREAM_MESSAGE_MAX, Side, StreamMessage, Welcome,
 };

@@ -107,7 +107,7 @@ async fn a_session_goes_from_the_welcome_to_a_report_that_agrees_with_the_master
     assert!(report.slave_loop.ticks > Some(100));
     assert!(report.tool.held_s.get().is_some());
     assert!(report.tool.force_peak_n.get() > Some(0.0));
-    assert_eq!(report.model.mass_kg.truth.get(), totals.mass_kg.truth);
+    assert_eq!(report.model.mass_kg.truth, totals.model.mass_kg.truth);
 }
 
 #[tokio::test]

@@ -82,7 +82,7 @@ pub struct Peer {
     duplicates: u32,
     too_old: u32,
     their_report: Loss,
-    bad_echoes: u32,
+    echoes_implausible: u32,
     round_trip: RoundTrip,
 }
 
@@ -107,7 +107,7 @@ impl Peer {
             duplicates: 0,
             too_old: 0,
             their_report: Loss::default(),
-            bad_echoes: 0,
+            echoes_implausible: 0,
             round_trip: RoundTrip::new(),
         }
     }
@@ -178,7 +178,7 @@ impl Peer {
         let round_trip = away.and_then(|away| away.checked_sub(echo.held_ns));
         let possible = echo.number <= self.sent && echo.received <= echo.number;
         let Some(round_trip) = round_trip.filter(|_| possible) else {
-            self.bad_echoes = self.bad_echoes.saturating_add(1);
+            self.echoes_implausible = self.echoes_implausible.saturating_add(1);
             return;
         };
         self.round_trip.note(now, Duration::from_nanos(round_trip));
@@ -240,8 +240,8 @@ impl Peer {
 
     /// Echoes that cannot be true: of a number never sent, or held for longer than it was away.
     #[must_use]
-    pub fn bad_echoes(&self) -> u32 {
-        self.bad_echoes
+    pub fn echoes_implausible(&self) -> u32 {
+        self.echoes_implausible
     }
 
     /// Loss from the other side to this one. Reordering is no loss once the late ones are there.

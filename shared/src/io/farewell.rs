@@ -9,7 +9,7 @@ use serde::de::DeserializeOwned;
 
 use super::stream::{ReadFrameError, WriteFrameError};
 use super::transport::{ReadError, RecvStream, SendStream};
-use crate::stats::session;
+use crate::report::totals::{of_report, to_report};
 use crate::wire::{DecodeError, Ending, Farewell, Kind, STREAM_MESSAGE_MAX, Side, StreamMessage};
 
 /// How long each side waits for the other's farewell and close after its own farewell (docs/protocol.md, section 2).
@@ -62,7 +62,7 @@ pub async fn send_farewell(
     report: &impl Serialize,
     limit: Duration,
 ) -> Result<(), WriteFrameError> {
-    let report = session::to_report(report);
+    let report = to_report(report);
     let mut out = [0; STREAM_MESSAGE_MAX];
     let mut write = |report| StreamMessage::Farewell(Farewell { ending, report }).encode(&mut out);
     // a report too long for the frame stays behind
@@ -85,7 +85,7 @@ pub async fn receive_farewell<T: DeserializeOwned>(
     match StreamMessage::decode(&message, from)? {
         StreamMessage::Farewell(Farewell { ending, report }) => Ok(ReceivedFarewell {
             ending,
-            report: session::of_report(report),
+            report: of_report(report),
         }),
         other => Err(FarewellError::Unexpected { kind: other.kind() }),
     }

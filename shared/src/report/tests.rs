@@ -102,7 +102,7 @@ fn full() -> RunReport<Value> {
         cpu_us: quantiles(3.1),
         lateness_us: quantiles(12.0),
     };
-    report.slave_loop = report.haptic_loop.clone();
+    report.slave_loop = report.haptic_loop;
     report.drops = Some(Counts::from([("malformed".to_owned(), 0)]));
     report
 }

@@ -1,23 +1,8 @@
-//! What each side counts and measures in a session, as its farewell reports it to the other.
+//! What each side counts of a session's messages and updates.
 
-use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
-use crate::model::update::Cause;
 use crate::wire::Kind;
-
-/// The report of a farewell: JSON. A number that is not finite is null.
-#[must_use]
-pub fn to_report(totals: &impl Serialize) -> Vec<u8> {
-    serde_json::to_vec(totals).unwrap_or_default()
-}
-
-/// What a farewell reports; none if it cannot be read. Keys that are not known are skipped, those that are missing are 0
-/// or absent.
-#[must_use]
-pub fn of_report<T: DeserializeOwned>(report: &[u8]) -> Option<T> {
-    serde_json::from_slice(report).ok()
-}
 
 /// Messages in datagrams, by type.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -84,56 +69,6 @@ pub struct Traffic {
     pub udp_bytes_received: u64,
 }
 
-/// The force metrics of a session (docs/metrics.md): each absent if there was nothing to judge.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(default)]
-pub struct ForceTotals {
-    /// PMSE (13)–(15), both axes.
-    pub pmse: Option<f64>,
-    /// PMSE of the x axis.
-    pub pmse_x: Option<f64>,
-    /// PMSE of the y axis.
-    pub pmse_y: Option<f64>,
-    /// PMSE of the magnitude |f|.
-    pub pmse_magnitude: Option<f64>,
-    /// Relative error of the force vector.
-    pub relative_error: Option<f64>,
-    /// Share of contact time with the force outside the 7 % JND, 0 to 1.
-    pub jnd7_share: Option<f64>,
-}
-
-/// One parameter of the model: what the estimator found and what it is.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(default)]
-pub struct Identified {
-    /// The last estimate; absent if it could not be seen.
-    pub estimate: Option<f64>,
-    /// The truth; absent if nobody knows it.
-    pub truth: Option<f64>,
-}
-
-/// What the slave reports in its farewell.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(default)]
-pub struct SlaveTotals {
-    /// From the welcome to the farewell, ns.
-    pub duration_ns: u64,
-    /// Datagrams.
-    pub traffic: Traffic,
-    /// Updates sent for the first time, by cause, in the order of [`Cause::ALL`]; repeats are not here.
-    pub updates_by_cause: [u32; Cause::ALL.len()],
-    /// HIP samples taken into the play-out buffer.
-    pub samples_received: u64,
-    /// Force metrics over the samples for which both forces are known.
-    pub force: ForceTotals,
-    /// m, kg.
-    pub mass_kg: Identified,
-    /// b, N s/m.
-    pub damping_ns_per_m: Identified,
-    /// c, N.
-    pub friction_n: Identified,
-}
-
 /// Updates that the master received and did not apply, by cause.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default)]
@@ -151,58 +86,16 @@ pub struct UpdateDrops {
 }
 
 impl UpdateDrops {
-    /// All of them.
+    /// Each cause by its name in reports.
     #[must_use]
-    pub fn total(&self) -> u64 {
-        let causes = [
-            self.duplicate,
-            self.stale,
-            self.rejected,
-            self.superseded,
-            self.frozen,
-        ];
-        causes.into_iter().map(u64::from).sum()
+    pub fn by_name(&self) -> [(&'static str, u64); 5] {
+        [
+            ("duplicate", self.duplicate),
+            ("stale", self.stale),
+            ("rejected", self.rejected),
+            ("superseded", self.superseded),
+            ("frozen", self.frozen),
+        ]
+        .map(|(name, count)| (name, u64::from(count)))
     }
-}
-
-/// Three quantiles of a time, µs.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(default)]
-pub struct Quantiles {
-    /// Median.
-    pub p50: f64,
-    /// 99 %.
-    pub p99: f64,
-    /// 99.9 %.
-    pub p999: f64,
-}
-
-/// How the master's 1 kHz loop kept its time.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(default)]
-pub struct LoopTotals {
-    /// Ticks run.
-    pub ticks: u64,
-    /// Whole periods skipped on overrun.
-    pub skipped: u64,
-    /// Computing time of a tick, µs; absent in virtual time.
-    pub cpu_us: Option<Quantiles>,
-    /// How late a tick began, µs; absent in virtual time.
-    pub lateness_us: Option<Quantiles>,
-}
-
-/// What the master reports in its farewell.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(default)]
-pub struct MasterTotals {
-    /// From the welcome to the farewell, ns.
-    pub duration_ns: u64,
-    /// Datagrams.
-    pub traffic: Traffic,
-    /// Updates that reached the model.
-    pub updates_applied: u32,
-    /// Updates that did not.
-    pub updates_dropped: UpdateDrops,
-    /// The haptic loop.
-    pub haptic_loop: LoopTotals,
 }

@@ -14,7 +14,7 @@ use mmt_shared::io::stream::{read_frame, write_frame};
 use mmt_shared::model::geometry::{BoxFootprint, Pose};
 use mmt_shared::model::settings::Mode;
 use mmt_shared::model::update::Update;
-use mmt_shared::stats::session::{self, MasterTotals};
+use mmt_shared::report::totals::{MasterTotals, of_report, to_report};
 use mmt_shared::time::Time;
 use mmt_shared::wire::{
     DATAGRAM_MAX, Farewell, Hello, Label, Message, STREAM_MESSAGE_MAX, Side, StreamMessage, Welcome,
@@ -131,7 +131,7 @@ impl Session {
     }
 
     pub(super) async fn say_farewell(&mut self, ending: Ending, totals: SlaveTotals) {
-        let report = &session::to_report(&totals);
+        let report = &to_report(&totals);
         self.say(&StreamMessage::Farewell(Farewell { ending, report }))
             .await;
     }
@@ -172,7 +172,7 @@ impl Session {
         match StreamMessage::decode(&message, Side::Master).unwrap() {
             StreamMessage::Farewell(Farewell { ending, report }) => ReceivedFarewell {
                 ending,
-                report: session::of_report(report),
+                report: of_report(report),
             },
             other => panic!("{other:?} instead of a farewell"),
         }

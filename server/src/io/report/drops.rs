@@ -2,10 +2,10 @@
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use mmt_shared::report::Counts;
+use mmt_shared::report::{Counts, named};
 use mmt_shared::stats::session::Traffic;
 
-use super::{Outcome, named};
+use super::Outcome;
 use crate::io::host::Shared;
 use crate::io::slave_loop::Finished;
 
@@ -27,7 +27,7 @@ pub(super) fn drops(
         ("datagrams_displaced", outcome.unsent),
         (
             "echoes_implausible",
-            finished.end.channel().peer().bad_echoes().into(),
+            finished.end.channel().peer().echoes_implausible().into(),
         ),
         (
             "datagrams_ring_full",

@@ -5,7 +5,7 @@ use std::time::Duration;
 use mmt_shared::channel::peer::NumbersSpent;
 use mmt_shared::io::farewell::{FarewellError, ReceivedFarewell};
 use mmt_shared::io::transport::ConnectionError;
-use mmt_shared::stats::session::MasterTotals;
+use mmt_shared::report::totals::MasterTotals;
 
 /// A master that has not been heard for this long has lost its lease (reliability.md, section 1).
 pub(super) const SILENCE_MAX: Duration = Duration::from_secs(10);

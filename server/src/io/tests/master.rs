@@ -16,7 +16,7 @@ use mmt_shared::model::sample::{HipCounts, HipSample};
 use mmt_shared::model::tool::HandPort;
 use mmt_shared::model::update::Update;
 use mmt_shared::pairing::{Pairing, Token};
-use mmt_shared::stats::session::{self, MasterTotals, SlaveTotals};
+use mmt_shared::report::totals::{MasterTotals, SlaveTotals, of_report, to_report};
 use mmt_shared::time::{TICK, Time};
 use mmt_shared::wire::{
     Architecture, Command, DATAGRAM_MAX, Ending, Farewell, Hello, Label, Message, RawState,
@@ -205,7 +205,7 @@ impl Master {
         };
         let farewell = Farewell {
             ending: Ending::Finished,
-            report: &session::to_report(&totals),
+            report: &to_report(&totals),
         };
         self.say(&encoded(&StreamMessage::Farewell(farewell))).await;
     }
@@ -213,7 +213,7 @@ impl Master {
     pub(super) async fn hear_farewell(&mut self) -> (Ending, SlaveTotals) {
         match StreamMessage::decode(&self.hear().await, Side::Slave) {
             Ok(StreamMessage::Farewell(Farewell { ending, report })) => {
-                (ending, session::of_report(report).unwrap())
+                (ending, of_report(report).unwrap())
             }
             other => panic!("{other:?}"),
         }

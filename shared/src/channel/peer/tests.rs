@@ -34,7 +34,7 @@ fn round_trip_leaves_out_the_time_that_the_answer_was_held_whatever_the_other_cl
             Some(Duration::from_millis(UP + DOWN))
         );
     }
-    assert_eq!(here.bad_echoes(), 0);
+    assert_eq!(here.echoes_implausible(), 0);
     assert_eq!(here.round_trip().histogram().total(), 100);
 }
 
@@ -162,7 +162,10 @@ fn an_echo_that_cannot_be_true_teaches_nothing() {
         peer.stamp(ms(0)).unwrap();
         let echo = Some(echo);
         peer.handle(ms(10), &Envelope { echo, ..plain(1) }, 10);
-        (peer.bad_echoes(), peer.round_trip().histogram().total())
+        (
+            peer.echoes_implausible(),
+            peer.round_trip().histogram().total(),
+        )
     };
     assert_eq!(handled(true_echo), (0, 1));
     for echo in impossible {
