@@ -127,8 +127,8 @@ impl Conditions {
         let mean = self.round_trip / 2 + self.jitter;
         LinkConfig {
             delay: match self.jitter {
-                Duration::ZERO => Delay::Constant { delay: mean },
-                half_width => Delay::Uniform { mean, half_width },
+                Duration::ZERO => Delay::constant(mean),
+                half_width => Delay::uniform(mean, half_width),
             },
             order: Order::Free,
             loss: match self.loss {

@@ -150,7 +150,7 @@ impl World {
         let scripted = Scripted::try_new(config.operator, view)?;
         let operator = Operator::Scripted(Box::new(scripted));
         slave.start_at(operator.start());
-        let (down_delay, _) = config.down.delay.parts();
+        let down_delay = config.down.delay.middle();
         let path = |link: LinkConfig, direction| {
             Link::try_new(link, config.seed, LinkId::first(direction))
         };
@@ -242,7 +242,7 @@ impl World {
     pub fn rewire(&mut self, link: &LinkConfig, seed: u64) -> Result<(), WorldError> {
         self.up = Link::try_new(link.clone(), seed, LinkId::first(Direction::Up))?;
         self.down = Link::try_new(link.clone(), seed, LinkId::first(Direction::Down))?;
-        (self.down_delay, _) = link.delay.parts();
+        self.down_delay = link.delay.middle();
         Ok(())
     }
 

@@ -14,7 +14,7 @@ use std::net::{Ipv4Addr, SocketAddr, UdpSocket};
 use std::time::{Duration, Instant};
 
 use mmt_netem::LinkConfig;
-use mmt_netem::io::relay::{Relay, RelayHandle};
+use mmt_netem::io::relay::{Extras, Relay, RelayHandle};
 
 const LOCAL: (Ipv4Addr, u16) = (Ipv4Addr::LOCALHOST, 0);
 const TICK: Duration = Duration::from_millis(1);
@@ -63,7 +63,14 @@ fn echo() -> Result<(SocketAddr, std::thread::JoinHandle<()>), Box<dyn Error>> {
 
 fn relay(to: SocketAddr, words: &str) -> Result<RelayHandle, Box<dyn Error>> {
     let link: LinkConfig = words.parse()?;
-    Ok(Relay::bind(LOCAL.into(), to, link.clone(), link, 1)?)
+    Ok(Relay::bind(
+        LOCAL.into(),
+        to,
+        link.clone(),
+        link,
+        1,
+        Extras::default(),
+    )?)
 }
 
 /// Round trips at 1 kHz, sorted; each packet carries its number.

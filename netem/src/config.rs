@@ -16,7 +16,7 @@ mod slot;
 #[cfg(test)]
 mod tests;
 
-pub use delay::{Correlation, Delay, Order, Reorder, TAU_MIN};
+pub use delay::{Correlation, Delay, Order, Reorder, Shape, TAU_MIN};
 pub use loss::{BURST_MIN, FourState, GilbertElliott, Loss, Outage, PacketList, TimedBursts};
 pub use probability::{Chance, Probability};
 pub use queue::{Codel, Framing, Queue, RATE_MAX_BIT_S, Rate, Service};
@@ -138,7 +138,7 @@ impl LinkConfig {
             && self.mtu.is_none()
             && self.rate.is_none()
             && self.replay.is_none()
-            && self.profile.is_empty()
+            && self.profile.steps.is_empty()
     }
 
     /// How far apart the shortest and the longest delay are: all of it for a bounded jitter, 99 % of it

@@ -47,7 +47,8 @@ pub(crate) fn lognormal(mean: f64, sd: f64, p: f64) -> f64 {
 /// A distribution table of iproute2 (`*.dist`): 16-bit numbers, 8192 for one J; `#` begins a comment.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Table {
-    name: String,
+    /// What the settings call it.
+    pub(crate) name: String,
     sorted: Vec<i16>,
 }
 
@@ -79,12 +80,6 @@ impl Table {
         })
     }
 
-    /// What the settings call it.
-    #[must_use]
-    pub fn name(&self) -> &str {
-        &self.name
-    }
-
     /// In J.
     pub(crate) fn quantile(&self, p: f64) -> f64 {
         let at = (p * self.sorted.len() as f64) as usize;
@@ -96,8 +91,8 @@ impl Table {
 /// A measured distribution of delay: points of the cumulative distribution, straight lines between.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Cdf {
-    /// The file it came from; none: it stands among the words.
-    name: Option<String>,
+    /// The file it came from, as the settings call it; none: it stands among the words.
+    pub(crate) name: Option<String>,
     /// Cumulative share and delay in nanoseconds, ascending in both.
     points: Vec<(f64, f64)>,
 }
@@ -163,12 +158,6 @@ impl Cdf {
         };
         let last = rows.last().map_or(1, |(line, _)| *line);
         Self::try_new(Some(name.to_owned()), &points).map_err(|why| TraceError::at(last, why))
-    }
-
-    /// The file it came from, as the settings call it.
-    #[must_use]
-    pub fn name(&self) -> Option<&str> {
-        self.name.as_deref()
     }
 
     /// The points: delay in nanoseconds and cumulative share.

@@ -71,7 +71,7 @@ impl LinkConfig {
         let mean_ms = mean(&stream.delays_ms);
         let free_mean_ms = match config.order {
             // a wait is only that of the order where nothing else waits
-            Order::Fifo if config.profile.is_empty() => {
+            Order::Fifo if config.profile.steps.is_empty() => {
                 mean(&Stream::through(&unordered, rate_hz)?.delays_ms)
             }
             Order::Fifo | Order::Free => mean_ms,
@@ -81,7 +81,7 @@ impl LinkConfig {
             && config.mtu.is_none()
             && config.replay.is_none()
             && !config.ecn
-            && config.profile.is_empty();
+            && config.profile.steps.is_empty();
         let known = config.loss.share().filter(|_| only_the_model);
         let known_burst = config.loss.mean_burst(rate_hz).filter(|_| only_the_model);
         let drops = &stream.drops;
@@ -118,7 +118,7 @@ fn sample_size(config: &LinkConfig) -> u32 {
     let in_time = matches!(config.correlation, Correlation::InTime(_))
         || matches!(config.loss, Loss::Bursts(_))
         || !config.outages.is_empty()
-        || !config.profile.is_empty();
+        || !config.profile.steps.is_empty();
     if in_time { 10 * PACKETS } else { PACKETS }
 }
 

@@ -9,7 +9,6 @@
     reason = "the drivers are the shell: they read the clock, own sockets and threads"
 )]
 
-pub mod alarm;
 pub mod driver;
 pub mod lateness;
 pub mod record_file;
@@ -17,6 +16,15 @@ pub mod relay;
 pub mod socket;
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
+
+use mmt_shared::io::clock::Clock;
+use mmt_shared::time::Time;
+
+/// The time of `CLOCK_MONOTONIC`, which is the clock of every `Time` in the drivers.
+fn now() -> Time {
+    const CLOCK: Clock = Clock::since_boot();
+    CLOCK.now()
+}
 
 /// Locks; what a panicking thread left behind is plain counts and queues, good to go on with.
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {

@@ -91,7 +91,7 @@ impl<T: Clone> Link<T> {
     pub fn reconfigure(&mut self, now: Time, config: LinkConfig) -> Result<(), ConfigError> {
         config.check()?;
         self.stages.settle(&self.timeline, now);
-        self.timeline = Timeline::new(self.timeline.origin(), config);
+        self.timeline = Timeline::new(self.timeline.origin, config);
         Ok(())
     }
 }
@@ -100,25 +100,25 @@ impl<T> Link<T> {
     /// Sets when the time of the link begins, before the first offer: profiles, outages, replays and all that
     /// is correlated in time count from there.
     pub fn set_origin(&mut self, origin: Time) {
-        self.timeline.set_origin(origin);
+        self.timeline.origin = origin;
     }
 
     /// The settings, with all that they have for later.
     #[must_use]
     pub fn config(&self) -> &LinkConfig {
-        self.timeline.config()
+        &self.timeline.config
     }
 
     /// Packets and copies on the link.
     #[must_use]
     pub fn in_flight(&self) -> usize {
-        self.stages.in_flight()
+        self.stages.in_flight
     }
 
     /// What became of the packets so far.
     #[must_use]
     pub fn counters(&self) -> LinkCounters {
-        self.stages.counters()
+        self.stages.counters
     }
 }
 

@@ -19,12 +19,22 @@ mod tests;
 
 pub use error::{ParseError, Reason};
 
-use crate::config::{LinkConfig, Profile, STEPS_MAX, Step};
+use crate::config::{LinkConfig, Profile, STEPS_MAX, Shape, Step};
 use draft::Draft;
 use number::time;
 
 const A_WORD: &str = "delay, loss, outage, order, reorder, duplicate, corrupt, mtu, rate, queue, codel, \
                       slot, ecn, limit, trace, seed, preset or none";
+
+/// The distributions by name, but for tables.
+const SHAPES: [(&str, Shape); 6] = [
+    ("uniform", Shape::Uniform),
+    ("normal", Shape::Normal),
+    ("pareto", Shape::Pareto),
+    ("paretonormal", Shape::ParetoNormal),
+    ("lognormal", Shape::LogNormal),
+    ("gamma", Shape::Gamma),
+];
 
 /// Reads the text of a file by the name that the words give it, or returns why it cannot.
 pub type ReadFile<'a> = dyn FnMut(&str) -> Result<String, String> + 'a;
@@ -128,7 +138,7 @@ impl<'a, 'r> Parser<'a, 'r> {
                 "at" if profile.repeat.is_none() && profile.steps.len() < STEPS_MAX => {
                     self.step(&mut profile)?;
                 }
-                "loop" if profile.repeat.is_none() && !profile.is_empty() => {
+                "loop" if profile.repeat.is_none() && !profile.steps.is_empty() => {
                     profile.repeat = Some(self.loop_time(&profile)?);
                 }
                 _ if profile.repeat.is_some() => {

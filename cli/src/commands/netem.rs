@@ -79,7 +79,7 @@ pub(crate) fn run(arguments: &NetemArguments) -> Result<(), Failure> {
         record: record.as_ref().map(RecordFile::writer),
         rebind_every: arguments.rebind,
     };
-    let relay = Relay::bind_with(listen, to, up, down, arguments.seed, extras);
+    let relay = Relay::bind(listen, to, up, down, arguments.seed, extras);
     let relay = relay.map_err(start_error)?;
     let local = relay.local_addr();
     note(format_args!("up   (to {to}): {effect_up}"));

@@ -147,7 +147,7 @@ async fn open_at(
     let plain = socket::for_quic(socket::bind(local)?).map_err(MasterHostError::Socket)?;
     let (netem, extras) = (options.netem.clone(), options.netem_extras.clone());
     let seed = options.netem_seed;
-    let wrapped = EmulatedSocket::try_new_with(plain, netem, seed, LinkId::UP, extras)?;
+    let wrapped = EmulatedSocket::try_new(plain, netem, seed, LinkId::UP, extras)?;
     let meter = wrapped.meter();
     let endpoint = Endpoint::of_master(options.transport, Arc::new(wrapped))?;
     let traffic = traffic(&options.commands, options.architecture);

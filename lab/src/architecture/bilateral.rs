@@ -96,7 +96,7 @@ impl Bilateral {
         };
         let scripted = Scripted::try_new(config.operator, view)?;
         let operator = Operator::Scripted(Box::new(scripted));
-        let (down_delay, _) = config.down.delay.parts();
+        let down_delay = config.down.delay.middle();
         Ok(Self {
             now: Time::ZERO,
             bytes: wire_bytes(baseline),
@@ -252,7 +252,7 @@ impl Bilateral {
 
 /// The waves' smoothing over a link: none where every packet takes the same time and arrives.
 fn smoothing_ticks(link: &LinkConfig) -> u16 {
-    let (_, jitter) = link.delay.parts();
+    let jitter = link.delay.jitter;
     if jitter == Duration::ZERO && link.loss == Loss::None && link.outages.is_empty() {
         return 1;
     }

@@ -14,149 +14,103 @@ pub const TAU_MIN: Duration = Duration::from_millis(1);
 
 /// The distribution of the propagation delay. Every distribution is cut at zero: what would leave
 /// before it came leaves at once, so a jitter near the delay raises the mean.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Delay {
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Delay {
+    /// The mean before the cut at zero; of a table the delay at x = 0. A measured distribution has its own.
+    pub mean: Duration,
+    /// J, what the shape makes of it.
+    pub jitter: Duration,
+    /// The distribution around the mean.
+    pub shape: Shape,
+}
+
+/// The distribution of a delay around its mean.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub enum Shape {
     /// The same for every packet.
-    Constant {
-        /// The delay.
-        delay: Duration,
-    },
-    /// Uniform in `mean ± half_width`.
-    Uniform {
-        /// The middle.
-        mean: Duration,
-        /// J: half of the width.
-        half_width: Duration,
-    },
-    /// Normal.
-    Normal {
-        /// The mean before the cut at zero.
-        mean: Duration,
-        /// J: the standard deviation before the cut at zero.
-        sigma: Duration,
-    },
+    #[default]
+    Constant,
+    /// Uniform in mean ± J.
+    Uniform,
+    /// Normal: J is the standard deviation before the cut at zero.
+    Normal,
     /// Pareto of exponent 3 as in iproute2's table: mean + J (4/3) ((1 - u)^(-1/3) - 3/2), cut at
-    /// mean + 4 J as that table is.
-    Pareto {
-        /// The mean before the cuts.
-        mean: Duration,
-        /// J: the scale; the standard deviation before the cuts is 1.15 J.
-        scale: Duration,
-    },
+    /// mean + 4 J as that table is. Before the cuts the standard deviation is 1.15 J.
+    Pareto,
     /// A quarter normal, three quarters Pareto, as in iproute2's table.
-    ParetoNormal {
-        /// The mean before the cuts.
-        mean: Duration,
-        /// J: the scale.
-        scale: Duration,
-    },
-    /// Log-normal from zero on.
-    LogNormal {
-        /// The mean.
-        mean: Duration,
-        /// J: the standard deviation.
-        sigma: Duration,
-    },
-    /// Gamma from zero on: log-normal's lighter tail.
-    Gamma {
-        /// The mean.
-        mean: Duration,
-        /// J: the standard deviation.
-        sigma: Duration,
-    },
+    ParetoNormal,
+    /// Log-normal from zero on: J is the standard deviation.
+    LogNormal,
+    /// Gamma from zero on, log-normal's lighter tail: J is the standard deviation.
+    Gamma,
     /// Drawn from a table of iproute2's kind: mean + J x / 8192.
-    Table {
-        /// The delay at x = 0.
-        mean: Duration,
-        /// J: the delay added at x = 8192.
-        scale: Duration,
-        /// The table.
-        table: Arc<Table>,
-    },
-    /// Drawn from a measured distribution.
+    Table(Arc<Table>),
+    /// Drawn from a measured distribution, whatever mean and J.
     Empirical(Arc<Cdf>),
 }
 
-impl Default for Delay {
-    fn default() -> Self {
-        Self::Constant {
-            delay: Duration::ZERO,
+impl Delay {
+    /// The same for every packet.
+    #[must_use]
+    pub fn constant(delay: Duration) -> Self {
+        Self {
+            mean: delay,
+            ..Self::default()
         }
     }
-}
 
-impl Delay {
+    /// Uniform in `mean ± half_width`.
+    #[must_use]
+    pub fn uniform(mean: Duration, half_width: Duration) -> Self {
+        Self {
+            mean,
+            jitter: half_width,
+            shape: Shape::Uniform,
+        }
+    }
+
     /// The delay that a share `p` of all packets does not exceed, `p` in [0, 1).
     #[must_use]
     pub fn quantile(&self, p: f64) -> Duration {
-        let (mean, jitter) = self.parts();
-        let (mean, jitter) = (mean.as_nanos() as f64, jitter.as_nanos() as f64);
-        let nanos = match self {
-            Self::Constant { .. } => mean,
-            Self::Uniform { .. } => mean + jitter * (2.0 * p - 1.0),
-            Self::Normal { .. } => mean + jitter * quantile::standard_normal(p),
-            Self::Pareto { .. } => mean + jitter * pareto(p),
-            Self::ParetoNormal { .. } => mean + jitter * pareto_normal(p),
-            Self::LogNormal { .. } => lognormal(mean, jitter, p),
-            Self::Gamma { .. } => gamma(mean, jitter, p),
-            Self::Table { table, .. } => mean + jitter * table.quantile(p),
-            Self::Empirical(cdf) => cdf.quantile_nanos(p),
+        let (mean, jitter) = (self.mean.as_nanos() as f64, self.jitter.as_nanos() as f64);
+        let nanos = match &self.shape {
+            Shape::Constant => mean,
+            Shape::Uniform => mean + jitter * (2.0 * p - 1.0),
+            Shape::Normal => mean + jitter * quantile::standard_normal(p),
+            Shape::Pareto => mean + jitter * pareto(p),
+            Shape::ParetoNormal => mean + jitter * pareto_normal(p),
+            Shape::LogNormal => lognormal(mean, jitter, p),
+            Shape::Gamma => gamma(mean, jitter, p),
+            Shape::Table(table) => mean + jitter * table.quantile(p),
+            Shape::Empirical(cdf) => cdf.quantile_nanos(p),
         };
         // The cast saturates, and takes what is below zero to zero.
         Duration::from_nanos((nanos + 0.5) as u64)
     }
 
-    /// The delay (its middle) and the jitter J; of a measured distribution its median and zero.
+    /// The mean, or the median of a measured distribution.
     #[must_use]
-    pub fn parts(&self) -> (Duration, Duration) {
-        match self {
-            Self::Constant { delay } => (*delay, Duration::ZERO),
-            Self::Uniform { mean, half_width } => (*mean, *half_width),
-            Self::Normal { mean, sigma }
-            | Self::LogNormal { mean, sigma }
-            | Self::Gamma { mean, sigma } => (*mean, *sigma),
-            Self::Pareto { mean, scale }
-            | Self::ParetoNormal { mean, scale }
-            | Self::Table { mean, scale, .. } => (*mean, *scale),
-            Self::Empirical(cdf) => {
-                let median = cdf.quantile_nanos(0.5);
-                (Duration::from_nanos(median as u64), Duration::ZERO)
-            }
+    pub fn middle(&self) -> Duration {
+        match &self.shape {
+            Shape::Empirical(cdf) => Duration::from_nanos(cdf.quantile_nanos(0.5) as u64),
+            _ => self.mean,
         }
     }
 
     pub(super) fn is_zero(&self) -> bool {
-        let (mean, jitter) = self.parts();
-        match self {
-            Self::Empirical(_) => self.quantile(1.0) == Duration::ZERO,
-            _ => mean.saturating_add(jitter) == Duration::ZERO,
+        match self.shape {
+            Shape::Empirical(_) => self.quantile(1.0) == Duration::ZERO,
+            _ => self.mean.saturating_add(self.jitter) == Duration::ZERO,
         }
     }
 
     pub(super) fn span(&self) -> Duration {
-        match self {
-            Self::Uniform { half_width, .. } => half_width.saturating_mul(2),
+        match self.shape {
+            Shape::Uniform => self.jitter.saturating_mul(2),
             // 99 % of a normal is within 2.58 sigma either way
-            Self::Normal { sigma, .. } => sigma.saturating_mul(5),
+            Shape::Normal => self.jitter.saturating_mul(5),
             _ => self.quantile(0.995).saturating_sub(self.quantile(0.005)),
         }
-    }
-
-    /// The same distribution with other numbers; `None` if its kind has no mean and jitter to set.
-    pub(super) fn with_parts(&self, new_mean: Duration, jitter: Duration) -> Option<Self> {
-        let mut changed = self.clone();
-        match &mut changed {
-            Self::Constant { delay } => *delay = new_mean,
-            Self::Uniform { mean, half_width } => (*mean, *half_width) = (new_mean, jitter),
-            Self::Normal { mean, sigma }
-            | Self::LogNormal { mean, sigma }
-            | Self::Gamma { mean, sigma } => (*mean, *sigma) = (new_mean, jitter),
-            Self::Pareto { mean, scale }
-            | Self::ParetoNormal { mean, scale }
-            | Self::Table { mean, scale, .. } => (*mean, *scale) = (new_mean, jitter),
-            Self::Empirical(_) => return None,
-        }
-        Some(changed)
     }
 }
 

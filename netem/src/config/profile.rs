@@ -3,18 +3,12 @@
 use std::time::Duration;
 
 use super::delay::between;
-use super::{Delay, LinkConfig, Loss, Probability, Profile, Service};
+use super::{Delay, LinkConfig, Loss, Probability, Profile, Service, Shape};
 
 /// The equal parts in which a ramp is walked.
 const RAMP_PARTS: u32 = 32;
 
 impl Profile {
-    /// Whether nothing ever changes.
-    #[must_use]
-    pub fn is_empty(&self) -> bool {
-        self.steps.is_empty()
-    }
-
     /// Every stretch of constant settings with its beginning, from `base` at zero on.
     #[must_use]
     pub(crate) fn stretches(&self, base: &LinkConfig) -> Vec<(Duration, LinkConfig)> {
@@ -69,18 +63,16 @@ fn plain(loss: &Loss) -> Option<f64> {
 }
 
 fn delay_on_the_way(from: &Delay, to: &Delay, share: f64) -> Delay {
-    let ((mean_a, jitter_a), (mean_b, jitter_b)) = (from.parts(), to.parts());
-    let (mean, jitter) = (
-        between(mean_a, mean_b, share),
-        between(jitter_a, jitter_b, share),
-    );
     // a constant delay is any distribution without jitter
-    let kind = match (from, to) {
-        (Delay::Constant { .. }, _) => to,
-        (_, Delay::Constant { .. }) => from,
-        (a, b) if std::mem::discriminant(a) == std::mem::discriminant(b) => from,
+    let shape = match (&from.shape, &to.shape) {
+        (Shape::Empirical(_), _) | (_, Shape::Empirical(_)) => return from.clone(),
+        (Shape::Constant, other) | (other, Shape::Constant) => other,
+        (a, b) if std::mem::discriminant(a) == std::mem::discriminant(b) => a,
         _ => return from.clone(),
     };
-    kind.with_parts(mean, jitter)
-        .unwrap_or_else(|| from.clone())
+    Delay {
+        mean: between(from.mean, to.mean, share),
+        jitter: between(from.jitter, to.jitter, share),
+        shape: shape.clone(),
+    }
 }

@@ -57,7 +57,7 @@ impl LinkConfig {
     }
 
     fn check_delay(&self) -> Result<(), ConfigError> {
-        let (delay, jitter) = self.delay.parts();
+        let (delay, jitter) = (self.delay.mean, self.delay.jitter);
         if delay > DELAY_MAX {
             return Err(ConfigError::DelayTooLong { delay });
         }
@@ -80,32 +80,22 @@ impl LinkConfig {
     }
 
     fn check_loss(&self) -> Result<(), ConfigError> {
-        let (fits, what, range) = match &self.loss {
-            Loss::FourState(chain) => (
+        let outages = self.outages.len() <= STEPS_MAX;
+        holds(outages, "the outages", "1000 at most")?;
+        match &self.loss {
+            Loss::FourState(chain) => holds(
                 chain.is_chain(),
                 "the ways out of a loss state",
                 "100 % together at most",
             ),
-            Loss::Bursts(bursts) => (
+            Loss::Bursts(bursts) => holds(
                 (super::BURST_MIN..=DELAY_MAX).contains(&bursts.mean),
                 "the mean burst of loss",
                 "1 ms to 1 h",
             ),
-            Loss::Every(n) => (*n > 0, "the n of `loss every`", "at least 1"),
-            _ => {
-                return holds(
-                    self.outages.len() <= STEPS_MAX,
-                    "the outages",
-                    "1000 at most",
-                );
-            }
-        };
-        holds(fits, what, range)?;
-        holds(
-            self.outages.len() <= STEPS_MAX,
-            "the outages",
-            "1000 at most",
-        )
+            Loss::Every(n) => holds(*n > 0, "the n of `loss every`", "at least 1"),
+            _ => Ok(()),
+        }
     }
 
     fn check_bottleneck(&self) -> Result<(), ConfigError> {
@@ -141,7 +131,7 @@ impl LinkConfig {
                 "in order, each after the ramp before it",
             )?;
             holds(
-                step.settings.profile.is_empty(),
+                step.settings.profile.steps.is_empty(),
                 "a step of a profile",
                 "without steps of its own",
             )?;
@@ -155,7 +145,7 @@ impl LinkConfig {
         }
         let long_enough = profile
             .repeat
-            .is_none_or(|repeat| repeat > free_from && !profile.is_empty());
+            .is_none_or(|repeat| repeat > free_from && !profile.steps.is_empty());
         holds(
             long_enough,
             "the loop of a profile",

@@ -45,10 +45,7 @@ impl Slot {
     pub(super) fn in_range(&self) -> bool {
         let times = match &self.gap {
             SlotGap::Uniform { least, most } => least <= most && *most <= DELAY_MAX,
-            SlotGap::Drawn(gap) => {
-                let (mean, jitter) = gap.parts();
-                mean.max(jitter) <= DELAY_MAX
-            }
+            SlotGap::Drawn(gap) => gap.mean.max(gap.jitter) <= DELAY_MAX,
         };
         times && self.packets != Some(0) && self.bytes != Some(0)
     }

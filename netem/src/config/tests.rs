@@ -6,17 +6,15 @@ const MS: Duration = Duration::from_millis(1);
 
 #[test]
 fn uniform_jitter_is_a_half_width_and_normal_jitter_a_standard_deviation() {
-    let uniform = Delay::Uniform {
-        mean: 50 * MS,
-        half_width: 5 * MS,
-    };
+    let uniform = Delay::uniform(50 * MS, 5 * MS);
     assert_eq!(uniform.quantile(0.0), 45 * MS);
     assert_eq!(uniform.quantile(0.5), 50 * MS);
     assert_eq!(uniform.quantile(0.75), Duration::from_micros(52_500));
 
-    let normal = Delay::Normal {
+    let normal = Delay {
         mean: 50 * MS,
-        sigma: 5 * MS,
+        jitter: 5 * MS,
+        shape: Shape::Normal,
     };
     assert_eq!(normal.quantile(0.5), 50 * MS);
     let one_sigma = normal.quantile(0.841_344_746_068_542_9).as_nanos();
@@ -25,9 +23,10 @@ fn uniform_jitter_is_a_half_width_and_normal_jitter_a_standard_deviation() {
 
 #[test]
 fn a_delay_is_never_negative() {
-    let wide = Delay::Normal {
+    let wide = Delay {
         mean: MS,
-        sigma: 10 * MS,
+        jitter: 10 * MS,
+        shape: Shape::Normal,
     };
     assert_eq!(wide.quantile(0.1), Duration::ZERO);
     assert!(wide.quantile(0.9) > MS);
@@ -37,7 +36,7 @@ fn a_delay_is_never_negative() {
 fn settings_out_of_range_are_refused_with_their_value() {
     let delay = DELAY_MAX + MS;
     let config = LinkConfig {
-        delay: Delay::Constant { delay },
+        delay: Delay::constant(delay),
         ..LinkConfig::default()
     };
     assert_eq!(config.check(), Err(ConfigError::DelayTooLong { delay }));

@@ -10,7 +10,7 @@ use std::thread::JoinHandle;
 
 use mmt_shared::time::Time;
 
-use super::alarm::now;
+use super::now;
 use crate::record::{Entry, Heading, binary, csv};
 
 /// Packets that may wait for the disk: 3 s at 20 000 packets a second. One more is missed and counted.

@@ -11,13 +11,13 @@ use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
+use mmt_shared::io::alarm::Alarm;
 use serde::Serialize;
 
-use super::alarm::{Alarm, now};
 use super::driver::{DirectionCounters, Driver};
 use super::lateness::{Lateness, Recorder};
-use super::lock;
 use super::record_file::RecordWriter;
+use super::{lock, now};
 use crate::config::{ConfigError, LinkConfig};
 use crate::counters::Tally;
 use crate::direction::LinkId;
@@ -125,20 +125,6 @@ impl Relay {
     /// # Errors
     /// Settings out of range, a target that cannot be one, an address in use, no thread to be had.
     pub fn bind(
-        listen: SocketAddr,
-        to: SocketAddr,
-        up: LinkConfig,
-        down: LinkConfig,
-        seed: u64,
-    ) -> Result<RelayHandle, RelayError> {
-        Self::bind_with(listen, to, up, down, seed, Extras::default())
-    }
-
-    /// Starts a relay as [`Self::bind`] does, with a record or a NAT that forgets.
-    ///
-    /// # Errors
-    /// Those of [`Self::bind`].
-    pub fn bind_with(
         listen: SocketAddr,
         to: SocketAddr,
         up: LinkConfig,

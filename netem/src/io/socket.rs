@@ -68,24 +68,11 @@ pub struct EmulatedSocket {
 }
 
 impl EmulatedSocket {
-    /// Wraps `inner`. A transparent `config` makes no thread and sends straight through.
+    /// Wraps `inner`. A transparent `config` without extras makes no thread and sends straight through.
     ///
     /// # Errors
     /// Settings out of range, or no thread to be had.
     pub fn try_new(
-        inner: Arc<dyn AsyncUdpSocket>,
-        config: LinkConfig,
-        seed: u64,
-        id: LinkId,
-    ) -> Result<Self, WrapError> {
-        Self::try_new_with(inner, config, seed, id, SocketExtras::default())
-    }
-
-    /// Wraps `inner` as [`Self::try_new`] does, with a record or somebody who controls it.
-    ///
-    /// # Errors
-    /// Those of [`Self::try_new`].
-    pub fn try_new_with(
         inner: Arc<dyn AsyncUdpSocket>,
         config: LinkConfig,
         seed: u64,

@@ -9,12 +9,14 @@ use std::time::Duration;
 mod wire;
 
 use super::codel::CodelState;
-use super::stages::ROOM;
 use super::timeline::Timeline;
 use crate::config::{LinkConfig, Queue, Rate, Service};
 use crate::packet::DropCause;
 use crate::trace::mahimahi::OPPORTUNITY_BYTES;
 use wire::{Opportunity, TimeLeft, mtu_time, sending_time};
+
+/// Packets made room for at the start; more take memory as they come, up to the limit.
+pub(super) const ROOM: usize = 1024;
 
 /// The state of the bottleneck. Times are counted from the origin of the link.
 #[derive(Clone, Debug)]

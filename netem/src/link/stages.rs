@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use mmt_shared::time::Time;
 
-use super::bottleneck::{Bottleneck, Sent};
+use super::bottleneck::{Bottleneck, ROOM, Sent};
 use super::correlated::ByPacket;
 use super::loss_model::{LossDraw, LossModel};
 use super::propagation::Propagation;
@@ -15,9 +15,6 @@ use super::timeline::Timeline;
 use crate::counters::LinkCounters;
 use crate::direction::LinkId;
 use crate::packet::{Departure, DropCause, Fate, Packet};
-
-/// Packets made room for at the start; more take memory as they come, up to the limit.
-pub(super) const ROOM: usize = 1024;
 
 /// The packets on a link, the states of its stages, and the counts.
 #[derive(Clone, Debug)]
@@ -30,8 +27,8 @@ pub(super) struct Stages<T> {
     propagation: Propagation,
     /// What leaves at a known time, and what was dropped.
     out: BinaryHeap<Reverse<ByTime<T>>>,
-    in_flight: usize,
-    counters: LinkCounters,
+    pub(super) in_flight: usize,
+    pub(super) counters: LinkCounters,
 }
 
 /// A packet on the link: its departure as far as it is known, and what the later stages need.
@@ -61,14 +58,6 @@ impl<T> Stages<T> {
             in_flight: 0,
             counters: LinkCounters::default(),
         }
-    }
-
-    pub(super) fn in_flight(&self) -> usize {
-        self.in_flight
-    }
-
-    pub(super) fn counters(&self) -> LinkCounters {
-        self.counters
     }
 
     /// Takes in a packet, and perhaps makes a copy of it.
@@ -237,7 +226,7 @@ impl<T> Stages<T> {
     fn report(&mut self, timeline: &Timeline, mut departure: Departure<T>, cause: DropCause) {
         departure.fate = Fate::Dropped(cause);
         let held = self.out.len().saturating_add(self.bottleneck.len());
-        if held.saturating_sub(self.in_flight) < timeline.config().limit as usize {
+        if held.saturating_sub(self.in_flight) < timeline.config.limit as usize {
             self.out.push(Reverse(ByTime(departure)));
         }
     }

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use super::*;
-use crate::config::{Delay, Loss, Order, Probability};
+use crate::config::{Delay, Loss, Order, Probability, Shape};
 use crate::direction::Direction;
 use crate::packet::{DropCause, Fate};
 
@@ -351,9 +351,10 @@ fn the_ends_of_time_do_not_panic() {
 fn the_drawn_delays_are_pinned() {
     // a change of stream names, draw order or quantile changes every figure: it must be noticed
     let config = LinkConfig {
-        delay: Delay::Normal {
+        delay: Delay {
             mean: 50 * MS,
-            sigma: 5 * MS,
+            jitter: 5 * MS,
+            shape: Shape::Normal,
         },
         loss: Loss::Independent {
             probability: Probability::from_percent(50.0).unwrap(),

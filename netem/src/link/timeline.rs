@@ -9,8 +9,8 @@ use crate::config::LinkConfig;
 /// The settings of a link over time. Times are counted from the origin.
 #[derive(Clone, Debug)]
 pub(super) struct Timeline {
-    origin: Time,
-    config: LinkConfig,
+    pub(super) origin: Time,
+    pub(super) config: LinkConfig,
     /// The stretches of constant settings, each with its beginning.
     stretches: Vec<(Duration, LinkConfig)>,
 }
@@ -22,18 +22,6 @@ impl Timeline {
             stretches: config.profile.stretches(&config),
             config,
         }
-    }
-
-    pub(super) fn origin(&self) -> Time {
-        self.origin
-    }
-
-    pub(super) fn set_origin(&mut self, origin: Time) {
-        self.origin = origin;
-    }
-
-    pub(super) fn config(&self) -> &LinkConfig {
-        &self.config
     }
 
     /// How long after the origin `time` is.

@@ -3,43 +3,15 @@
 //! Times are differences: to the offer before, to the own offer, to the own due time.
 
 use mmt_shared::time::Time;
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
-use super::entry::{End, Entry, Heading};
-use crate::direction::Direction;
-use crate::packet::DropCause;
+use super::entry::{Entry, Heading};
 use crate::trace::TraceError;
 
 /// How a record in binary begins, of any version.
 pub const MAGIC: &[u8] = b"mmtnetem";
 /// What follows in this version.
 const VERSION: &[u8] = b"2\n";
-
-/// An entry as it is written.
-#[derive(Serialize, Deserialize)]
-struct Row {
-    direction: Direction,
-    number: u64,
-    /// Nanoseconds since the offer before, in the order of the record.
-    offered: i64,
-    bytes: u32,
-    backlog: u32,
-    end: RowEnd,
-}
-
-#[derive(Serialize, Deserialize)]
-enum RowEnd {
-    Sent {
-        /// Nanoseconds since the offer.
-        due: i64,
-        /// Nanoseconds since the due time.
-        late: i64,
-        copy: bool,
-        corrupted: bool,
-    },
-    Dropped(DropCause),
-    Unsent,
-}
 
 /// Writes a record, entry by entry.
 #[derive(Clone, Debug, Default)]
@@ -57,29 +29,11 @@ impl Writer {
 
     /// Adds a packet to `bytes`.
     pub fn push(&mut self, bytes: &mut Vec<u8>, entry: &Entry) {
-        let end = match entry.end {
-            End::Sent {
-                due,
-                sent,
-                copy,
-                corrupted,
-            } => RowEnd::Sent {
-                due: difference(due, entry.offered),
-                late: difference(sent, due),
-                copy,
-                corrupted,
-            },
-            End::Dropped(cause) => RowEnd::Dropped(cause),
-            End::Unsent => RowEnd::Unsent,
-        };
-        let row = Row {
-            direction: entry.direction,
-            number: entry.number,
-            offered: difference(entry.offered, self.offered),
-            bytes: entry.bytes,
-            backlog: entry.backlog,
-            end,
-        };
+        // nanoseconds since the offer before, since the offer, and since the due time
+        let offered = difference(entry.offered, self.offered);
+        let row = entry.with_times(offered, |due, sent| {
+            (difference(due, entry.offered), difference(sent, due))
+        });
         self.offered = entry.offered;
         add(bytes, &row);
     }
@@ -115,41 +69,12 @@ pub fn read(bytes: &[u8]) -> Result<(Heading, Vec<Entry>), TraceError> {
     let mut offered = Time::ZERO;
     while !rest.is_empty() {
         let wrong = |_| TraceError::at(entries.len() + 1, "the entry is cut off or none");
-        let (row, after) = postcard::take_from_bytes(rest).map_err(wrong)?;
-        let entry = entry(row, offered);
-        (rest, offered) = (after, entry.offered);
-        entries.push(entry);
+        let (row, after): (Entry<i64>, _) = postcard::take_from_bytes(rest).map_err(wrong)?;
+        (rest, offered) = (after, later(offered, row.offered));
+        entries.push(row.with_times(offered, |due, late| {
+            let due = later(offered, due);
+            (due, later(due, late))
+        }));
     }
     Ok((heading, entries))
-}
-
-fn entry(row: Row, offer_before: Time) -> Entry {
-    let offered = later(offer_before, row.offered);
-    let end = match row.end {
-        RowEnd::Sent {
-            due,
-            late,
-            copy,
-            corrupted,
-        } => {
-            let due = later(offered, due);
-            let sent = later(due, late);
-            End::Sent {
-                due,
-                sent,
-                copy,
-                corrupted,
-            }
-        }
-        RowEnd::Dropped(cause) => End::Dropped(cause),
-        RowEnd::Unsent => End::Unsent,
-    };
-    Entry {
-        direction: row.direction,
-        number: row.number,
-        offered,
-        bytes: row.bytes,
-        backlog: row.backlog,
-        end,
-    }
 }

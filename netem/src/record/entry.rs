@@ -19,21 +19,21 @@ pub struct Heading {
     pub down: String,
 }
 
-/// One packet, or one copy of one.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Entry {
+/// One packet, or one copy of one; `T` is how times are given.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Entry<T = Time> {
     /// Which way it went.
     pub direction: Direction,
     /// The how-manieth offer it was, from 0.
     pub number: u64,
     /// When it was offered, counted from the start of the record.
-    pub offered: Time,
+    pub offered: T,
     /// Its length, bytes.
     pub bytes: u32,
     /// Packets in flight and waiting in this direction when it came.
     pub backlog: u32,
     /// What became of it.
-    pub end: End,
+    pub end: End<T>,
 }
 
 impl Entry {
@@ -61,26 +61,59 @@ impl Entry {
 
     /// The same with its times counted from `origin`.
     #[must_use]
-    pub fn since(mut self, origin: Time) -> Self {
-        let from_origin = |time: &mut Time| *time = Time::ZERO + time.saturating_since(origin);
-        from_origin(&mut self.offered);
-        if let End::Sent { due, sent, .. } = &mut self.end {
-            from_origin(due);
-            from_origin(sent);
+    pub fn since(self, origin: Time) -> Self {
+        let from_origin = |time: Time| Time::ZERO + time.saturating_since(origin);
+        self.with_times(from_origin(self.offered), |due, sent| {
+            (from_origin(due), from_origin(sent))
+        })
+    }
+}
+
+impl<T: Copy> Entry<T> {
+    /// The same with another time of offer, and with what `sending` makes of the times `due` and `sent`.
+    pub(super) fn with_times<U>(
+        self,
+        offered: U,
+        sending: impl FnOnce(T, T) -> (U, U),
+    ) -> Entry<U> {
+        let end = match self.end {
+            End::Dropped(cause) => End::Dropped(cause),
+            End::Unsent => End::Unsent,
+            End::Sent {
+                due,
+                sent,
+                copy,
+                corrupted,
+            } => {
+                let (due, sent) = sending(due, sent);
+                End::Sent {
+                    due,
+                    sent,
+                    copy,
+                    corrupted,
+                }
+            }
+        };
+        Entry {
+            direction: self.direction,
+            number: self.number,
+            offered,
+            bytes: self.bytes,
+            backlog: self.backlog,
+            end,
         }
-        self
     }
 }
 
 /// What became of a packet.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum End {
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum End<T = Time> {
     /// It was sent on.
     Sent {
         /// When it was due by the settings.
-        due: Time,
+        due: T,
         /// When it really was sent; the difference is the lateness of the host.
-        sent: Time,
+        sent: T,
         /// Whether it is a copy.
         copy: bool,
         /// Whether a bit of it was turned over.
@@ -98,12 +131,10 @@ impl End {
         match self {
             Self::Sent {
                 copy, corrupted, ..
-            } => match (copy, corrupted) {
-                (false, false) => ("sent", ""),
-                (true, false) => ("copy", ""),
-                (false, true) => ("sent", "corrupt"),
-                (true, true) => ("copy", "corrupt"),
-            },
+            } => (
+                if *copy { "copy" } else { "sent" },
+                if *corrupted { "corrupt" } else { "" },
+            ),
             Self::Dropped(cause) => ("dropped", cause.name()),
             Self::Unsent => ("dropped", "socket"),
         }

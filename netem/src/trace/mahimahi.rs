@@ -15,7 +15,8 @@ const NANOS_PER_MS: u64 = 1_000_000;
 /// The times at which a bottleneck can send, over and over.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Opportunities {
-    name: String,
+    /// The file, as the settings call it.
+    pub(crate) name: String,
     /// Milliseconds from the start, ascending; the last is the period.
     times_ms: Vec<u64>,
     period_ns: u64,
@@ -53,12 +54,6 @@ impl Opportunities {
             times_ms,
             period_ns: period_ms * NANOS_PER_MS,
         })
-    }
-
-    /// The file, as the settings call it.
-    #[must_use]
-    pub fn name(&self) -> &str {
-        &self.name
     }
 
     /// Bits per second on average.

@@ -1,41 +1,7 @@
 //! Settings as far as they are read, and which words were seen.
 
-use std::sync::Arc;
-use std::time::Duration;
-
 use super::{ParseError, Reason, Word};
-use crate::config::{Chance, Delay, LinkConfig, Loss, Probability, Reorder};
-use crate::distribution::Table;
-
-/// The distribution of a jitter.
-pub(super) enum Shape {
-    Uniform,
-    Normal,
-    Pareto,
-    ParetoNormal,
-    LogNormal,
-    Gamma,
-    Table(Table),
-}
-
-impl Shape {
-    /// The distribution of this shape.
-    pub(super) fn delay(self, mean: Duration, jitter: Duration) -> Delay {
-        let (sigma, scale, half_width) = (jitter, jitter, jitter);
-        match self {
-            Self::Uniform => Delay::Uniform { mean, half_width },
-            Self::Normal => Delay::Normal { mean, sigma },
-            Self::Pareto => Delay::Pareto { mean, scale },
-            Self::ParetoNormal => Delay::ParetoNormal { mean, scale },
-            Self::LogNormal => Delay::LogNormal { mean, sigma },
-            Self::Gamma => Delay::Gamma { mean, sigma },
-            Self::Table(table) => {
-                let table = Arc::new(table);
-                Delay::Table { mean, scale, table }
-            }
-        }
-    }
-}
+use crate::config::{Chance, Delay, LinkConfig, Loss, Probability, Reorder, Shape};
 
 /// Settings as far as they are read.
 #[derive(Default)]
@@ -44,7 +10,7 @@ pub(super) struct Draft<'a> {
     /// The shape of the jitter, which may stand before the delay.
     pub(super) shape: Option<Shape>,
     /// The words that began the sentences so far, each by its first spelling.
-    seen: Vec<(&'static str, Word<'a>)>,
+    seen: Vec<(&'a str, Word<'a>)>,
 }
 
 impl<'a> Draft<'a> {
@@ -59,12 +25,12 @@ impl<'a> Draft<'a> {
     }
 
     /// Takes note of a sentence that may come more than once.
-    pub(super) fn note(&mut self, name: &'static str, word: Word<'a>) {
+    pub(super) fn note(&mut self, name: &'a str, word: Word<'a>) {
         self.seen.push((name, word));
     }
 
     /// Takes note of a sentence that may come once.
-    pub(super) fn once(&mut self, name: &'static str, word: Word<'a>) -> Result<(), ParseError> {
+    pub(super) fn once(&mut self, name: &'a str, word: Word<'a>) -> Result<(), ParseError> {
         if self.seen(name).is_some() {
             return Err(word.wrong(Reason::Repeated));
         }
@@ -96,12 +62,10 @@ impl<'a> Draft<'a> {
             return Err(word.expected("no delay and no loss beside a trace: it has its own"));
         }
         if let (Some(word), Some(shape)) = (self.seen("distribution"), self.shape.take()) {
-            self.config.delay = match self.config.delay {
-                Delay::Uniform { mean, half_width } if self.seen("delay").is_some() => {
-                    shape.delay(mean, half_width)
-                }
-                _ => return Err(word.expected("delay with a jitter beside a distribution")),
-            };
+            if self.config.delay.shape != Shape::Uniform || self.seen("delay").is_none() {
+                return Err(word.expected("delay with a jitter beside a distribution"));
+            }
+            self.config.delay.shape = shape;
         }
         if let Some(word) = self.seen("reorder").or(self.seen("gap"))
             && self.config.delay == Delay::default()

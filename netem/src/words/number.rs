@@ -11,27 +11,6 @@ const A_TIME_HAS_A_UNIT: &str =
 const A_PERCENTAGE: &str = "a percentage, such as 1%";
 const A_RATE: &str = "a rate, such as 1mbit (bit, kbit, mbit, gbit; bps and so on are bytes)";
 
-/// Units of a rate in bits per second. As in tc, those in `bps` are bytes, and `i` is a power of 1024.
-const RATE_UNITS: [(&str, f64); 17] = [
-    ("", 1.0),
-    ("bit", 1.0),
-    ("kbit", 1e3),
-    ("mbit", 1e6),
-    ("gbit", 1e9),
-    ("tbit", 1e12),
-    ("kibit", 1024.0),
-    ("mibit", 1024.0 * 1024.0),
-    ("gibit", 1024.0 * 1024.0 * 1024.0),
-    ("bps", 8.0),
-    ("kbps", 8e3),
-    ("mbps", 8e6),
-    ("gbps", 8e9),
-    ("tbps", 8e12),
-    ("kibps", 8.0 * 1024.0),
-    ("mibps", 8.0 * 1024.0 * 1024.0),
-    ("gibps", 8.0 * 1024.0 * 1024.0 * 1024.0),
-];
-
 /// Digits with at most one point: no sign, no exponent, no `inf`.
 fn decimal(text: &str) -> Option<f64> {
     let plain = text.chars().all(|c| c.is_ascii_digit() || c == '.');
@@ -87,11 +66,24 @@ pub(super) fn percentage(word: Word<'_>) -> Result<Probability, ParseError> {
     }
 }
 
+/// A unit of a rate in bits per second. As in tc, those in `bps` are bytes, and `i` is a power of 1024.
+fn bits_of(unit: &str) -> Option<f64> {
+    let (size, prefix) = match (unit.strip_suffix("bit"), unit.strip_suffix("bps")) {
+        (Some(prefix), _) => (1.0, prefix),
+        (_, Some(prefix)) => (8.0, prefix),
+        _ => return unit.is_empty().then_some(1.0),
+    };
+    let (base, letter) = prefix
+        .strip_suffix('i')
+        .map_or((1e3, prefix), |k| (1024.0, k));
+    let power = ["", "k", "m", "g", "t"].iter().position(|k| *k == letter)?;
+    (power > 0 || base < 1024.0).then(|| size * libm::pow(base, power as f64))
+}
+
 pub(super) fn bits_per_second(word: Word<'_>) -> Result<u64, ParseError> {
     let (number, unit) = with_unit(word.text);
     let number = number.ok_or_else(|| word.expected(A_RATE))?;
-    let known = RATE_UNITS.iter().find(|(name, _)| *name == unit);
-    let (_, factor) = known.ok_or_else(|| word.expected(A_RATE))?;
+    let factor = bits_of(&unit).ok_or_else(|| word.expected(A_RATE))?;
     let rate = (number * factor + 0.5) as u64;
     if !(1..=RATE_MAX_BIT_S).contains(&rate) {
         return Err(out_of_range(word, "1bit to 1tbit".to_owned()));

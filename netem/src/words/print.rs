@@ -3,9 +3,10 @@
 use std::fmt;
 use std::time::Duration;
 
+use super::SHAPES;
 use crate::config::{
     Chance, Codel, Correlation, Delay, LIMIT_DEFAULT, LinkConfig, Loss, Order, Outage, Probability,
-    Profile, Queue, Rate, Service, Slot, SlotGap,
+    Profile, Queue, Rate, Service, Shape, Slot, SlotGap,
 };
 use crate::distribution::Cdf;
 use crate::trace::path::Replay;
@@ -78,32 +79,30 @@ impl fmt::Display for Profile {
 }
 
 fn delay(delay: &Delay, correlation: Correlation) -> String {
-    if let Delay::Empirical(cdf) = delay {
-        return format!("delay cdf {}{}", points(cdf), correlated(correlation));
-    }
-    let (mean, jitter) = delay.parts();
-    let mean = Exact(mean);
-    let shape = match delay {
-        Delay::Constant { .. } => return format!("delay {mean}"),
-        Delay::Uniform { .. } => String::new(),
-        other => format!(" distribution {}", shape(other)),
+    let correlated = match correlation {
+        Correlation::None => String::new(),
+        Correlation::PerPacket(rho) => format!(" {rho}"),
+        Correlation::InTime(tau) => format!(" tau {}", Exact(tau)),
     };
-    let correlated = correlated(correlation);
-    format!("delay {mean} {}{correlated}{shape}", Exact(jitter))
+    let (mean, jitter) = (Exact(delay.mean), Exact(delay.jitter));
+    match &delay.shape {
+        Shape::Empirical(cdf) => format!("delay cdf {}{correlated}", points(cdf)),
+        Shape::Constant => format!("delay {mean}"),
+        Shape::Uniform => format!("delay {mean} {jitter}{correlated}"),
+        other => format!(
+            "delay {mean} {jitter}{correlated} distribution {}",
+            shape(other)
+        ),
+    }
 }
 
 /// The name of a distribution.
-fn shape(delay: &Delay) -> String {
-    let name = match delay {
-        Delay::Constant { .. } | Delay::Uniform { .. } | Delay::Empirical(_) => "uniform",
-        Delay::Normal { .. } => "normal",
-        Delay::Pareto { .. } => "pareto",
-        Delay::ParetoNormal { .. } => "paretonormal",
-        Delay::LogNormal { .. } => "lognormal",
-        Delay::Gamma { .. } => "gamma",
-        Delay::Table { table, .. } => return format!("table {}", table.name()),
-    };
-    name.to_owned()
+fn shape(shape: &Shape) -> String {
+    if let Shape::Table(table) = shape {
+        return format!("table {}", table.name);
+    }
+    let named = SHAPES.iter().find(|(_, named)| named == shape);
+    named.map_or("uniform", |(name, _)| name).to_owned()
 }
 
 fn slot(slot: &Slot) -> String {
@@ -111,9 +110,8 @@ fn slot(slot: &Slot) -> String {
         SlotGap::Uniform { least, most } if least == most => format!("slot {}", Exact(*least)),
         SlotGap::Uniform { least, most } => format!("slot {} {}", Exact(*least), Exact(*most)),
         SlotGap::Drawn(gap) => {
-            let (mean, jitter) = gap.parts();
-            let (mean, jitter) = (Exact(mean), Exact(jitter));
-            format!("slot distribution {} {mean} {jitter}", shape(gap))
+            let (mean, jitter) = (Exact(gap.mean), Exact(gap.jitter));
+            format!("slot distribution {} {mean} {jitter}", shape(&gap.shape))
         }
     };
     if let Some(packets) = slot.packets {
@@ -125,17 +123,9 @@ fn slot(slot: &Slot) -> String {
     words
 }
 
-fn correlated(correlation: Correlation) -> String {
-    match correlation {
-        Correlation::None => String::new(),
-        Correlation::PerPacket(rho) => format!(" {rho}"),
-        Correlation::InTime(tau) => format!(" tau {}", Exact(tau)),
-    }
-}
-
 fn points(cdf: &Cdf) -> String {
-    if let Some(name) = cdf.name() {
-        return name.to_owned();
+    if let Some(name) = &cdf.name {
+        return name.clone();
     }
     let point = |(delay, share): (u64, f64)| {
         let share = Probability::from_percent(100.0 * share).unwrap_or_default();
@@ -200,7 +190,7 @@ fn outage_words(outage: &Outage) -> String {
 fn rate(rate: &Rate) -> String {
     let service = match &rate.service {
         Service::Constant { bits_per_second } => bits(*bits_per_second),
-        Service::Opportunities(trace) => format!("trace {}", trace.name()),
+        Service::Opportunities(trace) => format!("trace {}", trace.name),
     };
     let framing = &rate.framing;
     match (framing.overhead, framing.cell, framing.cell_overhead) {

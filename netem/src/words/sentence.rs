@@ -2,44 +2,20 @@
 
 use std::sync::Arc;
 
-use super::draft::{Draft, Shape};
+use super::draft::Draft;
 use super::number::{
     QueueLimit, bits_per_second, percentage, queue_limit, signed_bytes, time, time_from, whole,
 };
-use super::{A_WORD, ParseError, Parser, Reason, Word};
+use super::{A_WORD, ParseError, Parser, Reason, SHAPES, Word};
 use crate::config::{
     Chance, Codel, Correlation, Delay, Framing, LIMIT_MAX, Order, Probability, Queue, Rate,
-    STEPS_MAX, Service, Slot, SlotGap, TAU_MIN,
+    STEPS_MAX, Service, Shape, Slot, SlotGap, TAU_MIN,
 };
 use crate::direction::Direction;
 use crate::distribution::{Cdf, Table};
 use crate::presets;
 use crate::trace::mahimahi::Opportunities;
 use crate::trace::path::{PathTrace, Replay};
-
-/// The sentences that may come once, by their first word and the name that they are remembered by.
-const ONCE: [(&str, &str); 20] = [
-    ("delay", "delay"),
-    ("latency", "delay"),
-    ("distribution", "distribution"),
-    ("order", "order"),
-    ("reorder", "reorder"),
-    ("gap", "gap"),
-    ("loss", "loss"),
-    ("drop", "loss"),
-    ("duplicate", "duplicate"),
-    ("corrupt", "corrupt"),
-    ("mtu", "mtu"),
-    ("rate", "rate"),
-    ("queue", "queue"),
-    ("codel", "codel"),
-    ("limit", "limit"),
-    ("trace", "trace"),
-    ("slot", "slot"),
-    ("ecn", "ecn"),
-    ("seed", "seed"),
-    ("none", "none"),
-];
 
 impl<'a> Parser<'a, '_> {
     pub(super) fn sentence(
@@ -71,14 +47,22 @@ impl<'a> Parser<'a, '_> {
             }
             _ => {}
         }
-        let known = ONCE.iter().find(|(text, _)| *text == word.text);
-        let (_, name) = known.ok_or_else(|| word.expected(A_WORD))?;
+        let name = match word.text {
+            "latency" => "delay",
+            "drop" => "loss",
+            name => name,
+        };
         draft.once(name, word)?;
-        self.clause(draft, name)
+        self.clause(draft, name, word)
     }
 
     /// What comes after the first word of a sentence that may come once.
-    fn clause(&mut self, draft: &mut Draft<'a>, name: &str) -> Result<(), ParseError> {
+    fn clause(
+        &mut self,
+        draft: &mut Draft<'a>,
+        name: &str,
+        word: Word<'a>,
+    ) -> Result<(), ParseError> {
         let config = &mut draft.config;
         match name {
             "delay" => (config.delay, config.correlation) = self.delay()?,
@@ -108,7 +92,8 @@ impl<'a> Parser<'a, '_> {
             "slot" => config.slot = Some(self.slot()?),
             "ecn" => config.ecn = true,
             "seed" => config.seed = Some(whole(self.argument(), 0, u64::MAX, "of 64 bits")?),
-            _ => {}
+            "none" => {}
+            _ => return Err(word.expected(A_WORD)),
         }
         Ok(())
     }
@@ -155,14 +140,16 @@ impl<'a> Parser<'a, '_> {
             } else {
                 self.file(points, Cdf::parse)?
             };
-            Delay::Empirical(Arc::new(cdf))
+            Delay {
+                shape: Shape::Empirical(Arc::new(cdf)),
+                ..Delay::default()
+            }
         } else {
             let mean = time(self.argument())?;
             let Some(half_width) = self.time_if_given()? else {
-                let delay = Delay::Constant { delay: mean };
-                return Ok((delay, Correlation::None));
+                return Ok((Delay::constant(mean), Correlation::None));
             };
-            let delay = Delay::Uniform { mean, half_width };
+            let delay = Delay::uniform(mean, half_width);
             if let Some(word) = self.number() {
                 return Ok((delay, Correlation::PerPacket(percentage(word)?)));
             }
@@ -178,18 +165,15 @@ impl<'a> Parser<'a, '_> {
 
     fn shape(&mut self) -> Result<Shape, ParseError> {
         let word = self.argument();
-        match word.text {
-            "uniform" => Ok(Shape::Uniform),
-            "normal" => Ok(Shape::Normal),
-            "pareto" => Ok(Shape::Pareto),
-            "paretonormal" => Ok(Shape::ParetoNormal),
-            "lognormal" => Ok(Shape::LogNormal),
-            "gamma" => Ok(Shape::Gamma),
-            "table" => {
+        let shapes = SHAPES.iter().find(|(name, _)| *name == word.text);
+        match (word.text, shapes) {
+            (_, Some((_, shape))) => Ok(shape.clone()),
+            ("table", _) => {
                 let name = self.argument();
-                self.file(name, Table::parse).map(Shape::Table)
+                let table = self.file(name, Table::parse)?;
+                Ok(Shape::Table(Arc::new(table)))
             }
-            "experimental" => Err(word.not_yet("a table by name (`distribution table FILE`)")),
+            ("experimental", _) => Err(word.not_yet("a table by name (`distribution table FILE`)")),
             _ => Err(word
                 .expected("uniform, normal, pareto, paretonormal, lognormal, gamma or table FILE")),
         }
@@ -197,9 +181,11 @@ impl<'a> Parser<'a, '_> {
 
     fn slot(&mut self) -> Result<Slot, ParseError> {
         let gap = if self.takes("distribution") {
-            let shape = self.shape()?;
-            let (mean, jitter) = (time(self.argument())?, time(self.argument())?);
-            SlotGap::Drawn(shape.delay(mean, jitter))
+            SlotGap::Drawn(Delay {
+                shape: self.shape()?,
+                mean: time(self.argument())?,
+                jitter: time(self.argument())?,
+            })
         } else {
             let least = time(self.argument())?;
             let most = self.number().map(|word| time_from(word, least));

@@ -27,9 +27,10 @@ fn the_words_of_tc_are_taken_verbatim() {
     let config = parsed("delay 50ms 5ms distribution normal loss 1%");
     assert_eq!(
         config.delay,
-        Delay::Normal {
+        Delay {
             mean: 50 * MS,
-            sigma: 5 * MS
+            jitter: 5 * MS,
+            shape: Shape::Normal
         }
     );
     let probability = Probability::from_percent(1.0).unwrap();
@@ -48,10 +49,7 @@ fn the_words_of_tc_are_taken_verbatim() {
 
 #[test]
 fn plain_jitter_is_uniform() {
-    let uniform = Delay::Uniform {
-        mean: 50 * MS,
-        half_width: 5 * MS,
-    };
+    let uniform = Delay::uniform(50 * MS, 5 * MS);
     assert_eq!(parsed("delay 50ms 5ms").delay, uniform);
     assert_eq!(parsed("delay 50ms 5ms distribution uniform").delay, uniform);
 }
@@ -287,36 +285,22 @@ fn any_chance() -> impl Strategy<Value = Chance> {
 }
 
 fn any_delay() -> impl Strategy<Value = Delay> {
-    (0..8, any_time(), any_time()).prop_map(|(kind, mean, jitter)| match kind {
-        0 => Delay::Constant { delay: mean },
-        1 => Delay::Uniform {
-            mean,
-            half_width: jitter,
-        },
-        2 => Delay::Normal {
-            mean,
-            sigma: jitter,
-        },
-        3 => Delay::Pareto {
-            mean,
-            scale: jitter,
-        },
-        4 => Delay::ParetoNormal {
-            mean,
-            scale: jitter,
-        },
-        5 => Delay::LogNormal {
-            mean,
-            sigma: jitter,
-        },
-        6 => Delay::Gamma {
-            mean,
-            sigma: jitter,
-        },
-        _ => {
+    (0..8_usize, any_time(), any_time()).prop_map(|(kind, mean, jitter)| {
+        if kind == 7 {
             let ns = |time: Duration| time.as_nanos() as u64;
             let points = [(ns(mean.min(jitter)), 0.0), (ns(mean.max(jitter)), 1.0)];
-            Delay::Empirical(Arc::new(Cdf::try_new(None, &points).unwrap()))
+            return Delay {
+                shape: Shape::Empirical(Arc::new(Cdf::try_new(None, &points).unwrap())),
+                ..Delay::default()
+            };
+        }
+        match SHAPES.get(kind) {
+            None => Delay::constant(mean),
+            Some((_, shape)) => Delay {
+                mean,
+                jitter,
+                shape: shape.clone(),
+            },
         }
     })
 }
@@ -325,9 +309,9 @@ fn any_correlation(delay: &Delay) -> BoxedStrategy<Correlation> {
     let none = Just(Correlation::None);
     let in_time = (1..3_600_000_u64).prop_map(|ms| Correlation::InTime(MS * ms as u32));
     let per_packet = any_share().prop_map(Correlation::PerPacket);
-    match delay {
-        Delay::Constant { .. } => none.boxed(),
-        Delay::Empirical(_) => prop_oneof![none, in_time].boxed(),
+    match delay.shape {
+        Shape::Constant => none.boxed(),
+        Shape::Empirical(_) => prop_oneof![none, in_time].boxed(),
         _ => prop_oneof![none, in_time, per_packet].boxed(),
     }
 }
@@ -416,8 +400,14 @@ fn any_slot() -> impl Strategy<Value = Slot> {
             least: a.min(b),
             most: a.max(b),
         }),
-        (any_time(), any_time())
-            .prop_map(|(mean, sigma)| { SlotGap::Drawn(Delay::Gamma { mean, sigma }) }),
+        (any_time(), any_time()).prop_map(|(mean, jitter)| {
+            let shape = Shape::Gamma;
+            SlotGap::Drawn(Delay {
+                mean,
+                jitter,
+                shape,
+            })
+        }),
     ];
     let (packets, bytes) = (1..=u32::MAX, 1..=u64::MAX);
     let most = (prop::option::of(packets), prop::option::of(bytes));
@@ -491,7 +481,7 @@ fn any_config() -> impl Strategy<Value = LinkConfig> {
             free_from = at + ramp;
             profile.steps.push(Step { at, ramp, settings });
         }
-        profile.repeat = (repeats && !profile.is_empty()).then(|| free_from + MS);
+        profile.repeat = (repeats && !profile.steps.is_empty()).then(|| free_from + MS);
         LinkConfig {
             profile,
             seed,

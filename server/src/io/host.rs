@@ -128,8 +128,7 @@ impl SlaveHost {
         let inner = socket::for_quic(socket::bind(options.listen)?).map_err(unusable)?;
         let netem = options.netem.to_string();
         let (seed, extras) = (options.netem_seed, options.netem_extras);
-        let emulated =
-            EmulatedSocket::try_new_with(inner, options.netem, seed, LinkId::DOWN, extras)?;
+        let emulated = EmulatedSocket::try_new(inner, options.netem, seed, LinkId::DOWN, extras)?;
         let meter = emulated.meter();
         let socket = Arc::new(emulated);
         let endpoint = Endpoint::of_slave(options.transport, socket, &options.identity, TRAFFIC)?;

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use bytes::Bytes;
-use mmt_netem::io::socket::{EmulatedSocket, SocketMeter};
+use mmt_netem::io::socket::{EmulatedSocket, SocketExtras, SocketMeter};
 use mmt_netem::{LinkConfig, LinkId};
 use mmt_shared::io::clock::{Clock, thread_cpu_time};
 use mmt_shared::io::congestion::RateCap;
@@ -95,7 +95,13 @@ impl Endpoint {
         let opened = runtime.block_on(async {
             // it emulates nothing: it counts
             let link = LinkConfig::default();
-            let socket = EmulatedSocket::try_new(for_quic(socket)?, link, 0, LinkId::UP)?;
+            let socket = EmulatedSocket::try_new(
+                for_quic(socket)?,
+                link,
+                0,
+                LinkId::UP,
+                SocketExtras::default(),
+            )?;
             let meter = socket.meter();
             Ok::<_, Failure>((meter, open(Arc::new(socket)).await?))
         });

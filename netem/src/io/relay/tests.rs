@@ -18,7 +18,7 @@ fn socket(ip: IpAddr) -> UdpSocket {
 
 fn relay(listen: IpAddr, to: SocketAddr, up: &str, down: &str) -> RelayHandle {
     let (up, down) = (up.parse().unwrap(), down.parse().unwrap());
-    Relay::bind((listen, 0).into(), to, up, down, 1).unwrap()
+    Relay::bind((listen, 0).into(), to, up, down, 1, Extras::default()).unwrap()
 }
 
 fn receive(socket: &UdpSocket) -> (Vec<u8>, SocketAddr) {
@@ -238,7 +238,8 @@ fn stopping_is_prompt_with_packets_in_flight_and_frees_the_address() {
 #[test]
 fn what_cannot_work_is_refused_at_the_start() {
     let config = LinkConfig::default;
-    let start = |listen, to| Relay::bind(listen, to, config(), config(), 1).unwrap_err();
+    let start =
+        |listen, to| Relay::bind(listen, to, config(), config(), 1, Extras::default()).unwrap_err();
     let any = SocketAddr::from((LOCAL, 0));
     assert!(matches!(start(any, any), RelayError::Target { .. }));
     let taken = socket(LOCAL);
@@ -252,7 +253,7 @@ fn what_cannot_work_is_refused_at_the_start() {
         limit: 0,
         ..config()
     };
-    let refused = Relay::bind(any, address, config(), bad, 1);
+    let refused = Relay::bind(any, address, config(), bad, 1, Extras::default());
     assert!(matches!(refused, Err(RelayError::Config(_))));
 }
 
@@ -285,7 +286,7 @@ fn rebinding_goes_on_by_itself_when_asked_for() {
     };
     let (any, to) = ((LOCAL, 0).into(), server.local_addr().unwrap());
     let none = LinkConfig::default;
-    let relay = Relay::bind_with(any, to, none(), none(), 1, extras).unwrap();
+    let relay = Relay::bind(any, to, none(), none(), 1, extras).unwrap();
     socket(LOCAL).send_to(b"hello", relay.local_addr()).unwrap();
     receive(&server);
     until(&relay, |seen| seen.rebinds >= 3);
@@ -337,7 +338,7 @@ fn every_packet_is_on_record_in_both_forms() {
         };
         let (any, to) = ((LOCAL, 0).into(), server.local_addr().unwrap());
         let up = words.parse().unwrap();
-        let relay = Relay::bind_with(any, to, up, LinkConfig::default(), 1, extras).unwrap();
+        let relay = Relay::bind(any, to, up, LinkConfig::default(), 1, extras).unwrap();
         let client = socket(LOCAL);
         for number in 0..100_u8 {
             client.send_to(&[number; 50], relay.local_addr()).unwrap();

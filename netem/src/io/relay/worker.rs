@@ -8,6 +8,7 @@ use std::time::Duration;
 use quinn::udp::Transmit;
 use rustix::event::{PollFd, PollFlags};
 
+use mmt_shared::io::alarm::wait;
 use mmt_shared::io::realtime;
 use mmt_shared::time::Time;
 
@@ -16,11 +17,10 @@ use super::port::{Port, Received, Receiver};
 use super::{RelaySnapshot, Shared};
 use crate::counters::Tally;
 use crate::direction::Direction;
-use crate::io::alarm::{now, wait};
 use crate::io::driver::{Datagram, Driver, Outcome};
 use crate::io::lateness::Lateness;
-use crate::io::lock;
 use crate::io::record_file::RecordWriter;
+use crate::io::{lock, now};
 use crate::packet::Departure;
 
 /// Batches taken from one socket before the times are looked at again.

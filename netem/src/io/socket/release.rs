@@ -7,6 +7,7 @@ use std::task::{Context, Poll, Waker};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
+use mmt_shared::io::alarm::Alarm;
 use mmt_shared::io::realtime;
 use mmt_shared::time::Time;
 use quinn::udp::Transmit;
@@ -16,9 +17,8 @@ use super::meter::SocketMeter;
 use super::{Address, SocketExtras, WrapError};
 use crate::config::{ConfigError, LinkConfig};
 use crate::direction::LinkId;
-use crate::io::alarm::{Alarm, now};
 use crate::io::driver::{Datagram, Driver, Outcome};
-use crate::io::lock;
+use crate::io::{lock, now};
 use crate::packet::Departure;
 
 /// How long the thread waits for a full socket before it drops the datagram: long against the time in

@@ -13,7 +13,7 @@ use quinn::{ClientConfig, Endpoint, EndpointConfig, Runtime, ServerConfig, Tokio
 use super::*;
 use crate::counters::Tally;
 use crate::direction::Direction;
-use crate::io::alarm;
+use crate::io::now;
 use crate::io::record_file::RecordFile;
 
 const PATIENCE: Duration = Duration::from_secs(30);
@@ -63,7 +63,7 @@ impl AsyncUdpSocket for Pretended {
         self.sent
             .lock()
             .unwrap()
-            .push((alarm::now(), contents, transmit.ecn));
+            .push((now(), contents, transmit.ecn));
         Ok(())
     }
 
@@ -90,7 +90,14 @@ impl AsyncUdpSocket for Pretended {
 }
 
 fn wrap(inner: &Arc<Pretended>, words: &str) -> EmulatedSocket {
-    EmulatedSocket::try_new(inner.clone(), words.parse().unwrap(), 1, LinkId::UP).unwrap()
+    EmulatedSocket::try_new(
+        inner.clone(),
+        words.parse().unwrap(),
+        1,
+        LinkId::UP,
+        SocketExtras::default(),
+    )
+    .unwrap()
 }
 
 fn transmit(contents: &[u8], segment_size: Option<usize>) -> Transmit<'_> {
@@ -137,7 +144,7 @@ fn offered_is_accounted_for(counters: &SocketCounters) {
 fn a_datagram_leaves_whole_marked_in_order_and_never_early() {
     let inner = Arc::new(Pretended::default());
     let socket = wrap(&inner, "delay 20ms 10ms");
-    let start = alarm::now();
+    let start = now();
     for number in 0..50 {
         socket.try_send(&transmit(&[number], None)).unwrap();
     }
@@ -167,7 +174,7 @@ fn a_datagram_due_sooner_wakes_the_thread_that_waits_for_a_later_one() {
 
 fn wrap_with(inner: &Arc<Pretended>, words: &str, extras: SocketExtras) -> EmulatedSocket {
     let config = words.parse().unwrap();
-    EmulatedSocket::try_new_with(inner.clone(), config, 1, LinkId::UP, extras).unwrap()
+    EmulatedSocket::try_new(inner.clone(), config, 1, LinkId::UP, extras).unwrap()
 }
 
 #[test]
@@ -184,7 +191,7 @@ fn a_socket_at_work_takes_new_settings_and_keeps_the_times_of_what_is_in_flight(
 
     let reconfigure = |words: &str| control.reconfigure(words.parse().unwrap());
     reconfigure("delay 20ms").unwrap();
-    let start = alarm::now();
+    let start = now();
     socket.try_send(&transmit(b"in flight", None)).unwrap();
     reconfigure("loss 100%").unwrap();
     let refused = LinkConfig {
@@ -404,7 +411,7 @@ fn settings_out_of_range_are_refused() {
         ..LinkConfig::default()
     };
     let inner = Arc::new(Pretended::default());
-    let wrapped = EmulatedSocket::try_new(inner, config, 1, LinkId::UP);
+    let wrapped = EmulatedSocket::try_new(inner, config, 1, LinkId::UP, SocketExtras::default());
     assert!(matches!(wrapped, Err(WrapError::Config(_))));
 }
 
@@ -412,7 +419,7 @@ fn endpoint(words: &str, id: LinkId, server: Option<ServerConfig>) -> (Endpoint,
     let socket = std::net::UdpSocket::bind((Ipv4Addr::LOCALHOST, 0)).unwrap();
     let inner = TokioRuntime.wrap_udp_socket(socket).unwrap();
     let config = words.parse().unwrap();
-    let wrapped = EmulatedSocket::try_new(inner, config, 1, id).unwrap();
+    let wrapped = EmulatedSocket::try_new(inner, config, 1, id, SocketExtras::default()).unwrap();
     let meter = wrapped.meter();
     let endpoint = Endpoint::new_with_abstract_socket(
         EndpointConfig::default(),
