@@ -63,8 +63,7 @@ impl<T: Clone> Link<T> {
 
     /// The next packet that has left or was dropped by `now`: by time, then by order of offer.
     ///
-    /// Of a packet and its copy, a drop is handed out only if it is the packet's own, and a copy whose packet
-    /// was dropped at the offer stands in for it. All drops are counted.
+    /// A drop of a copy is counted, and not handed out.
     pub fn poll(&mut self, now: Time) -> Option<Departure<T>> {
         self.stages.poll(&self.timeline, now)
     }

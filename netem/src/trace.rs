@@ -42,7 +42,32 @@ pub struct Sample {
     pub delay: Option<Duration>,
 }
 
-/// The lines that say something, with their numbers from 1: not empty, no comment.
+/// What a probe met on one way.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Met {
+    Delay(Duration),
+    Lost,
+    /// It arrived, after a delay that nobody measured: the answer was lost on the other way.
+    Arrived,
+}
+
+/// The samples of one way. A delay that nobody measured is taken to be that of the last probe before it that
+/// arrived, or of the first one after it.
+pub(crate) fn samples(met: &[(Duration, Met)]) -> Vec<Sample> {
+    let measured = |(_, met): &(Duration, Met)| match met {
+        Met::Delay(delay) => Some(*delay),
+        Met::Lost | Met::Arrived => None,
+    };
+    let mut last = met.iter().find_map(measured);
+    let mut sample = |probe: &(Duration, Met)| {
+        last = measured(probe).or(last);
+        let delay = last.filter(|_| probe.1 != Met::Lost);
+        Sample { at: probe.0, delay }
+    };
+    met.iter().map(&mut sample).collect()
+}
+
+/// The lines that are not empty and no comment, with their numbers from 1.
 pub(crate) fn meaningful_lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
     let lines = text.lines().enumerate();
     lines

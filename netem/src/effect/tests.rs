@@ -78,8 +78,8 @@ fn rates_without_sense_are_taken_to_the_nearest_with_sense() {
 fn the_line_reads_as_documented() {
     assert_eq!(
         at_1_khz("delay 50ms 5ms loss 1%").to_string(),
-        "at 1000 packets/s: delay mean 51.85 ms, s.d. 1.74 ms, p99 54.90 ms; loss 1.000 % in \
-         bursts of 1.01 packets; reordered 0.0 %; keeping order adds 1.86 ms to the mean"
+        "at 1000 packets/s: delay mean 51.86 ms, s.d. 1.73 ms, p99 54.90 ms; loss 1.000 % in \
+         bursts of 1.01 packets; reordered 0.0 %; keeping order adds 1.87 ms to the mean"
     );
 }
 

@@ -84,14 +84,15 @@ impl LossModel {
         LossDraw { probability, draw }
     }
 
-    /// As in the kernel: the state decides about this packet, then moves on.
+    /// As in the kernel: the state decides about this packet, then moves on. Low draws lead to the bad state
+    /// from either, so that, for p + r up to 1, raising p only ever adds losses.
     fn gemodel(&mut self, chain: &GilbertElliott, draw: f64) -> f64 {
-        let (loss, leaves) = if self.bad {
-            (chain.loss_in_bad, chain.to_good)
+        let (loss, to_bad) = if self.bad {
+            (chain.loss_in_bad, chain.to_good.complement())
         } else {
             (chain.loss_in_good, chain.to_bad)
         };
-        self.bad ^= draw < leaves.get();
+        self.bad = draw < to_bad.get();
         loss.get()
     }
 }
@@ -113,15 +114,21 @@ impl ChainState {
     }
 }
 
-/// Bursts in time: a function of time alone.
+/// Bursts in time: a function of time alone, and of the share only by how early bursts begin.
+///
+/// A burst ends at a constant rate, 1 / mean; between ends, one begins an exponentially distributed time after
+/// the last end. By the exponential distribution's lack of memory an end while no burst is on changes nothing.
 #[derive(Clone, Debug)]
 struct Bursts {
     start: Substream,
     stream: Substream,
-    settings: Option<TimedBursts>,
-    on: bool,
-    /// When the state ends, nanoseconds.
-    until: u64,
+    /// Nanoseconds; zero before its first use.
+    mean: u64,
+    /// The last end and the next one, nanoseconds.
+    ended: i128,
+    ends: i128,
+    /// How long after the last end a burst begins, in mean times between bursts.
+    rest: f64,
 }
 
 impl Bursts {
@@ -129,55 +136,53 @@ impl Bursts {
         Self {
             stream: start.clone(),
             start,
-            settings: None,
-            on: false,
-            until: 0,
+            mean: 0,
+            ended: 0,
+            ends: 0,
+            rest: 0.0,
         }
     }
 
     /// Whether a burst is on at `elapsed`.
     fn on(&mut self, settings: &TimedBursts, elapsed: Duration) -> bool {
-        let share = settings.share.get();
+        let (share, mean) = (settings.share.get(), duration_nanos(settings.mean));
         if share <= 0.0 || share >= 1.0 {
             return share >= 1.0;
         }
-        let elapsed = duration_nanos(elapsed);
-        let timing = |s: &TimedBursts| (s.share, s.mean);
-        if self.settings.as_ref().map(timing) != Some(timing(settings)) {
+        let elapsed = i128::from(duration_nanos(elapsed));
+        if self.mean != mean {
             self.stream = self.start.clone();
-            self.settings = Some(*settings);
-            self.begin(settings, 0);
+            self.mean = mean;
+            self.begin(0);
         }
         let mut steps = 0;
-        while self.until <= elapsed {
-            self.on = !self.on;
-            let lasts = self.duration(settings);
-            self.until = self.until.saturating_add(lasts);
+        while self.ends <= elapsed {
+            self.ended = self.ends;
+            self.ends += self.duration();
+            self.rest = self.exponential();
             steps += 1;
             if steps > CATCH_UP_STEPS {
-                self.begin(settings, elapsed);
+                self.begin(elapsed);
             }
         }
-        self.on
+        let between = mean as f64 * (1.0 - share) / share;
+        (elapsed - self.ended) as f64 >= self.rest * between
     }
 
-    /// Begins at a random point of the stationary process: exponential times have no memory.
-    fn begin(&mut self, settings: &TimedBursts, now: u64) {
-        self.on = self.stream.uniform() < settings.share.get();
-        let lasts = self.duration(settings);
-        self.until = now.saturating_add(lasts);
+    /// Begins at a random point of the stationary process.
+    fn begin(&mut self, now: i128) {
+        self.ended = now - self.duration();
+        self.ends = now + self.duration();
+        self.rest = self.exponential();
     }
 
-    /// How long the present state lasts, nanoseconds.
-    fn duration(&mut self, settings: &TimedBursts) -> u64 {
-        let share = settings.share.get();
-        let burst = duration_nanos(settings.mean) as f64;
-        let mean = if self.on {
-            burst
-        } else {
-            burst * (1.0 - share) / share
-        };
-        let nanos = -libm::log1p(-self.stream.uniform()) * mean;
-        (nanos as u64).saturating_add(1)
+    /// A time from end to end, nanoseconds.
+    fn duration(&mut self) -> i128 {
+        let nanos = self.exponential() * self.mean as f64;
+        1 + nanos as i128
+    }
+
+    fn exponential(&mut self) -> f64 {
+        -libm::log1p(-self.stream.uniform())
     }
 }

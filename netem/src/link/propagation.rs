@@ -10,6 +10,15 @@ use super::streams::{Draws, substream};
 use crate::config::{Correlation, LinkConfig, Order, Reorder};
 use crate::direction::LinkId;
 
+/// What is decided about the way of a packet at its offer.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Way {
+    /// The share of all delays that the packet's delay is not below, unless jitter lives in time.
+    pub(super) share: f64,
+    /// Whether it skips the delay.
+    pub(super) overtakes: bool,
+}
+
 /// The state of these stages. Times are counted from the origin of the link.
 #[derive(Clone, Debug)]
 pub(super) struct Propagation {
@@ -35,6 +44,17 @@ impl Propagation {
         }
     }
 
+    /// What is decided about the way of a packet at its offer, for every packet offered.
+    pub(super) fn draw(&mut self, config: &LinkConfig, draws: &Draws) -> Way {
+        let overtakes = config.reorder.as_ref();
+        let overtakes = overtakes.is_some_and(|reorder| self.overtakes(reorder, draws.reorder));
+        let share = match config.correlation {
+            Correlation::PerPacket(rho) => self.jitter.uniform(rho.get(), draws.delay),
+            Correlation::None | Correlation::InTime(_) => draws.delay,
+        };
+        Way { share, overtakes }
+    }
+
     /// When a packet of so many bytes leaves the link that left the bottleneck at `sent`. `replayed`: the
     /// delay of the recorded path that it met at its offer.
     pub(super) fn leave(
@@ -43,13 +63,16 @@ impl Propagation {
         sent: Duration,
         bytes: usize,
         replayed: Option<Duration>,
-        draws: &Draws,
+        way: Way,
     ) -> Duration {
-        let leaves = match (replayed, &config.reorder) {
-            (Some(delay), _) => self.in_order(config.order, sent.saturating_add(delay)),
-            (None, Some(reorder)) if self.overtakes(reorder, draws.reorder) => sent,
-            (None, _) => {
-                let share = self.share(config.correlation, sent, draws.delay);
+        let leaves = match replayed {
+            Some(delay) => self.in_order(config.order, sent.saturating_add(delay)),
+            None if way.overtakes => sent,
+            None => {
+                let share = match config.correlation {
+                    Correlation::InTime(tau) => self.jitter_in_time.uniform(tau, sent),
+                    Correlation::None | Correlation::PerPacket(_) => way.share,
+                };
                 let own = sent.saturating_add(config.delay.quantile(share));
                 self.in_order(config.order, own)
             }
@@ -57,15 +80,6 @@ impl Propagation {
         match &config.slot {
             Some(slot) => self.slots.leave(slot, leaves, bytes),
             None => leaves,
-        }
-    }
-
-    /// The share of all delays that the packet's delay is not below.
-    fn share(&mut self, correlation: Correlation, sent: Duration, draw: f64) -> f64 {
-        match correlation {
-            Correlation::None => draw,
-            Correlation::PerPacket(rho) => self.jitter.uniform(rho.get(), draw),
-            Correlation::InTime(tau) => self.jitter_in_time.uniform(tau, sent),
         }
     }
 

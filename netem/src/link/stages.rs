@@ -8,10 +8,11 @@ use mmt_shared::time::Time;
 
 use super::bottleneck::{Bottleneck, ROOM, Sent};
 use super::correlated::ByPacket;
-use super::loss_model::{LossDraw, LossModel};
-use super::propagation::Propagation;
-use super::streams::{Draws, Streams, substream};
+use super::loss_model::LossModel;
+use super::propagation::{Propagation, Way};
+use super::streams::{Streams, substream};
 use super::timeline::Timeline;
+use crate::config::LinkConfig;
 use crate::counters::LinkCounters;
 use crate::direction::LinkId;
 use crate::packet::{Departure, DropCause, Fate, Packet};
@@ -38,11 +39,17 @@ struct Transit<T> {
     ecn_capable: bool,
     /// The delay of the recorded path.
     replayed: Option<Duration>,
-    draws: Draws,
+    way: Way,
 }
 
-/// A packet that found no place on the link.
-type Refused<T> = (Departure<T>, DropCause);
+/// What chance does to a packet, or to its copy.
+#[derive(Clone, Copy, Debug)]
+struct Chances {
+    lost: bool,
+    marked: bool,
+    corrupted_bit: Option<u64>,
+    way: Way,
+}
 
 impl<T> Stages<T> {
     pub(super) fn new(seed: u64, id: LinkId, limit: u32) -> Self {
@@ -67,39 +74,9 @@ impl<T> Stages<T> {
     {
         let now = timeline.elapsed(at);
         self.advance(timeline, now);
-        let (bytes, number) = (packet.bytes, self.counters.offered.packets);
-        let itself = self.enter(at, packet);
         let settings = timeline.at(now);
-        if settings.mtu.is_some_and(|mtu| bytes > mtu as usize) {
-            self.counters.dropped.count(DropCause::Mtu, bytes);
-            return self.report(timeline, itself.departure, DropCause::Mtu);
-        }
-        let draws = itself.draws;
-        let doubled = self
-            .duplicating
-            .happens(settings.duplicate, draws.duplicate);
-        let loss = self.loss.draw(&settings.loss, number, now, &draws);
-        let copy = doubled.then(|| itself.clone());
-        let refused = self.admit(timeline, now, itself, loss);
-        let mut replaced = false;
-        if let Some(mut copy) = copy {
-            self.counters.duplicated.count(bytes);
-            // a copy whose packet is gone stands in for it
-            copy.departure.copy = refused.is_none();
-            copy.draws.delay = draws.copy_delay;
-            let draw = draws.copy_loss;
-            let refused = self.admit(timeline, now, copy, LossDraw { draw, ..loss });
-            replaced = refused.is_none();
-        }
-        if let Some((departure, cause)) = refused
-            && !replaced
-        {
-            self.report(timeline, departure, cause);
-        }
-    }
-
-    /// Counts a packet and takes its draws: one from every stream, whatever becomes of it.
-    fn enter(&mut self, at: Time, packet: Packet<T>) -> Transit<T> {
+        let marks = settings.ecn && packet.ecn_capable;
+        let (chances, of_copy) = self.draw(settings, now, packet.bytes, marks);
         let departure = Departure {
             number: self.counters.offered.packets,
             offered_at: at,
@@ -115,12 +92,62 @@ impl<T> Stages<T> {
             payload: packet.payload,
         };
         self.counters.offered.count(packet.bytes);
-        Transit {
+        let itself = Transit {
             departure,
             ecn_capable: packet.ecn_capable,
             replayed: None,
-            draws: self.streams.draw(),
+            way: chances.way,
+        };
+        let copy = of_copy.map(|chances| (itself.clone(), chances));
+        self.admit(timeline, now, itself, chances);
+        if let Some((mut copy, chances)) = copy {
+            copy.departure.copy = true;
+            self.counters.duplicated.count(packet.bytes);
+            self.admit(timeline, now, copy, chances);
         }
+    }
+
+    /// What chance does to a packet that is offered, and to its copy if it has one. Every effect draws for
+    /// every packet, whatever becomes of it, so that no effect moves the draws of another.
+    fn draw(
+        &mut self,
+        settings: &LinkConfig,
+        now: Duration,
+        bytes: usize,
+        marks: bool,
+    ) -> (Chances, Option<Chances>) {
+        let (draws, number) = (self.streams.draw(), self.counters.offered.packets);
+        let loss = self.loss.draw(&settings.loss, number, now, &draws);
+        let way = self.propagation.draw(settings, &draws);
+        let hit = loss.is_lost();
+        let bit = |draw: f64| (draw * bytes as f64 * 8.0) as u64;
+        let corrupt = self.corrupting.happens(settings.corrupt, draws.corrupt) && bytes > 0;
+        let mut chances = Chances {
+            lost: hit && !marks,
+            marked: hit && marks,
+            corrupted_bit: corrupt.then(|| bit(draws.corrupted_bit)),
+            way,
+        };
+        let doubled = self
+            .duplicating
+            .happens(settings.duplicate, draws.duplicate);
+        if !doubled || !fits(settings, bytes) {
+            return (chances, None);
+        }
+        let hit = draws.copy_loss < loss.probability;
+        let corrupt = draws.copy_corrupt < settings.corrupt.probability.get() && bytes > 0;
+        let copy = Chances {
+            // as in tc, a packet that is both lost and copied passes once
+            lost: chances.lost || hit && !marks,
+            marked: chances.marked || hit && marks,
+            corrupted_bit: corrupt.then(|| bit(draws.copy_bit)),
+            way: Way {
+                share: draws.copy_delay,
+                ..way
+            },
+        };
+        chances.lost = false;
+        (chances, Some(copy))
     }
 
     /// Puts a packet or a copy before the bottleneck, or drops it.
@@ -129,51 +156,73 @@ impl<T> Stages<T> {
         timeline: &Timeline,
         now: Duration,
         mut packet: Transit<T>,
-        loss: LossDraw,
-    ) -> Option<Refused<T>> {
-        let bytes = packet.departure.bytes;
-        let weight = match self.decide(timeline, now, &mut packet, loss) {
-            Ok(weight) => weight,
+        chances: Chances,
+    ) {
+        let (settings, bytes) = (timeline.at(now), packet.departure.bytes);
+        packet.way = chances.way;
+        packet.departure.fate = Fate::Delivered {
+            corrupted_bit: chances.corrupted_bit,
+            marked: chances.marked,
+        };
+        let passes = self
+            .survives(settings, now, &mut packet, chances.lost)
+            .and_then(|()| self.finds_room(timeline, now, bytes));
+        match passes {
+            Ok(weight) => {
+                self.in_flight = self.in_flight.saturating_add(1);
+                let ecn_capable = packet.ecn_capable;
+                self.bottleneck.push(packet, weight, ecn_capable, now);
+                self.advance(timeline, now);
+            }
             Err(cause) => {
                 self.counters.dropped.count(cause, bytes);
-                return Some((packet.departure, cause));
+                if !packet.departure.copy {
+                    self.report(timeline, packet.departure, cause);
+                }
             }
-        };
-        self.in_flight = self.in_flight.saturating_add(1);
-        let ecn_capable = packet.ecn_capable;
-        self.bottleneck.push(packet, weight, ecn_capable, now);
-        self.advance(timeline, now);
-        None
+        }
     }
 
-    /// What happens to a packet before it waits: returns its weight before the bottleneck, bytes.
-    fn decide(
+    /// What happens to a packet on the way, whatever else is on the link.
+    fn survives(
+        &mut self,
+        settings: &LinkConfig,
+        now: Duration,
+        packet: &mut Transit<T>,
+        lost: bool,
+    ) -> Result<(), DropCause> {
+        let bytes = packet.departure.bytes;
+        let replayed = settings.replay.as_ref().map(|replay| replay.path.at(now));
+        packet.replayed = replayed.flatten();
+        let dropped = if !fits(settings, bytes) {
+            DropCause::Mtu
+        } else if settings.outages.iter().any(|outage| outage.covers(now)) {
+            DropCause::Outage
+        } else if lost || replayed == Some(None) {
+            DropCause::Loss
+        } else {
+            return Ok(());
+        };
+        // Without a bottleneck it is lost at the end of its way, where it keeps its place in the order: a loss
+        // moves no other packet.
+        if settings.rate.is_none() && self.bottleneck.len() == 0 && replayed != Some(None) {
+            self.propagation
+                .leave(settings, now, bytes, packet.replayed, packet.way);
+        }
+        Err(dropped)
+    }
+
+    /// The weight of a packet before the bottleneck, bytes, if it finds room on the link.
+    fn finds_room(
         &mut self,
         timeline: &Timeline,
         now: Duration,
-        packet: &mut Transit<T>,
-        loss: LossDraw,
+        bytes: usize,
     ) -> Result<u64, DropCause> {
         let settings = timeline.at(now);
-        if settings.outages.iter().any(|outage| outage.covers(now)) {
-            return Err(DropCause::Outage);
-        }
-        let replayed = settings.replay.as_ref().map(|replay| replay.path.at(now));
-        let marked = loss.is_lost() && settings.ecn && packet.ecn_capable;
-        if (loss.is_lost() && !marked) || replayed == Some(None) {
-            return Err(DropCause::Loss);
-        }
-        packet.replayed = replayed.flatten();
         if self.in_flight >= settings.limit as usize {
             return Err(DropCause::Limit);
         }
-        let (draws, bytes) = (&packet.draws, packet.departure.bytes);
-        let corrupt = self.corrupting.happens(settings.corrupt, draws.corrupt) && bytes > 0;
-        let bit = (draws.corrupted_bit * bytes as f64 * 8.0) as u64;
-        packet.departure.fate = Fate::Delivered {
-            corrupted_bit: corrupt.then_some(bit),
-            marked,
-        };
         let Some(rate) = &settings.rate else {
             return Ok(0);
         };
@@ -198,7 +247,7 @@ impl<T> Stages<T> {
         let Transit {
             mut departure,
             replayed,
-            draws,
+            way,
             ..
         } = sent.packet;
         departure.queued = sent.queued;
@@ -217,7 +266,7 @@ impl<T> Stages<T> {
         let settings = timeline.at(sent.at);
         let leaves = self
             .propagation
-            .leave(settings, sent.at, departure.bytes, replayed, &draws);
+            .leave(settings, sent.at, departure.bytes, replayed, way);
         departure.due = timeline.time(leaves);
         self.out.push(Reverse(ByTime(departure)));
     }
@@ -264,6 +313,11 @@ impl<T> Stages<T> {
         self.advance(timeline, now);
         self.bottleneck.change_at(now);
     }
+}
+
+/// Whether a packet is no larger than the MTU.
+fn fits(settings: &LinkConfig, bytes: usize) -> bool {
+    settings.mtu.is_none_or(|mtu| bytes <= mtu as usize)
 }
 
 /// A departure ordered by its time, then by number of offer, a copy last.

@@ -18,6 +18,7 @@ pub(super) struct Streams {
     corrupted_bit: Substream,
     reorder: Substream,
     copy: Substream,
+    copy_corrupt: Substream,
 }
 
 /// The draws of one packet, uniform in [0, 1).
@@ -39,6 +40,9 @@ pub(super) struct Draws {
     /// Loss and delay of the copy.
     pub(super) copy_loss: f64,
     pub(super) copy_delay: f64,
+    /// Whether a bit of the copy is flipped, and which.
+    pub(super) copy_corrupt: f64,
+    pub(super) copy_bit: f64,
 }
 
 impl Streams {
@@ -53,6 +57,7 @@ impl Streams {
             corrupted_bit: stream("netem/up/bit", "netem/down/bit"),
             reorder: stream("netem/up/reorder", "netem/down/reorder"),
             copy: stream("netem/up/copy", "netem/down/copy"),
+            copy_corrupt: stream("netem/up/copybits", "netem/down/copybits"),
         }
     }
 
@@ -67,6 +72,8 @@ impl Streams {
             reorder: self.reorder.uniform(),
             copy_loss: self.copy.uniform(),
             copy_delay: self.copy.uniform(),
+            copy_corrupt: self.copy_corrupt.uniform(),
+            copy_bit: self.copy_corrupt.uniform(),
         }
     }
 }

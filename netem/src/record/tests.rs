@@ -185,7 +185,7 @@ fn the_log_of_a_run_is_the_same_to_the_byte_and_another_seed_gives_another() {
     assert_eq!(log(words), log(words));
     assert_ne!(log(words), log(&format!("{words} seed 4")));
     // pinned: another machine and another day give the same
-    assert_eq!(log(words), 0x6af5_3457_6b9a_7fb5, "{:#x}", log(words));
+    assert_eq!(log(words), 0xf4aa_0937_80d4_adbf, "{:#x}", log(words));
 }
 
 #[test]

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use serde::Deserialize;
 
-use super::{Sample, TraceError};
+use super::{Met, Sample, TraceError, samples};
 use crate::direction::Direction;
 
 #[derive(Deserialize)]
@@ -50,6 +50,9 @@ struct Delays {
 /// that the shortest is half of the shortest round trip: the clocks of the two ends differ by an unknown
 /// offset. Otherwise half of each round trip.
 ///
+/// With a direction, a probe that was lost on the other way arrived on this one. Where irtt does not know on
+/// which (`true`), the first such loss counts for the way up, the second for the way down, and so on.
+///
 /// # Errors
 /// Line and reason.
 pub(super) fn parse(text: &str, direction: Option<Direction>) -> Result<Vec<Sample>, TraceError> {
@@ -63,33 +66,44 @@ pub(super) fn parse(text: &str, direction: Option<Direction>) -> Result<Vec<Samp
     };
     let shortest_way = trips.iter().filter_map(way).min();
     let shortest_trip = trips.iter().filter_map(|trip| trip.delay.rtt).min();
-    let mut samples = Vec::with_capacity(trips.len());
+    let mut met = Vec::with_capacity(trips.len());
     let first = trips.first().and_then(sent);
+    let mut unknown_way = Direction::Down;
     for (number, trip) in trips.iter().enumerate() {
         let wrong = |what| TraceError::at(line_of(text, number), what);
         let sent = sent(trip).ok_or_else(|| wrong("a round trip without a time of sending"))?;
-        let nanos = match (trip.lost.as_str(), way(trip), shortest_way, shortest_trip) {
-            ("false", Some(way), Some(least), Some(trip)) => {
-                Some(way.saturating_sub(least).saturating_add(trip / 2))
+        let lost_on = match trip.lost.as_str() {
+            "false" => None,
+            "true_up" => Some(Direction::Up),
+            "true_down" => Some(Direction::Down),
+            "true" => {
+                unknown_way = unknown_way.opposite();
+                Some(unknown_way)
             }
-            ("false", ..) => {
-                let rtt = trip.delay.rtt;
-                Some(rtt.ok_or_else(|| wrong("a round trip that arrived without its rtt"))? / 2)
-            }
-            ("true" | "true_up" | "true_down", ..) => None,
             _ => return Err(wrong("lost must be false, true, true_up or true_down")),
         };
-        let nanos = match nanos {
-            Some(nanos) => Some(u64::try_from(nanos).map_err(|_| wrong("a delay below zero"))?),
-            None => None,
-        };
         let since = sent.saturating_sub(first.unwrap_or(sent));
-        samples.push(Sample {
-            at: Duration::from_nanos(u64::try_from(since).unwrap_or(0)),
-            delay: nanos.map(Duration::from_nanos),
-        });
+        let at = Duration::from_nanos(u64::try_from(since).unwrap_or(0));
+        let fate = match (lost_on, direction) {
+            (Some(lost_on), Some(direction)) if lost_on != direction => Met::Arrived,
+            (Some(_), _) => Met::Lost,
+            (None, _) => {
+                let nanos = match (way(trip), shortest_way, shortest_trip) {
+                    (Some(way), Some(least), Some(trip)) => {
+                        way.saturating_sub(least).saturating_add(trip / 2)
+                    }
+                    _ => {
+                        let rtt = trip.delay.rtt;
+                        rtt.ok_or_else(|| wrong("a round trip that arrived without its rtt"))? / 2
+                    }
+                };
+                let nanos = u64::try_from(nanos).map_err(|_| wrong("a delay below zero"))?;
+                Met::Delay(Duration::from_nanos(nanos))
+            }
+        };
+        met.push((at, fate));
     }
-    Ok(samples)
+    Ok(samples(&met))
 }
 
 fn sent(trip: &RoundTrip) -> Option<i64> {

@@ -3,18 +3,22 @@
 
 use std::time::Duration;
 
-use super::{Sample, TraceError};
+use super::{Met, Sample, TraceError, samples};
 use crate::direction::Direction;
 
+/// What stands for a lost probe.
+const LOST: f64 = -1.0;
+
 /// Reads it: stamps in whole nanoseconds (irtt) or decimal seconds (ping), delays in ms, -1 for the way
-/// on which a probe was lost. Without a direction, or without one-way columns, half of the round trip is
+/// on which a probe was lost. A probe that was lost on the other way arrived on this one, after a delay that
+/// nobody measured. Without a direction, or without one-way columns, half of the round trip is
 /// taken for one way. The clocks of both ends were not synchronised: only the sum of both ways is sure.
 ///
 /// # Errors
 /// Line and reason.
 pub(super) fn parse(text: &str, direction: Option<Direction>) -> Result<Vec<Sample>, TraceError> {
-    let mut samples = Vec::new();
-    let mut stamps_before: Option<u64> = None;
+    let mut met = Vec::new();
+    let mut begin: Option<u64> = None;
     for (at, line) in text.lines().enumerate().skip(1) {
         if line.trim().is_empty() {
             continue;
@@ -24,30 +28,26 @@ pub(super) fn parse(text: &str, direction: Option<Direction>) -> Result<Vec<Samp
         let stamp = fields.next().and_then(nanos);
         let stamp = stamp.ok_or_else(|| wrong("expected a stamp in nanoseconds or seconds"))?;
         let numbers: Result<Vec<f64>, _> = fields.map(str::parse).collect();
-        let delay_ms = match (numbers.as_deref(), direction) {
-            (Ok([_, up, _]), Some(Direction::Up)) => one_way(numbers.as_deref(), *up),
-            (Ok([_, _, down]), Some(Direction::Down)) => one_way(numbers.as_deref(), *down),
-            (Ok([rtt, ..]), _) => one_way(numbers.as_deref(), 0.5 * rtt),
+        let (own, others) = match (numbers.as_deref(), direction) {
+            (Ok([_, up, down]), Some(Direction::Up)) => (*up, *down),
+            (Ok([_, up, down]), Some(Direction::Down)) => (*down, *up),
+            (Ok([rtt, ways @ ..]), _) if ways.contains(&LOST) || *rtt == LOST => (LOST, *rtt),
+            (Ok([rtt, ..]), _) => (0.5 * rtt, *rtt),
             _ => return Err(wrong("expected numbers in ms: rtt, or rtt,uplink,downlink")),
         };
-        let begin = *stamps_before.get_or_insert(stamp);
-        let delay = match delay_ms {
-            Some(ms) if (0.0..=3.6e6).contains(&ms) => Some(Duration::from_secs_f64(ms * 1e-3)),
-            Some(_) => return Err(wrong("a delay lies between 0 and 1 h")),
-            None => None,
+        let fate = if own == LOST {
+            Met::Lost
+        } else if others == LOST {
+            Met::Arrived
+        } else if (0.0..=3.6e6).contains(&own) {
+            Met::Delay(Duration::from_secs_f64(own * 1e-3))
+        } else {
+            return Err(wrong("a delay lies between 0 and 1 h"));
         };
-        samples.push(Sample {
-            at: Duration::from_nanos(stamp.saturating_sub(begin)),
-            delay,
-        });
+        let begin = *begin.get_or_insert(stamp);
+        met.push((Duration::from_nanos(stamp.saturating_sub(begin)), fate));
     }
-    Ok(samples)
-}
-
-/// The delay of a probe; `None` if it was lost on either way: then no delay of it is known.
-fn one_way(numbers: Result<&[f64], &std::num::ParseFloatError>, delay_ms: f64) -> Option<f64> {
-    let lost = numbers.is_ok_and(|numbers| numbers.iter().any(|ms| *ms == -1.0));
-    (!lost).then_some(delay_ms)
+    Ok(samples(&met))
 }
 
 /// Nanoseconds of a stamp: whole ones as they are, decimals as seconds.

@@ -72,11 +72,12 @@ fn lens_csv_is_read_in_both_of_its_forms() {
                 1705744800626565141,120.126123,72.439368,47.68675\n\
                 1705744800636737402,109.976237,62.295097,47.681199\n";
     let up = micros(&path(irtt, UP));
-    assert_eq!(
-        up,
-        [(0, None), (9_667, Some(72_439)), (19_840, Some(62_295))]
-    );
+    // the first was lost on its way down: it arrived
+    let arrived = Some(72_439);
+    assert_eq!(up, [(0, arrived), (9_667, arrived), (19_840, Some(62_295))]);
+    assert_eq!(micros(&path(irtt, DOWN))[0].1, None);
     assert_eq!(micros(&path(irtt, DOWN))[1].1, Some(47_686));
+    assert_eq!(micros(&path(irtt, None))[0].1, None);
     assert_eq!(micros(&path(irtt, None))[1].1, Some(60_063));
     let ping = "timestamp,rtt\n1705744800.533641,91.8\n1705744800.55492,96.5\n";
     assert_eq!(micros(&path(ping, None))[1].1, Some(48_250));
@@ -114,14 +115,42 @@ fn irtt_json_gives_each_way_up_to_the_offset_of_the_clocks() {
         up,
         [
             (0, Some(9_807)),
-            (1_000_645, None),
+            (1_000_645, Some(9_807)),
             (1_999_818, Some(8_032))
         ]
     );
     let down = micros(&path(IRTT, DOWN));
-    assert_eq!((down[0].1, down[2].1), (Some(8_032), Some(8_580)));
+    assert_eq!(
+        (down[0].1, down[1].1, down[2].1),
+        (Some(8_032), None, Some(8_580))
+    );
     let half = micros(&path(IRTT, None));
     assert_eq!((half[0].1, half[2].1), (Some(8_645), Some(8_032)));
+}
+
+#[test]
+fn each_loss_of_a_trace_with_directions_is_one_loss() {
+    let lens = "timestamp,rtt,uplink,downlink\n1,5,2,3\n2,0,0,-1\n3,0,-1,0\n4,0,0,-1\n5,5,2,3\n";
+    let trip = |lost: &str| IRTT.replacen("true_down", lost, 1);
+    let twice = |lost: &str| trip(lost).replacen("\"false\"", &format!("\"{lost}\""), 1);
+    for (text, lost_up, lost_down) in [
+        (lens.to_owned(), 1, 2),
+        (trip("true_down"), 0, 1),
+        (trip("true_up"), 1, 0),
+        // nobody knows where: once for each way in turn
+        (trip("true"), 1, 0),
+        (twice("true"), 1, 1),
+    ] {
+        let lost = |direction| {
+            let path = path(&text, direction);
+            path.samples()
+                .iter()
+                .filter(|sample| sample.delay.is_none())
+                .count()
+        };
+        assert_eq!((lost(UP), lost(DOWN)), (lost_up, lost_down), "{text}");
+        assert_eq!(lost(None), lost_up + lost_down, "{text}");
+    }
 }
 
 #[test]

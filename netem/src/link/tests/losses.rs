@@ -170,8 +170,7 @@ fn copies_and_turned_bits_have_their_shares_and_their_counts() {
     let duplicated = counters.duplicated.packets as f64;
     assert!((duplicated - 0.1 * passed).abs() < 4.0 * (0.09 * passed).sqrt());
     let corrupted = counters.corrupted.packets as f64;
-    // a packet and its copy are turned or spared together
-    assert!((corrupted - 0.055 * passed).abs() < 6.0 * (0.055 * passed).sqrt());
+    assert!((corrupted - 0.055 * passed).abs() < 4.0 * (0.055 * passed).sqrt());
     let even = turned.iter().sum::<u64>() as f64 / 8.0;
     assert!(
         turned
@@ -187,4 +186,19 @@ fn copies_and_turned_bits_have_their_shares_and_their_counts() {
     flip_bit(&mut bytes, 9);
     flip_bit(&mut bytes, 16);
     assert_eq!(bytes, [0, 2]);
+}
+
+#[test]
+fn a_copy_draws_its_own_corruption() {
+    let packets = (0..N).map(|packet| (Time::from_millis(packet), Packet::new(100, ())));
+    let out = with_copies(
+        &mut link("duplicate 100% corrupt 20%", 79, LinkId::UP),
+        packets,
+    );
+    let hits = |copy| out.iter().filter(move |out| out.copy == copy);
+    let both = hits(false).zip(hits(true));
+    let both = both.filter(|(packet, copy)| packet.is_corrupted() && copy.is_corrupted());
+    let expected = 0.04 * N as f64;
+    let both = both.count() as f64;
+    assert!((both - expected).abs() < 4.0 * expected.sqrt(), "{both}");
 }
