@@ -14,13 +14,13 @@ use std::time::Duration;
 use crate::baselines::Baseline;
 use crate::baselines::message::OVERHEAD_BYTES;
 use mmt_client::device::DeviceProfile;
-use mmt_client::operator::Operator;
-use mmt_client::operator::scripted::{Phase, Picture};
+use mmt_client::operator::scripted::Picture;
 use mmt_server::playout::PlayoutBuffer;
 use mmt_shared::model::settings::{ModelSettings, PoseCorrection};
 use serde::Serialize;
 
 use crate::world::{World, WorldConfig, WorldError};
+use bilateral::pushes;
 
 /// What stands between the hand and the object.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -32,6 +32,10 @@ pub enum Architecture {
 }
 
 impl Architecture {
+    /// Position–force with passivity control.
+    pub const TDPA: Self = Self::Bilateral(Baseline::Tdpa);
+    /// The live system's own.
+    pub const REPLAY: Self = Self::Mediated(PoseCorrection::Replay);
     /// All that are compared, in the order of tables.
     pub const ALL: [Self; 8] = [
         Self::Bilateral(Baseline::PositionForce),
@@ -61,7 +65,7 @@ impl Architecture {
 pub struct DelayRow {
     /// Pushes that the operator completed.
     pub pushes: u64,
-    /// Packets with news per second from slave to master: forces, waves or updates.
+    /// Packets with a force, a wave or an update per second from slave to master.
     pub packet_rate_hz: f64,
     /// All packets per second from slave to master, heartbeats included.
     pub wire_rate_hz: f64,
@@ -109,14 +113,12 @@ pub fn run(
         }
         Architecture::Mediated(correction) => {
             let device = DeviceProfile::default().used_with(config.stiffness_n_per_m, None)?;
-            let settings = config
-                .settings
-                .unwrap_or_else(|| config.slave.mode.model_settings(device.coupling()));
+            let settings = ModelSettings {
+                correction,
+                ..config.model_settings(device.coupling())
+            };
             let config = WorldConfig {
-                settings: Some(ModelSettings {
-                    correction,
-                    ..settings
-                }),
+                settings: Some(settings),
                 ..config.clone()
             };
             Ok(world_row(World::try_new(&config)?, duration))
@@ -125,8 +127,8 @@ pub fn run(
 }
 
 fn bilateral_row(world: &Bilateral, duration: Duration) -> DelayRow {
-    let (outcome, force) = (world.outcome(), world.force());
-    let pushes = world.operator().pushes_completed().unwrap_or(0);
+    let (outcome, force) = (&world.outcome, world.force());
+    let pushes = world.operator.pushes_completed().unwrap_or(0);
     let seconds = duration.as_secs_f64();
     let [up, down] = world.sent();
     let rate_hz = down.packets as f64 / seconds;
@@ -143,7 +145,7 @@ fn bilateral_row(world: &Bilateral, duration: Duration) -> DelayRow {
         energy_injected_j: None,
         observer_min_j: outcome.hand_port.least_j(),
         network_min_j: Some(outcome.network_min_j),
-        playout_delay_ms: playout_delay_ms(world.slave().playout()),
+        playout_delay_ms: playout_delay_ms(world.slave.playout()),
         apparent_mass_ratio: outcome.felt.ratio(),
     }
 }
@@ -153,10 +155,7 @@ fn world_row(mut world: World, duration: Duration) -> DelayRow {
     let ticks = u64::try_from(duration.as_millis()).unwrap_or(u64::MAX);
     for _ in 0..ticks {
         let tick = world.step();
-        let pushes = match world.operator() {
-            Operator::Scripted(scripted) => scripted.phase() == Phase::Push,
-            Operator::Trace(_) => true,
-        };
+        let pushes = pushes(world.operator());
         let in_contact = world.master().view().in_contact;
         let hip = tick.master.sample.hip.metres();
         felt.push_hand(tick.now, hip, -tick.master.hand_force, pushes && in_contact);

@@ -5,3 +5,5 @@
 pub mod description;
 pub mod findings;
 pub mod grid;
+#[cfg(feature = "io")]
+pub(crate) mod prelude;

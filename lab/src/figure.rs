@@ -1,10 +1,9 @@
 //! Figures: panels of curves with error bars, drawn as SVG.
 //!
-//! An experiment says what is to be seen; this file and its drawing say how. The same data must give the same
+//! An experiment decides what is to be seen; this file and its drawing decide how. The same data must give the same
 //! bytes on every machine.
 
 mod draw;
-mod symbol;
 mod ticks;
 
 use std::ops::Range;
@@ -40,7 +39,7 @@ impl Figure {
     ) -> Self {
         let mut panels: Vec<Panel> = panels.into_iter().collect();
         if let Some(first) = panels.first_mut() {
-            first.legend = legend;
+            first.legend = Some(legend);
         }
         Self {
             panels,
@@ -100,20 +99,8 @@ impl Axis {
     }
 }
 
-/// Where the legend stands.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Legend {
-    /// Nowhere.
-    None,
-    /// In a corner of the panel.
-    UpperRight,
-    /// In a corner of the panel.
-    UpperLeft,
-    /// In a corner of the panel.
-    LowerLeft,
-    /// In a corner of the panel.
-    LowerRight,
-}
+/// The corner or side of a panel where its legend stands.
+pub use plotters::chart::SeriesLabelPosition as Legend;
 
 /// One panel.
 #[derive(Clone, Debug, PartialEq)]
@@ -126,8 +113,8 @@ pub struct Panel {
     pub y: Axis,
     /// The curves, later ones on top.
     pub series: Vec<Series>,
-    /// Where the legend stands.
-    pub legend: Legend,
+    /// Where the legend stands; none for no legend.
+    pub legend: Option<Legend>,
 }
 
 impl Panel {
@@ -144,7 +131,16 @@ impl Panel {
             x,
             y,
             series: series.into_iter().collect(),
-            legend: Legend::None,
+            legend: None,
+        }
+    }
+
+    /// The same with a legend.
+    #[must_use]
+    pub fn with_legend(self, legend: Legend) -> Self {
+        Self {
+            legend: Some(legend),
+            ..self
         }
     }
 }
@@ -156,8 +152,6 @@ pub enum Stroke {
     Solid,
     /// In dashes.
     Dashed,
-    /// Not at all: marks alone.
-    None,
     /// A thin vertical line from the foot of the panel at each point: events.
     Events,
 }
@@ -165,8 +159,6 @@ pub enum Stroke {
 /// How a curve's points are drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Mark {
-    /// Not at all.
-    None,
     /// A filled circle.
     Circle,
     /// A filled square.
@@ -177,61 +169,20 @@ pub enum Mark {
     Cross,
 }
 
-/// Colours that most colour-blind readers can tell apart (Okabe and Ito 2008).
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Colour {
-    /// #0072B2
-    Blue,
-    /// #D55E00
-    Vermilion,
-    /// #009E73
-    Green,
-    /// #CC79A7
-    Purple,
-    /// #E69F00
-    Orange,
-    /// #56B4E9
-    Sky,
-    /// #000000
-    Black,
-    /// #999999
-    Grey,
-}
+/// A colour that most colour-blind readers can tell from the others here (Okabe and Ito 2008).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Colour(RGBColor);
 
+#[expect(missing_docs, reason = "a colour is named by its name")]
 impl Colour {
-    /// In the order in which curves take them.
-    pub const ALL: [Self; 8] = [
-        Self::Blue,
-        Self::Vermilion,
-        Self::Green,
-        Self::Purple,
-        Self::Orange,
-        Self::Sky,
-        Self::Black,
-        Self::Grey,
-    ];
-
-    /// The colour of the n-th curve.
-    #[must_use]
-    pub fn nth(n: usize) -> Self {
-        Self::ALL
-            .get(n % Self::ALL.len())
-            .copied()
-            .unwrap_or(Self::Black)
-    }
-
-    fn rgb(self) -> RGBColor {
-        match self {
-            Self::Blue => RGBColor(0x00, 0x72, 0xB2),
-            Self::Vermilion => RGBColor(0xD5, 0x5E, 0x00),
-            Self::Green => RGBColor(0x00, 0x9E, 0x73),
-            Self::Purple => RGBColor(0xCC, 0x79, 0xA7),
-            Self::Orange => RGBColor(0xE6, 0x9F, 0x00),
-            Self::Sky => RGBColor(0x56, 0xB4, 0xE9),
-            Self::Black => RGBColor(0, 0, 0),
-            Self::Grey => RGBColor(0x99, 0x99, 0x99),
-        }
-    }
+    pub const BLUE: Self = Self(RGBColor(0x00, 0x72, 0xB2));
+    pub const VERMILION: Self = Self(RGBColor(0xD5, 0x5E, 0x00));
+    pub const GREEN: Self = Self(RGBColor(0x00, 0x9E, 0x73));
+    pub const PURPLE: Self = Self(RGBColor(0xCC, 0x79, 0xA7));
+    pub const ORANGE: Self = Self(RGBColor(0xE6, 0x9F, 0x00));
+    pub const SKY: Self = Self(RGBColor(0x56, 0xB4, 0xE9));
+    pub const BLACK: Self = Self(RGBColor(0, 0, 0));
+    pub const GREY: Self = Self(RGBColor(0x99, 0x99, 0x99));
 }
 
 /// A point of a curve with its intervals.
@@ -282,8 +233,8 @@ pub struct Series {
     pub stroke: Stroke,
     /// Width of the line, pixels.
     pub width: u32,
-    /// Its points' marks.
-    pub mark: Mark,
+    /// Its points' marks; none for a line alone.
+    pub mark: Option<Mark>,
     /// Its points, in the order in which they are joined.
     pub dots: Vec<Dot>,
 }
@@ -297,7 +248,7 @@ impl Series {
             colour,
             stroke: Stroke::Solid,
             width: 2,
-            mark: Mark::None,
+            mark: None,
             dots,
         }
     }
@@ -305,7 +256,10 @@ impl Series {
     /// The same with marks.
     #[must_use]
     pub fn marked(self, mark: Mark) -> Self {
-        Self { mark, ..self }
+        Self {
+            mark: Some(mark),
+            ..self
+        }
     }
 
     /// The same with another line.

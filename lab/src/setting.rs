@@ -75,6 +75,19 @@ pub const FIG5_CURVES: [(Mode, Curve); 7] = [
     (Mode::Recommended, Curve::Useful(150)),
 ];
 
+/// The two modes with the schemes that they default to.
+pub(crate) const MODES: [(Mode, Curve); 2] = [
+    (Mode::Paper, Curve::Hybrid(150)),
+    (Mode::Recommended, Curve::Useful(150)),
+];
+
+/// The paper's experiment in both modes, each with the scheme that it defaults to.
+pub(crate) fn paper_worlds(deadband: f64) -> Vec<WorldConfig> {
+    MODES
+        .map(|(mode, curve)| paper_world(mode, curve.at(deadband)))
+        .to_vec()
+}
+
 /// A point of a rate–PMSE curve.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Point {
@@ -99,12 +112,21 @@ impl Point {
         curves.into_iter().flat_map(points).collect()
     }
 
-    /// The run of the paper's experiment at this point with a seed.
+    /// The run of the paper's experiment at this point.
     #[must_use]
-    pub fn trial(&self, seed: u64, duration: Duration) -> Trial {
-        let world = paper_world(self.mode, self.curve.at(self.deadband));
-        Trial::new(world.seeded(seed), duration)
+    pub fn trial(&self, duration: Duration) -> Trial {
+        Trial::new(
+            paper_world(self.mode, self.curve.at(self.deadband)),
+            duration,
+        )
     }
+}
+
+/// How much steeper PMSE falls from 30 to 10 % than from 10 to 2.5 %: the difference of the exponents d ln PMSE / d ln
+/// Delta; of the PMSE at 2.5, 10 and 30 %.
+pub(crate) fn knee(fine: f64, middle: f64, coarse: f64) -> f64 {
+    let [fine, middle, coarse] = [fine, middle, coarse].map(libm::log);
+    (coarse - middle) / libm::log(3.0) - (middle - fine) / libm::log(4.0)
 }
 
 /// The name of a mode in files.

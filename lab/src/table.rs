@@ -1,14 +1,15 @@
 //! A table of results: one shape for CSV files, for the terminal and for JSON.
 //!
 //! A number that does not exist is empty in CSV, a dash on the terminal and null in JSON, never a zero. CSV and
-//! JSON hold every digit; the terminal rounds as the column says.
+//! JSON hold every digit; the terminal rounds to the column's decimals.
 
 use std::fmt;
 
-use serde::ser::{Serialize, SerializeMap, SerializeSeq, Serializer};
+use serde::{Serialize, Serializer};
 
-/// What one field holds.
-#[derive(Clone, Debug, PartialEq)]
+/// What one field holds; in JSON a word, a number or null.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(untagged)]
 pub enum Cell {
     /// A word.
     Text(String),
@@ -64,17 +65,6 @@ impl From<f64> for Cell {
 impl<T: Into<Cell>> From<Option<T>> for Cell {
     fn from(value: Option<T>) -> Self {
         value.map_or(Self::Absent, Into::into)
-    }
-}
-
-impl Serialize for Cell {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        match self {
-            Self::Text(text) => serializer.serialize_str(text),
-            Self::Count(count) => serializer.serialize_u64(*count),
-            Self::Number(number) => serializer.serialize_f64(*number),
-            Self::Absent => serializer.serialize_none(),
-        }
     }
 }
 
@@ -167,21 +157,16 @@ impl Table {
     /// The same with some of its columns, in their order; keys that it does not have are passed over.
     #[must_use]
     pub fn selected(&self, keys: &[&str]) -> Self {
-        let places = keys
-            .iter()
-            .filter_map(|key| self.columns.iter().position(|column| column.key == *key));
-        let places: Vec<usize> = places.collect();
-        let rows = self.rows.iter().map(|row| {
-            let cells = places.iter().filter_map(|place| row.get(*place).cloned());
-            cells.collect()
-        });
+        let place = |key: &&str| self.columns.iter().position(|column| column.key == *key);
+        let places: Vec<usize> = keys.iter().filter_map(place).collect();
+        fn at<T: Clone>(places: &[usize], all: &[T]) -> Vec<T> {
+            let picked = places.iter().filter_map(|place| all.get(*place));
+            picked.cloned().collect()
+        }
         Self {
             title: self.title.clone(),
-            columns: places
-                .iter()
-                .filter_map(|place| self.columns.get(*place).copied())
-                .collect(),
-            rows: rows.collect(),
+            columns: at(&places, &self.columns),
+            rows: self.rows.iter().map(|row| at(&places, row)).collect(),
         }
     }
 
@@ -205,19 +190,6 @@ impl Table {
         let rows = rows.map(|row| row.iter().map(Cell::csv).collect());
         csv_of(std::iter::once(keys.collect::<Vec<_>>()).chain(rows))
     }
-
-    fn texts(&self) -> Vec<Vec<String>> {
-        let keys = self.columns.iter().map(|column| column.key.to_owned());
-        let shown = |row: &Vec<Cell>| {
-            let cells = row.iter().zip(&self.columns);
-            cells
-                .map(|(cell, column)| shown(cell, column.decimals))
-                .collect()
-        };
-        std::iter::once(keys.collect())
-            .chain(self.rows.iter().map(shown))
-            .collect()
-    }
 }
 
 /// Records of equal length as CSV (RFC 4180, lines end with LF).
@@ -232,12 +204,14 @@ pub(crate) fn csv_of<T: AsRef<[u8]>>(
     csv.into_inner().unwrap_or_default()
 }
 
-fn shown(cell: &Cell, decimals: usize) -> String {
-    match cell {
-        Cell::Text(text) => text.clone(),
-        Cell::Count(count) => count.to_string(),
-        Cell::Number(number) => format!("{number:.decimals$}"),
-        Cell::Absent => "-".to_owned(),
+impl Heading {
+    /// A field of the column as the terminal shows it.
+    fn shown(&self, cell: &Cell) -> String {
+        match cell {
+            Cell::Number(number) => format!("{number:.*}", self.decimals),
+            Cell::Absent => "-".to_owned(),
+            word_or_count => word_or_count.csv(),
+        }
     }
 }
 
@@ -245,27 +219,28 @@ impl fmt::Display for Table {
     /// The title and the rows, words to the left and numbers to the right.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(f, "{}", self.title)?;
-        let texts = self.texts();
-        let width = |k: usize| {
-            let fields = texts.iter().filter_map(|row| row.get(k));
-            fields.map(|text| text.chars().count()).max().unwrap_or(0)
-        };
-        let widths: Vec<usize> = (0..self.columns.len()).map(width).collect();
-        for (n, texts) in texts.iter().enumerate() {
-            let cells = n.checked_sub(1).and_then(|n| self.rows.get(n));
-            let mut line = String::new();
-            for (k, (text, width)) in texts.iter().zip(&widths).enumerate() {
-                let sample = cells.or(self.rows.first()).and_then(|row| row.get(k));
-                let word = matches!(sample, Some(Cell::Text(_)));
-                let gap = if k == 0 { "  " } else { "   " };
-                line += gap;
-                let pad = " ".repeat(width.saturating_sub(text.chars().count()));
-                line += &if word {
-                    format!("{text}{pad}")
+        let mut lines = vec![String::new(); self.rows.len() + 1];
+        for (k, column) in self.columns.iter().enumerate() {
+            let cells: Vec<&Cell> = self.rows.iter().filter_map(|row| row.get(k)).collect();
+            let texts = cells.iter().map(|cell| column.shown(cell));
+            let texts: Vec<String> = std::iter::once(column.key.to_owned())
+                .chain(texts)
+                .collect();
+            let width = texts.iter().map(|text| text.chars().count()).max();
+            // a heading stands as the first field below it
+            let samples = cells.iter().take(1).chain(&cells);
+            let words = samples.map(|cell| matches!(cell, Cell::Text(_)));
+            let words = words.chain(std::iter::repeat(false));
+            for ((line, text), word) in lines.iter_mut().zip(texts).zip(words) {
+                let (gap, width) = (if k == 0 { "  " } else { "   " }, width.unwrap_or(0));
+                *line += &if word {
+                    format!("{gap}{text:<width$}")
                 } else {
-                    format!("{pad}{text}")
+                    format!("{gap}{text:>width$}")
                 };
             }
+        }
+        for line in lines {
             writeln!(f, "{}", line.trim_end())?;
         }
         Ok(())
@@ -277,22 +252,15 @@ struct Record<'a>(&'a [Heading], &'a [Cell]);
 
 impl Serialize for Record<'_> {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let mut map = serializer.serialize_map(Some(self.1.len()))?;
-        for (column, cell) in self.0.iter().zip(self.1) {
-            map.serialize_entry(column.key, cell)?;
-        }
-        map.end()
+        let keys = self.0.iter().map(|column| column.key);
+        serializer.collect_map(keys.zip(self.1))
     }
 }
 
 impl Serialize for Table {
     /// A list of records.
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let mut list = serializer.serialize_seq(Some(self.rows.len()))?;
-        for row in &self.rows {
-            list.serialize_element(&Record(&self.columns, row))?;
-        }
-        list.end()
+        serializer.collect_seq(self.rows.iter().map(|row| Record(&self.columns, row)))
     }
 }
 

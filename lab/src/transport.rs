@@ -3,7 +3,7 @@
 //! A case is one flow of messages over one path by stock quinn or by quinn as mmt sets it. Delay added is the time
 //! from the application that sends to the one that receives, without what the path itself takes for the packet that
 //! brought the message: its serialisation, propagation and jitter. Waiting counts, before the socket and at a
-//! bottleneck. Pure: who runs a case tells the log what happened, and nothing here knows QUIC.
+//! bottleneck. Pure: who runs a case reports to the log what happened, and nothing here knows QUIC.
 
 mod log;
 
@@ -15,7 +15,7 @@ use std::time::Duration;
 use mmt_netem::{Delay, LinkConfig, Loss, Order, Probability};
 use mmt_shared::time::Time;
 
-/// The slave of a measured master says this often that it lives.
+/// The slave of a measured master sends a heartbeat this often.
 pub const HEARTBEAT: Duration = Duration::from_millis(50);
 /// Bytes of a heartbeat with an echo.
 pub const HEARTBEAT_BYTES: usize = 32;

@@ -149,6 +149,15 @@ impl Trial {
         }
     }
 
+    /// The same with another seed.
+    #[must_use]
+    pub fn seeded(self, seed: u64) -> Self {
+        Self {
+            config: self.config.seeded(seed),
+            ..self
+        }
+    }
+
     /// Runs it.
     ///
     /// # Errors

@@ -1,31 +1,25 @@
 //! A slave, a master and the two directions of a link in one struct, stepped in virtual time.
 //!
 //! Everything that decides anything is the live system's own core: the same slave, master, link ends and
-//! emulated link. A run is a pure function of its configuration; the digest of its event log says so.
+//! emulated link. A run is a pure function of its configuration; equal ones have equal digests of
+//! their event logs.
 
-use std::collections::VecDeque;
 use std::time::Duration;
 
-use crate::baselines::message::OVERHEAD_BYTES;
 use mmt_client::device::DeviceProfile;
 use mmt_client::end::MasterEnd;
 use mmt_client::limiter::ForceLimiter;
 use mmt_client::master::{Master, MasterTick};
 use mmt_client::operator::Operator;
 use mmt_client::operator::scripted::{Picture, Scripted, View};
-use mmt_netem::config::LinkConfig;
 use mmt_netem::counters::Tally;
-use mmt_netem::link::{Direction, LinkId};
+use mmt_netem::link::LinkId;
 use mmt_netem::{Link, Packet};
 use mmt_server::end::SlaveEnd;
 use mmt_server::environment::Environment;
 use mmt_server::slave::{Slave, SlaveTick};
-use mmt_shared::metrics::{
-    AgeOfInformation, ContactBreaks, ForcePeak, ForceSummary, PoseError, Staleness, UpdateCounts,
-};
-use mmt_shared::model::contact::Coupling;
+use mmt_shared::metrics::{ForceSummary, PoseError, Staleness};
 use mmt_shared::model::geometry::Vec2;
-use mmt_shared::report::{MessagesReport, UpDown, WireReport};
 use mmt_shared::time::{TICK, Time};
 use mmt_shared::wire::{DATAGRAM_MAX, Label, Welcome};
 use sha2::{Digest, Sha256};
@@ -33,8 +27,13 @@ use sha2::{Digest, Sha256};
 use crate::digest::hex;
 
 mod config;
+mod outcome;
+pub(crate) mod picture;
 
 pub use config::{WorldConfig, WorldError};
+pub use outcome::{Outcome, Traffic};
+
+use picture::{DelayedPicture, scene};
 
 /// By how much the slave's clock is ahead of the master's at the start: nothing may depend on it.
 const SLAVE_EPOCH: Duration = Duration::from_secs(3600);
@@ -50,17 +49,6 @@ pub struct WorldTick {
     pub slave: Option<SlaveTick>,
 }
 
-/// The three packet rates of a world, as sent.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Traffic {
-    /// Messages by kind.
-    pub messages: UpDown<MessagesReport>,
-    /// Repeats of updates, by the cause of what they repeat.
-    pub repeated: UpdateCounts,
-    /// Datagrams, and bits per second with headers.
-    pub wire: UpDown<WireReport>,
-}
-
 /// The world.
 pub struct World {
     now: Time,
@@ -68,8 +56,8 @@ pub struct World {
     master: MasterEnd,
     operator: Operator,
     hand_force: Vec2,
-    /// The remote scene on its way to the operator's eyes, if that is what it looks at.
-    picture: Option<VecDeque<(Time, View)>>,
+    /// What the operator looks at, if it is not the local model.
+    picture: Option<DelayedPicture>,
     up: Link<Datagram>,
     down: Link<Datagram>,
     /// The delay of `down`, without jitter.
@@ -101,29 +89,10 @@ struct Datagram {
     length: usize,
 }
 
-/// What a run came to.
-#[derive(Clone, Debug)]
-pub struct Outcome {
-    /// Updates by cause, per second and per second of contact.
-    pub updates: UpdateCounts,
-    /// Updates that a newer one overtook before a tick could apply them.
-    pub superseded: u64,
-    /// Age of the update that the master's model rests on.
-    pub age: AgeOfInformation,
-    /// How long updates took to become known at the master.
-    pub staleness: Staleness,
-    /// Error of the master's pose against the truth, at the same HIP sample.
-    pub pose: PoseError,
-    /// Breaks of contact at the master.
-    pub breaks: ContactBreaks,
-    /// Force on the hand.
-    pub on_hand: ForcePeak,
-    /// Energy that updates added to the master's model beyond what its tank paid, J.
-    pub energy_injected_j: f64,
-    /// The least that the passivity observer at the hand ever showed, J.
-    pub observer_min_j: f64,
-    /// Packets with a force of the tool.
-    pub forces: u64,
+impl Datagram {
+    fn bytes(&self) -> &[u8] {
+        self.bytes.get(..self.length).unwrap_or_default()
+    }
 }
 
 impl World {
@@ -133,10 +102,7 @@ impl World {
     /// When a number of the configuration is not accepted.
     pub fn try_new(config: &WorldConfig) -> Result<Self, WorldError> {
         let device = DeviceProfile::default().used_with(config.stiffness_n_per_m, None)?;
-        let coupling: Coupling = device.coupling();
-        let settings = config
-            .settings
-            .unwrap_or_else(|| config.slave.mode.model_settings(coupling));
+        let settings = config.model_settings(device.coupling());
         let mut slave = Slave::with_settings(&config.slave(), settings)?;
         let welcome = Welcome {
             settings,
@@ -146,14 +112,11 @@ impl World {
         };
         let limiter = ForceLimiter::try_new(device.limits())?;
         let master = Master::with_architecture(&welcome, limiter, config.architecture);
-        let view: View = master.view();
+        let view = master.view();
         let scripted = Scripted::try_new(config.operator, view)?;
         let operator = Operator::Scripted(Box::new(scripted));
         slave.start_at(operator.start());
         let down_delay = config.down.delay.middle();
-        let path = |link: LinkConfig, direction| {
-            Link::try_new(link, config.seed, LinkId::first(direction))
-        };
         Ok(Self {
             now: Time::ZERO,
             slave: SlaveEnd::new(Time::ZERO + SLAVE_EPOCH, slave, config.slave_end()),
@@ -161,10 +124,9 @@ impl World {
             master: MasterEnd::new(Time::ZERO + down_delay, master, config.commands()),
             operator,
             hand_force: Vec2::zeros(),
-            picture: (config.operator.view == Picture::Delayed)
-                .then(|| VecDeque::from([(Time::ZERO, view)])),
-            up: path(config.up.clone(), Direction::Up)?,
-            down: path(config.down.clone(), Direction::Down)?,
+            picture: (config.operator.view == Picture::Delayed).then(|| DelayedPicture::new(view)),
+            up: Link::try_new(config.up.clone(), config.seed, LinkId::UP)?,
+            down: Link::try_new(config.down.clone(), config.seed, LinkId::DOWN)?,
             down_delay,
             slave_clock: SlaveClock {
                 ahead: SLAVE_EPOCH,
@@ -199,27 +161,12 @@ impl World {
         &self.slave
     }
 
-    /// What was sent: messages by kind, and datagrams with bits per second. Every message is a datagram of its own
-    /// here; its headers are those of IPv4, UDP and QUIC, whose own packets this world does not have.
+    /// What was sent: messages by kind, and datagrams with bits per second.
     #[must_use]
     pub fn traffic(&self) -> Traffic {
-        let duration_s = self.now.as_secs_f64();
-        let repeats = &self.slave.counts().repeated;
-        let wire =
-            |of: Tally| WireReport::new(of.packets, of.bytes, OVERHEAD_BYTES as u64, duration_s);
-        let [up, down] = self.sent();
-        let (master, slave) = (self.master.channel(), self.slave.channel());
-        Traffic {
-            messages: UpDown {
-                up: MessagesReport::up(&master.traffic().sent, duration_s),
-                down: MessagesReport::down(&slave.traffic().sent, repeats.total(), duration_s),
-            },
-            repeated: *repeats,
-            wire: UpDown {
-                up: wire(up),
-                down: wire(down),
-            },
-        }
+        let ends = (self.master.channel(), self.slave.channel());
+        let repeated = self.slave.counts().repeated;
+        Traffic::of(ends, repeated, self.sent(), self.now.as_secs_f64())
     }
 
     /// Datagrams sent up and down, as long as their payload.
@@ -235,17 +182,6 @@ impl World {
         of(&self.up) + of(&self.down)
     }
 
-    /// Another network from now on, both ways; what is on its way is lost, and what was sent is counted anew.
-    ///
-    /// # Errors
-    /// When a number of the network is not accepted.
-    pub fn rewire(&mut self, link: &LinkConfig, seed: u64) -> Result<(), WorldError> {
-        self.up = Link::try_new(link.clone(), seed, LinkId::first(Direction::Up))?;
-        self.down = Link::try_new(link.clone(), seed, LinkId::first(Direction::Down))?;
-        self.down_delay = link.delay.middle();
-        Ok(())
-    }
-
     /// The operator.
     #[must_use]
     pub fn operator(&self) -> &Operator {
@@ -258,7 +194,6 @@ impl World {
         let (master, counts) = (self.master(), self.master.counts());
         Outcome {
             updates: self.slave.counts().updates,
-            superseded: counts.updates_superseded,
             age: counts.age,
             staleness: self.staleness.clone(),
             pose: self.pose,
@@ -312,9 +247,8 @@ impl World {
         while let Some(packet) = self.down.poll_delivered(self.now) {
             // QUIC drops what does not authenticate
             if !packet.is_corrupted() {
-                let Datagram { bytes, length } = packet.payload;
-                let bytes = bytes.get(..length).unwrap_or_default();
-                self.master.handle_datagram(packet.due, bytes);
+                self.master
+                    .handle_datagram(packet.due, packet.payload.bytes());
             }
         }
         let before = self.master.counts().newest_applied;
@@ -342,38 +276,17 @@ impl World {
     /// What the operator sees; contact is felt, not seen.
     fn seen(&mut self) -> View {
         let model = self.master().view();
-        let Some(picture) = &mut self.picture else {
-            return model;
-        };
-        while picture.get(1).is_some_and(|(due, _)| *due <= self.now) {
-            picture.pop_front();
-        }
-        picture.front().map_or(model, |(_, scene)| View {
+        self.picture.as_mut().map_or(model, |picture| View {
             in_contact: model.in_contact,
-            ..*scene
+            ..picture.seen(self.now)
         })
-    }
-
-    /// The scene as it is now leaves for the operator's eyes, without loss or jitter.
-    fn show(&mut self, in_contact: bool) {
-        if let Some(picture) = &mut self.picture {
-            let environment = self.slave.slave().environment();
-            let scene = View {
-                pose: environment.pose(),
-                footprint: environment.footprint(),
-                in_contact,
-            };
-            picture.push_back((self.now + self.down_delay, scene));
-        }
     }
 
     fn deliver_up(&mut self) {
         while let Some(packet) = self.up.poll_delivered(self.now) {
             if !packet.is_corrupted() {
-                let Datagram { bytes, length } = packet.payload;
-                let bytes = bytes.get(..length).unwrap_or_default();
                 let arrived = self.slave_clock.at(packet.due);
-                self.slave.handle_datagram(arrived, bytes);
+                self.slave.handle_datagram(arrived, packet.payload.bytes());
             }
         }
     }
@@ -382,7 +295,10 @@ impl World {
         let now = self.slave_clock.at(self.now);
         let tick = self.slave.tick(now);
         if let Some(tick) = &tick {
-            self.show(tick.in_contact);
+            if let Some(picture) = &mut self.picture {
+                let scene = scene(self.slave.slave().environment(), tick.in_contact);
+                picture.show(self.now + self.down_delay, scene);
+            }
             if let Some(then) = self.master().model().history().at(tick.stamp) {
                 let model = then.motion.pose;
                 self.pose.push(&model, &tick.truth);
@@ -399,7 +315,7 @@ impl World {
         tick
     }
 
-    /// Every number that either side felt or said goes into the log, bit by bit.
+    /// Every number that either side felt or sent goes into the log, bit by bit.
     fn log_tick(&mut self, master: &MasterTick, slave: Option<&SlaveTick>) {
         let mut number = |value: f64| self.log.update(value.to_bits().to_le_bytes());
         [master.felt, master.hand_force].iter().for_each(|f| {

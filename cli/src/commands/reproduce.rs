@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use mmt_lab::experiment::findings::{ExperimentError, Findings};
+use mmt_lab::experiment::findings::{ExperimentError, Section};
 use mmt_lab::io::{Folder, Runner};
 use serde::Serialize;
 
@@ -16,7 +16,7 @@ use crate::progress::Bar;
 struct Manifest {
     program: &'static str,
     version: &'static str,
-    experiments: Vec<Findings>,
+    experiments: Vec<Section>,
     /// Every file with its SHA-256.
     files: BTreeMap<String, String>,
 }
@@ -38,15 +38,15 @@ pub(crate) fn run(arguments: &ReproduceArguments) -> Result<(), Failure> {
     let runner = Runner::new(folder, arguments.jobs, &progress);
     let mut experiments = Vec::new();
     for experiment in &arguments.chosen.experiments {
-        let findings = (experiment.run)(&runner, &arguments.request(experiment));
+        let section = experiment.reproduce(&runner, &arguments.request(experiment));
         bar.clear();
-        let findings = findings.map_err(explain)?;
+        let section = section.map_err(explain)?;
         if !arguments.json {
-            for table in &findings.tables {
+            for table in &section.findings.tables {
                 print(table)?;
             }
         }
-        experiments.push(findings);
+        experiments.push(section);
     }
     let manifest = Manifest {
         program: "mmt",

@@ -26,26 +26,26 @@ pub(crate) fn run(arguments: &SweepArguments) -> Result<(), Failure> {
     let text = read_text(&arguments.plan, "the plan")?;
     let plan = Plan::parse(&text).map_err(|error| {
         Failure::usage(format!("the plan {}: {error}", arguments.plan.display()))
-            .remedy("correct that place; docs/sweep.md tells what a plan holds")
+            .remedy("correct that place; docs/sweep.md describes what a plan holds")
     })?;
     if arguments.dry_run {
         let preview = Preview::new(&plan, arguments.shard);
-        return tell(arguments.json, &preview);
+        return print_document(arguments.json, &preview);
     }
     if arguments.merge && !arguments.out.is_dir() {
         let what = format!("there is no folder {}", arguments.out.display());
         return Err(Failure::usage(what).remedy("give the folder of the shards with --out"));
     }
-    let told = |error| explain(error, arguments);
-    let dir = SweepDir::open(&arguments.out).map_err(told)?;
-    let before = dir.results(&plan).map_err(told)?;
+    let explained = |error| explain(error, arguments);
+    let dir = SweepDir::open(&arguments.out).map_err(explained)?;
+    let before = dir.results(&plan).map_err(explained)?;
     // only now: the plan of a folder that holds another plan's rows stays
-    dir.keep_plan(&text).map_err(told)?;
+    dir.keep_plan(&text).map_err(explained)?;
     let interrupted = !arguments.merge && run_missing(arguments, &plan, &dir, &before)?;
     finish(arguments, &plan, &dir, &before, interrupted)
 }
 
-/// Runs the rows of the shard that are not done, and says whether it was interrupted.
+/// Runs the rows of the shard that are not done; whether it was interrupted.
 fn run_missing(
     arguments: &SweepArguments,
     plan: &Plan,
@@ -76,7 +76,7 @@ fn run_missing(
     }
 }
 
-/// Writes the table if every row is there, tells the state, and fails if rows are missing that should be there.
+/// Writes the table if every row is there, prints the state, and fails if rows are missing that should be there.
 fn finish(
     arguments: &SweepArguments,
     plan: &Plan,
@@ -84,14 +84,14 @@ fn finish(
     before: &Results,
     interrupted: bool,
 ) -> Result<(), Failure> {
-    let told = |error| explain(error, arguments);
-    let results = dir.results(plan).map_err(told)?;
+    let explained = |error| explain(error, arguments);
+    let results = dir.results(plan).map_err(explained)?;
     let table = match results.to_csv(plan) {
-        Some(csv) => Some(dir.keep_results(&csv).map_err(told)?),
+        Some(csv) => Some(dir.keep_results(&csv).map_err(explained)?),
         None => None,
     };
     let summary = Summary::new(plan, arguments, before, &results, table.as_deref());
-    tell(arguments.json, &summary)?;
+    print_document(arguments.json, &summary)?;
     let Some(missing) = summary.missing_here() else {
         return Ok(());
     };
@@ -106,7 +106,7 @@ fn finish(
     })
 }
 
-fn tell(json: bool, document: &(impl Display + serde::Serialize)) -> Result<(), Failure> {
+fn print_document(json: bool, document: &(impl Display + serde::Serialize)) -> Result<(), Failure> {
     if json {
         print_json(document)
     } else {

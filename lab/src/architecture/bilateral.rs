@@ -4,7 +4,6 @@
 //! crosses the network differs. A sample goes out every tick in a packet of its own, since a force that is waited for
 //! must not wait for nine others.
 
-use std::collections::VecDeque;
 use std::time::Duration;
 
 use crate::baselines::Baseline;
@@ -15,10 +14,10 @@ use mmt_client::device::DeviceProfile;
 use mmt_client::limiter::ForceLimiter;
 use mmt_client::master::PortObserver;
 use mmt_client::operator::Operator;
-use mmt_client::operator::scripted::{Phase, Picture, Scripted, View};
+use mmt_client::operator::scripted::{Phase, Picture, Scripted};
 use mmt_netem::config::{LinkConfig, Loss};
 use mmt_netem::counters::Tally;
-use mmt_netem::link::{Direction, LinkId};
+use mmt_netem::link::LinkId;
 use mmt_netem::{Link, Packet};
 use mmt_server::environment::Environment;
 use mmt_server::slave::SlaveError;
@@ -27,6 +26,7 @@ use mmt_shared::model::geometry::Vec2;
 use mmt_shared::time::{TICK, Time};
 
 use super::felt::FeltMasses;
+use crate::world::picture::{DelayedPicture, scene};
 use crate::world::{WorldConfig, WorldError};
 
 /// Least smoothing of waves on a path with jitter or loss, ticks: several packets that are lost in a row.
@@ -54,16 +54,18 @@ pub struct Bilateral {
     now: Time,
     bytes: usize,
     master: BilateralMaster,
-    slave: BilateralSlave,
-    operator: Operator,
-    hand_force: Vec2,
+    /// The slave.
+    pub(super) slave: BilateralSlave,
+    /// The operator.
+    pub(super) operator: Operator,
+    /// The force on the hand now, N.
+    pub(super) hand_force: Vec2,
     up: Link<ToSlave>,
     down: Link<ToMaster>,
-    /// The scene on its way to the operator's eyes, with the time of its arrival.
-    scenes: VecDeque<(Time, View)>,
-    seen: View,
-    scene_delay: Duration,
-    outcome: BilateralOutcome,
+    picture: DelayedPicture,
+    picture_delay: Duration,
+    /// What the run has come to so far.
+    pub(super) outcome: BilateralOutcome,
 }
 
 impl Bilateral {
@@ -89,11 +91,7 @@ impl Bilateral {
         }
         let environment =
             Environment::try_new(config.slave.environment).map_err(SlaveError::from)?;
-        let view = View {
-            pose: environment.pose(),
-            footprint: environment.footprint(),
-            in_contact: false,
-        };
+        let view = scene(&environment, false);
         let scripted = Scripted::try_new(config.operator, view)?;
         let operator = Operator::Scripted(Box::new(scripted));
         let down_delay = config.down.delay.middle();
@@ -114,15 +112,10 @@ impl Bilateral {
             )?,
             operator,
             hand_force: Vec2::zeros(),
-            up: Link::try_new(config.up.clone(), config.seed, LinkId::first(Direction::Up))?,
-            down: Link::try_new(
-                config.down.clone(),
-                config.seed,
-                LinkId::first(Direction::Down),
-            )?,
-            scenes: VecDeque::new(),
-            seen: view,
-            scene_delay: match picture {
+            up: Link::try_new(config.up.clone(), config.seed, LinkId::UP)?,
+            down: Link::try_new(config.down.clone(), config.seed, LinkId::DOWN)?,
+            picture: DelayedPicture::new(view),
+            picture_delay: match picture {
                 Picture::Delayed => down_delay,
                 Picture::Model => Duration::ZERO,
             },
@@ -130,40 +123,10 @@ impl Bilateral {
         })
     }
 
-    /// What the run has come to so far.
-    #[must_use]
-    pub fn outcome(&self) -> &BilateralOutcome {
-        &self.outcome
-    }
-
     /// The force metrics so far.
     #[must_use]
     pub fn force(&self) -> ForceSummary {
         self.slave.force().summary()
-    }
-
-    /// The operator.
-    #[must_use]
-    pub fn operator(&self) -> &Operator {
-        &self.operator
-    }
-
-    /// The master.
-    #[must_use]
-    pub fn master(&self) -> &BilateralMaster {
-        &self.master
-    }
-
-    /// The slave.
-    #[must_use]
-    pub fn slave(&self) -> &BilateralSlave {
-        &self.slave
-    }
-
-    /// The force on the hand now, N.
-    #[must_use]
-    pub fn hand_force(&self) -> Vec2 {
-        self.hand_force
     }
 
     /// Packets sent up and down, with all headers.
@@ -183,17 +146,13 @@ impl Bilateral {
     /// One millisecond with the scripted operator, in the order of [`crate::world::World::step`].
     pub fn step(&mut self) -> Option<BilateralSlaveTick> {
         let elapsed = self.now.saturating_since(Time::ZERO);
-        self.look();
-        let view = self.seen;
+        let view = self.picture.seen(self.now + TICK);
         let hip = self.operator.step(elapsed, &view, self.hand_force);
-        let pushes = match &self.operator {
-            Operator::Scripted(scripted) => scripted.phase() == Phase::Push,
-            Operator::Trace(_) => true,
-        };
-        self.step_at(hip, pushes && view.in_contact)
+        let pushes = pushes(&self.operator) && view.in_contact;
+        self.step_at(hip, pushes)
     }
 
-    /// One millisecond with the hand at `hip` (m), whoever moves it; `pushes` says whether it pushes the object.
+    /// One millisecond with the hand at `hip` (m), whoever moves it; `pushes`: whether it pushes the object.
     pub fn step_at(&mut self, hip: Vec2, pushes: bool) -> Option<BilateralSlaveTick> {
         self.now += TICK;
         while let Some(packet) = self.down.poll_delivered(self.now) {
@@ -232,21 +191,17 @@ impl Bilateral {
         outcome.tool_port.push(tick.tool, -tick.true_force);
         let made_j = outcome.hand_port.energy_j() - outcome.tool_port.energy_j();
         outcome.network_min_j = outcome.network_min_j.min(made_j);
-        let environment = self.slave.environment();
-        let scene = View {
-            pose: environment.pose(),
-            footprint: environment.footprint(),
-            in_contact: tick.in_contact,
-        };
-        self.scenes.push_back((self.now + self.scene_delay, scene));
+        let scene = scene(self.slave.environment(), tick.in_contact);
+        self.picture.show(self.now + self.picture_delay, scene);
         Some(tick)
     }
+}
 
-    fn look(&mut self) {
-        let now = self.now + TICK;
-        while let Some((_, scene)) = self.scenes.pop_front_if(|(due, _)| *due <= now) {
-            self.seen = scene;
-        }
+/// Whether an operator is in the middle of a push.
+pub(super) fn pushes(operator: &Operator) -> bool {
+    match operator {
+        Operator::Scripted(scripted) => scripted.phase() == Phase::Push,
+        Operator::Trace(_) => true,
     }
 }
 

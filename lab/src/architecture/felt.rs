@@ -3,7 +3,7 @@
 //! While the hand pushes the sliding object, `f·d = m a·d + b |v| + c` with d the direction of its motion: the same law
 //! (1) that the slave estimates by, but between the hand's own motion and the hand's own force. Force, velocity and
 //! acceleration pass the same filter, so that none is late against the others. The same regression of the tool's motion
-//! and force says what there is to be felt: a box that turns under a push is not a point mass for either of them.
+//! and force gives what there is to be felt: a box that turns under a push is not a point mass for either of them.
 
 use std::collections::VecDeque;
 

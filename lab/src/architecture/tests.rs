@@ -126,7 +126,7 @@ fn position_force_limit_cycles_beyond_a_delay_that_falls_with_stiffness() {
 fn without_delay_position_force_is_direct_coupling() {
     let config = over("delay 0ms", 1000.0, 1);
     let mut world = Bilateral::try_new(&config, Baseline::PositionForce, Picture::Delayed).unwrap();
-    let start = world.operator().start();
+    let start = world.operator.start();
     let (mut sensed, mut touched) = (Vec2::zeros(), 0);
     for n in 0..8000 {
         // a slow press by up to 3 mm
@@ -136,7 +136,7 @@ fn without_delay_position_force_is_direct_coupling() {
         let off = (tick.tool - hip).norm();
         assert!(off <= 1e-6, "tick {n}: the tool is {off} m from the hand");
         if n > 300 {
-            let felt = -world.hand_force();
+            let felt = -world.hand_force;
             assert!(
                 (felt - sensed).norm() <= 1e-4,
                 "what was met a tick ago is felt"
@@ -194,21 +194,21 @@ fn least_with_random_hand(baseline: Baseline, words: &str, noise_n: f64, seed: u
     let mut config = over(words, 1000.0, seed);
     config.slave.sensing.force_noise_n = noise_n;
     let mut world = Bilateral::try_new(&config, baseline, Picture::Delayed).unwrap();
-    let mut wish = world.operator().start();
+    let mut wish = world.operator.start();
     let mut hand = Hand::new(hand, seed, wish);
     let mut velocity = Vec2::zeros();
     for tick in 0..10_000 {
         if tick % 400 == 0 {
-            let pose = world.slave().environment().pose();
+            let pose = world.slave.environment().pose();
             let inside = Vec2::new(stream.uniform_in(-0.30, 0.10), stream.uniform_in(-0.1, 0.1));
             let there = pose.point_to_world(inside) - wish;
             velocity = there * (stream.uniform_in(0.0, 0.35) / there.norm().max(1e-3));
         }
-        let hip = hand.step(wish, velocity, world.hand_force());
+        let hip = hand.step(wish, velocity, world.hand_force);
         wish += velocity * TICK_S;
         world.step_at(hip, true);
     }
-    let outcome = world.outcome();
+    let outcome = &world.outcome;
     let worked_j = outcome.tool_port.energy_j();
     assert!(worked_j > 0.01, "nothing was touched: {worked_j} J");
     outcome.network_min_j

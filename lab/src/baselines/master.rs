@@ -158,7 +158,7 @@ mod tests {
         master
     }
 
-    fn says(sent_ms: u64, force: Vec2, in_j: f64) -> ToMaster {
+    fn message(sent_ms: u64, force: Vec2, in_j: f64) -> ToMaster {
         ToMaster {
             sent: Time::from_millis(sent_ms),
             force: ForceCounts::nearest(force),
@@ -174,8 +174,8 @@ mod tests {
     #[test]
     fn position_force_holds_the_newest_force_and_the_hand_gets_its_opposite() {
         let mut master = master(Baseline::PositionForce);
-        master.receive(&says(5, Vec2::new(1.0, 0.5), 0.0));
-        master.receive(&says(4, Vec2::new(9.0, 9.0), 0.0));
+        master.receive(&message(5, Vec2::new(1.0, 0.5), 0.0));
+        master.receive(&message(4, Vec2::new(9.0, 9.0), 0.0));
         for ms in 0..50 {
             let tick = tick(&mut master, ms, 0.0);
             assert_eq!(tick.displayed, Vec2::new(1.0, 0.5));
@@ -187,7 +187,7 @@ mod tests {
     fn with_passivity_control_a_hand_that_is_pushed_gets_no_more_than_the_slave_took_in() {
         for in_j in [RESERVE_J, 5e-3] {
             let mut master = master(Baseline::Tdpa);
-            master.receive(&says(5, Vec2::new(1.5, 0.0), in_j));
+            master.receive(&message(5, Vec2::new(1.5, 0.0), in_j));
             // the hand gives way at 0.1 m/s for a second: 150 mJ, if it were let
             for ms in 0..1000 {
                 tick(&mut master, ms, -1e-4 * ms as f64);

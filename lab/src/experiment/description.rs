@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-use super::findings::{ExperimentError, Extent, Findings};
+use super::findings::{ExperimentError, Extent, Findings, Section};
 use crate::io::Runner;
 
 /// An experiment. All that there is of it stands in one file; the list of them is in `experiments`.
@@ -21,6 +21,41 @@ pub struct Experiment {
     pub arguments: &'static [Argument],
     /// Runs it and keeps its files.
     pub run: fn(&Runner, &Request) -> Result<Findings, ExperimentError>,
+}
+
+impl Experiment {
+    /// An experiment of runs as long as most and without arguments of its own.
+    pub(crate) const fn new(
+        name: &'static str,
+        about: &'static str,
+        seeds: u64,
+        run: fn(&Runner, &Request) -> Result<Findings, ExperimentError>,
+    ) -> Self {
+        Self {
+            name,
+            about,
+            seeds,
+            duration: DURATION,
+            arguments: &[],
+            run,
+        }
+    }
+
+    /// Does it: its part of the manifest.
+    ///
+    /// # Errors
+    /// As its [`Self::run`].
+    pub fn reproduce(
+        &self,
+        runner: &Runner,
+        request: &Request,
+    ) -> Result<Section, ExperimentError> {
+        Ok(Section {
+            experiment: self.name,
+            extent: request.extent,
+            findings: (self.run)(runner, request)?,
+        })
+    }
 }
 
 /// Length of a run of most experiments: four or five pushes.

@@ -25,18 +25,26 @@ fn seconds<S: serde::Serializer>(duration: &Duration, serializer: S) -> Result<S
 }
 
 /// What an experiment found.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Findings {
-    /// The experiment's name.
-    pub experiment: &'static str,
-    /// How much of it was done.
-    pub extent: Extent,
     /// SHA-256 over the digests of all its runs, in their order: equal on every machine. Empty if its runs have none.
     pub digest: String,
     /// The configuration that its runs vary, by mode.
     pub configuration: Vec<WorldConfig>,
     /// What is printed.
     pub tables: Vec<Table>,
+}
+
+/// What an experiment found, with its name and how much of it was done.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Section {
+    /// The experiment's name.
+    pub experiment: &'static str,
+    /// How much of it was done.
+    pub extent: Extent,
+    /// What it found.
+    #[serde(flatten)]
+    pub findings: Findings,
 }
 
 /// Why an experiment could not be done.
@@ -57,11 +65,8 @@ pub enum ExperimentError {
         why: String,
     },
     /// A transport could not be measured.
-    #[error("the transport could not be measured: {why}")]
-    Transport {
-        /// What went wrong.
-        why: String,
-    },
+    #[error("the transport could not be measured: {0}")]
+    Transport(String),
     /// A file could not be written.
     #[error("cannot write {name}: {why}")]
     Keep {

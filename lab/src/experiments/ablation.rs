@@ -3,107 +3,45 @@
 //! Each variant changes one choice of paper mode; everything else stays.
 
 use mmt_server::estimator::{EstimatorConfig, PaperConfig, Rows};
-use mmt_shared::model::contact::Coupling;
-use mmt_shared::model::settings::{Mode, ModelSettings, Smoothing};
+use mmt_shared::model::settings::{ModelSettings, Smoothing};
 
-use crate::experiment::description::{DURATION, Experiment, Request};
-use crate::experiment::findings::{ExperimentError, Findings};
-use crate::experiment::grid::{self, digest, interval};
-use crate::io::Runner;
-use crate::setting::{Curve, paper_world};
-use crate::statistics::Interval;
-use crate::table::{Column, Table, column};
-use crate::trial::{Measured, Trial};
-use crate::world::WorldConfig;
+use crate::experiment::prelude::*;
+use crate::setting::knee;
 
 /// The ablation.
-pub(super) const ABLATION: Experiment = Experiment {
-    name: "ablation",
-    about: "How the paper's results depend on what the paper leaves open",
-    seeds: 10,
-    duration: DURATION,
-    arguments: &[],
+pub(super) const ABLATION: Experiment = Experiment::new(
+    "ablation",
+    "How the paper's results depend on what the paper leaves open",
+    10,
     run,
-};
+);
 
 /// Deadbands at the ends of the knee.
 const DEADBANDS: [f64; 3] = [0.025, 0.10, 0.30];
 /// The schemes.
 const CURVES: [Curve; 3] = [Curve::Deadband, Curve::Hybrid(50), Curve::Hybrid(150)];
 
-/// One choice made otherwise.
-struct Variant {
-    name: &'static str,
-    apply: fn(&mut WorldConfig),
-}
+/// One choice made otherwise: its name and what it makes of the world.
+type Variant = (&'static str, fn(&mut WorldConfig));
 
+#[rustfmt::skip]
 static VARIANTS: [Variant; 13] = [
-    Variant {
-        name: "as stated",
-        apply: |_| {},
-    },
-    Variant {
-        name: "window 100 ms",
-        apply: |world| paper_estimator(world, |paper| paper.window_s = 0.1),
-    },
-    Variant {
-        name: "window 500 ms",
-        apply: |world| paper_estimator(world, |paper| paper.window_s = 0.5),
-    },
-    Variant {
-        name: "window 1 s",
-        apply: |world| paper_estimator(world, |paper| paper.window_s = 1.0),
-    },
-    Variant {
-        name: "rows x and y stacked",
-        apply: |world| paper_estimator(world, |paper| paper.rows = Rows::Stacked),
-    },
-    Variant {
-        name: "timer packets carry the pose",
-        apply: |world| world.slave.trigger.timer_carries_pose = true,
-    },
-    Variant {
-        name: "timer in contact only",
-        apply: |world| world.slave.trigger.timer_in_free_space = false,
-    },
-    Variant {
-        name: "sticking is no mismatch",
-        apply: |world| world.slave.trigger.judge_sticking = false,
-    },
-    Variant {
-        name: "no sensor noise",
-        apply: |world| noise(world, 0.0),
-    },
-    Variant {
-        name: "three times the sensor noise",
-        apply: |world| noise(world, 3.0),
-    },
-    Variant {
-        name: "lambda 0.9",
-        apply: |world| {
-            settings(world, |s| {
-                s.smoothing = Smoothing::PerPacket { lambda: 0.9 }
-            })
-        },
-    },
-    Variant {
-        name: "(6) without contact damping",
-        apply: |world| {
-            settings(world, |s| {
-                s.coupling = Coupling {
-                    damping_ns_per_m: 0.0,
-                    ..s.coupling
-                };
-            });
-        },
-    },
-    Variant {
-        name: "model of the true side, 36 cm",
-        apply: |world| world.slave.start.side_m = 0.36,
-    },
+    ("as stated", |_| {}),
+    ("window 100 ms", |world| estimator(world, |paper| paper.window_s = 0.1)),
+    ("window 500 ms", |world| estimator(world, |paper| paper.window_s = 0.5)),
+    ("window 1 s", |world| estimator(world, |paper| paper.window_s = 1.0)),
+    ("rows x and y stacked", |world| estimator(world, |paper| paper.rows = Rows::Stacked)),
+    ("timer packets carry the pose", |world| world.slave.trigger.timer_carries_pose = true),
+    ("timer in contact only", |world| world.slave.trigger.timer_in_free_space = false),
+    ("sticking is no mismatch", |world| world.slave.trigger.judge_sticking = false),
+    ("no sensor noise", |world| noise(world, 0.0)),
+    ("three times the sensor noise", |world| noise(world, 3.0)),
+    ("lambda 0.9", |world| settings(world, |s| s.smoothing = Smoothing::PerPacket { lambda: 0.9 })),
+    ("(6) without contact damping", |world| settings(world, |s| s.coupling.damping_ns_per_m = 0.0)),
+    ("model of the true side, 36 cm", |world| world.slave.start.side_m = 0.36),
 ];
 
-fn paper_estimator(world: &mut WorldConfig, change: impl FnOnce(&mut PaperConfig)) {
+fn estimator(world: &mut WorldConfig, change: impl FnOnce(&mut PaperConfig)) {
     let mut paper = PaperConfig::default();
     change(&mut paper);
     world.slave.estimator = Some(EstimatorConfig::Paper(paper));
@@ -138,12 +76,12 @@ fn cases() -> Vec<Case> {
 /// Keeps `ablation.csv`.
 fn run(runner: &Runner, request: &Request) -> Result<Findings, ExperimentError> {
     let extent = request.extent;
-    let run = |(variant, curve, deadband): &Case, seed| {
+    let trial = |((_, change), curve, deadband): &Case| {
         let mut world = paper_world(Mode::Paper, curve.at(*deadband));
-        (variant.apply)(&mut world);
-        runner.trial(&Trial::new(world.seeded(seed), extent.duration))
+        change(&mut world);
+        Trial::new(world, extent.duration)
     };
-    let groups = runner.grid("ablation", extent.seeds, cases(), run)?;
+    let groups = runner.trials("ablation", extent.seeds, cases(), trial)?;
     let title = format!(
         "Ablation of paper mode, {} seeds: packets/s and PMSE at 2.5, 10 and 30 %",
         extent.seeds
@@ -151,8 +89,6 @@ fn run(runner: &Runner, request: &Request) -> Result<Findings, ExperimentError> 
     let table = Table::of(title, &rows(&groups), &columns());
     runner.keep_table("ablation.csv", &table)?;
     Ok(Findings {
-        experiment: ABLATION.name,
-        extent,
         digest: digest(&groups),
         configuration: vec![paper_world(Mode::Paper, Curve::Hybrid(150).at(0.10))],
         tables: vec![table],
@@ -188,7 +124,7 @@ fn columns<'a>() -> Vec<Column<'a, Row<'a>>> {
         group.mean(|run| run.force.pmse)
     }
     let mut columns: Vec<Column<Row>> = vec![
-        column("variant", "", 0, |row| row.at[0].case.0.name),
+        column("variant", "", 0, |row| row.at[0].case.0.0),
         column("scheme", "", 0, |row| row.at[0].case.1.label()),
         column("rate_2.5", "Hz", 0, |row| rate(&row.at[0])),
         column("rate_10", "Hz", 0, |row| rate(&row.at[1])),
@@ -197,8 +133,7 @@ fn columns<'a>() -> Vec<Column<'a, Row<'a>>> {
         column("pmse_10", "", 3, |row| pmse(&row.at[1])),
         column("pmse_30", "", 3, |row| pmse(&row.at[2])),
     ];
-    let knee = |row: &Row| knee(row.at);
-    columns.extend(interval(["knee", "knee_low", "knee_high"], "", 2, knee));
+    columns.extend(interval(["knee", "knee_low", "knee_high"], "", 2, |row: &Row| knees(row.at)));
     columns.extend(interval(
         ["vs_deadband_30", "vs_low", "vs_high"],
         "",
@@ -209,12 +144,11 @@ fn columns<'a>() -> Vec<Column<'a, Row<'a>>> {
     columns
 }
 
-/// The exponent of PMSE over Delta from 30 to 10 % less that from 10 to 2.5 %, seed by seed.
-fn knee([fine, middle, coarse]: &[Group; 3]) -> Option<Interval> {
+/// The knee, seed by seed.
+fn knees([fine, middle, coarse]: &[Group; 3]) -> Option<Interval> {
     let seeds = fine.runs.iter().zip(&middle.runs).zip(&coarse.runs);
     Interval::of(seeds.filter_map(|((fine, middle), coarse)| {
-        let ln = |run: &Measured| run.force.pmse.map(libm::log);
-        let (fine, middle, coarse) = (ln(fine)?, ln(middle)?, ln(coarse)?);
-        Some((coarse - middle) / libm::log(3.0) - (middle - fine) / libm::log(4.0))
+        let pmse = |run: &Measured| run.force.pmse;
+        Some(knee(pmse(fine)?, pmse(middle)?, pmse(coarse)?))
     }))
 }

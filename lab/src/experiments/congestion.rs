@@ -7,25 +7,13 @@ mod bins;
 mod figure;
 mod phases;
 
-use std::time::Duration;
-
 use mmt_shared::channel::rate_control::StretchMax;
 
 use super::loss::{Loss, link};
 use crate::digest::of_runs;
-use crate::experiment::description::{Experiment, Request};
-use crate::experiment::findings::{ExperimentError, Findings};
-use crate::experiment::grid;
-use crate::io::Runner;
-use crate::table::{Column, Table, column};
-use crate::world::WorldConfig;
-use bins::{Bin, Run, per_second};
+use crate::experiment::prelude::*;
+use bins::{Bin, Variant, per_second};
 
-/// When the bottleneck comes and goes, s.
-const FROM_S: f64 = 10.0;
-const UNTIL_S: f64 = 25.0;
-/// Beginning of the part after congestion: what had queued is gone, and the stretch.
-const AFTER_S: f64 = 35.0;
 /// Each direction; the 58 bytes are the headers of IPv4, UDP and QUIC.
 const NETWORK: &str = "delay 50ms; at 10s delay 50ms rate 64kbit 58 queue 1s; at 25s delay 50ms";
 /// Who answers congestion: nobody, the master with its samples alone, both; greatest stretches of master and slave.
@@ -35,28 +23,20 @@ const VARIANTS: [(&str, StretchMax, StretchMax); 3] = [
     ("both", StretchMax::RECOMMENDED, StretchMax::RECOMMENDED),
 ];
 
-/// Rate control at a bottleneck.
+/// Rate control at a bottleneck, with time to come back.
 pub(super) const CONGESTION: Experiment = Experiment {
-    name: "congestion",
-    about: "The deadband as rate controller at a bottleneck of 64 kbit/s, with and without",
-    seeds: 10,
-    // it needs time to come back
     duration: Duration::from_secs(40),
-    arguments: &[],
-    run,
+    ..Experiment::new(
+        "congestion",
+        "The deadband as rate controller at a bottleneck of 64 kbit/s, with and without",
+        10,
+        run,
+    )
 };
-
-/// Who answers, and the world.
-struct Variant {
-    name: &'static str,
-    world: WorldConfig,
-}
-
-type Group = grid::Group<Variant, Run>;
 
 /// The live defaults over that network, with these greatest stretches of master and slave.
 fn world(master: StretchMax, slave: StretchMax) -> Result<WorldConfig, ExperimentError> {
-    let link = link(NETWORK, Loss::None)?;
+    let link = link(NETWORK, Loss::NONE)?;
     let mut world = WorldConfig {
         up: link.clone(),
         down: link,
@@ -79,21 +59,15 @@ fn run(runner: &Runner, request: &Request) -> Result<Findings, ExperimentError> 
         bins::run(&variant.world.clone().seeded(seed), extent.duration)
     })?;
     let runs = grid::runs(&groups);
-    let bins: Vec<BinRow> = runs
-        .iter()
-        .flat_map(|run| {
-            run.measured
-                .bins
-                .iter()
-                .map(move |bin| (run.case.name, run.seed, bin))
-        })
-        .collect();
+    let bins = runs.iter().flat_map(|run| {
+        let bins = run.measured.bins.iter();
+        bins.map(move |bin| (run.case.name, run.seed, bin))
+    });
+    let bins: Vec<BinRow> = bins.collect();
     let table = Table::of("Congestion, bin by bin", &bins, &columns());
     runner.keep_table("congestion.csv", &table)?;
     runner.keep_figure("congestion.svg", &figure::figure(&groups))?;
     Ok(Findings {
-        experiment: CONGESTION.name,
-        extent,
         digest: of_runs(runs.iter().map(|run| run.measured.digest.as_str())),
         tables: vec![phases::table(&groups)],
         configuration: groups.into_iter().map(|group| group.case.world).collect(),
@@ -124,6 +98,7 @@ fn columns<'a>() -> [Column<'a, BinRow<'a>>; 13] {
 
 #[cfg(test)]
 mod tests {
+    use super::bins::{FROM_S, UNTIL_S};
     use super::*;
     use crate::statistics::median;
     use mmt_shared::channel::rate_control::StretchMax;

@@ -10,33 +10,25 @@ mod grid_point;
 mod limits;
 mod tables;
 
-use std::time::Duration;
-
-use crate::architecture::{self, DelayRow};
-use crate::experiment::description::{Argument, Experiment, Request};
-use crate::experiment::findings::{ExperimentError, Findings};
-use crate::experiment::grid;
-use crate::io::Runner;
+use crate::architecture;
+use crate::experiment::prelude::*;
 use crate::trial::TrialError;
-use crate::world::WorldConfig;
-use grid_point::{GridPoint, all_points, picture_points, some_points};
+use grid_point::{GridPoint, Group, all_points, picture_points, some_points};
 
-/// The architectures over the delay.
+/// The architectures over the delay; pushes come later with it.
 pub(super) const DELAY: Experiment = Experiment {
-    name: "delay",
-    about: "At which delay each architecture stops being usable",
-    seeds: 5,
-    // pushes come later
     duration: Duration::from_secs(40),
     arguments: &[Argument::Flag {
         name: "full",
         help: "The whole grid of delays, jitter, losses and stiffnesses: about an hour",
     }],
-    run,
+    ..Experiment::new(
+        "delay",
+        "At which delay each architecture stops being usable",
+        5,
+        run,
+    )
 };
-
-/// A point with the rows of its seeds.
-type Group = grid::Group<GridPoint, DelayRow>;
 
 /// Keeps `delay.csv`, `delay-limits.csv`, `delay-view.csv`, `delay-crossing.csv` and `delay.svg`.
 fn run(runner: &Runner, request: &Request) -> Result<Findings, ExperimentError> {
@@ -59,8 +51,6 @@ fn run(runner: &Runner, request: &Request) -> Result<Findings, ExperimentError> 
     let [near, crossings] = crossing::tables(&near);
     runner.keep_table("delay-crossing.csv", &near)?;
     Ok(Findings {
-        experiment: DELAY.name,
-        extent: request.extent,
         digest: String::new(),
         configuration: vec![WorldConfig::default()],
         tables: vec![tables::replayed(&groups), limits, views, near, crossings],

@@ -2,35 +2,26 @@
 //!
 //! One row per run; the figure shows means over the seeds with 95 % intervals.
 
-use std::fmt::Write as _;
-
-use mmt_shared::model::settings::Mode;
-
-use crate::experiment::description::{Argument, DURATION, Experiment, Request};
-use crate::experiment::findings::{ExperimentError, Findings};
-use crate::experiment::grid::{self, Run, digest, mean};
-use crate::figure::{Axis, Colour, Dot, Figure, Legend, Mark, Panel, Series, Stroke};
-use crate::io::Runner;
-use crate::setting::{Curve, FIG5_CURVES, Point, mode_name, paper_world};
-use crate::statistics::Interval;
-use crate::table::{Column, Table, column};
-use crate::trial::{Measured, TraceRow, Trial};
+use crate::experiment::grid::Run;
+use crate::experiment::prelude::*;
+use crate::setting::{FIG5_CURVES, Point};
+use crate::trial::TraceRow;
 
 /// Deadbands that are written beside their points.
 const NOTED: [f64; 4] = [0.025, 0.05, 0.10, 0.30];
 
-/// Fig. 5.
+/// Fig. 5, with the paper's ten repetitions.
 pub(super) const FIG5: Experiment = Experiment {
-    name: "fig5",
-    about: "Fig. 5: packet rate and PMSE of the update schemes, both modes",
-    // the paper's ten repetitions
-    seeds: 10,
-    duration: DURATION,
     arguments: &[Argument::Flag {
         name: "samples",
         help: "Write every run's forces and updates at 1 kHz as well, under samples/ (about 2 MB a run)",
     }],
-    run,
+    ..Experiment::new(
+        "fig5",
+        "Fig. 5: packet rate and PMSE of the update schemes, both modes",
+        10,
+        run,
+    )
 };
 
 type Group = grid::Group<Point, Measured>;
@@ -40,11 +31,11 @@ fn run(runner: &Runner, request: &Request) -> Result<Findings, ExperimentError> 
     let (extent, traced) = (request.extent, request.flag("samples"));
     let points = Point::of(FIG5_CURVES);
     let groups = runner.grid("fig5", extent.seeds, points, |point, seed| {
-        let trial = point.trial(seed, extent.duration);
+        let trial = point.trial(extent.duration).seeded(seed);
         let mut measured = runner.trial(&Trial { traced, ..trial })?;
         if traced {
             let trace = std::mem::take(&mut measured.trace);
-            runner.keep(&samples_name(point, seed), samples_csv(&trace).as_bytes())?;
+            runner.keep_table(&samples_name(point, seed), &samples(&trace))?;
         }
         Ok(measured)
     })?;
@@ -52,13 +43,8 @@ fn run(runner: &Runner, request: &Request) -> Result<Findings, ExperimentError> 
     runner.keep_table("fig5.csv", &runs)?;
     runner.keep_figure("fig5.svg", &figure(&groups))?;
     Ok(Findings {
-        experiment: FIG5.name,
-        extent,
         digest: digest(&groups),
-        configuration: vec![
-            paper_world(Mode::Paper, Curve::Hybrid(150).at(0.10)),
-            paper_world(Mode::Recommended, Curve::Useful(150).at(0.10)),
-        ],
+        configuration: paper_worlds(0.10),
         tables: vec![summary(&groups)],
     })
 }
@@ -70,19 +56,20 @@ fn samples_name(point: &Point, seed: u64) -> String {
     format!("samples/{mode}-{scheme}-{t_update_ms}-{deadband}-{seed}.csv")
 }
 
-/// f_s and f_m of every sample and whether an update was sent; a lost sample's f_m is empty.
-fn samples_csv(trace: &[TraceRow]) -> String {
-    let mut csv = String::from("t_s,fs_x_n,fs_y_n,fm_x_n,fm_y_n,update\n");
-    for row in trace {
-        // writing to a string cannot fail
-        let _ = write!(csv, "{},{},{},", row.t_s, row.f_s.x, row.f_s.y);
-        let _ = match row.f_m {
-            Some(f_m) => write!(csv, "{},{},", f_m.x, f_m.y),
-            None => write!(csv, ",,"),
-        };
-        let _ = writeln!(csv, "{}", u8::from(row.update.is_some()));
-    }
-    csv
+/// f_s and f_m of every sample and whether an update was sent; a lost sample's f_m is absent.
+fn samples(trace: &[TraceRow]) -> Table {
+    Table::of(
+        "Samples",
+        trace,
+        &[
+            column("t_s", "s", 3, |row| row.t_s),
+            column("fs_x_n", "N", 3, |row| row.f_s.x),
+            column("fs_y_n", "N", 3, |row| row.f_s.y),
+            column("fm_x_n", "N", 3, |row| row.f_m.map(|f_m| f_m.x)),
+            column("fm_y_n", "N", 3, |row| row.f_m.map(|f_m| f_m.y)),
+            column("update", "", 0, |row| u64::from(row.update.is_some())),
+        ],
+    )
 }
 
 /// The columns of `fig5.csv`.
@@ -147,24 +134,22 @@ fn figure(groups: &[Group]) -> Figure {
         wanted.map(move |(mode, curve)| drawn(groups, mode, curve, notes))
     };
     let rate = "packet rate, 1/s";
+    let of_paper = Panel::new(
+        "The paper's schemes",
+        Axis::linear(rate),
+        Axis::linear("PMSE"),
+        series(Mode::Paper, true),
+    );
+    let of_both = Panel::new(
+        "Both modes",
+        Axis::log(rate),
+        Axis::log("PMSE"),
+        series(Mode::Paper, false).chain(series(Mode::Recommended, false)),
+    );
     Figure {
         panels: vec![
-            Panel {
-                title: "The paper's schemes".to_owned(),
-                x: Axis::linear(rate),
-                y: Axis::linear("PMSE"),
-                series: series(Mode::Paper, true).collect(),
-                legend: Legend::UpperRight,
-            },
-            Panel {
-                title: "Both modes".to_owned(),
-                x: Axis::log(rate),
-                y: Axis::log("PMSE"),
-                series: series(Mode::Paper, false)
-                    .chain(series(Mode::Recommended, false))
-                    .collect(),
-                legend: Legend::UpperLeft,
-            },
+            of_paper.with_legend(Legend::UpperRight),
+            of_both.with_legend(Legend::UpperLeft),
         ],
         columns: 2,
         panel_size: (560, 440),
@@ -173,10 +158,10 @@ fn figure(groups: &[Group]) -> Figure {
 
 fn drawn(groups: &[Group], mode: Mode, curve: Curve, notes: bool) -> Series {
     let (colour, mark) = match curve {
-        Curve::Deadband => (Colour::Blue, Mark::Circle),
-        Curve::Hybrid(50) => (Colour::Vermilion, Mark::Square),
-        Curve::Hybrid(_) => (Colour::Green, Mark::Triangle),
-        Curve::Useful(_) => (Colour::Black, Mark::Cross),
+        Curve::Deadband => (Colour::BLUE, Mark::Circle),
+        Curve::Hybrid(50) => (Colour::VERMILION, Mark::Square),
+        Curve::Hybrid(_) => (Colour::GREEN, Mark::Triangle),
+        Curve::Useful(_) => (Colour::BLACK, Mark::Cross),
     };
     let of_curve = groups
         .iter()

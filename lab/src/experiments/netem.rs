@@ -1,6 +1,4 @@
-//! Every network preset: what its settings say that it does, against what it did in virtual time.
-
-use std::time::Duration;
+//! Every network preset: what its settings ask for against what it did in virtual time.
 
 use mmt_netem::config::LinkConfig;
 use mmt_netem::effect::Effect;
@@ -11,13 +9,8 @@ use mmt_netem::record::{End, Entry};
 use mmt_netem::{Link, Packet};
 use mmt_shared::time::{TICK, Time};
 
-use crate::experiment::description::{DURATION, Experiment, Request};
-use crate::experiment::findings::{ExperimentError, Findings};
-use crate::experiment::grid;
-use crate::figure::{Axis, Colour, Dot, Figure, Legend, Panel, Series, Stroke};
-use crate::io::Runner;
+use crate::experiment::prelude::*;
 use crate::statistics::quantile;
-use crate::table::{Column, Table, column};
 
 /// Packets per second that are offered: a haptic stream that sends every sample.
 const RATE_HZ: f64 = 1000.0;
@@ -25,16 +18,14 @@ const RATE_HZ: f64 = 1000.0;
 const BYTES: usize = 90;
 
 /// The presets of the emulated network.
-pub(super) const NETEM: Experiment = Experiment {
-    name: "netem",
-    about: "Every network preset: configured against achieved",
-    seeds: 10,
-    duration: DURATION,
-    arguments: &[],
+pub(super) const NETEM: Experiment = Experiment::new(
+    "netem",
+    "Every network preset: configured against achieved",
+    10,
     run,
-};
+);
 
-/// A preset and what its settings say that it does.
+/// A preset and what its settings ask for.
 struct Case {
     preset: &'static Preset,
     config: LinkConfig,
@@ -48,12 +39,7 @@ struct Met {
     delays_ms: Vec<f64>,
 }
 
-/// What a preset did.
-struct Achieved {
-    group: grid::Group<Case, Met>,
-    /// Delays of all seeds, ms, by rising delay.
-    delays_ms: Vec<f64>,
-}
+type Group = grid::Group<Case, Met>;
 
 fn case(preset: &'static Preset) -> Result<Case, ExperimentError> {
     let refused = |error: &dyn std::fmt::Display| ExperimentError::network(preset.name, error);
@@ -75,48 +61,35 @@ fn run(runner: &Runner, request: &Request) -> Result<Findings, ExperimentError> 
         let run = run.map_err(|error| ExperimentError::network(case.preset.name, error))?;
         Ok(Met::of(&run))
     })?;
-    let achieved: Vec<Achieved> = groups.into_iter().map(Achieved::of).collect();
     let title =
         format!("Presets at {RATE_HZ} packets/s: configured, and achieved over the seeds (mean)");
-    let table = Table::of(title, &achieved, &columns());
+    let table = Table::of(title, &groups, &columns());
     runner.keep_table("netem.csv", &table)?;
-    let figure = Figure::of_alike(achieved.iter().map(panel), Legend::UpperLeft, 4, (330, 260));
+    let figure = Figure::of_alike(groups.iter().map(panel), Legend::UpperLeft, 4, (330, 260));
     runner.keep_figure("netem.svg", &figure)?;
     Ok(Findings {
-        experiment: NETEM.name,
-        extent,
-        digest: String::new(),
-        configuration: Vec::new(),
         tables: vec![table],
+        ..Findings::default()
     })
 }
 
 #[rustfmt::skip]
-fn columns<'a>() -> [Column<'a, Achieved>; 14] {
-    fn mean(achieved: &Achieved, of: fn(&Summary) -> f64) -> Option<f64> {
-        achieved.group.mean(|met| Some(of(&met.summary)))
-    }
-    fn configured(achieved: &Achieved) -> &Effect {
-        &achieved.group.case.configured
-    }
+fn columns<'a>() -> [Column<'a, Group>; 14] {
     [
-        column("preset", "", 0, |of| of.group.case.preset.name),
-        column("packets", "", 0, |of| {
-            let offered = of.group.runs.iter().map(|met| met.summary.offered.packets);
-            offered.sum::<u64>()
-        }),
-        column("mean_ms", "ms", 2, |of| configured(of).mean_ms),
-        column("mean_ms_achieved", "ms", 2, |of| mean(of, |run| run.mean_ms)),
-        column("sd_ms", "ms", 2, |of| configured(of).sd_ms),
-        column("sd_ms_achieved", "ms", 2, |of| mean(of, |run| run.sd_ms)),
-        column("p99_ms", "ms", 2, |of| configured(of).p99_ms),
-        column("p99_ms_achieved", "ms", 2, |of| quantile(&of.delays_ms, 0.99)),
-        column("loss", "", 5, |of| configured(of).loss),
-        column("loss_achieved", "", 5, |of| mean(of, |run| run.loss)),
-        column("burst_packets", "", 1, |of| configured(of).burst_packets),
-        column("burst_packets_achieved", "", 1, |of| mean(of, |run| run.burst_packets)),
-        column("reordered", "", 4, |of| configured(of).reordered),
-        column("reordered_achieved", "", 4, |of| mean(of, |run| run.reordered)),
+        column("preset", "", 0, |group| group.case.preset.name),
+        column("packets", "", 0, |group| group.runs.iter().map(|met| met.summary.offered.packets).sum::<u64>()),
+        column("mean_ms", "ms", 2, |group| group.case.configured.mean_ms),
+        mean("mean_ms_achieved", "ms", 2, |met| Some(met.summary.mean_ms)),
+        column("sd_ms", "ms", 2, |group| group.case.configured.sd_ms),
+        mean("sd_ms_achieved", "ms", 2, |met| Some(met.summary.sd_ms)),
+        column("p99_ms", "ms", 2, |group| group.case.configured.p99_ms),
+        column("p99_ms_achieved", "ms", 2, |group| quantile(&delays_ms(group), 0.99)),
+        column("loss", "", 5, |group| group.case.configured.loss),
+        mean("loss_achieved", "", 5, |met| Some(met.summary.loss)),
+        column("burst_packets", "", 1, |group| group.case.configured.burst_packets),
+        mean("burst_packets_achieved", "", 1, |met| Some(met.summary.burst_packets)),
+        column("reordered", "", 4, |group| group.case.configured.reordered),
+        mean("reordered_achieved", "", 4, |met| Some(met.summary.reordered)),
     ]
 }
 
@@ -154,46 +127,46 @@ impl Met {
     }
 }
 
-impl Achieved {
-    fn of(group: grid::Group<Case, Met>) -> Self {
-        let delays = group.runs.iter().flat_map(|met| &met.delays_ms);
-        let mut delays_ms: Vec<f64> = delays.copied().collect();
-        delays_ms.sort_by(f64::total_cmp);
-        Self { group, delays_ms }
-    }
+/// Delays of all seeds, ms, by rising delay.
+fn delays_ms(group: &Group) -> Vec<f64> {
+    let delays = group.runs.iter().flat_map(|met| &met.delays_ms);
+    let mut delays_ms: Vec<f64> = delays.copied().collect();
+    delays_ms.sort_by(f64::total_cmp);
+    delays_ms
 }
 
 /// Shares of packets at which a curve is drawn. The first and the last quarter of a per cent are left out:
 /// a single packet would set the axis.
 const SHARES: u32 = 400;
 
-/// The share of packets that came within a delay: as the settings draw it, and as it was met; the loss of both
-/// in the title.
-fn panel(achieved: &Achieved) -> Panel {
+/// The share of packets that came within a delay: as it is configured and as it was achieved; the loss of both in the
+/// title.
+fn panel(group: &Group) -> Panel {
     let Case {
         preset,
         config,
         configured,
-    } = &achieved.group.case;
+    } = &group.case;
+    let delays_ms = delays_ms(group);
     let shares = (1..SHARES).map(|k| f64::from(k) / f64::from(SHARES));
-    let said = |share| config.delay.quantile(share).as_secs_f64() * 1e3;
+    let drawn = |share| config.delay.quantile(share).as_secs_f64() * 1e3;
     let met = shares
         .clone()
-        .filter_map(|share| Some(Dot::at(quantile(&achieved.delays_ms, share)?, share)));
-    let said: Vec<Dot> = shares.map(|share| Dot::at(said(share), share)).collect();
+        .filter_map(|share| Some(Dot::at(quantile(&delays_ms, share)?, share)));
     let met: Vec<Dot> = met.collect();
-    let loss = achieved.group.mean(|met| Some(met.summary.loss));
+    let drawn: Vec<Dot> = shares.map(|share| Dot::at(drawn(share), share)).collect();
+    let loss = group.mean(|met| Some(met.summary.loss));
     let title = format!(
         "{}: loss {:.2} %, configured {:.2} %",
         preset.name,
         100.0 * loss.unwrap_or(0.0),
         100.0 * configured.loss
     );
-    let x = Axis::linear("delay, ms").over(range(said.iter().chain(&met)));
+    let x = Axis::linear("delay, ms").over(range(drawn.iter().chain(&met)));
     let y = Axis::linear("share of packets").over(0.0..1.0);
     let series = [
-        Series::line("achieved", Colour::Sky, met).stroked(Stroke::Solid, 3),
-        Series::line("configured", Colour::Black, said).stroked(Stroke::Dashed, 1),
+        Series::line("achieved", Colour::SKY, met).stroked(Stroke::Solid, 3),
+        Series::line("configured", Colour::BLACK, drawn).stroked(Stroke::Dashed, 1),
     ];
     Panel::new(title, x, y, series)
 }

@@ -1,46 +1,38 @@
 //! The reference motions of a body: what the environment does against what it should do.
 
-use crate::experiment::description::{Argument, DURATION, Experiment, Request};
-use crate::experiment::findings::{ExperimentError, Findings};
-use crate::figure::{Axis, Colour, Dot, Figure, Legend, Panel, Series, Stroke};
-use crate::io::Runner;
+use crate::experiment::prelude::*;
 use crate::physics::{Body, PhysicsCase, PhysicsTrace, TracePoint, cases, traces};
-use crate::table::{Table, column};
 
 /// The reference motions.
+#[rustfmt::skip]
 pub(super) const PHYSICS: Experiment = Experiment {
-    name: "physics",
-    about: "What the environment does against closed forms and a fine reference, for any body",
-    seeds: 1,
-    duration: DURATION,
     arguments: &[
-        Argument::Number {
-            name: "mass",
-            unit: "KG",
-            help: "Mass m, kg",
-            default: Body::DEFAULT.mass_kg,
-        },
-        Argument::Number {
-            name: "side",
-            unit: "M",
-            help: "Side l of the square footprint, m",
-            default: Body::DEFAULT.side_m,
-        },
-        Argument::Number {
-            name: "mu",
-            unit: "MU",
-            help: "Friction coefficient between body and ground",
-            default: Body::DEFAULT.friction_coefficient,
-        },
-        Argument::Number {
-            name: "damping",
-            unit: "NS_PER_M",
-            help: "Viscous damping b, N s/m",
-            default: Body::DEFAULT.damping_ns_per_m,
-        },
+        number("mass", "KG", "Mass m, kg", Body::DEFAULT.mass_kg),
+        number("side", "M", "Side l of the square footprint, m", Body::DEFAULT.side_m),
+        number("mu", "MU", "Friction coefficient between body and ground", Body::DEFAULT.friction_coefficient),
+        number("damping", "NS_PER_M", "Viscous damping b, N s/m", Body::DEFAULT.damping_ns_per_m),
     ],
-    run,
+    ..Experiment::new(
+        "physics",
+        "What the environment does against closed forms and a fine reference, for any body",
+        1,
+        run,
+    )
 };
+
+const fn number(
+    name: &'static str,
+    unit: &'static str,
+    help: &'static str,
+    default: f64,
+) -> Argument {
+    Argument::Number {
+        name,
+        unit,
+        help,
+        default,
+    }
+}
 
 /// Keeps `physics.csv` and `physics.svg`.
 fn run(runner: &Runner, request: &Request) -> Result<Findings, ExperimentError> {
@@ -56,11 +48,8 @@ fn run(runner: &Runner, request: &Request) -> Result<Findings, ExperimentError> 
     runner.keep_table("physics.csv", &all)?;
     runner.keep_figure("physics.svg", &figure(&traces))?;
     Ok(Findings {
-        experiment: PHYSICS.name,
-        extent: request.extent,
-        digest: String::new(),
-        configuration: Vec::new(),
         tables: vec![shown],
+        ..Findings::default()
     })
 }
 
@@ -97,9 +86,9 @@ fn figure(traces: &[PhysicsTrace]) -> Figure {
                 .collect()
         };
         let series = [
-            Series::line("measured", Colour::Sky, curve(&|point| point.measured))
+            Series::line("measured", Colour::SKY, curve(&|point| point.measured))
                 .stroked(Stroke::Solid, 4),
-            Series::line("reference", Colour::Black, curve(&|point| point.reference))
+            Series::line("reference", Colour::BLACK, curve(&|point| point.reference))
                 .stroked(Stroke::Dashed, 1),
         ];
         Panel::new(trace.case, Axis::linear("time, s"), vertical(trace), series)

@@ -1,8 +1,7 @@
 //! The columns that show how runs followed a change of the object.
 
-use crate::experiment::grid::Group;
-use crate::table::{Column, column};
-use crate::trial::Measured;
+use crate::experiment::prelude::*;
+use grid::Group;
 
 /// The share of the runs that recovered; medians of the contact and the packets that they needed.
 #[rustfmt::skip]

@@ -3,23 +3,13 @@
 //! The live defaults over 50 ms one way, and the paper's best scheme, which sends more; only the repeats differ, so that
 //! a seed meets the same operator, noise and network everywhere. It must never compare different seeds.
 
-use std::time::Duration;
-
 use mmt_netem::config::LinkConfig;
 use mmt_server::repeats::Repeats;
 use mmt_shared::channel::rate_control::StretchMax;
 use mmt_shared::metrics::Staleness;
 
 use super::loss::{Loss, link};
-use crate::experiment::description::{DURATION, Experiment, Request};
-use crate::experiment::findings::{ExperimentError, Findings};
-use crate::experiment::grid::{self, digest, interval, mean};
-use crate::figure::{Axis, Colour, Dot, Figure, Legend, Panel, Series, Stroke};
-use crate::io::Runner;
-use crate::setting::Curve;
-use crate::table::{Column, Table, column};
-use crate::trial::{Measured, Trial};
-use crate::world::WorldConfig;
+use crate::experiment::prelude::*;
 
 /// One way.
 const DELAY: &str = "delay 50ms";
@@ -32,18 +22,15 @@ const REPEAT_SAMPLES: [u8; 2] = [0, 1];
 const CURVES: [Curve; 2] = [Curve::Useful(150), Curve::Hybrid(150)];
 const DELTA: f64 = 0.10;
 
-/// What repeats buy and cost.
-pub(super) const REPEATS: Experiment = Experiment {
-    name: "repeats",
-    about: "What repeats of updates and samples buy under loss, and cost",
-    // one update in a thousand must be seen
-    seeds: 20,
-    duration: DURATION,
-    arguments: &[],
+/// What repeats buy and cost: with these seeds, one update in a thousand is seen.
+pub(super) const REPEATS: Experiment = Experiment::new(
+    "repeats",
+    "What repeats of updates and samples buy under loss, and cost",
+    20,
     run,
-};
+);
 
-/// One place of the grid.
+/// A point of the grid.
 struct Case {
     curve: Curve,
     loss: Loss,
@@ -93,19 +80,13 @@ fn world(curve: Curve, link: &LinkConfig, repeats: Repeats, repeat_samples: u8) 
 /// Keeps `repeats.csv` and `repeats.svg`.
 fn run(runner: &Runner, request: &Request) -> Result<Findings, ExperimentError> {
     let extent = request.extent;
-    let groups = runner.grid("repeats", extent.seeds, cases()?, |case, seed| {
-        runner.trial(&Trial::new(
-            case.world.clone().seeded(seed),
-            extent.duration,
-        ))
+    let groups = runner.trials("repeats", extent.seeds, cases()?, |case| {
+        Trial::new(case.world.clone(), extent.duration)
     })?;
     let table = |title: &str, shown: fn(&Case) -> bool| {
         let rows = rows(&groups);
-        Table::of(
-            title,
-            rows.iter().filter(|row| shown(&row.group.case)),
-            &columns(),
-        )
+        let rows = rows.iter().filter(|row| shown(&row.group.case));
+        Table::of(title, rows, &columns())
     };
     let all = table("Repeats over 50 ms one way", |_| true);
     runner.keep_table("repeats.csv", &all)?;
@@ -120,8 +101,6 @@ fn run(runner: &Runner, request: &Request) -> Result<Findings, ExperimentError> 
     );
     let configuration = groups.first().map(|group| group.case.world.clone());
     Ok(Findings {
-        experiment: REPEATS.name,
-        extent,
         digest: digest(&groups),
         configuration: configuration.into_iter().collect(),
         tables: vec![
@@ -131,7 +110,7 @@ fn run(runner: &Runner, request: &Request) -> Result<Findings, ExperimentError> 
     })
 }
 
-/// Columns that say nothing of repeated updates.
+/// Columns that repeated updates do not change.
 const NOT_OF_UPDATES: [&str; 8] = [
     "repeat_samples",
     "datagrams_up_hz",
@@ -178,31 +157,15 @@ fn rows(groups: &[Group]) -> Vec<Row<'_>> {
 fn columns<'a>() -> Vec<Column<'a, Row<'a>>> {
     let of_group: Vec<Column<Group>> = vec![
         column("scheme", "", 0, |group| group.case.curve.label()),
-        column("loss", "", 0, |group| group.case.loss.name()),
+        column("loss", "", 0, |group| group.case.loss.name),
         column("repeats", "", 0, |group| group.case.repeats.to_string()),
         column("repeat_samples", "", 0, |group| u64::from(group.case.repeat_samples)),
-        column("updates", "", 0, |group| {
-            group
-                .runs
-                .iter()
-                .map(|run| run.updates.total())
-                .sum::<u64>()
-        }),
-        column("repeated", "", 0, |group| {
-            let repeated = group.runs.iter().map(|run| run.traffic.repeated.total());
-            repeated.sum::<u64>()
-        }),
+        column("updates", "", 0, |group| group.runs.iter().map(|run| run.updates.total()).sum::<u64>()),
+        column("repeated", "", 0, |group| group.runs.iter().map(|run| run.traffic.repeated.total()).sum::<u64>()),
         mean("datagrams_up_hz", "Hz", 1, |run| run.traffic.wire.up.rate_hz.get()),
         mean("datagrams_down_hz", "Hz", 1, |run| run.traffic.wire.down.rate_hz.get()),
         mean("kbit_up_per_s", "kbit/s", 1, |run| run.traffic.wire.up.bits_per_s.get().map(|bits| bits * 1e-3)),
-        mean("kbit_down_per_s", "kbit/s", 1, |run| {
-            run.traffic
-                .wire
-                .down
-                .bits_per_s
-                .get()
-                .map(|bits| bits * 1e-3)
-        }),
+        mean("kbit_down_per_s", "kbit/s", 1, |run| run.traffic.wire.down.bits_per_s.get().map(|bits| bits * 1e-3)),
         column("stale_p50_ms", "ms", 0, |group| stale_ms(group, 0.5)),
         column("stale_p99_ms", "ms", 0, |group| stale_ms(group, 0.99)),
         column("stale_p999_ms", "ms", 0, |group| stale_ms(group, 0.999)),
@@ -239,9 +202,9 @@ fn stale_ms(group: &Group, share: f64) -> Option<f64> {
 /// A panel a loss: the share of updates of the chattier scheme that took longer than a time, without repeated samples.
 fn figure(groups: &[Group]) -> Figure {
     let styles = [
-        (Colour::Vermilion, Stroke::Solid),
-        (Colour::Blue, Stroke::Dashed),
-        (Colour::Black, Stroke::Solid),
+        (Colour::VERMILION, Stroke::Solid),
+        (Colour::BLUE, Stroke::Dashed),
+        (Colour::BLACK, Stroke::Solid),
     ];
     let panels = Loss::ALL.into_iter().map(|loss| {
         let of = groups.iter().filter(|group| {
@@ -252,7 +215,7 @@ fn figure(groups: &[Group]) -> Figure {
             let label = group.case.repeats.to_string();
             Series::line(&label, colour, exceeded(times(&group.runs))).stroked(stroke, 2)
         });
-        let title = match loss.words() {
+        let title = match loss.words {
             "" => "no loss",
             words => words,
         };

@@ -5,27 +5,18 @@
 
 use mmt_server::environment::{Bounded, EnvironmentConfig, GroundPatch, Ripple, Shape, Wall};
 use mmt_shared::model::geometry::Vec2;
-use mmt_shared::model::settings::Mode;
 
 use super::recovery;
-use crate::experiment::description::{DURATION, Experiment, Request};
-use crate::experiment::findings::{ExperimentError, Findings};
-use crate::experiment::grid::{self, digest, mean};
-use crate::io::Runner;
-use crate::setting::{Curve, mode_name, paper_world};
-use crate::table::{Column, Table, column};
-use crate::trial::{Alteration, Change, Measured, Trial};
-use crate::world::WorldConfig;
+use crate::experiment::prelude::*;
+use crate::trial::{Alteration, Change};
 
 /// The scenarios in both modes.
-pub(super) const EXPERIMENT: Experiment = Experiment {
-    name: "scenarios",
-    about: "Other bodies, other grounds, changes in mid-run: recovery, packets and force error in both modes",
-    seeds: 10,
-    duration: DURATION,
-    arguments: &[],
+pub(super) const EXPERIMENT: Experiment = Experiment::new(
+    "scenarios",
+    "Other bodies, other grounds, changes in mid-run: recovery, packets and force error in both modes",
+    10,
     run,
-};
+);
 
 /// The cube's side, m: side errors are shares of it.
 const SIDE_M: f64 = 0.36;
@@ -36,103 +27,60 @@ pub struct Scenario {
     pub name: &'static str,
     /// What is otherwise than in the default scenario.
     pub what: &'static str,
-    apply: fn(&mut WorldConfig),
+    apply: fn(&mut EnvironmentConfig),
+    /// By how much the model's side is too long when the object is first touched, as a share of it.
+    side_error: Option<f64>,
     change: Option<Alteration>,
 }
 
 /// All scenarios.
+#[rustfmt::skip]
 pub static SCENARIOS: [Scenario; 16] = [
     plain("cube", "the default scenario", |_| {}),
-    plain("brick", "36 by 24 cm", |world| {
-        shape(
-            world,
-            Shape::Brick {
-                length_m: 0.36,
-                width_m: 0.24,
-            },
-        );
+    plain("brick", "36 by 24 cm", |world| world.shape = Shape::Brick { length_m: 0.36, width_m: 0.24 }),
+    plain("disc", "36 cm across", |world| world.shape = Shape::Disc { diameter_m: 0.36 }),
+    plain("polygon", "an irregular hexagon, 36 by 34 cm", |world| world.shape = hexagon()),
+    plain("ripple", "friction varies by 30 % over 0.2 m", |world| world.ripple = Some(Ripple::default())),
+    plain("patches", "two strips of mu 0.20 and 0.45", |world| world.patches = strips()),
+    plain("static-friction", "static friction 1.5 times the sliding one", |world| world.static_ratio = 1.5),
+    plain("wall", "a wall that stops the first push, unknown to the model", |world| {
+        world.wall = Some(Wall { distance_m: 0.38, angle_rad: 0.0 });
     }),
-    plain("disc", "36 cm across", |world| {
-        shape(world, Shape::Disc { diameter_m: 0.36 });
-    }),
-    plain("polygon", "an irregular hexagon, 36 by 34 cm", |world| {
-        shape(
-            world,
-            Shape::Polygon {
-                vertices_m: hexagon(),
-            },
-        );
-    }),
-    plain("ripple", "friction varies by 30 % over 0.2 m", |world| {
-        environment(world).ripple = Some(Ripple::default());
-    }),
-    plain("patches", "two strips of mu 0.20 and 0.45", |world| {
-        environment(world).patches = strips();
-    }),
-    plain(
-        "static-friction",
-        "static friction 1.5 times the sliding one",
-        |world| {
-            environment(world).static_ratio = 1.5;
-        },
-    ),
-    plain(
-        "wall",
-        "a wall that stops the first push, unknown to the model",
-        |world| {
-            environment(world).wall = Some(Wall {
-                distance_m: 0.38,
-                angle_rad: 0.0,
-            });
-        },
-    ),
-    plain("centre-of-mass", "3 cm off the centre", |world| {
-        environment(world).centre_of_mass_m = Vec2::new(0.03, 0.0);
-    }),
-    plain("side-0", "the model has the true side", |world| {
-        side_error(world, 0.00)
-    }),
-    plain("side-5", "the model's side is 5 % too long", |world| {
-        side_error(world, 0.05)
-    }),
-    plain("side-10", "the model's side is 10 % too long", |world| {
-        side_error(world, 0.10)
-    }),
-    plain("side-20", "the model's side is 20 % too long", |world| {
-        side_error(world, 0.20)
-    }),
-    changing(
-        "friction-step",
-        "mu steps from 0.30 to 0.45 in the second push",
-        Alteration::FrictionCoefficient(0.45),
-    ),
-    changing(
-        "friction-drop",
-        "mu steps from 0.30 to 0.15 in the second push",
-        Alteration::FrictionCoefficient(0.15),
-    ),
-    changing(
-        "mass-step",
-        "m steps from 0.7 to 1.2 kg in the second push",
-        Alteration::MassKg(1.2),
-    ),
+    plain("centre-of-mass", "3 cm off the centre", |world| world.centre_of_mass_m = Vec2::new(0.03, 0.0)),
+    side("side-0", "the model has the true side", 0.00),
+    side("side-5", "the model's side is 5 % too long", 0.05),
+    side("side-10", "the model's side is 10 % too long", 0.10),
+    side("side-20", "the model's side is 20 % too long", 0.20),
+    changing("friction-step", "mu steps from 0.30 to 0.45 in the second push", Alteration::FrictionCoefficient(0.45)),
+    changing("friction-drop", "mu steps from 0.30 to 0.15 in the second push", Alteration::FrictionCoefficient(0.15)),
+    changing("mass-step", "m steps from 0.7 to 1.2 kg in the second push", Alteration::MassKg(1.2)),
 ];
 
-const fn plain(name: &'static str, what: &'static str, apply: fn(&mut WorldConfig)) -> Scenario {
+const fn plain(
+    name: &'static str,
+    what: &'static str,
+    apply: fn(&mut EnvironmentConfig),
+) -> Scenario {
     Scenario {
         name,
         what,
         apply,
+        side_error: None,
         change: None,
+    }
+}
+
+const fn side(name: &'static str, what: &'static str, error: f64) -> Scenario {
+    Scenario {
+        side_error: Some(error),
+        ..plain(name, what, |_| {})
     }
 }
 
 const fn changing(name: &'static str, what: &'static str, change: Alteration) -> Scenario {
     Scenario {
-        name,
-        what,
-        apply: |_| {},
         change: Some(change),
+        ..plain(name, what, |_| {})
     }
 }
 
@@ -141,7 +89,10 @@ impl Scenario {
     #[must_use]
     pub fn world(&self, mode: Mode, curve: Curve, deadband: f64) -> WorldConfig {
         let mut world = paper_world(mode, curve.at(deadband));
-        (self.apply)(&mut world);
+        (self.apply)(&mut world.slave.environment);
+        if let Some(error) = self.side_error {
+            world.slave.start.side_m = SIDE_M * (1.0 + error);
+        }
         world
     }
 
@@ -159,19 +110,7 @@ impl Scenario {
     }
 }
 
-fn environment(world: &mut WorldConfig) -> &mut EnvironmentConfig {
-    &mut world.slave.environment
-}
-
-fn shape(world: &mut WorldConfig, shape: Shape) {
-    environment(world).shape = shape;
-}
-
-fn side_error(world: &mut WorldConfig, share: f64) {
-    world.slave.start.side_m = SIDE_M * (1.0 + share);
-}
-
-fn hexagon() -> Bounded<Vec2, { mmt_server::environment::VERTICES_MAX }> {
+fn hexagon() -> Shape {
     let corners = [
         (0.18, -0.06),
         (0.18, 0.09),
@@ -180,7 +119,10 @@ fn hexagon() -> Bounded<Vec2, { mmt_server::environment::VERTICES_MAX }> {
         (-0.18, -0.05),
         (-0.02, -0.17),
     ];
-    Bounded::try_new(&corners.map(|(x, y)| Vec2::new(x, y))).unwrap_or_default()
+    let corners = corners.map(|(x, y)| Vec2::new(x, y));
+    Shape::Polygon {
+        vertices_m: Bounded::try_new(&corners).unwrap_or_default(),
+    }
 }
 
 /// Strips across the way of the pushes, 10 cm wide, on both sides of the start.
@@ -194,29 +136,19 @@ pub(super) fn strips() -> Bounded<GroundPatch, { mmt_server::environment::PATCHE
     Bounded::try_new(&places.map(|(x, mu)| strip(x, mu))).unwrap_or_default()
 }
 
-/// The two modes with the schemes that they default to.
-const MODES: [(Mode, Curve); 2] = [
-    (Mode::Paper, Curve::Hybrid(150)),
-    (Mode::Recommended, Curve::Useful(150)),
-];
-
-type Group = grid::Group<(&'static Scenario, Mode, Curve), Measured>;
+type Case = (&'static Scenario, Mode, Curve);
+type Group = grid::Group<Case, Measured>;
 
 /// Keeps `scenarios.csv`.
 fn run(runner: &Runner, request: &Request) -> Result<Findings, ExperimentError> {
     let extent = request.extent;
-    let cases = SCENARIOS
-        .iter()
-        .flat_map(|scenario| MODES.map(|(mode, curve)| (scenario, mode, curve)));
-    let cases = cases.collect();
-    let run = |(scenario, mode, curve): &(&Scenario, Mode, Curve), seed| {
-        let world = scenario.world(*mode, *curve, 0.10).seeded(seed);
-        runner.trial(&Trial {
-            change: Some(scenario.change()),
-            ..Trial::new(world, extent.duration)
-        })
+    let of = |scenario| MODES.map(|(mode, curve)| (scenario, mode, curve));
+    let cases = SCENARIOS.iter().flat_map(of).collect();
+    let trial = |(scenario, mode, curve): &Case| Trial {
+        change: Some(scenario.change()),
+        ..Trial::new(scenario.world(*mode, *curve, 0.10), extent.duration)
     };
-    let groups = runner.grid("scenarios", extent.seeds, cases, run)?;
+    let groups = runner.trials("scenarios", extent.seeds, cases, trial)?;
     let title = format!(
         "Scenarios, {} seeds: paper (hybrid 10 %, 150 ms) against recommended (useful 10 %, 150 ms)",
         extent.seeds
@@ -225,12 +157,8 @@ fn run(runner: &Runner, request: &Request) -> Result<Findings, ExperimentError> 
     runner.keep_table("scenarios.csv", &table)?;
     let shown = table.without(&["what", "pmse_magnitude", "pushes"]);
     Ok(Findings {
-        experiment: EXPERIMENT.name,
-        extent,
         digest: digest(&groups),
-        configuration: MODES
-            .map(|(mode, curve)| paper_world(mode, curve.at(0.10)))
-            .to_vec(),
+        configuration: paper_worlds(0.10),
         tables: vec![shown],
     })
 }

@@ -1,18 +1,10 @@
 //! Every update scheme and every metric of mismatch in one table, scored on the usual run and on a change in mid-run.
 
-use std::time::Duration;
-
 use mmt_server::trigger::{MismatchMetric, Scheme};
-use mmt_shared::model::settings::Mode;
 
 use super::recovery;
-use crate::experiment::description::{DURATION, Experiment, Request};
-use crate::experiment::findings::{ExperimentError, Findings};
-use crate::experiment::grid::{self, digest, mean};
-use crate::io::Runner;
-use crate::setting::{Curve, mode_name, paper_world};
-use crate::table::{Column, Table, column};
-use crate::trial::{Alteration, Change, Measured, Trial};
+use crate::experiment::prelude::*;
+use crate::trial::{Alteration, Change};
 
 /// Delta of every scheme that has one.
 const DELTA: f64 = 0.10;
@@ -24,14 +16,12 @@ const CHANGE: Change = Change {
 };
 
 /// The comparison of the schemes.
-pub(super) const SCHEMES: Experiment = Experiment {
-    name: "schemes",
-    about: "Every update scheme and mismatch metric, with recovery after a change of friction",
-    seeds: 10,
-    duration: DURATION,
-    arguments: &[],
+pub(super) const SCHEMES: Experiment = Experiment::new(
+    "schemes",
+    "Every update scheme and mismatch metric, with recovery after a change of friction",
+    10,
     run,
-};
+);
 
 struct Case {
     mode: Mode,
@@ -67,7 +57,7 @@ fn schemes() -> Vec<(Scheme, MismatchMetric)> {
 /// Each scheme twice: without and with the change.
 fn cases() -> Vec<Case> {
     let mut cases = Vec::new();
-    for mode in [Mode::Paper, Mode::Recommended] {
+    for (mode, _) in MODES {
         for (scheme, metric) in schemes() {
             cases.extend([None, Some(CHANGE)].map(|change| Case {
                 mode,
@@ -83,13 +73,13 @@ fn cases() -> Vec<Case> {
 /// Keeps `schemes.csv`.
 fn run(runner: &Runner, request: &Request) -> Result<Findings, ExperimentError> {
     let extent = request.extent;
-    let groups = runner.grid("schemes", extent.seeds, cases(), |case, seed| {
+    let groups = runner.trials("schemes", extent.seeds, cases(), |case| {
         let mut world = paper_world(case.mode, case.scheme);
         world.slave.trigger.metric = case.metric;
-        runner.trial(&Trial {
+        Trial {
             change: case.change,
-            ..Trial::new(world.seeded(seed), extent.duration)
-        })
+            ..Trial::new(world, extent.duration)
+        }
     })?;
     let title = format!(
         "Update schemes, {} seeds; recovery when mu steps from 0.30 to 0.45 in mid-push",
@@ -98,13 +88,8 @@ fn run(runner: &Runner, request: &Request) -> Result<Findings, ExperimentError> 
     let table = Table::of(title, groups.as_chunks::<2>().0, &columns());
     runner.keep_table("schemes.csv", &table)?;
     Ok(Findings {
-        experiment: SCHEMES.name,
-        extent,
         digest: digest(&groups),
-        configuration: vec![
-            paper_world(Mode::Paper, Curve::Hybrid(150).at(DELTA)),
-            paper_world(Mode::Recommended, Curve::Useful(150).at(DELTA)),
-        ],
+        configuration: paper_worlds(DELTA),
         tables: vec![table],
     })
 }

@@ -2,16 +2,8 @@
 
 use std::ops::RangeInclusive;
 
-use mmt_shared::model::settings::Mode;
-
-use crate::experiment::description::{DURATION, Experiment, Request};
-use crate::experiment::findings::{ExperimentError, Findings};
-use crate::experiment::grid::digest;
-use crate::figure::{Axis, Colour, Dot, Figure, Legend, Panel, Series, Stroke};
-use crate::io::Runner;
-use crate::setting::{Curve, paper_world};
-use crate::table::{Table, column};
-use crate::trial::{Measured, TraceRow, Trial};
+use crate::experiment::prelude::*;
+use crate::trial::TraceRow;
 
 /// The deadband of both figures.
 const DEADBAND: f64 = 0.15;
@@ -21,31 +13,29 @@ const OPENING_S: f64 = 6.0;
 const PARTS: usize = 900;
 
 /// Fig. 6.
-pub(super) const FIG6: Experiment = Experiment {
-    name: "fig6",
-    about: "Fig. 6: forces and packets over time, deadband 15 %",
-    seeds: 1,
-    duration: DURATION,
-    arguments: &[],
-    run: |runner, request| run(runner, request, &FIG6, Curve::Deadband),
-};
+pub(super) const FIG6: Experiment = Experiment::new(
+    "fig6",
+    "Fig. 6: forces and packets over time, deadband 15 %",
+    1,
+    |runner, request| run(runner, request, "fig6", Curve::Deadband),
+);
 
 /// Fig. 7.
-pub(super) const FIG7: Experiment = Experiment {
-    name: "fig7",
-    about: "Fig. 7: the same for hybrid 15 %, 150 ms",
-    run: |runner, request| run(runner, request, &FIG7, Curve::Hybrid(150)),
-    ..FIG6
-};
+pub(super) const FIG7: Experiment = Experiment::new(
+    "fig7",
+    "Fig. 7: the same for hybrid 15 %, 150 ms",
+    1,
+    |runner, request| run(runner, request, "fig7", Curve::Hybrid(150)),
+);
 
 /// Keeps CSV and SVG of the run with the last of the seeds.
 fn run(
     runner: &Runner,
     request: &Request,
-    figure: &Experiment,
+    name: &str,
     curve: Curve,
 ) -> Result<Findings, ExperimentError> {
-    let (extent, name) = (request.extent, figure.name);
+    let extent = request.extent;
     let world = paper_world(Mode::Paper, curve.at(DEADBAND)).seeded(extent.seeds);
     let groups = runner.grid(name, 1, vec![world.clone()], |world, _| {
         runner.trial(&Trial {
@@ -61,8 +51,6 @@ fn run(
         tables.push(summary(format!("{name}: {title}"), run));
     }
     Ok(Findings {
-        experiment: name,
-        extent,
         digest: digest(&groups),
         configuration: vec![world],
         tables,
@@ -126,10 +114,10 @@ fn panel(title: &str, rows: &[TraceRow], when: RangeInclusive<f64>) -> Panel {
     // a strip of its own below the forces
     let events = sent.map(|row| Dot::at(row.t_s, -0.03 * top)).collect();
     let series = [
-        Series::line("packet", Colour::Sky, events).stroked(Stroke::Events, 1),
-        curve("|f_s|", Colour::Vermilion, 2, &|row| Some(row.f_s.norm())),
-        curve("|f_m|", Colour::Blue, 1, &|row| row.f_m.map(|f| f.norm())),
-        curve("|f_s − f_m|", Colour::Grey, 1, &|row| {
+        Series::line("packet", Colour::SKY, events).stroked(Stroke::Events, 1),
+        curve("|f_s|", Colour::VERMILION, 2, &|row| Some(row.f_s.norm())),
+        curve("|f_m|", Colour::BLUE, 1, &|row| row.f_m.map(|f| f.norm())),
+        curve("|f_s − f_m|", Colour::GREY, 1, &|row| {
             row.f_m.map(|f| (row.f_s - f).norm())
         }),
     ];

@@ -3,34 +3,20 @@
 //! Recommended mode, Delta 10 %, the timer in contact only, so that the period alone decides. At equal packet rate the
 //! adaptive rule is held against the lower envelope of all fixed periods of both fixed schemes.
 
-use std::time::Duration;
-
 use mmt_server::environment::Ripple;
 use mmt_server::trigger::Scheme;
-use mmt_shared::model::settings::Mode;
 
 use super::scenarios::strips;
-use crate::experiment::description::{DURATION, Experiment, Request};
-use crate::experiment::findings::{ExperimentError, Findings};
-use crate::experiment::grid::{self, digest, interval, mean};
-use crate::figure::{Axis, Colour, Dot, Figure, Legend, Mark, Panel, Series, Stroke};
-use crate::io::Runner;
-use crate::setting::{Curve, paper_world};
-use crate::statistics::{Interval, log_ratio};
-use crate::table::{Column, Table, column};
-use crate::trial::{Measured, Trial};
-use crate::world::WorldConfig;
+use crate::experiment::prelude::*;
+use crate::statistics::log_ratio;
 
-/// The search for the best T_update.
-pub(super) const TUPDATE: Experiment = Experiment {
-    name: "tupdate",
-    about: "The best T_update: fixed periods and an adaptive rule, over trajectories and grounds",
-    // 252 places
-    seeds: 5,
-    duration: DURATION,
-    arguments: &[],
+/// The search for the best T_update, over 252 points.
+pub(super) const TUPDATE: Experiment = Experiment::new(
+    "tupdate",
+    "The best T_update: fixed periods and an adaptive rule, over trajectories and grounds",
+    5,
     run,
-};
+);
 
 /// T_update, ms.
 const PERIODS_MS: [u64; 10] = [10, 20, 50, 100, 150, 200, 300, 500, 1000, 2000];
@@ -66,48 +52,38 @@ const GROUNDS: [Named; 3] = [
 ];
 
 /// A family of schemes with one time as its parameter.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Family {
-    Hybrid,
-    Useful,
-    Adaptive,
+struct Family {
+    name: &'static str,
+    times_ms: &'static [u64],
+    at: fn(u64) -> Scheme,
 }
 
-impl Family {
-    const ALL: [Self; 3] = [Self::Hybrid, Self::Useful, Self::Adaptive];
+static FAMILIES: [Family; 3] = [
+    Family {
+        name: "hybrid",
+        times_ms: &PERIODS_MS,
+        at: |ms| Curve::Hybrid(ms).at(DELTA),
+    },
+    Family {
+        name: "useful",
+        times_ms: &PERIODS_MS,
+        at: |ms| Curve::Useful(ms).at(DELTA),
+    },
+    Family {
+        name: "adaptive",
+        times_ms: &HORIZONS_MS,
+        at: |ms| Scheme::Adaptive {
+            delta: DELTA,
+            horizon: Duration::from_millis(ms),
+        },
+    },
+];
 
-    fn name(self) -> &'static str {
-        match self {
-            Self::Hybrid => "hybrid",
-            Self::Useful => "useful",
-            Self::Adaptive => "adaptive",
-        }
-    }
-
-    fn times_ms(self) -> &'static [u64] {
-        match self {
-            Self::Hybrid | Self::Useful => &PERIODS_MS,
-            Self::Adaptive => &HORIZONS_MS,
-        }
-    }
-
-    fn at(self, ms: u64) -> Scheme {
-        match self {
-            Self::Hybrid => Curve::Hybrid(ms).at(DELTA),
-            Self::Useful => Curve::Useful(ms).at(DELTA),
-            Self::Adaptive => Scheme::Adaptive {
-                delta: DELTA,
-                horizon: Duration::from_millis(ms),
-            },
-        }
-    }
-}
-
-/// One place of the sweep.
+/// A point of the sweep.
 struct Case {
     trajectory: &'static str,
     ground: &'static str,
-    family: Family,
+    family: &'static str,
     ms: u64,
     world: WorldConfig,
 }
@@ -116,16 +92,16 @@ fn cases() -> Vec<Case> {
     let mut cases = Vec::new();
     for (trajectory, push) in TRAJECTORIES {
         for (ground, lay) in GROUNDS {
-            for family in Family::ALL {
-                cases.extend(family.times_ms().iter().map(|ms| {
-                    let mut world = paper_world(Mode::Recommended, family.at(*ms));
+            for family in &FAMILIES {
+                cases.extend(family.times_ms.iter().map(|ms| {
+                    let mut world = paper_world(Mode::Recommended, (family.at)(*ms));
                     world.slave.trigger.timer_in_free_space = false;
                     push(&mut world);
                     lay(&mut world);
                     Case {
                         trajectory,
                         ground,
-                        family,
+                        family: family.name,
                         ms: *ms,
                         world,
                     }
@@ -141,22 +117,17 @@ type Group = grid::Group<Case, Measured>;
 /// Keeps `tupdate.csv`, `tupdate-adaptive.csv` and `tupdate.svg`.
 fn run(runner: &Runner, request: &Request) -> Result<Findings, ExperimentError> {
     let extent = request.extent;
-    let groups = runner.grid("tupdate", extent.seeds, cases(), |case, seed| {
-        runner.trial(&Trial::new(
-            case.world.clone().seeded(seed),
-            extent.duration,
-        ))
+    let groups = runner.trials("tupdate", extent.seeds, cases(), |case| {
+        Trial::new(case.world.clone(), extent.duration)
     })?;
     let all = Table::of("Rate and PMSE over T_update", &groups, &columns());
-    let fronts: Vec<Fronts> = places().map(|place| Fronts::of(&groups, place)).collect();
+    let fronts: Vec<Fronts> = pairs().map(|pair| Fronts::of(&groups, pair)).collect();
     let title = "The best fixed T_update (least rate within 5 % of the least PMSE), and the adaptive rule at equal rate";
     let verdict = Table::of(title, &fronts, &verdict_columns());
     runner.keep_table("tupdate.csv", &all)?;
     runner.keep_table("tupdate-adaptive.csv", &verdict)?;
     runner.keep_figure("tupdate.svg", &figure(&fronts))?;
     Ok(Findings {
-        experiment: TUPDATE.name,
-        extent,
         digest: digest(&groups),
         configuration: vec![paper_world(Mode::Recommended, Curve::Useful(150).at(DELTA))],
         tables: vec![verdict],
@@ -168,7 +139,7 @@ fn columns<'a>() -> Vec<Column<'a, Group>> {
     let mut columns: Vec<Column<Group>> = vec![
         column("trajectory", "", 0, |group| group.case.trajectory),
         column("ground", "", 0, |group| group.case.ground),
-        column("scheme", "", 0, |group| group.case.family.name()),
+        column("scheme", "", 0, |group| group.case.family),
         column("time_ms", "ms", 0, |group| group.case.ms),
         mean("packet_rate_hz", "Hz", 2, |run| run.updates.rate_hz()),
     ];
@@ -179,7 +150,7 @@ fn columns<'a>() -> Vec<Column<'a, Group>> {
 }
 
 /// Trajectory and ground of every panel.
-fn places() -> impl Iterator<Item = (&'static str, &'static str)> {
+fn pairs() -> impl Iterator<Item = (&'static str, &'static str)> {
     TRAJECTORIES
         .into_iter()
         .flat_map(|(trajectory, _)| GROUNDS.map(|(ground, _)| (trajectory, ground)))
@@ -193,7 +164,7 @@ struct CurvePoint {
     pmse: Interval,
 }
 
-/// What each family of schemes reached at one place.
+/// What each family of schemes reached with a trajectory on a ground.
 struct Fronts {
     trajectory: &'static str,
     ground: &'static str,
@@ -204,25 +175,25 @@ struct Fronts {
 
 impl Fronts {
     fn of(groups: &[Group], (trajectory, ground): (&'static str, &'static str)) -> Self {
-        let points = |family: Family| {
-            let there = groups.iter().filter(move |Group { case, .. }| {
-                (case.trajectory, case.ground, case.family) == (trajectory, ground, family)
+        let [hybrid, useful, adaptive] = FAMILIES.each_ref().map(|family| {
+            let there = groups.iter().filter(|Group { case, .. }| {
+                (case.trajectory, case.ground, case.family) == (trajectory, ground, family.name)
             });
-            let point = |group: &Group| {
+            let points = there.map(|group| {
                 Some(CurvePoint {
                     ms: group.case.ms,
                     rate_hz: group.mean(|run| run.updates.rate_hz())?,
                     pmse: group.interval(|run| run.force.pmse)?,
                 })
-            };
-            there.filter_map(point).collect()
-        };
+            });
+            points.flatten().collect()
+        });
         Self {
             trajectory,
             ground,
-            hybrid: points(Family::Hybrid),
-            useful: points(Family::Useful),
-            adaptive: points(Family::Adaptive),
+            hybrid,
+            useful,
+            adaptive,
         }
     }
 
@@ -269,29 +240,21 @@ fn verdict_columns<'a>() -> [Column<'a, Fronts>; 10] {
 
 fn figure(fronts: &[Fronts]) -> Figure {
     let panels = fronts.iter().map(|at| {
-        let line = |family: Family, points: &[CurvePoint], colour, mark, stroke| {
-            let noted = |ms| family == Family::Hybrid && [10, 150, 2000].contains(&ms);
+        let line = |name, points: &[CurvePoint], colour| {
+            let noted = |ms| name == "hybrid" && [10, 150, 2000].contains(&ms);
             let dot = |point: &CurvePoint| Dot {
                 y_interval: Some((point.pmse.low, point.pmse.high)),
                 note: noted(point.ms).then(|| format!("{} ms", point.ms)),
                 ..Dot::at(point.rate_hz, point.pmse.mean)
             };
-            let dots = points.iter().map(dot).collect();
-            let line = Series::line(family.name(), colour, dots);
-            line.marked(mark).stroked(stroke, 2)
+            Series::line(name, colour, points.iter().map(dot).collect())
         };
-        let (square, triangle, circle) = (Mark::Square, Mark::Triangle, Mark::Circle);
-        let (solid, dashed) = (Stroke::Solid, Stroke::Dashed);
         let series = [
-            line(Family::Hybrid, &at.hybrid, Colour::Vermilion, square, solid),
-            line(Family::Useful, &at.useful, Colour::Green, triangle, solid),
-            line(
-                Family::Adaptive,
-                &at.adaptive,
-                Colour::Black,
-                circle,
-                dashed,
-            ),
+            line("hybrid", &at.hybrid, Colour::VERMILION).marked(Mark::Square),
+            line("useful", &at.useful, Colour::GREEN).marked(Mark::Triangle),
+            line("adaptive", &at.adaptive, Colour::BLACK)
+                .marked(Mark::Circle)
+                .stroked(Stroke::Dashed, 2),
         ];
         let title = format!("{} pushes, {} ground", at.trajectory, at.ground);
         let (x, y) = (Axis::log("packet rate, 1/s"), Axis::log("PMSE"));

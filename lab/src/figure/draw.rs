@@ -9,8 +9,7 @@ use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
-use super::symbol::Symbol;
-use super::{Axis, Dot, DrawError, Figure, Legend, Panel, Scale, Series, Stroke, ticks};
+use super::{Axis, Dot, DrawError, Figure, Mark, Panel, Scale, Series, Stroke, ticks};
 
 /// Family of every text.
 const FAMILY: &str = "sans-serif";
@@ -19,6 +18,9 @@ const TITLE: u32 = 17;
 /// Size of an axis' label, of the legend and of the numbers at the marks, pixels.
 const LABEL: u32 = 15;
 const NUMBER: u32 = 13;
+/// Half of the size of a point's mark, pixels, and a square of about that size.
+const HALF: i32 = 4;
+const SQUARE: [(i32, i32); 2] = [(-3, -3), (3, 3)];
 /// Most marks of a linear axis.
 const MARKS: usize = 9;
 
@@ -169,7 +171,7 @@ fn draw_series<X: Numbers, Y: Numbers>(
     let (scale_x, scale_y) = (panel.x.scale, panel.y.scale);
     let on_x = |dot: &Dot| scale_x.shows(dot.x) && within(&x, dot.x);
     let shown = |dot: &Dot| on_x(dot) && scale_y.shows(dot.y) && within(&y, dot.y);
-    let colour = series.colour.rgb();
+    let colour = series.colour.0;
     if series.stroke == Stroke::Events {
         let lines = series.dots.iter().filter(|dot| on_x(dot)).map(|dot| {
             let top = dot.y.clamp(y.start, y.end);
@@ -194,11 +196,29 @@ fn draw_series<X: Numbers, Y: Numbers>(
             let bar = ErrorBar::new_vertical(dot.x, low, dot.y, high, bar, 4);
             chart.draw_series([bar]).map_err(failed)?;
         }
-        let mark = Symbol::mark((dot.x, dot.y), series.mark, colour);
-        chart.draw_series([mark]).map_err(failed)?;
         draw_note(chart, dot, colour)?;
     }
-    Ok(())
+    let places = series.dots.iter().filter(|dot| shown(dot));
+    draw_marks(chart, series, places.map(|dot| (dot.x, dot.y)))
+}
+
+fn draw_marks<X: Numbers, Y: Numbers>(
+    chart: &mut Chart<X, Y>,
+    series: &Series,
+    places: impl Iterator<Item = (f64, f64)>,
+) -> Result<(), DrawError> {
+    let (filled, crossed) = (series.colour.0.filled(), series.colour.0.stroke_width(2));
+    let drawn = match series.mark {
+        None => return Ok(()),
+        Some(Mark::Circle) => chart.draw_series(places.map(|at| Circle::new(at, HALF, filled))),
+        Some(Mark::Square) => chart
+            .draw_series(places.map(|at| EmptyElement::at(at) + Rectangle::new(SQUARE, filled))),
+        Some(Mark::Triangle) => {
+            chart.draw_series(places.map(|at| TriangleMarker::new(at, HALF + 1, filled)))
+        }
+        Some(Mark::Cross) => chart.draw_series(places.map(|at| Cross::new(at, HALF, crossed))),
+    };
+    drawn.map(drop).map_err(failed)
 }
 
 fn draw_line<X: Numbers, Y: Numbers>(
@@ -206,14 +226,14 @@ fn draw_line<X: Numbers, Y: Numbers>(
     series: &Series,
     run: &[Dot],
 ) -> Result<(), DrawError> {
-    let style = series.colour.rgb().stroke_width(series.width);
+    let style = series.colour.0.stroke_width(series.width);
     let places = run.iter().map(|dot| (dot.x, dot.y));
     let drawn = match series.stroke {
         Stroke::Solid => chart.draw_series(LineSeries::new(places, style)).map(drop),
         Stroke::Dashed => chart
             .draw_series(DashedLineSeries::new(places, 7, 4, style))
             .map(drop),
-        Stroke::None | Stroke::Events => Ok(()),
+        Stroke::Events => Ok(()),
     };
     drawn.map_err(failed)
 }
@@ -243,28 +263,37 @@ fn draw_legend<'a, 'b: 'a, X: Numbers + 'a, Y: Numbers + 'a>(
     chart: &mut Chart<'a, 'b, X, Y>,
     panel: &Panel,
 ) -> Result<(), DrawError> {
-    let position = match panel.legend {
-        Legend::None => return Ok(()),
-        Legend::UpperRight => SeriesLabelPosition::UpperRight,
-        Legend::UpperLeft => SeriesLabelPosition::UpperLeft,
-        Legend::LowerLeft => SeriesLabelPosition::LowerLeft,
-        Legend::LowerRight => SeriesLabelPosition::LowerRight,
+    let Some(position) = panel.legend.clone() else {
+        return Ok(());
     };
     let labelled = panel.series.iter();
     for series in labelled.filter(|series| !series.label.is_empty()) {
-        let (colour, mark) = (series.colour.rgb(), series.mark);
-        let line = Some((series.stroke, series.width));
+        let (colour, stroke) = (series.colour.0, series.stroke);
+        let line = colour.stroke_width(series.width);
+        let (filled, crossed) = (colour.filled(), colour.stroke_width(2));
         let nobody: [Circle<(f64, f64), i32>; 0] = [];
-        chart
-            .draw_series(nobody)
-            .map_err(failed)?
-            .label(roomy(&series.label))
-            .legend(move |(x, y)| Symbol {
-                at: (x + 13, y),
-                mark,
-                colour,
-                line,
-            });
+        let item = chart.draw_series(nobody).map_err(failed)?;
+        let item = item.label(roomy(&series.label));
+        let sample = move |(x, y)| {
+            let [first, second] = halves(stroke).map(|half| PathElement::new(half, line));
+            EmptyElement::at((x + REACH, y)) + first + second
+        };
+        let centre = (0, 0);
+        match series.mark {
+            None => item.legend(sample),
+            Some(Mark::Circle) => {
+                item.legend(move |at| sample(at) + Circle::new(centre, HALF, filled))
+            }
+            Some(Mark::Square) => {
+                item.legend(move |at| sample(at) + Rectangle::new(SQUARE, filled))
+            }
+            Some(Mark::Triangle) => {
+                item.legend(move |at| sample(at) + TriangleMarker::new(centre, HALF + 1, filled))
+            }
+            Some(Mark::Cross) => {
+                item.legend(move |at| sample(at) + Cross::new(centre, HALF, crossed))
+            }
+        };
     }
     chart
         .configure_series_labels()
@@ -276,4 +305,16 @@ fn draw_legend<'a, 'b: 'a, X: Numbers + 'a, Y: Numbers + 'a>(
         .border_style(BLACK.mix(0.25))
         .draw()
         .map_err(failed)
+}
+
+/// Half of the length of a line's sample in the legend, pixels.
+const REACH: i32 = 13;
+
+/// Both halves of the sample of a line, around its middle.
+fn halves(stroke: Stroke) -> [[(i32, i32); 2]; 2] {
+    match stroke {
+        Stroke::Solid => [[(-REACH, 0), (0, 0)], [(0, 0), (REACH, 0)]],
+        Stroke::Dashed => [[(-REACH, 0), (8 - REACH, 0)], [(REACH - 8, 0), (REACH, 0)]],
+        Stroke::Events => [[(0, -7), (0, 0)], [(0, 0), (0, 7)]],
+    }
 }

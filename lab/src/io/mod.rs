@@ -7,6 +7,7 @@
 )]
 
 mod cost;
+mod failure;
 mod folder;
 mod runner;
 mod sweep_dir;
@@ -15,6 +16,7 @@ pub mod transport_bench;
 pub mod virtual_time;
 
 pub use cost::estimator_tick_ms;
+pub use failure::Failure;
 pub use folder::Folder;
 pub use runner::{Progress, Runner};
 pub use sweep_dir::{SweepDir, SweepError};

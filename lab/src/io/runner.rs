@@ -75,6 +75,22 @@ impl<'a> Runner<'a> {
         Ok(cases.into_iter().map(group).collect())
     }
 
+    /// Runs a trial of every case with the seeds from 1 to that of the extent, as [`Self::grid`].
+    ///
+    /// # Errors
+    /// When a trial cannot be run. After it no new run begins.
+    pub fn trials<C: Sync>(
+        &self,
+        what: &str,
+        seeds: u64,
+        cases: Vec<C>,
+        trial: impl Fn(&C) -> Trial + Sync + Send,
+    ) -> Result<Vec<Group<C, Measured>>, ExperimentError> {
+        self.grid(what, seeds, cases, |case, seed| {
+            self.trial(&trial(case).seeded(seed))
+        })
+    }
+
     /// Runs a trial, or takes what an equal one came to before. The result of a traced one is too large to be
     /// remembered.
     ///

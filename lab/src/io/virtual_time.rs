@@ -9,12 +9,10 @@
 //! and its packets would leave at other times than those of the program that runs on robots.
 
 mod ends;
-mod error;
 mod executor;
 mod path;
 mod run;
 
-pub use error::VirtualTimeError;
 pub use run::run;
 
 #[cfg(test)]

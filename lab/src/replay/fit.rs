@@ -13,7 +13,7 @@ use crate::statistics::median;
 /// k: force errors well below it count by their square, well above by their size, N.
 const ROBUST_N: f64 = 0.3;
 /// Standard deviations of the prior: ln c, ln e/c, and the centre's x and y in m. Wide for c, which one
-/// push tells; the centre is known to be near the centroid.
+/// push shows; the centre is known to be near the centroid.
 const PRIOR_SD: [f64; 4] = [2.0, 0.7, 0.010, 0.010];
 /// Steps of the finite differences.
 const STEP: [f64; 4] = [1e-5, 1e-5, 1e-7, 1e-7];
@@ -217,7 +217,7 @@ mod tests {
     }
 
     #[test]
-    fn no_push_leaves_the_start_and_one_push_already_tells_c() {
+    fn without_a_push_the_start_stays_and_one_push_already_shows_c() {
         for law in Law::ALL {
             assert!(distance(&fit(law, &START, &START, &[]), &START) < 1e-12);
             let found = fit(law, &START, &START, &pushes(law, 1, 0.0));

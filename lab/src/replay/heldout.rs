@@ -4,7 +4,7 @@ use mmt_shared::model::geometry::Vec2;
 use mmt_shared::rng::Substream;
 use serde::Serialize;
 
-use super::ReplayConfig;
+use super::config::ReplayConfig;
 use super::fit::{Observation, fit};
 use super::surface::Law;
 use crate::statistics::{mean, median};

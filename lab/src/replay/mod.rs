@@ -4,12 +4,14 @@
 //! Pure: time is in the recording, the seed in the configuration. A push's own force must never take part
 //! in its own prediction. What each number means is in `docs/replay.md`.
 
+mod config;
 mod fit;
 mod heldout;
 mod report;
 mod surface;
 mod trigger;
 
+pub use config::ReplayConfig;
 pub use heldout::HeldOut;
 pub use report::{LawOnPush, LawReport, PushReport, Rates, ReplayReport, Spread};
 pub use surface::{Law, Motion, Surface};
@@ -17,57 +19,11 @@ pub use trigger::Packets;
 
 use mmt_shared::model::geometry::{Vec2, rotate};
 use mmt_shared::recording::{Push, Recording};
-use serde::Serialize;
 
 use crate::statistics::quantile;
 use fit::{Observation, fit};
 use heldout::Split;
 use trigger::{Contact, Traffic};
-
-/// How a recording is replayed. The command line checks the ranges; whatever they are, nothing panics.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct ReplayConfig {
-    /// Delta of (12). Default 0.10: the paper's knee.
-    pub deadband: f64,
-    /// T_update of the hybrid scheme, s; none is the pure deadband scheme. Default 0.150, the paper's.
-    pub t_update_s: Option<f64>,
-    /// Least denominator of (12), N. Default 0.3, as in recommended mode.
-    pub force_floor_n: f64,
-    /// Contact begins at this force, N. Default 0.5: ten times the sensor's noise.
-    pub contact_on_n: f64,
-    /// Contact ends below this force, N. Default 0.3.
-    pub contact_off_n: f64,
-    /// Friction believed before the first push, and the centre of the fit's weak prior. Default: 1 N, the
-    /// wrong value that every model of this project starts from, an arm of 50 mm (the block under uniform
-    /// pressure has 45 mm, under pressure towards its rim more), centred.
-    pub start: Surface,
-    /// Share of the pushes that the held-out prediction is fitted on. Default 0.75.
-    pub fitted_share: f64,
-    /// Repeats of the held-out prediction, each with its own split. Default 5.
-    pub repeats: u32,
-    /// Seed of the splits. Default 1.
-    pub seed: u64,
-}
-
-impl Default for ReplayConfig {
-    fn default() -> Self {
-        Self {
-            deadband: 0.10,
-            t_update_s: Some(0.150),
-            force_floor_n: 0.3,
-            contact_on_n: 0.5,
-            contact_off_n: 0.3,
-            start: Surface {
-                friction_n: 1.0,
-                arm_m: 0.050,
-                centre_m: Vec2::new(0.0, 0.0),
-            },
-            fitted_share: 0.75,
-            repeats: 5,
-            seed: 1,
-        }
-    }
-}
 
 /// Replays a recording under every law: friction fitted to the pushes so far, the next push's force
 /// predicted from its motion before its own force is used, the trigger run on measured against predicted
@@ -106,8 +62,6 @@ pub fn replay(
     ReplayReport {
         duration_s,
         contact_s,
-        mass_kg: None,
-        damping_ns_per_m: None,
         laws: learners
             .iter()
             .map(|learner| learner.report(&pushes, duration_s, contact_s))
@@ -191,7 +145,7 @@ fn contact_time_s(config: &ReplayConfig, push: &Push) -> f64 {
     sum_s
 }
 
-/// One law's friction as the slave knows it and as the master was last told.
+/// One law's friction as the slave knows it and as the master last received it.
 struct Learner {
     law: Law,
     config: ReplayConfig,

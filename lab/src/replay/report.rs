@@ -1,4 +1,4 @@
-//! What a replay found: one document for machines, two tables for people. A number without meaning is
+//! What a replay found: one document for machines, three tables for people. A number without meaning is
 //! none (null), never a guess.
 
 use std::fmt;
@@ -6,11 +6,12 @@ use std::fmt;
 use mmt_shared::model::geometry::Vec2;
 use serde::Serialize;
 
-use super::ReplayConfig;
+use super::config::ReplayConfig;
 use super::heldout::HeldOut;
 use super::surface::{Law, Surface};
 use super::trigger::Packets;
 use crate::statistics::{mean, median, quantile};
+use crate::table::{Column, Table, column};
 
 /// Median and mean of an error over pushes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
@@ -135,17 +136,14 @@ impl LawReport {
     }
 }
 
-/// The whole replay.
+/// The whole replay. Mass and damping are no part of it: at 3 mm/s the force of inertia is below the sensor's noise, and
+/// at one speed damping looks like friction.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ReplayReport {
     /// Length of all force records, s.
     pub duration_s: f64,
     /// Of it in contact, s.
     pub contact_s: f64,
-    /// Always none: at 3 mm/s the force of inertia is below the sensor's noise.
-    pub mass_kg: Option<f64>,
-    /// Always none: at one speed, damping cannot be told from friction.
-    pub damping_ns_per_m: Option<f64>,
     /// Each law over all pushes.
     pub laws: Vec<LawReport>,
     /// Held-out prediction of each law.
@@ -153,6 +151,7 @@ pub struct ReplayReport {
     /// Each push.
     pub pushes: Vec<PushReport>,
     /// How the replay was run.
+    #[serde(skip)]
     pub configuration: ReplayConfig,
 }
 
@@ -170,146 +169,89 @@ impl ReplayReport {
     }
 }
 
-/// A share in per cent, or a dash.
-struct Percent(Option<f64>);
-
-impl fmt::Display for Percent {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let text = self
-            .0
-            .map_or_else(|| "-".to_owned(), |share| format!("{:.1} %", 100.0 * share));
-        f.pad(&text)
-    }
-}
-
-/// A number with so many decimals, or a dash.
-struct Fixed(Option<f64>, usize);
-
-impl fmt::Display for Fixed {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let text = self
-            .0
-            .map_or_else(|| "-".to_owned(), |value| format!("{value:.*}", self.1));
-        f.pad(&text)
-    }
-}
-
 /// The most repeats of which every one is shown.
 const SHOWN_MAX: usize = 10;
 
 /// The errors of single repeats: each, or the 5th to the 95th percentile of many.
-struct Repeats<'a>(&'a [f64]);
-
-impl fmt::Display for Repeats<'_> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        if self.0.len() > SHOWN_MAX {
-            let mut sorted = self.0.to_vec();
-            sorted.sort_by(f64::total_cmp);
-            let [low, high] = [0.05, 0.95].map(|share| Percent(quantile(&sorted, share)));
-            return write!(f, "5th to 95th percentile: {low} to {high}");
-        }
-        for (repeat, error) in self.0.iter().enumerate() {
-            let comma = if repeat == 0 { "" } else { ", " };
-            write!(f, "{comma}{}", Percent(Some(*error)))?;
-        }
-        Ok(())
+fn of_repeats(errors: &[f64]) -> String {
+    let percent = |share: f64| format!("{:.1} %", 100.0 * share);
+    if errors.len() <= SHOWN_MAX {
+        let each = errors.iter().map(|error| percent(*error));
+        return each.collect::<Vec<_>>().join(", ");
     }
+    let mut sorted = errors.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let [low, high] =
+        [0.05, 0.95].map(|share| quantile(&sorted, share).map_or(String::new(), percent));
+    format!("5th to 95th percentile: {low} to {high}")
+}
+
+fn percent(share: Option<f64>) -> Option<f64> {
+    share.map(|share| 100.0 * share)
 }
 
 impl fmt::Display for ReplayReport {
+    /// A table of the pushes, one of the laws, one of the held-out prediction.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        self.write_pushes(f)?;
-        writeln!(f)?;
-        self.write_totals(f)?;
-        writeln!(f)?;
-        self.write_held_out(f)
+        writeln!(f, "{}", self.of_pushes())?;
+        writeln!(f, "{}", self.of_laws())?;
+        write!(f, "{}", self.of_held_out())
     }
 }
 
+#[rustfmt::skip]
 impl ReplayReport {
-    fn write_pushes(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        writeln!(
-            f,
-            "Each push, predicted from its motion and the pushes before it: |F| error, packets/s"
-        )?;
-        write!(f, "{:>4} {:>7} {:>7} {:>6}", "push", "mm", "deg", "N")?;
-        for law in &self.laws {
-            write!(f, "  {:>20}", law.law.name())?;
+    fn of_pushes(&self) -> Table {
+        let mut columns: Vec<Column<PushReport>> = vec![
+            column("push", "", 0, |push| push.index as u64),
+            column("mm", "mm", 2, |push| 1e3 * push.distance_m),
+            column("deg", "deg", 2, |push| push.turn_rad.to_degrees()),
+            column("N", "N", 2, |push| push.measured_n.map(|force| force.norm())),
+        ];
+        for law in Law::ALL {
+            let of = move |push: &PushReport| push.laws.iter().find(|report| report.law == law).copied();
+            let error = move |push: &PushReport| percent(of(push).and_then(|law| law.relative_error)).into();
+            let rate = move |push: &PushReport| of(push).and_then(|law| law.updates.rate_hz).into();
+            columns.push(Column::new(law.name(), "%", 1, error));
+            columns.push(Column::new("packets/s", "Hz", 1, rate));
         }
-        writeln!(f)?;
-        for push in &self.pushes {
-            write!(
-                f,
-                "{:>4} {:>7.2} {:>7.2} {:>6}",
-                push.index,
-                1e3 * push.distance_m,
-                push.turn_rad.to_degrees(),
-                Fixed(push.measured_n.map(|force| force.norm()), 2),
-            )?;
-            for law in &push.laws {
-                let rate = Fixed(law.updates.rate_hz, 1);
-                write!(f, "  {:>10} {rate:>9}", Percent(law.relative_error))?;
-            }
-            writeln!(f)?;
-        }
-        Ok(())
+        let title = "Each push, predicted from its motion and the pushes before it: |F| error in % by law, packets/s";
+        Table::of(title, &self.pushes, &columns)
     }
 
-    fn write_totals(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        writeln!(
-            f,
-            "All {} pushes, {:.0} s, {:.0} s in contact; mass and damping: absent (quasi-static)",
-            self.pushes.len(),
-            self.duration_s,
-            self.contact_s
-        )?;
-        writeln!(
-            f,
-            "{:<20} {:>8} {:>8} {:>12} {:>9} {:>10} {:>10} {:>10} {:>6}",
-            "",
-            "c N",
-            "e N m",
-            "|F| median",
-            "|F| mean",
-            "F median",
-            "packets/s",
-            "in contact",
-            "news"
-        )?;
-        for law in &self.laws {
-            writeln!(
-                f,
-                "{:<20} {:>8.3} {:>8} {:>12} {:>9} {:>10} {:>10} {:>10} {:>6}",
-                law.law.name(),
-                law.friction_n,
-                Fixed(law.friction_torque_nm, 3),
-                Percent(law.force_error.median),
-                Percent(law.force_error.mean),
-                Percent(law.vector_error.median),
-                Fixed(law.updates.rate_hz, 1),
-                Fixed(law.updates.contact_rate_hz, 1),
-                law.updates.packets.with_news,
-            )?;
-        }
-        Ok(())
+    fn of_laws(&self) -> Table {
+        let (pushes, all, contact) = (self.pushes.len(), self.duration_s, self.contact_s);
+        let title = format!(
+            "All {pushes} pushes, {all:.0} s, {contact:.0} s in contact; errors in %; mass and damping: absent (quasi-static)"
+        );
+        Table::of(
+            title,
+            &self.laws,
+            &[
+                column("law", "", 0, |law| law.law.name()),
+                column("c N", "N", 3, |law| law.friction_n),
+                column("e N m", "N m", 3, |law| law.friction_torque_nm),
+                column("|F| median", "%", 1, |law| percent(law.force_error.median)),
+                column("|F| mean", "%", 1, |law| percent(law.force_error.mean)),
+                column("F median", "%", 1, |law| percent(law.vector_error.median)),
+                column("packets/s", "Hz", 1, |law| law.updates.rate_hz),
+                column("in contact", "Hz", 1, |law| law.updates.contact_rate_hz),
+                column("with news", "", 0, |law| law.updates.packets.with_news),
+            ],
+        )
     }
 
-    fn write_held_out(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        writeln!(
-            f,
-            "Held-out pushes, {:.0} % fitted, {} repeats, seed {}: median |F| error",
-            100.0 * self.configuration.fitted_share,
-            self.configuration.repeats,
-            self.configuration.seed
-        )?;
-        for law in &self.held_out {
-            let (name, error) = (law.law.name(), Percent(law.median_error));
-            writeln!(
-                f,
-                "{name:<20} {error:>8}  ({})",
-                Repeats(&law.median_errors)
-            )?;
-        }
-        Ok(())
+    fn of_held_out(&self) -> Table {
+        let ReplayConfig { fitted_share, repeats, seed, .. } = self.configuration;
+        let fitted = 100.0 * fitted_share;
+        Table::of(
+            format!("Held-out pushes, {fitted:.0} % fitted, {repeats} repeats, seed {seed}: median |F| error in %"),
+            &self.held_out,
+            &[
+                column("law", "", 0, |held_out| held_out.law.name()),
+                column("mean", "%", 1, |held_out| percent(held_out.median_error)),
+                column("of each repeat", "", 0, |held_out| of_repeats(&held_out.median_errors)),
+            ],
+        )
     }
 }

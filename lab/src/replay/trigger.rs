@@ -8,7 +8,7 @@ use mmt_shared::model::geometry::Vec2;
 use mmt_shared::recording::ForceSample;
 use serde::Serialize;
 
-use super::ReplayConfig;
+use super::config::ReplayConfig;
 
 /// Packets of one push or of many.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
@@ -17,7 +17,7 @@ pub struct Packets {
     pub deadband: u64,
     /// Sent because T_update had passed.
     pub timer: u64,
-    /// Of all these, packets that told the master's model something new.
+    /// Of all these, packets that changed the force of the master's model.
     pub with_news: u64,
 }
 
@@ -45,7 +45,7 @@ pub(super) struct Traffic {
     pub(super) error_sum: f64,
 }
 
-/// Contact as the force sensor tells it, with two thresholds so that noise does not toggle it.
+/// Contact as the force sensor shows it, with two thresholds so that noise does not toggle it.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Contact {
     touching: bool,

@@ -1,4 +1,4 @@
-//! Reads a plan's text into configurations, and says of each wrong key or value where it stands.
+//! Reads a plan's text into configurations, and reports of each wrong key or value where it stands.
 //!
 //! Whatever a run could refuse must be refused here, before anything runs.
 
@@ -23,7 +23,7 @@ const DURATION_S: (f64, f64) = (0.001, 604_800.0);
 const SEED_KEYS: [&str; 3] = ["seed", "slave.seed", "operator.seed"];
 
 impl Plan {
-    /// The plan of a text in TOML (`docs/sweep.md` tells its keys).
+    /// The plan of a text in TOML (`docs/sweep.md` has its keys).
     ///
     /// # Errors
     /// What is wrong with which key or value, with its line: nothing of the plan has run by then.
@@ -242,7 +242,7 @@ impl<'i> Reader<'i> {
         }
         let start = beginning(self.start, &given);
         lay(&start, given, self.text.len())
-            .map_err(|error| PlanError::of(self.text, &error).context(&self.told(steps)))
+            .map_err(|error| PlanError::of(self.text, &error).context(&self.named(steps)))
     }
 
     fn assignments(
@@ -255,12 +255,12 @@ impl<'i> Reader<'i> {
     }
 
     /// Where the grid stands, for people.
-    fn told(&self, steps: &[Option<usize>]) -> String {
-        let told = self.assignments(steps).map(|(key, value)| {
+    fn named(&self, steps: &[Option<usize>]) -> String {
+        let named = self.assignments(steps).map(|(key, value)| {
             let value = self.text.get(value.span()).unwrap_or_default();
             format!("{} = {value}", key.get_ref())
         });
-        told.collect::<Vec<_>>().join(", ")
+        named.collect::<Vec<_>>().join(", ")
     }
 
     /// An error with the place that is to blame: the base, or the first axis whose value is refused without the
@@ -288,7 +288,7 @@ impl<'i> Reader<'i> {
             let first = spans.next()?;
             Some(first.start..spans.last().map_or(first.end, |last| last.end))
         });
-        PlanError::at(self.text, place, error).context(&self.told(steps))
+        PlanError::at(self.text, place, error).context(&self.named(steps))
     }
 }
 

@@ -9,6 +9,7 @@ use mmt_netem::config::{ConfigError, LinkConfig};
 use mmt_server::end::SlaveEndConfig;
 use mmt_server::slave::{SlaveConfig, SlaveError};
 use mmt_shared::channel::rate_control::StretchMax;
+use mmt_shared::model::contact::Coupling;
 use mmt_shared::model::settings::ModelSettings;
 use mmt_shared::range::OutOfRange;
 use mmt_shared::wire::Architecture;
@@ -74,6 +75,12 @@ impl WorldConfig {
         self.slave.seed = seed;
         self.operator.seed = seed;
         self
+    }
+
+    /// How both run the local model over this coupling.
+    pub(crate) fn model_settings(&self, coupling: Coupling) -> ModelSettings {
+        let of_mode = || self.slave.mode.model_settings(coupling);
+        self.settings.unwrap_or_else(of_mode)
     }
 
     /// The slave; where the tool may be felt, with the play-out of a session.

@@ -2,6 +2,8 @@
 //! configuration.
 
 use super::*;
+use mmt_netem::config::LinkConfig;
+use mmt_shared::model::contact::Coupling;
 use mmt_server::playout::PlayoutConfig;
 use mmt_server::slave::SlaveConfig;
 use mmt_shared::model::settings::Mode;

@@ -1,19 +1,20 @@
 //! The document of a replay: the report of a run, as far as its keys have a meaning here, and every table.
 
-use mmt_lab::replay::{HeldOut, Law, LawReport, PushReport, ReplayConfig, ReplayReport};
+use mmt_lab::replay::{Law, ReplayConfig, ReplayReport};
 use mmt_shared::model::update::Cause;
 use mmt_shared::report::{Counts, Number, RunReport};
 use serde::Serialize;
 
-/// The law that the keys of the run report speak of; all laws are in the section `replay`.
+/// The law of the run report's own keys; all laws are in the section `replay`.
 const LAW: Law = Law::LimitSurface;
 
 /// A file and what its replay found.
-#[derive(Debug)]
+#[derive(Debug, Serialize)]
 pub(super) struct Replayed {
     /// Its path as it was given.
     pub(super) file: String,
     /// What was found.
+    #[serde(flatten)]
     pub(super) report: ReplayReport,
 }
 
@@ -35,31 +36,7 @@ struct Configuration {
 struct Section {
     /// The law of the run report's own keys.
     law: Law,
-    files: Vec<FileSection>,
-}
-
-#[derive(Debug, Serialize)]
-struct FileSection {
-    file: String,
-    duration_s: f64,
-    contact_s: f64,
-    laws: Vec<LawReport>,
-    held_out: Vec<HeldOut>,
-    pushes: Vec<PushReport>,
-}
-
-impl From<Replayed> for FileSection {
-    fn from(replayed: Replayed) -> Self {
-        let report = replayed.report;
-        Self {
-            file: replayed.file,
-            duration_s: report.duration_s,
-            contact_s: report.contact_s,
-            laws: report.laws,
-            held_out: report.held_out,
-            pushes: report.pushes,
-        }
-    }
+    files: Vec<Replayed>,
 }
 
 impl Document {
@@ -86,10 +63,12 @@ impl Document {
             let law = only.report.law(LAW);
             run.model.friction_n.estimate = law.map(|law| law.friction_n).into();
         }
-        let files = replayed.into_iter().map(FileSection::from).collect();
         Self {
             run,
-            replay: Section { law: LAW, files },
+            replay: Section {
+                law: LAW,
+                files: replayed,
+            },
         }
     }
 }

@@ -1,4 +1,4 @@
-//! What `mmt sweep` says on stdout: what a plan asks for, and how much of it is there. It never decides what runs.
+//! What `mmt sweep` prints on stdout: what a plan asks for, and how much of it is there. It never decides what runs.
 
 use std::fmt;
 use std::path::Path;
@@ -140,7 +140,7 @@ impl Summary {
         }
     }
 
-    /// Says which rows are missing that should be there; none if all are.
+    /// Which rows are missing that should be there; none if all are there.
     pub(super) fn missing_here(&self) -> Option<String> {
         let (count, named) = (self.shard_missing, self.first_missing.len() as u64);
         if count == 0 {

@@ -6,8 +6,8 @@
 //! one another, so the interval comes from leaving out one seed at a time (jackknife).
 
 use crate::experiment::grid::Group;
-use crate::setting::{Curve, DEADBANDS, Point};
-use crate::statistics::{Interval, log_ratio};
+use crate::setting::{Curve, DEADBANDS, Point, knee};
+use crate::statistics::{Interval, log_ratio, mean};
 use crate::trial::Measured;
 
 /// A curve: (ln rate, ln PMSE), by rising rate.
@@ -21,23 +21,60 @@ pub(super) struct Runs<'a> {
 
 impl Runs<'_> {
     /// The run of a scheme at a deadband with a seed.
-    pub(super) fn run(&self, curve: Curve, deadband: f64, seed: u64) -> Option<&Measured> {
+    fn run(&self, curve: Curve, deadband: f64, seed: u64) -> Option<&Measured> {
         let wanted = |point: &Point| point.curve == curve && point.deadband == deadband;
         let group = self.groups.iter().find(|group| wanted(&group.case))?;
         group.runs.get(usize::try_from(seed.checked_sub(1)?).ok()?)
     }
 
     /// A number of each seed's runs, where all of them have one.
-    pub(super) fn per_seed(&self, of: impl Fn(u64) -> Option<f64>) -> Vec<f64> {
+    fn per_seed(&self, of: impl Fn(u64) -> Option<f64>) -> Vec<f64> {
         (1..=self.seeds).filter_map(of).collect()
     }
 
-    pub(super) fn pmse(&self, curve: Curve, deadband: f64, seed: u64) -> Option<f64> {
+    fn pmse(&self, curve: Curve, deadband: f64, seed: u64) -> Option<f64> {
         self.run(curve, deadband, seed)?.force.pmse
     }
 
     pub(super) fn rates(&self, curve: Curve, deadband: f64) -> Vec<f64> {
         self.per_seed(|seed| self.run(curve, deadband, seed)?.updates.rate_hz())
+    }
+
+    /// The least rate of any run; a bound is a bound on each, so it has no interval.
+    pub(super) fn least_rate(&self, curve: Curve) -> Option<Interval> {
+        let rates = DEADBANDS.iter();
+        let rates = rates.flat_map(|deadband| self.rates(curve, *deadband));
+        Interval::of([rates.reduce(f64::min)?])
+    }
+
+    /// How much steeper PMSE falls from 30 to 10 % than from 10 to 2.5 %.
+    pub(super) fn knee(&self, curve: Curve) -> Option<Interval> {
+        let knees = self.per_seed(|seed| {
+            let pmse = |deadband| self.pmse(curve, deadband, seed);
+            Some(knee(pmse(0.025)?, pmse(0.10)?, pmse(0.30)?))
+        });
+        Interval::of(knees)
+    }
+
+    /// Geometric mean of PMSE of one scheme over that of another at equal deadbands.
+    pub(super) fn ratio_at_equal_deadband(&self, better: Curve, worse: Curve) -> Option<Interval> {
+        let ratios = self.per_seed(|seed| {
+            let pmse = |curve, deadband: &f64| self.pmse(curve, *deadband, seed);
+            let log = |deadband| Some(libm::log(pmse(better, deadband)? / pmse(worse, deadband)?));
+            let logs: Option<Vec<f64>> = DEADBANDS.iter().map(log).collect();
+            mean(logs?).map(libm::exp)
+        });
+        Interval::of_ratios(ratios)
+    }
+
+    /// Packets per second of contact at 15 %: of the first second over those of the rest.
+    pub(super) fn opening(&self, curve: Curve) -> Option<Interval> {
+        let ratios = self.per_seed(|seed| {
+            let run = self.run(curve, 0.15, seed)?;
+            let later = run.later_rate_hz.filter(|rate| *rate > 0.0)?;
+            Some(run.opening_rate_hz.filter(|rate| *rate > 0.0)? / later)
+        });
+        Interval::of_ratios(ratios)
     }
 
     /// Geometric mean of PMSE of one scheme over that of another at equal rates; none if no rate is reached by both.
@@ -72,8 +109,8 @@ impl Runs<'_> {
         let point = |deadband: &f64| {
             let run = |seed: &u64| self.run(curve, *deadband, *seed);
             let runs = || seeds.iter().filter_map(run);
-            let rate = Interval::of(runs().filter_map(|run| run.updates.rate_hz()))?.mean;
-            let pmse = Interval::of(runs().filter_map(|run| run.force.pmse))?.mean;
+            let rate = mean(runs().filter_map(|run| run.updates.rate_hz()))?;
+            let pmse = mean(runs().filter_map(|run| run.force.pmse))?;
             Some((libm::log(rate), libm::log(pmse)))
         };
         let mut points: LogCurve = DEADBANDS.iter().filter_map(point).collect();

@@ -1,5 +1,7 @@
 //! Whether a claim holds here, from the interval of what it speaks of.
 
+use std::fmt;
+
 use crate::statistics::Interval;
 
 /// Where a claim expects a quantity.
@@ -8,6 +10,20 @@ pub(super) enum Bound {
     Above(f64),
     Below(f64),
     Within(f64, f64),
+    /// A rate of whole periods: a run of some of them and a rest has one packet less than its length over the period,
+    /// which half of a per cent allows for.
+    AtLeast(f64),
+}
+
+impl fmt::Display for Bound {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Above(bound) => write!(f, "> {bound}"),
+            Self::Below(bound) => write!(f, "< {bound}"),
+            Self::Within(least, most) => write!(f, "{least} to {most}"),
+            Self::AtLeast(bound) => write!(f, ">= {bound:.1}"),
+        }
+    }
 }
 
 /// Whether a claim holds here.
@@ -40,6 +56,7 @@ impl Bound {
         };
         let (agrees, contradicts) = match self {
             Self::Above(bound) => (low > bound, high < bound),
+            Self::AtLeast(bound) => (low > bound * 0.995, high < bound * 0.995),
             Self::Below(bound) => (high < bound, low > bound),
             Self::Within(least, most) => (low >= least && high <= most, low > most || high < least),
         };

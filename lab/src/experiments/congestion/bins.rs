@@ -8,11 +8,25 @@ use mmt_server::trigger::Scheme;
 use mmt_shared::time::Time;
 
 use crate::experiment::findings::ExperimentError;
+use crate::experiment::grid;
 use crate::trial::TrialError;
 use crate::world::{World, WorldConfig, WorldTick};
 
+/// When the bottleneck comes and goes, s.
+pub(super) const FROM_S: f64 = 10.0;
+pub(super) const UNTIL_S: f64 = 25.0;
+/// Beginning of the part after congestion: what had queued is gone, and the stretch.
+pub(super) const AFTER_S: f64 = 35.0;
 /// Length of a bin.
 pub(super) const BIN: Duration = Duration::from_millis(250);
+
+/// Who answers, and the world.
+pub(super) struct Variant {
+    pub(super) name: &'static str,
+    pub(super) world: WorldConfig,
+}
+
+pub(super) type Group = grid::Group<Variant, Binned>;
 
 /// What one bin of one run came to.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -125,8 +139,8 @@ impl Bin {
     }
 }
 
-/// One run.
-pub(super) struct Run {
+/// One run, cut into bins.
+pub(super) struct Binned {
     pub(super) bins: Vec<Bin>,
     /// Of the whole world.
     pub(super) digest: String,
@@ -136,7 +150,7 @@ pub(super) struct Run {
 ///
 /// # Errors
 /// When the world is not accepted.
-pub(super) fn run(config: &WorldConfig, duration: Duration) -> Result<Run, ExperimentError> {
+pub(super) fn run(config: &WorldConfig, duration: Duration) -> Result<Binned, ExperimentError> {
     let mut world = World::try_new(config).map_err(TrialError::from)?;
     let (mut bins, mut before) = (Vec::new(), Totals::default());
     for _ in 0..duration.as_millis() / BIN.as_millis() {
@@ -149,7 +163,7 @@ pub(super) fn run(config: &WorldConfig, duration: Duration) -> Result<Run, Exper
         before = bin.close(now, &world, &before);
         bins.push(bin);
     }
-    Ok(Run {
+    Ok(Binned {
         bins,
         digest: world.digest(),
     })

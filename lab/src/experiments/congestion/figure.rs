@@ -1,8 +1,7 @@
 //! The congestion figure: what a run measured and answered, over time.
 
-use super::bins::{Bin, per_second};
-use super::{FROM_S, Group, UNTIL_S};
-use crate::figure::{Axis, Colour, Dot, Figure, Legend, Panel, Series, Stroke};
+use super::bins::{Bin, FROM_S, Group, UNTIL_S, per_second};
+use crate::experiment::prelude::*;
 
 /// Over time, seed 1.
 pub(super) fn figure(groups: &[Group]) -> Figure {
@@ -18,9 +17,9 @@ pub(super) fn figure(groups: &[Group]) -> Figure {
         ("sent up", "kbit/s", |bin| Some(bin.kbit_per_s(bin.bits_up))),
     ];
     let styles = [
-        (Colour::Vermilion, Stroke::Dashed),
-        (Colour::Grey, Stroke::Solid),
-        (Colour::Blue, Stroke::Solid),
+        (Colour::VERMILION, Stroke::Dashed),
+        (Colour::GREY, Stroke::Solid),
+        (Colour::BLUE, Stroke::Solid),
     ];
     let panels = quantities.into_iter().map(|(what, unit, of)| {
         let bins = |group: &Group| -> Vec<Bin> {
@@ -36,7 +35,7 @@ pub(super) fn figure(groups: &[Group]) -> Figure {
         let values = groups.iter().flat_map(bins);
         let most = values.filter_map(|bin| of(&bin)).fold(0.0, f64::max);
         let edges = [FROM_S, UNTIL_S].map(|t_s| Dot::at(t_s, most)).to_vec();
-        let bottleneck = Series::line("", Colour::Black, edges).stroked(Stroke::Events, 1);
+        let bottleneck = Series::line("", Colour::BLACK, edges).stroked(Stroke::Events, 1);
         Panel::new(
             what,
             Axis::linear("time, s"),

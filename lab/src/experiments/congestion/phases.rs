@@ -1,10 +1,8 @@
 //! What the runs came to before, during and after congestion, as means over the seeds.
 
-use super::bins::{BIN, Bin};
-use super::{AFTER_S, FROM_S, Group, UNTIL_S};
-use crate::experiment::grid::{self, mean};
+use super::bins::{AFTER_S, BIN, Bin, FROM_S, Group, UNTIL_S};
+use crate::experiment::prelude::*;
 use crate::statistics::median;
-use crate::table::{Column, Table, column};
 
 /// The name of who answers and the phase, with the bins of each run in that phase.
 type Phase = grid::Group<(&'static str, &'static str), Vec<Bin>>;

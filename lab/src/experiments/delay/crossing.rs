@@ -3,28 +3,20 @@
 //! Short delays in narrow steps for the two; the rest of the sweep is too coarse there. What is written of the
 //! crossing is read off these runs and must never be written down from elsewhere.
 
-use crate::baselines::Baseline;
-use mmt_shared::model::settings::PoseCorrection;
-
-use super::Group;
-use super::grid_point::GridPoint;
+use super::grid_point::{GridPoint, Group, sweep};
 use crate::architecture::{Architecture, DelayRow};
-use crate::experiment::grid::mean;
-use crate::table::{Table, column};
+use crate::experiment::prelude::*;
 
 /// One-way delays, ms.
 const NEAR_MS: [u64; 8] = [0, 2, 5, 7, 10, 14, 20, 50];
 /// Virtual stiffness k_p, N/m.
 const STIFFNESSES: [u64; 2] = [1000, 3000];
 
-const TDPA: Architecture = Architecture::Bilateral(Baseline::Tdpa);
-const REPLAY: Architecture = Architecture::Mediated(PoseCorrection::Replay);
-
 /// The short delays.
 pub(super) fn points() -> Vec<GridPoint> {
     let mut points = Vec::new();
     for k_p in STIFFNESSES {
-        for architecture in [TDPA, REPLAY] {
+        for architecture in [Architecture::TDPA, Architecture::REPLAY] {
             points.extend(NEAR_MS.map(|one_way_ms| GridPoint {
                 k_p,
                 ..GridPoint::plain(architecture, one_way_ms)
@@ -79,17 +71,15 @@ fn crossings(groups: &[Group]) -> Vec<Crossing> {
         }),
     ];
     let at = |k_p: u64, (by, of): Measure| {
-        let curve = |architecture: Architecture| -> Vec<(f64, f64)> {
-            let here = groups
-                .iter()
-                .filter(|group| group.case.architecture == architecture && group.case.k_p == k_p);
-            here.filter_map(|group| Some((group.case.one_way_ms as f64, group.median(of)?)))
-                .collect()
+        let curve = |architecture| -> Vec<(f64, f64)> {
+            let dots = sweep(groups, architecture, k_p)
+                .map(|group| Some((group.case.one_way_ms as f64, group.median(of)?)));
+            dots.flatten().collect()
         };
         Crossing {
             k_p,
             by,
-            crossing_ms: crossing(&curve(TDPA), &curve(REPLAY)),
+            crossing_ms: crossing(&curve(Architecture::TDPA), &curve(Architecture::REPLAY)),
         }
     };
     let all = STIFFNESSES.into_iter();

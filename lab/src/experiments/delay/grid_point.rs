@@ -5,10 +5,10 @@
 use mmt_client::operator::scripted::Picture;
 use mmt_server::repeats::Repeats;
 use mmt_shared::channel::rate_control::StretchMax;
-use mmt_shared::model::settings::PoseCorrection;
 
-use crate::architecture::Architecture;
+use crate::architecture::{Architecture, DelayRow};
 use crate::experiment::findings::ExperimentError;
+use crate::experiment::grid;
 use crate::experiments::loss::{Loss, link};
 use crate::world::WorldConfig;
 
@@ -32,7 +32,7 @@ pub(super) enum Size {
     Unknown,
     /// Nothing, and the operator nudges each new face and rests until the answer must have come.
     Nudged,
-    /// Vision has told it.
+    /// All of it, by vision.
     Known,
 }
 
@@ -46,6 +46,9 @@ impl Size {
         }
     }
 }
+
+/// A point with the rows of its seeds.
+pub(super) type Group = grid::Group<GridPoint, DelayRow>;
 
 /// Where in the grid a run stands.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -65,7 +68,7 @@ impl GridPoint {
             architecture,
             one_way_ms,
             jitter_ms: 0,
-            loss: Loss::None,
+            loss: Loss::NONE,
             k_p: 1000,
             picture: Picture::Model,
             size: Size::Unknown,
@@ -98,11 +101,19 @@ impl GridPoint {
         config.stretch_max = StretchMax::OFF;
         Ok(config)
     }
+}
 
-    /// Whether nothing but delay troubles the network.
-    pub(super) fn is_clean(&self) -> bool {
-        self.jitter_ms == 0 && self.loss == Loss::None
-    }
+/// What an architecture did over the delay at a stiffness, without jitter and loss.
+pub(super) fn sweep(
+    groups: &[Group],
+    architecture: Architecture,
+    k_p: u64,
+) -> impl Iterator<Item = &Group> {
+    groups.iter().filter(move |group| {
+        let point = &group.case;
+        let clean = point.jitter_ms == 0 && point.loss == Loss::NONE;
+        clean && point.architecture == architecture && point.k_p == k_p
+    })
 }
 
 /// The default grid.
@@ -117,12 +128,12 @@ pub(super) fn some_points() -> Vec<GridPoint> {
             }));
         }
         let impairments = [
-            (10, Loss::None),
-            (30, Loss::None),
-            (0, Loss::TwentyPercent),
-            (10, Loss::TwentyPercent),
-            (0, Loss::Bursts30Ms),
-            (0, Loss::Bursts100Ms),
+            (10, Loss::NONE),
+            (30, Loss::NONE),
+            (0, Loss::TWENTY_PERCENT),
+            (10, Loss::TWENTY_PERCENT),
+            (0, Loss::BURSTS_30_MS),
+            (0, Loss::BURSTS_100_MS),
         ];
         for (jitter_ms, loss) in impairments {
             points.extend(IMPAIRED_MS.map(|ms| GridPoint {
@@ -157,12 +168,11 @@ pub(super) fn all_points() -> Vec<GridPoint> {
 
 /// Replay, with the operator looking at the local model or at the delayed picture; and what the object's size does.
 pub(super) fn picture_points() -> Vec<GridPoint> {
-    let replay = Architecture::Mediated(PoseCorrection::Replay);
     let of = |(picture, size)| {
         PICTURE_MS.map(|ms| GridPoint {
             picture,
             size,
-            ..GridPoint::plain(replay, ms)
+            ..GridPoint::plain(Architecture::REPLAY, ms)
         })
     };
     [

@@ -2,40 +2,22 @@
 //!
 //! The rule by which an architecture is no longer usable stands here and nowhere else.
 
-use super::Group;
-use super::grid_point::STIFFNESSES;
+use super::grid_point::{Group, STIFFNESSES, sweep};
 use crate::architecture::Architecture;
-use crate::table::{Table, column};
+use crate::experiment::prelude::*;
 
-/// Why an architecture is no longer usable.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Failing {
-    Breaks,
-    Peak,
-    Mass,
-}
-
-impl Failing {
-    fn words(self) -> &'static str {
-        match self {
-            Self::Breaks => "breaks per push > 2",
-            Self::Peak => "force peak > 2 x that at zero delay",
-            Self::Mass => "apparent mass > 1.5 x",
-        }
-    }
-}
-
-/// By the medians over the seeds; a run that completed no push counts as broken.
-fn failing(group: &Group, peak_at_zero: f64) -> Option<Failing> {
+/// Why an architecture is no longer usable, if it is not: by the medians over the seeds. A run that completed no push
+/// counts as broken.
+fn failing(group: &Group, peak_at_zero: f64) -> Option<&'static str> {
     let breaks = group.median(|row| Some(row.breaks_per_push.unwrap_or(f64::MAX)))?;
     let peak = group.median(|row| row.force_peak_n)?;
     let mass = group.median(|row| row.apparent_mass_ratio);
     if breaks > 2.0 {
-        Some(Failing::Breaks)
+        Some("breaks per push > 2")
     } else if peak > 2.0 * peak_at_zero {
-        Some(Failing::Peak)
+        Some("force peak > 2 x that at zero delay")
     } else if mass.is_some_and(|mass| mass > 1.5) {
-        Some(Failing::Mass)
+        Some("apparent mass > 1.5 x")
     } else {
         None
     }
@@ -46,17 +28,12 @@ struct Limit {
     architecture: Architecture,
     k_p: u64,
     usable_to_ms: Option<u64>,
-    failed: Option<(u64, Failing)>,
+    failed: Option<(u64, &'static str)>,
 }
 
 impl Limit {
     fn of(groups: &[Group], architecture: Architecture, k_p: u64) -> Self {
-        let sweep = || {
-            groups.iter().filter(move |group| {
-                let point = &group.case;
-                point.architecture == architecture && point.k_p == k_p && point.is_clean()
-            })
-        };
+        let sweep = || sweep(groups, architecture, k_p);
         let at_zero = sweep().find(|group| group.case.one_way_ms == 0);
         let peak = at_zero.and_then(|group| group.median(|row| row.force_peak_n));
         let failed = sweep().find_map(|group| {
@@ -64,12 +41,11 @@ impl Limit {
             Some((group.case.one_way_ms, why))
         });
         let delays = sweep().map(|group| group.case.one_way_ms);
+        let usable = delays.take_while(|ms| failed.is_none_or(|(at, _)| *ms < at));
         Self {
             architecture,
             k_p,
-            usable_to_ms: delays
-                .take_while(|ms| failed.is_none_or(|(at, _)| *ms < at))
-                .last(),
+            usable_to_ms: usable.last(),
             failed,
         }
     }
@@ -89,7 +65,7 @@ pub(super) fn table(groups: &[Group]) -> Table {
             column("k_p", "N/m", 0, |limit| limit.k_p),
             column("usable_to_ms", "ms", 0, |limit| limit.usable_to_ms),
             column("fails_at_ms", "ms", 0, |limit| limit.failed.map(|(at, _)| at)),
-            column("why", "", 0, |limit| limit.failed.map(|(_, why)| why.words())),
+            column("why", "", 0, |limit| limit.failed.map(|(_, why)| why)),
         ],
     )
 }

@@ -1,12 +1,10 @@
 //! What the runs of the delay experiment came to: a row a run, replay's own numbers, the operator's picture.
 
 use mmt_client::operator::scripted::Picture;
-use mmt_shared::model::settings::PoseCorrection;
 
-use super::Group;
+use super::grid_point::Group;
 use crate::architecture::Architecture;
-use crate::experiment::grid::{self, mean};
-use crate::table::{Table, column};
+use crate::experiment::prelude::*;
 
 /// A row a run.
 #[rustfmt::skip]
@@ -18,7 +16,7 @@ pub(super) fn runs(groups: &[Group]) -> Table {
             column("architecture", "", 0, |run| run.case.architecture.name()),
             column("one_way_ms", "ms", 0, |run| run.case.one_way_ms),
             column("jitter_ms", "ms", 0, |run| run.case.jitter_ms),
-            column("loss", "", 0, |run| run.case.loss.name()),
+            column("loss", "", 0, |run| run.case.loss.name),
             column("k_p", "N/m", 0, |run| run.case.k_p),
             column("seed", "", 0, |run| run.seed),
             column("packet_rate_hz", "Hz", 1, |run| run.measured.packet_rate_hz),
@@ -41,15 +39,14 @@ pub(super) fn runs(groups: &[Group]) -> Table {
 /// MMT with replay over everything that was tried.
 #[rustfmt::skip]
 pub(super) fn replayed(groups: &[Group]) -> Table {
-    let replay = Architecture::Mediated(PoseCorrection::Replay);
     let groups = groups.iter();
     Table::of(
         "MMT with replay: mean over the seeds; peak and energy the largest, observer the least",
-        groups.filter(|group| group.case.architecture == replay),
+        groups.filter(|group| group.case.architecture == Architecture::REPLAY),
         &[
             column("one_way_ms", "ms", 0, |group| group.case.one_way_ms),
             column("jitter_ms", "ms", 0, |group| group.case.jitter_ms),
-            column("loss", "", 0, |group| group.case.loss.name()),
+            column("loss", "", 0, |group| group.case.loss.name),
             column("k_p", "N/m", 0, |group| group.case.k_p),
             mean("packet_rate_hz", "Hz", 2, |row| Some(row.packet_rate_hz)),
             mean("relative_error", "", 3, |row| row.relative_error),

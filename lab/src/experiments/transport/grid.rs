@@ -1,10 +1,13 @@
-//! The grid of cases.
+//! The grid of cases, and what is taken of its runs.
 
 use std::time::Duration;
 
 use mmt_netem::Probability;
 
-use crate::transport::{Bottleneck, Case, Conditions, Flow, Stack};
+use crate::transport::{Bottleneck, Case, Conditions, Flow, Outcome, Stack};
+
+/// A case and what it measured.
+pub(super) type Run<'a> = (&'a Case, &'a Outcome);
 
 /// Shortest round trips, ms.
 pub(super) const ROUND_TRIPS_MS: [u64; 3] = [20, 100, 200];
@@ -53,4 +56,38 @@ pub(super) fn cases(duration: Duration, seed: u64) -> Vec<Case> {
         }
     }
     cases
+}
+
+/// Whether a path has an outage, and whether it has a bottleneck.
+pub(super) type Kind = (bool, bool);
+
+pub(super) const PLAIN: Kind = (false, false);
+pub(super) const OUTAGE: Kind = (true, false);
+pub(super) const NARROW: Kind = (false, true);
+
+/// What a path does to packets beyond loss and jitter.
+pub(super) fn kind(conditions: &Conditions) -> Kind {
+    (
+        !conditions.outage.is_zero(),
+        conditions.bottleneck.is_some(),
+    )
+}
+
+/// What the runs of a stack measured on some paths with some messages.
+pub(super) fn outcomes<'a>(
+    runs: &[Run<'a>],
+    stack: Stack,
+    wanted: impl Fn(&Case) -> bool,
+) -> Vec<&'a Outcome> {
+    let runs = runs.iter();
+    let runs = runs.filter(|(case, _)| case.stack == stack && wanted(case));
+    runs.map(|(_, outcome)| *outcome).collect()
+}
+
+/// The largest of what was measured.
+pub(super) fn largest(outcomes: &[&Outcome], of: fn(&Outcome) -> Option<f64>) -> Option<f64> {
+    outcomes
+        .iter()
+        .filter_map(|outcome| of(outcome))
+        .reduce(f64::max)
 }

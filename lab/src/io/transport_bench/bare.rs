@@ -6,8 +6,9 @@ use std::time::Duration;
 
 use mmt_shared::io::clock::{Clock, thread_cpu_time};
 
-use super::config::{BYTES_MAX, Failure};
+use super::config::BYTES_MAX;
 use super::slice::{Flow, Side, Slice};
+use crate::io::failure::Failure;
 
 /// How long a read blocks before it checks whether the slice is over.
 const READ_MAX: Duration = Duration::from_millis(10);

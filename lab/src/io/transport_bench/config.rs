@@ -1,10 +1,11 @@
 //! What is measured: the configuration with its ranges, the carriers, and what can go wrong.
 
-use std::error::Error;
 use std::io;
 use std::time::Duration;
 
 use mmt_shared::wire::DATAGRAM_MAX;
+
+use crate::io::failure::Failure;
 
 /// The shortest message, bytes: its stamp and the number of its slice.
 pub const BYTES_MIN: usize = 16;
@@ -72,11 +73,8 @@ pub enum BenchError {
     Cores(#[source] io::Error),
     /// The machine gave no socket, thread or connection, or took one back.
     #[error(transparent)]
-    Failed(#[from] Box<dyn Error + Send + Sync>),
+    Failed(#[from] Failure),
 }
-
-/// Why an end could not go on.
-pub(super) type Failure = Box<dyn Error + Send + Sync>;
 
 /// Where the two ends run.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -12,7 +12,8 @@ use std::thread::{self, JoinHandle};
 use mmt_shared::io::realtime::yield_to_all;
 use rustix::thread::{CpuSet, sched_getaffinity, sched_setaffinity};
 
-use super::config::{BenchError, Cores, Failure};
+use super::config::{BenchError, Cores};
+use crate::io::failure::Failure;
 
 /// The cores of the two ends, kept awake until it is dropped.
 #[derive(Debug)]

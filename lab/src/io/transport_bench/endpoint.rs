@@ -18,9 +18,10 @@ use quinn::AsyncUdpSocket;
 use tokio::runtime::{Builder, Runtime};
 use tokio::time::{timeout, timeout_at};
 
-use super::config::{BenchConfig, BenchError, Failure};
+use super::config::{BenchConfig, BenchError};
 use super::cores::Placement;
 use super::slice::{Flow, Side, Slice};
+use crate::io::failure::Failure;
 
 /// For both sides to connect.
 const CONNECT_MAX: Duration = Duration::from_secs(10);

@@ -70,7 +70,7 @@ impl Slice {
         self.due(self.messages) + SETTLING
     }
 
-    /// What tells the slices of one carrier apart.
+    /// The slices of one carrier have different numbers.
     fn number(&self) -> u64 {
         2 * self.round + self.flow as u64
     }

@@ -22,9 +22,9 @@ use quinn::{
     UdpPoller,
 };
 
-use super::error::VirtualTimeError;
 use super::executor::{Executor, lock};
 use super::path::{Datagram, OneWay};
+use crate::io::failure::Failure;
 use crate::transport::{Case, Stack};
 
 /// What QUIC adds to a message, bytes (short header, 8-byte connection id, frame, tag).
@@ -152,7 +152,7 @@ pub(super) fn ends(
     executor: &Executor,
     master: Arc<MemorySocket>,
     slave: Arc<MemorySocket>,
-) -> Result<Ends, VirtualTimeError> {
+) -> Result<Ends, Failure> {
     let identity = identity()?;
     let transport = Arc::new(transport(case));
     let mut server = ServerConfig::with_crypto(Arc::new(tls::server(&identity)?));
@@ -201,7 +201,7 @@ fn seeded(seed: u64, name: &str) -> EndpointConfig {
 }
 
 /// A fresh identity whose certificate has the usual length: a shorter one would move the handshake.
-fn identity() -> Result<Identity, VirtualTimeError> {
+fn identity() -> Result<Identity, Failure> {
     let mut longest = Identity::ephemeral()?;
     for _ in 1..IDENTITIES {
         let next = Identity::ephemeral()?;

@@ -16,13 +16,13 @@ use mmt_shared::time::{Time, duration_nanos};
 use quinn::{Connection, ConnectionError, Endpoint};
 
 use super::ends::{Ends, MemorySocket, ends};
-use super::error::VirtualTimeError;
 use super::executor::{Executor, lock};
 use super::path::{Datagram, OneWay};
+use crate::io::failure::Failure;
 use crate::transport::{Case, HEARTBEAT, HEARTBEAT_BYTES, Log, Outcome, Sent};
 
 /// Is called for each packet that came: when, and what the path itself took for it.
-type Arrived<'a> = &'a mut dyn FnMut(Time, Duration) -> Result<(), VirtualTimeError>;
+type Arrived<'a> = &'a mut dyn FnMut(Time, Duration) -> Result<(), Failure>;
 
 /// Name given to the TLS library, which wants one; it is not sent.
 const SERVER_NAME: &str = "mmt";
@@ -35,7 +35,7 @@ const START_GRID: Duration = Duration::from_secs(1);
 ///
 /// # Errors
 /// The link's settings are out of range, or quinn refuses to connect or to send.
-pub fn run(case: &Case) -> Result<Outcome, VirtualTimeError> {
+pub fn run(case: &Case) -> Result<Outcome, Failure> {
     Setup::new(case)?.measure(case)
 }
 
@@ -59,7 +59,7 @@ struct Pair {
 }
 
 impl Setup {
-    fn new(case: &Case) -> Result<Self, VirtualTimeError> {
+    fn new(case: &Case) -> Result<Self, Failure> {
         let executor = Executor::new();
         let address = |host| SocketAddr::from((Ipv4Addr::new(192, 0, 2, host), 4433));
         let path = |id| OneWay::try_new(&case.conditions, case.seed, id);
@@ -83,7 +83,7 @@ impl Setup {
     }
 
     /// The connection's two ends, once both have finished the handshake.
-    fn shake_hands(&self) -> Result<Pair, VirtualTimeError> {
+    fn shake_hands(&self) -> Result<Pair, Failure> {
         let (client, address) = (self.ends.client.clone(), self.ends.slave.local_addr()?);
         let connecting = self
             .ends
@@ -106,14 +106,12 @@ impl Setup {
                 return Ok(Pair { master, slave });
             }
             let next = self.next_event().filter(|at| *at < HANDSHAKE_MAX);
-            let next = next.ok_or(VirtualTimeError::Handshake {
-                after: HANDSHAKE_MAX,
-            })?;
+            let next = next.ok_or("the handshake was not over in time")?;
             self.pass(next, &mut |_, _| Ok(()))?;
         }
     }
 
-    fn measure(&self, case: &Case) -> Result<Outcome, VirtualTimeError> {
+    fn measure(&self, case: &Case) -> Result<Outcome, Failure> {
         let pair = self.shake_hands()?;
         let start = next_on_grid(self.executor.time());
         let (now, outage) = (self.executor.time(), case.outage(start));
@@ -150,7 +148,7 @@ impl Setup {
 
     /// Lets time go on to `now` and everything happen that is due; calls `arrived` for each packet, after the
     /// tasks have run.
-    fn pass(&self, now: Time, arrived: Arrived<'_>) -> Result<(), VirtualTimeError> {
+    fn pass(&self, now: Time, arrived: Arrived<'_>) -> Result<(), Failure> {
         self.executor.jump(now);
         for direction in [&self.up, &self.down] {
             while let Some(datagram) = direction.poll(now) {
@@ -205,7 +203,7 @@ fn finished<T, E>(poll: Poll<Result<T, E>>) -> Result<Option<T>, E> {
 }
 
 /// Hands every datagram that has come to `each`. Nobody need be woken: who calls this calls it after each packet.
-fn read_all(connection: &Connection, mut each: impl FnMut(&[u8])) -> Result<(), VirtualTimeError> {
+fn read_all(connection: &Connection, mut each: impl FnMut(&[u8])) -> Result<(), Failure> {
     let context = &mut Context::from_waker(Waker::noop());
     while let Poll::Ready(message) = pin!(connection.read_datagram()).poll(context) {
         each(&message?);
