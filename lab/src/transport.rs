@@ -48,37 +48,26 @@ impl Stack {
 }
 
 /// A flow of equal messages at equal intervals.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Flow {
-    /// 1000 a second of 100 bytes: a command for each sample, with room for repeated ones.
-    EverySample,
-    /// 150 a second of 180 bytes: updates as fast as an eager scheme sends them, or commands of several samples.
-    Eager,
-    /// 60 a second of 180 bytes: updates of a usual scheme.
-    Usual,
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Flow {
+    /// Messages a second.
+    pub rate_hz: u32,
+    /// Bytes of a message.
+    pub bytes: usize,
 }
 
 impl Flow {
+    /// A command for each sample, with room for repeated ones.
+    pub const EVERY_SAMPLE: Self = Self::new(1000, 100);
+    /// Updates as fast as an eager scheme sends them, or commands of several samples.
+    pub const EAGER: Self = Self::new(150, 180);
+    /// Updates of a usual scheme.
+    pub const USUAL: Self = Self::new(60, 180);
     /// All of them.
-    pub const ALL: [Self; 3] = [Self::EverySample, Self::Eager, Self::Usual];
+    pub const ALL: [Self; 3] = [Self::EVERY_SAMPLE, Self::EAGER, Self::USUAL];
 
-    /// Messages a second.
-    #[must_use]
-    pub fn rate_hz(self) -> u32 {
-        match self {
-            Self::EverySample => 1000,
-            Self::Eager => 150,
-            Self::Usual => 60,
-        }
-    }
-
-    /// Bytes of a message.
-    #[must_use]
-    pub fn bytes(self) -> usize {
-        match self {
-            Self::EverySample => 100,
-            Self::Eager | Self::Usual => 180,
-        }
+    const fn new(rate_hz: u32, bytes: usize) -> Self {
+        Self { rate_hz, bytes }
     }
 }
 

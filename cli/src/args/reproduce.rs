@@ -91,22 +91,16 @@ impl FromArgMatches for Chosen {
 }
 
 fn subcommand(experiment: &Experiment) -> Command {
-    let arguments = experiment.arguments.iter().map(|argument| match *argument {
-        Argument::Flag { name, help } => Arg::new(name)
-            .long(name)
-            .help(help)
-            .action(ArgAction::SetTrue),
-        Argument::Number {
-            name,
-            unit,
-            help,
-            default,
-        } => Arg::new(name)
-            .long(name)
-            .help(format!("{help} [default: {default}]"))
-            .value_name(unit)
-            .value_parser(value_parser!(f64))
-            .allow_negative_numbers(true),
+    let arguments = experiment.arguments.iter().map(|argument| {
+        let arg = Arg::new(argument.name).long(argument.name);
+        match argument.number {
+            None => arg.help(argument.help).action(ArgAction::SetTrue),
+            Some((unit, default)) => arg
+                .help(format!("{} [default: {default}]", argument.help))
+                .value_name(unit)
+                .value_parser(value_parser!(f64))
+                .allow_negative_numbers(true),
+        }
     });
     Command::new(experiment.name)
         .about(experiment.about)
@@ -114,9 +108,10 @@ fn subcommand(experiment: &Experiment) -> Command {
 }
 
 fn given(argument: &Argument, matches: &ArgMatches) -> Option<(&'static str, f64)> {
-    match *argument {
-        Argument::Flag { name, .. } => matches.get_flag(name).then_some((name, 1.0)),
-        Argument::Number { name, .. } => Some((name, *matches.get_one(name)?)),
+    let name = argument.name;
+    match argument.number {
+        None => matches.get_flag(name).then_some((name, 1.0)),
+        Some(_) => Some((name, *matches.get_one(name)?)),
     }
 }
 

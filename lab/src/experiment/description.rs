@@ -61,27 +61,15 @@ impl Experiment {
 /// Length of a run of most experiments: four or five pushes.
 pub const DURATION: Duration = Duration::from_secs(30);
 
-/// An argument of one experiment.
+/// An argument of one experiment: a number, or a flag that is given or not.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Argument {
-    /// Given or not.
-    Flag {
-        /// Its name, without dashes.
-        name: &'static str,
-        /// What it does.
-        help: &'static str,
-    },
-    /// A number.
-    Number {
-        /// Its name, without dashes.
-        name: &'static str,
-        /// Its unit, as help shows it.
-        unit: &'static str,
-        /// What it is.
-        help: &'static str,
-        /// What it is if it is not given.
-        default: f64,
-    },
+pub struct Argument {
+    /// Its name, without dashes.
+    pub name: &'static str,
+    /// What it is or does.
+    pub help: &'static str,
+    /// Of a number: its unit, as help shows it, and what it is if it is not given.
+    pub number: Option<(&'static str, f64)>,
 }
 
 /// How an experiment is to be done.

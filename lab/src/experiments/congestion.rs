@@ -37,14 +37,7 @@ pub(super) const CONGESTION: Experiment = Experiment {
 /// The live defaults over that network, with these greatest stretches of master and slave.
 fn world(master: StretchMax, slave: StretchMax) -> Result<WorldConfig, ExperimentError> {
     let link = link(NETWORK, Loss::NONE)?;
-    let mut world = WorldConfig {
-        up: link.clone(),
-        down: link,
-        stretch_max: master,
-        ..WorldConfig::default()
-    };
-    world.slave.stretch_max = slave;
-    Ok(world)
+    Ok(WorldConfig::over(link).stretched(master, slave))
 }
 
 /// Keeps `congestion.csv` (a row a bin) and `congestion.svg` (seed 1).

@@ -18,9 +18,10 @@ use grid_point::{GridPoint, Group, all_points, picture_points, some_points};
 /// The architectures over the delay; pushes come later with it.
 pub(super) const DELAY: Experiment = Experiment {
     duration: Duration::from_secs(40),
-    arguments: &[Argument::Flag {
+    arguments: &[Argument {
         name: "full",
         help: "The whole grid of delays, jitter, losses and stiffnesses: about an hour",
+        number: None,
     }],
     ..Experiment::new(
         "delay",

@@ -12,9 +12,10 @@ const NOTED: [f64; 4] = [0.025, 0.05, 0.10, 0.30];
 
 /// Fig. 5, with the paper's ten repetitions.
 pub(super) const FIG5: Experiment = Experiment {
-    arguments: &[Argument::Flag {
+    arguments: &[Argument {
         name: "samples",
         help: "Write every run's forces and updates at 1 kHz as well, under samples/ (about 2 MB a run)",
+        number: None,
     }],
     ..Experiment::new(
         "fig5",

@@ -4,14 +4,8 @@ use crate::experiment::prelude::*;
 use crate::physics::{Body, PhysicsCase, PhysicsTrace, TracePoint, cases, traces};
 
 /// The reference motions.
-#[rustfmt::skip]
 pub(super) const PHYSICS: Experiment = Experiment {
-    arguments: &[
-        number("mass", "KG", "Mass m, kg", Body::DEFAULT.mass_kg),
-        number("side", "M", "Side l of the square footprint, m", Body::DEFAULT.side_m),
-        number("mu", "MU", "Friction coefficient between body and ground", Body::DEFAULT.friction_coefficient),
-        number("damping", "NS_PER_M", "Viscous damping b, N s/m", Body::DEFAULT.damping_ns_per_m),
-    ],
+    arguments: &ARGUMENTS,
     ..Experiment::new(
         "physics",
         "What the environment does against closed forms and a fine reference, for any body",
@@ -20,19 +14,13 @@ pub(super) const PHYSICS: Experiment = Experiment {
     )
 };
 
-const fn number(
-    name: &'static str,
-    unit: &'static str,
-    help: &'static str,
-    default: f64,
-) -> Argument {
-    Argument::Number {
-        name,
-        unit,
-        help,
-        default,
-    }
-}
+#[rustfmt::skip]
+const ARGUMENTS: [Argument; 4] = [
+    Argument { name: "mass", help: "Mass m, kg", number: Some(("KG", Body::DEFAULT.mass_kg)) },
+    Argument { name: "side", help: "Side l of the square footprint, m", number: Some(("M", Body::DEFAULT.side_m)) },
+    Argument { name: "mu", help: "Friction coefficient between body and ground", number: Some(("MU", Body::DEFAULT.friction_coefficient)) },
+    Argument { name: "damping", help: "Viscous damping b, N s/m", number: Some(("NS_PER_M", Body::DEFAULT.damping_ns_per_m)) },
+];
 
 /// Keeps `physics.csv` and `physics.svg`.
 fn run(runner: &Runner, request: &Request) -> Result<Findings, ExperimentError> {

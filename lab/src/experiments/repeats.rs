@@ -64,16 +64,11 @@ fn cases() -> Result<Vec<Case>, ExperimentError> {
 }
 
 fn world(curve: Curve, link: &LinkConfig, repeats: Repeats, repeat_samples: u8) -> WorldConfig {
-    let mut world = WorldConfig {
-        up: link.clone(),
-        down: link.clone(),
-        repeat_samples,
-        stretch_max: StretchMax::OFF,
-        ..WorldConfig::default()
-    };
+    let world = WorldConfig::over(link.clone());
+    let mut world = world.stretched(StretchMax::OFF, StretchMax::OFF);
     world.slave.trigger.scheme = curve.at(DELTA);
     world.slave.repeats_ms = repeats;
-    world.slave.stretch_max = StretchMax::OFF;
+    world.repeat_samples = repeat_samples;
     world
 }
 

@@ -210,12 +210,16 @@ impl Learner {
             let laws = pushes.iter().flat_map(|push| &push.laws);
             laws.filter(|law| law.law == self.law)
         };
+        let coupled = self.law != Law::Decoupled;
         LawReport {
+            law: self.law,
+            friction_n: self.at_slave.friction_n,
+            friction_torque_nm: coupled.then(|| self.at_slave.torque_nm()),
+            centre_m: coupled.then_some(self.at_slave.centre_m),
             force_error: Spread::of(own().filter_map(|law| law.relative_error)),
             vector_error: Spread::of(own().filter_map(|law| law.vector_error)),
             held_error: mean(self.error_sum, self.samples),
             updates: Rates::of(self.packets, duration_s, contact_s),
-            ..LawReport::new(self.law, &self.at_slave)
         }
     }
 }

@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use super::config::ReplayConfig;
 use super::heldout::HeldOut;
-use super::surface::{Law, Surface};
+use super::surface::Law;
 use super::trigger::Packets;
 use crate::statistics::{mean, median, quantile};
 use crate::table::{Column, Table, column};
@@ -118,22 +118,6 @@ pub struct LawReport {
     pub held_error: Option<f64>,
     /// What the trigger sent.
     pub updates: Rates,
-}
-
-impl LawReport {
-    pub(super) fn new(law: Law, surface: &Surface) -> Self {
-        let coupled = law != Law::Decoupled;
-        Self {
-            law,
-            friction_n: surface.friction_n,
-            friction_torque_nm: coupled.then(|| surface.torque_nm()),
-            centre_m: coupled.then_some(surface.centre_m),
-            force_error: Spread::default(),
-            vector_error: Spread::default(),
-            held_error: None,
-            updates: Rates::default(),
-        }
-    }
 }
 
 /// The whole replay. Mass and damping are no part of it: at 3 mm/s the force of inertia is below the sensor's noise, and
@@ -249,7 +233,7 @@ impl ReplayReport {
             &self.held_out,
             &[
                 column("law", "", 0, |held_out| held_out.law.name()),
-                column("mean", "%", 1, |held_out| percent(held_out.median_error)),
+                column("error", "%", 1, |held_out| percent(held_out.median_error)),
                 column("of each repeat", "", 0, |held_out| of_repeats(&held_out.median_errors)),
             ],
         )

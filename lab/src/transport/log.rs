@@ -94,7 +94,7 @@ impl Log {
     /// The next message, which counts as sent.
     pub fn send(&mut self) -> Vec<u8> {
         let mut message = self.sent.to_le_bytes().to_vec();
-        message.resize(self.case.flow.bytes(), 0);
+        message.resize(self.case.flow.bytes, 0);
         self.sent += 1;
         message
     }
@@ -111,7 +111,7 @@ impl Log {
     }
 
     fn sent_at(&self, number: u32) -> Time {
-        let nanos = u64::from(number) * 1_000_000_000 / u64::from(self.case.flow.rate_hz());
+        let nanos = u64::from(number) * 1_000_000_000 / u64::from(self.case.flow.rate_hz);
         self.start + Duration::from_nanos(nanos)
     }
 

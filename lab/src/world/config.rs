@@ -68,6 +68,23 @@ impl Default for WorldConfig {
 }
 
 impl WorldConfig {
+    /// The default scenario over a network, the same both ways.
+    #[must_use]
+    pub fn over(link: LinkConfig) -> Self {
+        Self {
+            up: link.clone(),
+            down: link,
+            ..Self::default()
+        }
+    }
+
+    /// This configuration with these greatest stretches of master and slave.
+    pub(crate) fn stretched(mut self, master: StretchMax, slave: StretchMax) -> Self {
+        self.stretch_max = master;
+        self.slave.stretch_max = slave;
+        self
+    }
+
     /// This configuration with every seed derived from one.
     #[must_use]
     pub fn seeded(mut self, seed: u64) -> Self {

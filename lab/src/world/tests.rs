@@ -3,9 +3,9 @@
 
 use super::*;
 use mmt_netem::config::LinkConfig;
-use mmt_shared::model::contact::Coupling;
 use mmt_server::playout::PlayoutConfig;
 use mmt_server::slave::SlaveConfig;
+use mmt_shared::model::contact::Coupling;
 use mmt_shared::model::settings::Mode;
 
 mod estimation;
@@ -20,12 +20,7 @@ fn link(words: &str) -> LinkConfig {
 }
 
 fn over(words: &str, seed: u64) -> WorldConfig {
-    WorldConfig {
-        up: link(words),
-        down: link(words),
-        ..WorldConfig::default()
-    }
-    .seeded(seed)
+    WorldConfig::over(link(words)).seeded(seed)
 }
 
 fn run(config: &WorldConfig, seconds: u64) -> World {

@@ -82,12 +82,8 @@ impl GridPoint {
             words += &format!(" {}ms", self.jitter_ms);
         }
         let link = link(&words, self.loss)?;
-        let mut config = WorldConfig {
-            up: link.clone(),
-            down: link,
-            stiffness_n_per_m: Some(self.k_p as f64),
-            ..WorldConfig::default()
-        };
+        let mut config = WorldConfig::over(link);
+        config.stiffness_n_per_m = Some(self.k_p as f64);
         config.operator.view = self.picture;
         match self.size {
             Size::Unknown => {}
@@ -97,9 +93,7 @@ impl GridPoint {
         }
         // what the other architectures do not have either
         config.slave.repeats_ms = Repeats::NONE;
-        config.slave.stretch_max = StretchMax::OFF;
-        config.stretch_max = StretchMax::OFF;
-        Ok(config)
+        Ok(config.stretched(StretchMax::OFF, StretchMax::OFF))
     }
 }
 

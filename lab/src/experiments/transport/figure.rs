@@ -84,7 +84,7 @@ fn curves(runs: &[Run], row: &Row, round_trip: Duration) -> Vec<Series> {
             let dot = |loss: f64| {
                 let of_condition = outcomes(runs, stack, |case| {
                     let conditions = &case.conditions;
-                    case.flow == Flow::EverySample
+                    case.flow == Flow::EVERY_SAMPLE
                         && kind(conditions) == row.kind
                         && conditions.round_trip == round_trip
                         && conditions.jitter == Duration::from_millis(jitter_ms)

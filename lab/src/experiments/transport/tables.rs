@@ -21,8 +21,8 @@ pub(super) fn all(runs: &[Run]) -> Table {
         runs,
         &[
             column("stack", "", 0, |(case, _)| case.stack.name()),
-            column("messages_per_s", "Hz", 0, |(case, _)| u64::from(case.flow.rate_hz())),
-            column("message_bytes", "B", 0, |(case, _)| case.flow.bytes() as u64),
+            column("messages_per_s", "Hz", 0, |(case, _)| u64::from(case.flow.rate_hz)),
+            column("message_bytes", "B", 0, |(case, _)| case.flow.bytes as u64),
             column("round_trip_ms", "ms", 0, |(case, _)| millis(case.conditions.round_trip)),
             column("loss_percent", "%", 1, |(case, _)| case.conditions.loss_percent()),
             column("jitter_ms", "ms", 0, |(case, _)| millis(case.conditions.jitter)),
@@ -117,7 +117,7 @@ type Group<'a> = grid::Group<(Flow, &'static str, Stack), &'a Outcome>;
 #[rustfmt::skip]
 fn columns<'a>() -> [Column<'a, Group<'a>>; 9] {
     [
-        column("messages_per_s", "Hz", 0, |group| u64::from(group.case.0.rate_hz())),
+        column("messages_per_s", "Hz", 0, |group| u64::from(group.case.0.rate_hz)),
         column("path", "", 0, |group| group.case.1),
         column("stack", "", 0, |group| group.case.2.name()),
         column("cases", "", 0, |group| group.runs.len() as u64),
@@ -143,14 +143,14 @@ pub(super) fn examples(runs: &[Run]) -> Table {
     ] {
         let wanted = |case: &Case| {
             let conditions = &case.conditions;
-            (case.flow, case.seed) == (Flow::EverySample, 1)
+            (case.flow, case.seed) == (Flow::EVERY_SAMPLE, 1)
                 && conditions.round_trip == LONG
                 && (conditions.loss_percent() - loss).abs() < 1e-9
                 && millis(conditions.jitter) == jitter_ms
                 && kind(conditions) == of_kind
         };
         rows.extend(Stack::ALL.map(|stack| Group {
-            case: (Flow::EverySample, name, stack),
+            case: (Flow::EVERY_SAMPLE, name, stack),
             runs: outcomes(runs, stack, wanted),
         }));
     }

@@ -176,8 +176,8 @@ fn transport(case: &Case) -> TransportConfig {
     match case.stack {
         Stack::Stock => TransportConfig::default(),
         Stack::Ours => {
-            let message = case.flow.bytes();
-            let packets_per_s = u64::from(case.flow.rate_hz()) + 20;
+            let message = case.flow.bytes;
+            let packets_per_s = u64::from(case.flow.rate_hz) + 20;
             quic::transport(Traffic {
                 datagram_max: message,
                 // as both sides set it: twice what they send

@@ -42,7 +42,7 @@ fn rough(stack: Stack, flow: Flow) -> Case {
 }
 
 fn narrow(stack: Stack, round_trip: Duration) -> Case {
-    with(clean(stack, Flow::EverySample, round_trip), |conditions| {
+    with(clean(stack, Flow::EVERY_SAMPLE, round_trip), |conditions| {
         conditions.bottleneck = Some(Bottleneck::NARROW);
     })
 }
@@ -60,7 +60,7 @@ fn measured(case: Case) -> Outcome {
 /// Digests of runs in which every timer, queue and random number has a part.
 fn digests() -> String {
     let cases = Stack::ALL.map(|stack| {
-        with(rough(stack, Flow::EverySample), |conditions| {
+        with(rough(stack, Flow::EVERY_SAMPLE), |conditions| {
             conditions.outage = 500 * MS;
             conditions.bottleneck = Some(Bottleneck::NARROW);
         })
@@ -93,21 +93,21 @@ fn two_runs_of_one_seed_are_equal_in_one_process_and_in_two() {
 
 #[test]
 fn another_seed_is_another_run() {
-    let case = rough(Stack::Ours, Flow::Eager);
+    let case = rough(Stack::Ours, Flow::EAGER);
     let other = Case { seed: 2, ..case };
     assert_ne!(measured(case).digest, measured(other).digest);
 }
 
 #[test]
 fn virtual_time_is_exact_to_the_nanosecond() {
-    let jittered = with(clean(Stack::Ours, Flow::Eager, 100 * MS), |conditions| {
+    let jittered = with(clean(Stack::Ours, Flow::EAGER, 100 * MS), |conditions| {
         conditions.jitter = 20 * MS;
     });
     let outcome = measured(jittered);
     assert_eq!(outcome.added_max_ms, Some(0.0));
     assert_eq!((outcome.delivered, outcome.possible), (600, 600));
     // the bottleneck's own serialisation is the path's, and this flow leaves it idle in between
-    let alone = with(clean(Stack::Ours, Flow::Usual, 100 * MS), |conditions| {
+    let alone = with(clean(Stack::Ours, Flow::USUAL, 100 * MS), |conditions| {
         conditions.bottleneck = Some(Bottleneck::NARROW);
     });
     assert_eq!(measured(alone).added_max_ms, Some(0.0));
@@ -120,7 +120,7 @@ fn random_loss_and_reordering_add_nothing_to_ours_and_seconds_to_stock() {
         assert_eq!(outcome.added_max_ms, Some(0.0), "{flow:?}");
         assert!(outcome.share().unwrap() > 0.93, "{flow:?}: {outcome:?}");
     }
-    let stock = measured(rough(Stack::Stock, Flow::EverySample));
+    let stock = measured(rough(Stack::Stock, Flow::EVERY_SAMPLE));
     assert!(stock.added_p50_ms.unwrap() > 500.0, "{stock:?}");
 }
 
@@ -132,14 +132,14 @@ fn after_an_outage_the_next_message_is_on_time() {
         assert_eq!(outcome.stale, 0, "{flow:?}");
         assert_eq!(outcome.delivered, outcome.possible, "{flow:?}");
     }
-    let stock = measured(outage(Stack::Stock, Flow::EverySample));
+    let stock = measured(outage(Stack::Stock, Flow::EVERY_SAMPLE));
     assert!(stock.stale > 500, "{stock:?}");
     assert!(stock.fresh_ms.unwrap() > 100.0, "{stock:?}");
 }
 
 #[test]
 fn an_outage_far_longer_than_the_window_ends_without_a_wait_too() {
-    let long = with(outage(Stack::Ours, Flow::EverySample), |conditions| {
+    let long = with(outage(Stack::Ours, Flow::EVERY_SAMPLE), |conditions| {
         conditions.outage = 8000 * MS;
     });
     let long = Case {
@@ -180,7 +180,7 @@ fn the_queue_stays_short_for_minutes() {
 
 #[test]
 fn acknowledgements_are_a_tenth_of_the_packets_at_1_khz() {
-    let outcome = measured(clean(Stack::Ours, Flow::EverySample, 100 * MS));
+    let outcome = measured(clean(Stack::Ours, Flow::EVERY_SAMPLE, 100 * MS));
     let heartbeats = 4 * 20;
     let own = outcome.down.packets - heartbeats;
     assert!(own * 100 <= outcome.up.packets * 15, "{outcome:?}");

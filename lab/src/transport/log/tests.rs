@@ -12,7 +12,7 @@ const START: Time = Time::from_millis(5000);
 fn case() -> Case {
     Case {
         stack: Stack::Ours,
-        flow: Flow::EverySample,
+        flow: Flow::EVERY_SAMPLE,
         conditions: Conditions {
             round_trip: 20 * MS,
             loss: Probability::ZERO,
