@@ -63,7 +63,8 @@ impl Haptic {
     /// A message of the slave arrives.
     fn hear(&mut self, message: Message) {
         let mut out = [0; DATAGRAM_MAX];
-        let length = self.slave.encode(self.now, message, &mut out).unwrap();
+        let length = self.slave.encode(self.now, message, &mut out);
+        let length = length.unwrap().unwrap();
         self.end
             .handle_datagram(self.now, out.get(..length).unwrap());
     }

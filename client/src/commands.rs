@@ -67,8 +67,8 @@ pub(crate) struct CommandPacker {
     repeated: SampleBlock,
     /// Samples that congestion leaves out until the next one is packed.
     to_skip: u32,
-    refused: u32,
-    skipped: u32,
+    off_grid: u64,
+    skipped: u64,
 }
 
 impl CommandPacker {
@@ -78,36 +78,31 @@ impl CommandPacker {
             block: SampleBlock::new(),
             repeated: SampleBlock::new(),
             to_skip: 0,
-            refused: 0,
+            off_grid: 0,
             skipped: 0,
         }
     }
 
-    /// Samples that could not be packed because their stamps did not increase.
-    pub(crate) fn refused(&self) -> u32 {
-        self.refused
-    }
-
-    /// Samples that congestion left out on purpose.
-    pub(crate) fn skipped(&self) -> u32 {
-        self.skipped
-    }
-
-    /// Samples that wait for the command to be full.
-    pub(crate) fn pending(&self) -> usize {
-        self.block.len()
+    /// Samples that are in no command: stamps that did not increase, left out under congestion, still waiting for the
+    /// command to be full.
+    pub(crate) fn drops(&self) -> [(&'static str, u64); 3] {
+        [
+            ("samples_off_grid", self.off_grid),
+            ("samples_skipped", self.skipped),
+            ("samples_unsent", self.block.len() as u64),
+        ]
     }
 
     /// Packs a sample. Under congestion (`stretch` above 1) only every second, third, … sample is packed.
     pub(crate) fn push(&mut self, sample: HipSample, stretch: f64) {
         if self.to_skip > 0 {
             self.to_skip -= 1;
-            self.skipped = self.skipped.saturating_add(1);
+            self.skipped += 1;
             return;
         }
         self.to_skip = (libm::ceil(stretch) as u32).min(SPACING_MAX) - 1;
         if self.block.push(sample).is_err() {
-            self.refused = self.refused.saturating_add(1);
+            self.off_grid += 1;
         }
     }
 

@@ -3,15 +3,18 @@
 //! Pure: it reads no clock and touches no socket, so that a live session and an experiment run the same code, and a
 //! record of its inputs runs again to the same bits. An update is accepted before it is acknowledged.
 
-use mmt_shared::channel::datagram_channel::{DatagramChannel, SendError};
+use mmt_shared::channel::datagram_channel::DatagramChannel;
 use mmt_shared::channel::peer::{Freshness, NumbersSpent, SequenceWindow};
 use mmt_shared::metrics::{AgeOfInformation, ContactBreaks, ForcePeak};
 use mmt_shared::model::geometry::Vec2;
 use mmt_shared::model::tool::{HandPort, Scene};
 use mmt_shared::model::update::Update;
+use mmt_shared::report::{
+    ArchitectureReport, MasterHalf, PassivityReport, ReceivedUpdates, SessionStats, named,
+};
 use mmt_shared::stats::session::UpdateDrops;
 use mmt_shared::time::Time;
-use mmt_shared::wire::{Command, Message, RawState, Side};
+use mmt_shared::wire::{Architecture, Command, Message, RawState, Side};
 
 use crate::commands::{CommandConfig, CommandPacker};
 use crate::master::{Master, MasterTick};
@@ -32,8 +35,6 @@ pub struct MasterCounts {
     pub updates_rejected: u64,
     /// Updates that a newer one overtook before a tick could apply them.
     pub updates_superseded: u64,
-    /// Messages that break a rule of the wire and were not sent.
-    pub unsendable: u64,
 }
 
 /// The master's end.
@@ -95,18 +96,42 @@ impl MasterEnd {
         UpdateDrops {
             duplicate: self.window.duplicate(),
             stale: self.window.stale(),
-            rejected: count(self.counts.updates_rejected),
-            superseded: count(self.counts.updates_superseded),
-            frozen: count(u64::from(self.master.frozen()) + u64::from(self.update.is_some())),
+            rejected: self.counts.updates_rejected,
+            superseded: self.counts.updates_superseded,
+            frozen: u64::from(self.master.frozen()) + u64::from(self.update.is_some()),
         }
     }
 
-    /// Samples that were not sent: stamps that did not increase, left out under congestion, still waiting for a packet.
+    /// What it counted and measured in the `duration_s` (s) since it began.
     #[must_use]
-    pub fn samples_unsent(&self) -> [u64; 3] {
-        let packer = &self.commands;
-        let (refused, skipped) = (packer.refused(), packer.skipped());
-        [refused.into(), skipped.into(), packer.pending() as u64]
+    pub fn half(&self, duration_s: f64) -> MasterHalf {
+        let (master, counts, drops) = (&self.master, &self.counts, self.update_drops());
+        // an update that was received before is a repeat, whether the slave or the network repeated it
+        let mut session =
+            SessionStats::new(Side::Master, &self.channel, drops.duplicate, duration_s);
+        session.architecture = match master.tdpa() {
+            Some(hand) => ArchitectureReport::new(Architecture::Tdpa, hand.round_trip_s()),
+            None => ArchitectureReport::new(Architecture::Mmt, None),
+        };
+        session.add_drops(self.commands.drops());
+        session.add_drops([
+            ("bad_readings", master.bad_readings()),
+            ("forces_not_finite", master.limiter().rejected()),
+        ]);
+        MasterHalf {
+            session,
+            updates: ReceivedUpdates {
+                applied: Some(master.applied().into()),
+                dropped: Some(named(drops.by_name())),
+                age_ms: (&counts.age).into(),
+            },
+            force: (&counts.on_hand).into(),
+            passivity: PassivityReport {
+                energy_injected_j: master.energy_injected_j().into(),
+                observer_min_j: master.port().least_j().into(),
+            },
+            ..MasterHalf::default()
+        }
     }
 
     /// The newest scene; none where nobody asked for scenes.
@@ -191,10 +216,10 @@ impl MasterEnd {
                 samples,
                 port: self.port,
             };
-            return self.send(now, Message::Command(command), out);
+            return self.channel.encode(now, Message::Command(command), out);
         }
         if self.poll_timeout() <= now {
-            return self.send(now, Message::Heartbeat, out);
+            return self.channel.encode(now, Message::Heartbeat, out);
         }
         Ok(None)
     }
@@ -204,27 +229,6 @@ impl MasterEnd {
     pub fn poll_timeout(&self) -> Time {
         self.channel.heartbeat_due()
     }
-
-    fn send(
-        &mut self,
-        now: Time,
-        message: Message,
-        out: &mut [u8],
-    ) -> Result<Option<usize>, NumbersSpent> {
-        match self.channel.encode(now, message, out) {
-            Ok(length) => Ok(Some(length)),
-            Err(SendError::Numbers(spent)) => Err(spent),
-            Err(SendError::Encode(_)) => {
-                self.counts.unsendable += 1;
-                Ok(None)
-            }
-        }
-    }
-}
-
-/// As the wire counts.
-fn count(n: u64) -> u32 {
-    u32::try_from(n).unwrap_or(u32::MAX)
 }
 
 #[cfg(test)]

@@ -93,12 +93,12 @@ mod tests {
         let ms = Time::from_millis;
         for k in 1..=10 {
             let question = here.stamp(ms(100 * k)).unwrap();
-            there.handle(ms(100 * k + UP_MS), &question, 50);
+            there.handle(ms(100 * k + UP_MS), &question);
             let answer = there.stamp(ms(100 * k + UP_MS)).unwrap();
             let now = ms(100 * k + UP_MS + DOWN_MS);
             // the fourth and the fifth answer never arrive
             if !(4..=5).contains(&k) {
-                here.handle(now, &answer, 50);
+                here.handle(now, &answer);
                 recorder.note(now, &here);
                 // looking twice adds nothing
                 recorder.note(now, &here);
@@ -119,11 +119,11 @@ mod tests {
         let mut answers = Vec::new();
         for k in 1..=3 {
             let question = here.stamp(ms(k)).unwrap();
-            there.handle(ms(k), &question, 50);
+            there.handle(ms(k), &question);
             answers.push(there.stamp(ms(k)).unwrap());
         }
         for (at, number) in [(10, 0), (11, 2), (12, 1)] {
-            here.handle(ms(at), &answers[number], 50);
+            here.handle(ms(at), &answers[number]);
             recorder.note(ms(at), &here);
         }
         assert_eq!(recorder.path().unwrap().loss(), 0.0);

@@ -201,7 +201,7 @@ impl World {
             on_hand: counts.on_hand,
             energy_injected_j: master.energy_injected_j(),
             observer_min_j: master.port().least_j(),
-            forces: self.slave.channel().traffic().sent.tools.into(),
+            forces: self.slave.channel().counts().sent.tools,
         }
     }
 

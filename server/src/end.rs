@@ -5,7 +5,7 @@
 
 use std::time::Duration;
 
-use mmt_shared::channel::datagram_channel::{DatagramChannel, SendError};
+use mmt_shared::channel::datagram_channel::DatagramChannel;
 use mmt_shared::channel::peer::NumbersSpent;
 use mmt_shared::channel::rate_control::StretchMax;
 use mmt_shared::metrics::UpdateCounts;
@@ -16,6 +16,8 @@ use mmt_shared::wire::{Architecture, Command, Hello, Message, Side};
 
 use crate::repeats::{Repeating, Repeats};
 use crate::slave::{Slave, SlaveConfig, SlaveError, SlaveTick};
+
+mod half;
 
 const SECOND: Duration = Duration::from_secs(1);
 
@@ -45,8 +47,8 @@ pub struct SlaveCounts {
     pub updates_superseded: u64,
     /// HIP samples received, repeated ones included.
     pub samples: u64,
-    /// Messages that break a rule of the wire and were not sent.
-    pub unsendable: u64,
+    /// Updates that could not be sent: they break a rule of the wire, or the datagram numbers are used up.
+    pub updates_unsent: u64,
 }
 
 /// The slave of a session that a master opens with `hello`: play-out waits as long as its packing needs.
@@ -203,20 +205,21 @@ impl SlaveEnd {
             return self.send_update(now, &update, out);
         }
         if let Some(tool) = self.tool.take() {
-            return self.send(now, Message::Tool(tool), out);
+            return self.channel.encode(now, Message::Tool(tool), out);
         }
         if let Some(scene) = self.take_due_scene(now) {
-            return self.send(now, Message::Scene(scene), out);
+            return self.channel.encode(now, Message::Scene(scene), out);
         }
         if let Some(update) = self.take_due_repeat(now) {
-            let sent = self.send(now, Message::Update((&update).into()), out);
+            let message = Message::Update((&update).into());
+            let sent = self.channel.encode(now, message, out);
             if let Ok(Some(_)) = sent {
                 self.counts.repeated.sent(update.cause);
             }
             return sent;
         }
         if self.channel.heartbeat_due() <= now {
-            return self.send(now, Message::Heartbeat, out);
+            return self.channel.encode(now, Message::Heartbeat, out);
         }
         Ok(None)
     }
@@ -237,9 +240,13 @@ impl SlaveEnd {
         out: &mut [u8],
     ) -> Result<Option<usize>, NumbersSpent> {
         self.repeating = Some(Repeating::new(now, *update));
-        let sent = self.send(now, Message::Update(update.into()), out);
+        let sent = self
+            .channel
+            .encode(now, Message::Update(update.into()), out);
         if let Ok(Some(_)) = sent {
             self.counts.updates.sent(update.cause);
+        } else {
+            self.counts.updates_unsent += 1;
         }
         sent
     }
@@ -270,22 +277,6 @@ impl SlaveEnd {
         self.scene_due().filter(|due| *due <= now)?;
         self.scene_sent = now;
         self.scene
-    }
-
-    fn send(
-        &mut self,
-        now: Time,
-        message: Message,
-        out: &mut [u8],
-    ) -> Result<Option<usize>, NumbersSpent> {
-        match self.channel.encode(now, message, out) {
-            Ok(length) => Ok(Some(length)),
-            Err(SendError::Numbers(spent)) => Err(spent),
-            Err(SendError::Encode(_)) => {
-                self.counts.unsendable += 1;
-                Ok(None)
-            }
-        }
     }
 }
 

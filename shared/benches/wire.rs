@@ -100,10 +100,10 @@ fn peer(criterion: &mut Criterion) {
         b.iter(|| {
             now += Duration::from_millis(1);
             if let Ok(question) = here.stamp(now) {
-                there.handle(now, &question, 100);
+                there.handle(now, &question);
             }
             if let Ok(answer) = there.stamp(now) {
-                here.handle(now, &answer, 100);
+                here.handle(now, &answer);
             }
         });
     });

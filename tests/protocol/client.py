@@ -192,7 +192,7 @@ class Session:
         self.number = self.newest = self.newest_sent = self.newest_at = 0
         self.seen, self.last_sent, self.sequence = set(), 0, 0
         self.sent, self.received = (dict.fromkeys(KINDS.values(), 0) for _ in range(2))
-        self.drops = {"duplicates": 0, "too_old": 0, "malformed": 0}
+        self.drops = {"datagrams_duplicate": 0, "datagrams_too_old": 0, "datagrams_malformed": 0}
         self.updates = {"duplicate": 0, "stale": 0, "rejected": 0, "superseded": 0, "frozen": 0}
         self.sequences, self.applied, self.causes, self.rtt_ns = set(), [], {}, []
         self.sent_at = {}
@@ -206,11 +206,12 @@ class Session:
         try:
             kind, fields = decode(data, "datagram", "slave")
         except Refused:
-            self.drops["malformed"] += 1
+            self.drops["datagrams_malformed"] += 1
             return
         number = fields["number"]
         if number + 1024 <= self.newest or number in self.seen:
-            self.drops["too_old" if number + 1024 <= self.newest else "duplicates"] += 1
+            why = "too_old" if number + 1024 <= self.newest else "duplicate"
+            self.drops[f"datagrams_{why}"] += 1
             return
         self.seen.add(number)
         self.received[KINDS[kind]] += 1
@@ -278,13 +279,12 @@ class Session:
 
     def farewell(self):
         udp = self.master.capture
-        traffic = {"sent": self.sent, "received": self.received, **self.drops}
+        session = {"sent": self.sent, "received": self.received, "drops": self.drops,
+                   "timing": {"ticks": self.ticks, "skipped": 0}}
         for way in ("sent", "received"):
-            traffic[f"udp_datagrams_{way}"] = udp.datagrams[way]
-            traffic[f"udp_bytes_{way}"] = udp.bytes[way]
-        return messages.farewell({
-            "duration_ns": self.now(), "traffic": traffic, "updates_applied": len(self.applied),
-            "updates_dropped": self.updates, "haptic_loop": {"ticks": self.ticks, "skipped": 0}})
+            session[f"wire_{way}"] = {"datagrams": udp.datagrams[way], "bytes": udp.bytes[way]}
+        updates = {"applied": len(self.applied), "dropped": self.updates}
+        return messages.farewell({"session": session, "updates": updates})
 
     def document(self, theirs):
         states = [update["state"] for update in self.applied]

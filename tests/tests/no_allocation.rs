@@ -306,7 +306,7 @@ impl Parts {
         let sent = self
             .channel
             .encode(now, Message::Update((&update).into()), &mut out);
-        sent.ok()
+        sent.ok().flatten()
     }
 }
 

@@ -16,6 +16,7 @@ use mmt_shared::io::transport::Transport;
 use mmt_shared::io::truth::{self, TruthReceiver, TruthSender};
 use mmt_shared::model::settings::Mode;
 use mmt_shared::pairing::Pairing;
+use mmt_shared::report::RunReport;
 use mmt_shared::wire::Architecture;
 
 use super::netem::wrap::{Emulation, effect};
@@ -27,8 +28,6 @@ use crate::log::Messages;
 use crate::output::{note, print, print_json};
 use crate::stop::Stop;
 use crate::view::{Caption, Snapshot};
-
-mod joined;
 
 /// Samples in a command.
 const SAMPLES_PER_COMMAND: u8 = 10;
@@ -83,7 +82,7 @@ pub(crate) fn run(arguments: &DemoArguments, messages: &Messages) -> Result<(), 
     drop(viewer);
     let (master, slave) = (master.join(), slave.join());
     emulation.finish()?;
-    let report = joined::join(&master?, slave?.as_ref())?;
+    let report = RunReport::of_both(master?, slave?);
     if arguments.json {
         print_json(&report)?
     } else {

@@ -17,6 +17,7 @@ use mmt_netem::trace::mmt::path_text;
 use mmt_shared::io::connect::ConnectError;
 use mmt_shared::model::geometry::Vec2;
 use mmt_shared::pairing::Pairing;
+use mmt_shared::report::RunReport;
 use tokio::sync::watch;
 
 use super::host::{Host, spawn};
@@ -68,7 +69,7 @@ pub(crate) fn run(arguments: MasterArguments, messages: &Messages) -> Result<(),
         });
     }
     drop(viewer);
-    let report = host.join()?;
+    let report = RunReport::from(host.join()?);
     emulation.finish()?;
     if let (Some(file), Some(path)) = (&arguments.record_path, &path) {
         keep_path(file, path)?;

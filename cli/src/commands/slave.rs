@@ -13,6 +13,7 @@ use mmt_shared::io::identity_file::{default_directory, load_or_create};
 use mmt_shared::io::live::LiveCell;
 use mmt_shared::pairing::{Host as HostName, Pairing};
 use mmt_shared::report::RunReport;
+use mmt_shared::wire::Ending;
 use tokio::runtime::Runtime;
 use tokio::sync::watch;
 
@@ -48,7 +49,7 @@ pub(crate) fn run(arguments: SlaveArguments, messages: &Messages) -> Result<(), 
         print(&started.pairing)?;
         watch_sessions(&host, &started.live, messages, &stop);
     }
-    let report = host.join()?;
+    let report = host.join()?.map(RunReport::from);
     emulation.finish()?;
     match (arguments.json, report) {
         (true, report) => print_json(&report.unwrap_or(unserved)),
@@ -142,16 +143,16 @@ fn options(arguments: &SlaveArguments) -> Result<SlaveOptions, Failure> {
 }
 
 /// The report of a slave that no master came to.
-fn unserved(options: &SlaveOptions) -> SlaveReport {
+fn unserved(options: &SlaveOptions) -> RunReport<SlaveConfiguration> {
     let configuration = SlaveConfiguration {
         listen: options.listen.to_string(),
         transport: options.transport.name(),
         slave: options.config.clone(),
         netem: options.netem.to_string(),
     };
-    let mut report = RunReport::new(env!("CARGO_PKG_VERSION"), "slave", configuration);
+    let mut report = RunReport::new("slave", configuration);
     report.seed = Some(options.config.seed);
-    report.ending = Some("interrupted".to_owned());
+    report.ending = Some(Ending::Interrupted.name());
     report
 }
 
@@ -240,7 +241,7 @@ mod tests {
     #[test]
     fn a_slave_that_nobody_came_to_still_has_a_report() {
         let report = unserved(&options_of(&["--once"]));
-        assert_eq!(report.ending.as_deref(), Some("interrupted"));
+        assert_eq!(report.ending, Some("interrupted"));
         assert_eq!(report.seed, Some(1));
     }
 }

@@ -74,8 +74,6 @@ pub struct HapticLoop {
     hand_force: Vec2,
     /// Error of the model's pose; empty where the truth is not known.
     pub(super) pose: PoseError,
-    /// Datagrams for which there was no room before the network task.
-    pub(super) departures_dropped: u64,
 }
 
 impl HapticLoop {
@@ -98,7 +96,6 @@ impl HapticLoop {
             why: None,
             hand_force: Vec2::zeros(),
             pose: PoseError::default(),
-            departures_dropped: 0,
         }
     }
 
@@ -133,7 +130,6 @@ impl HapticLoop {
         // what came before the end counts
         self.receive(&mut side);
         self.timing = ticker.report();
-        self.departures_dropped = side.departures_dropped();
         self
     }
 

@@ -28,7 +28,7 @@ use mmt_shared::model::geometry::{BoxFootprint, Pose, Vec2};
 use mmt_shared::model::tool::Scene;
 use mmt_shared::pairing::Pairing;
 use mmt_shared::range::OutOfRange;
-use mmt_shared::report::RunReport;
+use mmt_shared::report::MasterSession;
 use mmt_shared::wire::Architecture;
 use serde::Serialize;
 
@@ -166,7 +166,7 @@ pub struct MasterLive {
     pub ended: Option<SessionEnd>,
 }
 
-/// The configuration as the report tells it.
+/// The configuration as the report shows it.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct MasterConfiguration {
     /// The slave's address.
@@ -188,5 +188,5 @@ pub struct MasterConfiguration {
     pub netem: String,
 }
 
-/// The report of a master host's session.
-pub type MasterReport = RunReport<MasterConfiguration>;
+/// A master host's session.
+pub type MasterReport = MasterSession<MasterConfiguration>;

@@ -8,14 +8,14 @@ use mmt_shared::io::farewell::{FarewellError, ReceivedFarewell, receive_farewell
 use mmt_shared::io::loop_thread;
 use mmt_shared::io::network_task::{Event, NetworkTask, asked_to_stop};
 use mmt_shared::model::geometry::{BoxFootprint, Pose};
-use mmt_shared::report::totals::SlaveTotals;
+use mmt_shared::report::SlaveHalf;
 use mmt_shared::wire::Side;
 use tokio::sync::watch;
 use tokio::time::{Instant, error::Elapsed, timeout_at};
 
 use super::haptic::HapticLoop;
 use super::open::{Opened, TIMEOUTS, Timeouts, open};
-use super::report::Ended;
+use super::report::half;
 use super::{MasterHostError, MasterLive, MasterOptions, MasterReport, SessionEnd};
 use crate::end::MasterEnd;
 use crate::failsafe::LinkState;
@@ -32,7 +32,7 @@ const THREAD: &str = "mmt-haptic";
 /// second; the last one says why the session ended.
 ///
 /// A session that began always gives a report: one that the link or the slave broke has the ending
-/// `failed`, and what only the slave could have told is absent from it.
+/// `failed`, and what only the slave counts is absent from it.
 ///
 /// Call it inside of a tokio runtime with I/O and time.
 ///
@@ -115,53 +115,48 @@ pub(super) async fn operate(
         shown: LinkState::default(),
     };
     let mut farewell = pin!(receive_farewell(&mut receive, Side::Slave));
-    let Some(haptic) = session.run(farewell.as_mut(), &mut stop).await else {
+    let Some(mut haptic) = session.run(farewell.as_mut(), &mut stop).await else {
         connected
             .close("the master's haptic loop failed", timeouts.idle)
             .await;
         return Err(MasterHostError::Panicked);
     };
-    let began = haptic.end.channel().began();
-    let mut ended = Ended {
-        // the loop knows its own reasons, the network task the others; one without a reason was asked to end
-        why: haptic.why.or(session.why).unwrap_or(SessionEnd::Stopped),
-        duration: clock.now().saturating_since(began),
-        counts: *session.task.counts(),
-        arrivals_dropped: session.task.handle().arrivals_dropped(),
-        farewell: session.farewell,
-        sockets: connected.meter.snapshot(),
-        lateness: connected.meter.lateness(),
-        passed: connected.connection.datagrams(),
-        address: connected.address,
-        haptic,
-    };
-    tracing::info!("the session ends: {}", ended.why);
+    let duration = (clock.now()).saturating_since(haptic.end.channel().began());
+    // the loop knows its own reasons, the network task the others; one without a reason was asked to end
+    let why = haptic.why.or(session.why).unwrap_or(SessionEnd::Stopped);
+    tracing::info!("the session ends: {why}");
     if session.task.is_connected() {
         let deadline = Instant::now() + timeouts.farewell;
-        let (ending, report) = (ended.why.ending(), ended.totals());
-        let sent = send_farewell(&mut send, ending, &report, timeouts.farewell).await;
+        let half = half(&haptic, &session.task, &connected, duration);
+        let sent = send_farewell(&mut send, why.ending(), &half, timeouts.farewell).await;
         if let Err(error) = sent {
             tracing::warn!(%error, "the farewell did not reach the slave");
         }
         if session.task.awaits_farewell() {
-            ended.farewell = answer(timeout_at(deadline, farewell).await);
+            session.farewell = answer(timeout_at(deadline, farewell).await);
         } else {
             send.delivered(deadline.saturating_duration_since(Instant::now()))
                 .await;
         }
     }
-    ended.passed = connected.connection.datagrams();
-    connected.close(&ended.why.to_string(), timeouts.idle).await;
-    ended.sockets = connected.meter.snapshot();
-    ended.lateness = connected.meter.lateness();
-    session.show(Some(ended.why));
-    if let (Some(kept), Some(path)) = (&options.path, ended.haptic.path.take()) {
+    connected.close(&why.to_string(), timeouts.idle).await;
+    session.show(Some(why));
+    // the farewell and the close are part of what a session costs
+    let own = half(&haptic, &session.task, &connected, duration);
+    if let (Some(kept), Some(path)) = (&options.path, haptic.path.take()) {
         *kept.lock().unwrap_or_else(PoisonError::into_inner) = path;
     }
     if let Some(wanted) = &options.record {
-        *wanted.kept.lock().unwrap_or_else(PoisonError::into_inner) = ended.haptic.record.take();
+        *wanted.kept.lock().unwrap_or_else(PoisonError::into_inner) = haptic.record.take();
     }
-    Ok(ended.report(options))
+    Ok(MasterReport {
+        seed: options.netem_seed,
+        duration_s: haptic.elapsed.as_secs_f64(),
+        ending: why.ending(),
+        own,
+        other: session.farewell.and_then(|farewell| farewell.report),
+        configuration: options.into(),
+    })
 }
 
 /// What a session knows outside of its haptic loop.
@@ -171,11 +166,11 @@ struct Session<'a> {
     /// Why the session ends, if this task noticed first.
     why: Option<SessionEnd>,
     /// The slave's farewell, if it came.
-    farewell: Option<ReceivedFarewell<SlaveTotals>>,
+    farewell: Option<ReceivedFarewell<SlaveHalf>>,
     shown: LinkState,
 }
 
-type FarewellRead = Result<ReceivedFarewell<SlaveTotals>, FarewellError>;
+type FarewellRead = Result<ReceivedFarewell<SlaveHalf>, FarewellError>;
 
 impl Session<'_> {
     /// Runs until the haptic loop has ended; none if it panicked.
@@ -222,8 +217,8 @@ impl Session<'_> {
     fn handle_farewell(&mut self, read: FarewellRead) {
         match read {
             Ok(farewell) => {
-                self.farewell = Some(farewell);
                 self.end(SessionEnd::SlaveEnded(farewell.ending));
+                self.farewell = Some(farewell);
             }
             Err(error) if error.is_loss() => self.end(SessionEnd::ConnectionLost),
             Err(error) => {
@@ -235,7 +230,7 @@ impl Session<'_> {
 }
 
 /// The slave's answer to the master's farewell, if it came in time and could be read.
-fn answer(read: Result<FarewellRead, Elapsed>) -> Option<ReceivedFarewell<SlaveTotals>> {
+fn answer(read: Result<FarewellRead, Elapsed>) -> Option<ReceivedFarewell<SlaveHalf>> {
     match read {
         Ok(Ok(farewell)) => Some(farewell),
         Ok(Err(error)) => {

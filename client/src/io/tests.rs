@@ -11,8 +11,9 @@ use mmt_shared::model::geometry::{Pose, Twist, Vec2};
 use mmt_shared::model::params::{ModelParams, ModelState};
 use mmt_shared::model::update::Cause;
 use mmt_shared::pairing::{Pin, Token};
-use mmt_shared::report::totals::SlaveTotals;
-use mmt_shared::report::{EstimateReport, ForceReport, ModelReport};
+use mmt_shared::report::{
+    EstimateReport, ForceErrors, ModelReport, RunReport, SentUpdates, SlaveHalf, named,
+};
 use mmt_shared::time::{TICK, Time};
 use mmt_shared::wire::{Architecture, Ending, Message, Refusal};
 use tokio::sync::watch;
@@ -63,8 +64,9 @@ fn start(options: MasterOptions, timeouts: Timeouts) -> Running {
 }
 
 impl Running {
-    async fn end(&mut self) -> Result<MasterReport, MasterHostError> {
-        timeout(FOR_EVER, &mut self.done).await.unwrap().unwrap()
+    async fn end(&mut self) -> Result<RunReport<MasterConfiguration>, MasterHostError> {
+        let ended = timeout(FOR_EVER, &mut self.done).await.unwrap().unwrap();
+        ended.map(RunReport::from)
     }
 
     async fn error(&mut self) -> MasterHostError {
@@ -72,21 +74,25 @@ impl Running {
     }
 }
 
-fn totals() -> SlaveTotals {
-    SlaveTotals {
-        duration_ns: 2_000_000_000,
-        updates_by_cause: [3, 5, 0, 0, 1, 0],
-        force: ForceReport {
+fn totals() -> SlaveHalf {
+    SlaveHalf {
+        updates: SentUpdates {
+            sent: Some(9),
+            rate_hz: 4.5.into(),
+            by_cause: Some(named([("deadband", 3), ("timer", 5), ("contact_lost", 1)])),
+            ..SentUpdates::default()
+        },
+        force: ForceErrors {
             pmse: 0.125.into(),
             pmse_x: 0.25.into(),
             relative_error: 0.1.into(),
-            ..ForceReport::default()
+            ..ForceErrors::default()
         },
         model: ModelReport {
             mass_kg: EstimateReport::new(0.75, 0.7),
             ..ModelReport::default()
         },
-        ..SlaveTotals::default()
+        ..SlaveHalf::default()
     }
 }
 
@@ -107,22 +113,23 @@ async fn a_session_goes_from_hello_to_farewell_and_both_sides_are_in_the_report(
     assert!(stamps.windows(2).all(on_grid), "{stamps:?}");
     assert_eq!(stamps.len() % 10, 0, "ten samples a command");
 
-    assert_eq!(report.ending.as_deref(), Some("finished"));
-    let applied = report.updates.applied.unwrap();
-    let dropped: u64 = report.updates.dropped.as_ref().unwrap().values().sum();
+    assert_eq!(report.ending, Some("finished"));
+    let received = &report.updates.received;
+    let applied = received.applied.unwrap();
+    let dropped: u64 = received.dropped.as_ref().unwrap().values().sum();
     assert!(applied > 0);
     assert_eq!(Some(applied + dropped), report.messages.down.updates);
-    assert_eq!(u64::from(totals.updates_applied), applied);
-    assert!(report.updates.age_ms.mean.get().unwrap() > 0.0);
-    assert_eq!(report.updates.sent, Some(9));
-    assert_eq!(report.updates.rate_hz.get(), Some(4.5));
-    assert_eq!(report.updates.by_cause.as_ref().unwrap()["timer"], 5);
-    assert_eq!(report.force.pmse.get(), Some(0.125));
-    assert_eq!(report.force.pmse_y.get(), None);
+    assert_eq!(totals.updates.applied, Some(applied));
+    assert!(received.age_ms.mean.get().unwrap() > 0.0);
+    assert_eq!(report.updates.sent.sent, Some(9));
+    assert_eq!(report.updates.sent.rate_hz.get(), Some(4.5));
+    assert_eq!(report.updates.sent.by_cause.as_ref().unwrap()["timer"], 5);
+    assert_eq!(report.force.errors.pmse.get(), Some(0.125));
+    assert_eq!(report.force.errors.pmse_y.get(), None);
     assert_eq!(report.model.mass_kg.estimate.get(), Some(0.75));
-    assert!(report.force.largest_n.get().is_some());
+    assert!(report.force.hand.largest_n.get().is_some());
     let ticks = report.haptic_loop.ticks.unwrap();
-    assert_eq!(totals.haptic_loop.ticks, Some(ticks));
+    assert_eq!(totals.session.timing.ticks, Some(ticks));
     assert!(report.duration_s.get().unwrap() >= 0.4);
     assert!(report.haptic_loop.cpu_us.p50.get().unwrap() > 0.0);
     assert_eq!(report.slave_loop, Default::default());
@@ -282,7 +289,7 @@ async fn a_stop_in_the_session_releases_the_hand_and_says_farewell() {
     slave.say_farewell(Ending::Interrupted, totals()).await;
     let report = master.end().await.unwrap();
     assert_eq!(told.ending, Ending::Interrupted);
-    assert_eq!(report.ending.as_deref(), Some("interrupted"));
+    assert_eq!(report.ending, Some("interrupted"));
     let last = *master.live.borrow_and_update();
     assert_eq!(last.ended, Some(SessionEnd::Stopped));
     assert_eq!(last.hand_force, Vec2::zeros());
@@ -329,8 +336,8 @@ async fn a_slave_that_ends_first_gets_the_masters_farewell() {
     let told = slave.serve().await;
     let report = master.end().await.unwrap();
     assert_eq!(told.ending, Ending::Interrupted);
-    assert_eq!(report.ending.as_deref(), Some("interrupted"));
-    assert_eq!(report.updates.sent, Some(9), "the slave's totals are in");
+    assert_eq!(report.ending, Some("interrupted"));
+    assert_eq!(report.updates.sent.sent, Some(9), "the slave's half is in");
     let ended = master.live.borrow_and_update().ended;
     assert_eq!(ended, Some(SessionEnd::SlaveEnded(Ending::Interrupted)));
 }
@@ -350,16 +357,16 @@ async fn a_silent_slave_releases_the_hand_and_what_it_counted_stays_unknown() {
     let silent_since = Instant::now();
     let report = master.end().await.unwrap();
     assert!(silent_since.elapsed() >= Duration::from_millis(900));
-    assert_eq!(report.ending.as_deref(), Some("failed"));
+    assert_eq!(report.ending, Some("failed"));
     let last = *master.live.borrow_and_update();
     assert_eq!(last.ended, Some(SessionEnd::LinkSilent));
     assert_eq!(last.link, LinkState::Released);
     assert_eq!(last.hand_force, Vec2::zeros());
-    assert_eq!(report.updates.sent, None);
-    assert_eq!(report.updates.by_cause, None);
-    assert_eq!(report.force.pmse.get(), None);
+    assert_eq!(report.updates.sent.sent, None);
+    assert_eq!(report.updates.sent.by_cause, None);
+    assert_eq!(report.force.errors.pmse.get(), None);
     assert_eq!(report.model, Default::default());
-    assert!(report.updates.applied.is_some() && report.haptic_loop.ticks.is_some());
+    assert!(report.updates.received.applied.is_some() && report.haptic_loop.ticks.is_some());
 }
 
 #[tokio::test]
@@ -372,8 +379,8 @@ async fn a_lost_connection_ends_the_session_with_a_report() {
     slave.serve_for(Duration::from_millis(50)).await;
     slave.connection.close(9u32.into(), b"gone");
     let report = master.end().await.unwrap();
-    assert_eq!(report.ending.as_deref(), Some("failed"));
-    assert_eq!(report.updates.sent, None);
+    assert_eq!(report.ending, Some("failed"));
+    assert_eq!(report.updates.sent.sent, None);
     let last = *master.live.borrow_and_update();
     assert_eq!(last.ended, Some(SessionEnd::ConnectionLost));
     assert_eq!(last.hand_force, Vec2::zeros());
@@ -389,7 +396,7 @@ async fn a_second_welcome_breaks_the_protocol_and_ends_the_session() {
     slave.welcome(slave.hello.coupling).await;
     slave.serve().await;
     let report = master.end().await.unwrap();
-    assert_eq!(report.ending.as_deref(), Some("failed"));
+    assert_eq!(report.ending, Some("failed"));
     let ended = master.live.borrow_and_update().ended;
     assert_eq!(ended, Some(SessionEnd::StreamBroken));
 }
@@ -410,7 +417,7 @@ async fn a_trace_ends_the_session_when_it_is_over() {
     slave.serve().await;
     slave.say_farewell(Ending::Finished, totals()).await;
     let report = master.end().await.unwrap();
-    assert_eq!(report.ending.as_deref(), Some("finished"));
+    assert_eq!(report.ending, Some("finished"));
     assert_eq!(report.pushes.completed, None);
     assert_eq!(report.configuration.operator, "a path");
     let ended = master.live.borrow_and_update().ended;

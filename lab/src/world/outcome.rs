@@ -58,8 +58,8 @@ impl Traffic {
             |of: Tally| WireReport::new(of.packets, of.bytes, OVERHEAD_BYTES as u64, duration_s);
         Self {
             messages: UpDown {
-                up: MessagesReport::up(&master.traffic().sent, duration_s),
-                down: MessagesReport::down(&slave.traffic().sent, repeats, duration_s),
+                up: MessagesReport::up(&master.counts().sent, duration_s),
+                down: MessagesReport::down(&slave.counts().sent, repeats, duration_s),
             },
             repeated,
             wire: UpDown {

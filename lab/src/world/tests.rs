@@ -191,7 +191,7 @@ fn every_datagram_that_an_end_sent_was_received_or_lost_or_is_in_flight() {
     let up = (&world.up, world.master.channel(), world.slave.channel());
     let down = (&world.down, world.slave.channel(), world.master.channel());
     for (path, from, to) in [up, down] {
-        let (sent, received) = (from.traffic(), to.traffic());
+        let (sent, received) = (from.counts(), to.counts());
         let counters = path.counters();
         let lost = counters.dropped.total().packets;
         assert!(lost > 0 && path.in_flight() > 0, "the law has work to do");
@@ -201,8 +201,35 @@ fn every_datagram_that_an_end_sent_was_received_or_lost_or_is_in_flight() {
             sent.sent.total(),
             received.received.total() + lost + path.in_flight() as u64
         );
-        let refused = received.malformed + received.duplicates + received.too_old;
+        let refused = received.datagrams_malformed
+            + received.datagrams_duplicate
+            + received.datagrams_too_old;
         assert_eq!(refused, 0);
+    }
+}
+
+#[test]
+fn in_every_run_what_was_sent_arrived_or_was_lost_and_what_arrived_was_applied_or_dropped() {
+    for (link, seed) in [
+        ("delay 50ms 5ms", 1),
+        ("delay 50ms 5ms loss 5%", 3),
+        ("delay 1ms", 2),
+    ] {
+        let world = run(&over(link, seed), 10);
+        let (master, slave) = (world.master.half(10.0), world.slave.half(10.0));
+        let sent = slave.updates.sent.unwrap() + slave.updates.repeated.unwrap();
+        assert_eq!(slave.session.sent.updates, Some(sent));
+        let arrived = master.session.received.updates.unwrap();
+        let dropped: u64 = master.updates.dropped.unwrap().values().sum();
+        assert_eq!(master.updates.applied, Some(arrived - dropped), "{link}");
+        let [down, gone] = [world.slave.channel(), world.master.channel()].map(|end| end.counts());
+        let missing = down.sent.total() - gone.received.total();
+        let lost = world.down.counters().dropped.total().packets + world.down.in_flight() as u64;
+        assert_eq!(missing, lost, "{link}");
+        assert!((arrived..=arrived + lost).contains(&sent), "{link}");
+        let made =
+            slave.session.drops["updates_superseded"] + slave.session.drops["updates_unsent"];
+        assert_eq!(made, 0, "every tick sends");
     }
 }
 

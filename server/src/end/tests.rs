@@ -89,7 +89,7 @@ fn command(
     };
     let mut bytes = [0; DATAGRAM_MAX];
     let length = master.encode(AT(now), Message::Command(command), &mut bytes);
-    bytes[..length.unwrap()].to_vec()
+    bytes[..length.unwrap().unwrap()].to_vec()
 }
 
 #[test]
@@ -104,7 +104,7 @@ fn an_update_is_repeated_at_its_times_with_its_sequence_and_counted_by_its_cause
     let counts = end.counts();
     assert_eq!(counts.repeated.of(Cause::Timer), 2);
     assert_eq!((counts.updates.total(), counts.repeated.total()), (1, 2));
-    assert_eq!(end.channel().traffic().sent.updates, 3, "repeats included");
+    assert_eq!(end.channel().counts().sent.updates, 3, "repeats included");
 }
 
 #[test]
@@ -224,4 +224,33 @@ fn scenes_are_due_as_often_as_somebody_wants_to_see_them() {
     assert_eq!(end.scene_due(), Some(AT(150)));
     let nobody = self::end("none", Architecture::Mmt, 0);
     assert_eq!(nobody.scene_due(), None);
+}
+
+#[test]
+fn each_update_that_a_tick_made_is_sent_superseded_or_unsent() {
+    let mut config = SlaveConfig::default();
+    config.trigger.scheme = "every-sample".parse().unwrap();
+    let mut end = end("none", Architecture::Mmt, 0);
+    end.slave = Slave::try_new(&config, Coupling::for_stiffness(1000.0)).unwrap();
+    let mut master = DatagramChannel::new(Side::Master, Time::ZERO);
+    let mut made = 0;
+    for ms in 1..=400 {
+        // what is there leaves every 7 ms until 350 ms
+        if ms % 10 == 0 {
+            let bytes = command(&mut master, ms, ms - 9..=ms, 0, None);
+            end.handle_datagram(AT(ms), &bytes);
+        }
+        made += u64::from(end.tick(AT(ms)).is_some_and(|tick| tick.update.is_some()));
+        if ms % 7 == 0 && ms <= 350 {
+            sent(&mut end, &mut master, AT(ms));
+        }
+    }
+    let half = end.half(0.4);
+    let [superseded, unsent] =
+        ["updates_superseded", "updates_unsent"].map(|name| half.session.drops[name]);
+    assert!(
+        made > 0 && superseded > 0 && unsent > 0,
+        "the law has work to do"
+    );
+    assert_eq!(half.updates.sent, Some(made - superseded - unsent));
 }

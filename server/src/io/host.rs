@@ -1,29 +1,28 @@
 //! The host: an endpoint, the acceptor, and one session after the other.
 
-use std::io;
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr, UdpSocket};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
-use mmt_netem::io::socket::{EmulatedSocket, SocketMeter, WrapError};
+use mmt_netem::io::socket::EmulatedSocket;
 use mmt_netem::link::LinkId;
 use mmt_shared::io::clock::Clock;
 use mmt_shared::io::congestion::RateCap;
 use mmt_shared::io::live::LiveCell;
 use mmt_shared::io::network_task::asked_to_stop;
-use mmt_shared::io::quic::{EndpointError, Traffic};
-use mmt_shared::io::socket::{self, BindError};
-use mmt_shared::io::transport::{CLOSE_FINISHED, Endpoint, Insecure, Listener, Transport};
-use mmt_shared::io::truth::TruthSender;
+use mmt_shared::io::quic::Traffic;
+use mmt_shared::io::socket;
+use mmt_shared::io::transport::{CLOSE_FINISHED, Endpoint, Listener};
 use mmt_shared::model::contact::Coupling;
 use mmt_shared::pairing::{Address, Host, Pairing};
 use tokio::sync::{mpsc, watch};
 use tokio::time::timeout;
 
 use super::acceptor::{Acceptor, Admitted, Refusals};
+use super::context::{Context, SlaveHostError};
 use super::session;
-use super::{RecordWanted, SlaveConfiguration, SlaveLive, SlaveOptions, SlaveReport};
-use crate::slave::{Slave, SlaveConfig, SlaveError};
+use super::{SlaveLive, SlaveOptions, SlaveReport};
+use crate::slave::Slave;
 
 /// Updates are the longest datagrams of a slave, 196 bytes at most, and what the tool feels takes 92: at one of each
 /// per tick, with QUIC's 30 bytes each, heartbeats and acknowledgements they stay below 400 kB/s.
@@ -38,79 +37,13 @@ const TRIAL_STIFFNESS: f64 = 1000.0;
 /// How long closed connections may take to say so.
 const CLOSING: Duration = Duration::from_secs(1);
 
-/// Why a slave host could not start or go on.
-#[derive(Debug, thiserror::Error)]
-pub enum SlaveHostError {
-    /// Raw UDP beyond this host, and nobody insists.
-    #[error(transparent)]
-    Insecure(#[from] Insecure),
-    /// The port is taken or the address is not this host's.
-    #[error("cannot listen: {0}")]
-    Bind(#[from] BindError),
-    /// The socket cannot be used.
-    #[error("cannot listen on {address}: {source}")]
-    Socket {
-        /// Where.
-        address: SocketAddr,
-        /// What the system said.
-        source: io::Error,
-    },
-    /// The emulated network cannot be made.
-    #[error("cannot emulate the network: {0}")]
-    Netem(#[from] WrapError),
-    /// QUIC cannot start.
-    #[error("cannot start QUIC: {0}")]
-    Endpoint(#[from] EndpointError),
-    /// The configuration's numbers are not accepted.
-    #[error("the slave's configuration: {0}")]
-    Slave(#[from] SlaveError),
-    /// The 1 kHz thread cannot start.
-    #[error("cannot start the 1 kHz thread: {0}; see the limits on threads and descriptors")]
-    Thread(#[from] io::Error),
-    /// The 1 kHz thread panicked: a bug.
-    #[error("the slave's 1 kHz thread panicked: please report this with what was printed above")]
-    Panicked,
-}
-
 /// A slave that listens. One session at a time; others are refused meanwhile.
 pub struct SlaveHost {
     endpoint: Endpoint,
     address: SocketAddr,
     pairing: Pairing,
-    pub(super) shared: Shared,
+    pub(super) context: Context,
     once: bool,
-}
-
-/// What every session needs of its host.
-pub(super) struct Shared {
-    pub(super) clock: Clock,
-    pub(super) config: SlaveConfig,
-    pub(super) listen: String,
-    pub(super) transport: Transport,
-    pub(super) netem: String,
-    pub(super) meter: SocketMeter,
-    pub(super) listener: Arc<Listener>,
-    pub(super) refusals: Arc<Refusals>,
-    /// Until a session has taken it.
-    pub(super) truth: Mutex<Option<TruthSender>>,
-    pub(super) record: Option<RecordWanted>,
-}
-
-impl Shared {
-    /// The true pose's way to a master of this process; for the first session that asks.
-    pub(super) fn take_truth(&self) -> Option<TruthSender> {
-        let mut truth = self.truth.lock().unwrap_or_else(PoisonError::into_inner);
-        truth.take()
-    }
-
-    pub(super) fn configuration(&self, slave: &SlaveConfig) -> SlaveConfiguration {
-        SlaveConfiguration {
-            listen: self.listen.clone(),
-            transport: self.transport.name(),
-            slave: slave.clone(),
-            netem: self.netem.clone(),
-        }
-    }
 }
 
 impl SlaveHost {
@@ -141,7 +74,7 @@ impl SlaveHost {
             pin: options.identity.pin(),
             token: *options.identity.token(),
         };
-        let shared = Shared {
+        let context = Context {
             clock: Clock::start(),
             config: options.config,
             listen: address.to_string(),
@@ -157,7 +90,7 @@ impl SlaveHost {
             endpoint,
             address,
             pairing,
-            shared,
+            context,
             once: options.once,
         })
     }
@@ -183,16 +116,16 @@ impl SlaveHost {
     /// is over. The report is that of the last session, none if there was none.
     ///
     /// # Errors
-    /// The 1 kHz thread panicked, of which the session's master has been told, or could not be started, which
+    /// The 1 kHz thread panicked, which the session's master has learnt, or could not be started, which
     /// closes the connection.
     pub async fn run(
         self,
         mut stop: watch::Receiver<bool>,
         live: Arc<LiveCell<SlaveLive>>,
     ) -> Result<Option<SlaveReport>, SlaveHostError> {
-        let (token, refusals) = (self.pairing.token, Arc::clone(&self.shared.refusals));
+        let (token, refusals) = (self.pairing.token, Arc::clone(&self.context.refusals));
         let (acceptor, masters) = Acceptor::new(token, refusals, stop.clone());
-        let listener = Arc::clone(&self.shared.listener);
+        let listener = Arc::clone(&self.context.listener);
         let (served, ()) = tokio::join!(
             async {
                 let served = self.serve(masters, &mut stop, &live).await;
@@ -214,7 +147,7 @@ impl SlaveHost {
         live: &LiveCell<SlaveLive>,
     ) -> Result<Option<SlaveReport>, SlaveHostError> {
         let mut last = None;
-        let mut socket_before = self.shared.meter.snapshot();
+        let mut socket_before = self.context.meter.snapshot();
         loop {
             let admitted = tokio::select! {
                 biased;
@@ -224,8 +157,8 @@ impl SlaveHost {
             let Some(admitted) = admitted else {
                 return Ok(last);
             };
-            let report = session::serve(&self.shared, admitted, socket_before, stop, live).await?;
-            socket_before = self.shared.meter.snapshot();
+            let report = session::serve(&self.context, admitted, socket_before, stop, live).await?;
+            socket_before = self.context.meter.snapshot();
             live.set(SlaveLive::default());
             let served = report.is_some();
             last = report.or(last);

@@ -9,8 +9,8 @@
 )]
 
 mod acceptor;
+mod context;
 mod host;
-mod report;
 mod session;
 mod slave_loop;
 #[cfg(test)]
@@ -26,12 +26,13 @@ use mmt_shared::io::transport::Transport;
 use mmt_shared::io::truth::TruthSender;
 use mmt_shared::model::geometry::{BoxFootprint, Pose, Vec2};
 use mmt_shared::model::update::Cause;
-use mmt_shared::report::RunReport;
+use mmt_shared::report::SlaveSession;
 use serde::Serialize;
 
 use crate::slave::SlaveConfig;
 
-pub use host::{SlaveHost, SlaveHostError};
+pub use context::SlaveHostError;
+pub use host::SlaveHost;
 pub use slave_loop::SlaveRecord;
 
 /// How many inputs of the slave's loop are to be kept, and where a session leaves them at its end.
@@ -43,7 +44,7 @@ pub struct RecordWanted {
     pub kept: Arc<Mutex<Option<SlaveRecord>>>,
 }
 
-/// Name and version of this program, as it tells them to the other side.
+/// Name and version of this program, as it gives them to the other side.
 const PROGRAM: &str = concat!("mmt ", env!("CARGO_PKG_VERSION"));
 
 /// How a slave host runs.
@@ -100,7 +101,7 @@ pub struct SlaveLive {
     pub loss_up: Option<f64>,
 }
 
-/// The configuration as the report tells it.
+/// The configuration as the report shows it.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SlaveConfiguration {
     /// Where it listened.
@@ -113,5 +114,5 @@ pub struct SlaveConfiguration {
     pub netem: String,
 }
 
-/// The report of the last session of a slave host.
-pub type SlaveReport = RunReport<SlaveConfiguration>;
+/// A slave host's last session.
+pub type SlaveReport = SlaveSession<SlaveConfiguration>;

@@ -21,7 +21,7 @@ use mmt_shared::io::stream::WriteFrameError;
 use mmt_shared::io::ticker::Ticker;
 use mmt_shared::io::transport::{CLOSE_FINISHED, Connection, RecvStream, SendStream};
 use mmt_shared::model::contact::Coupling;
-use mmt_shared::report::totals::MasterTotals;
+use mmt_shared::report::{MasterHalf, SlaveHalf};
 use mmt_shared::wire::{
     Ending, Hello, Label, Refusal, STREAM_MESSAGE_MAX, Side, StreamMessage, Welcome,
 };
@@ -29,8 +29,7 @@ use tokio::sync::watch;
 use tokio::time::{sleep, timeout};
 
 use super::acceptor::{Admitted, refuse};
-use super::host::{Shared, SlaveHostError};
-use super::report::{self, Outcome};
+use super::context::{Context, SlaveHostError};
 use super::slave_loop::{Finished, SlaveLoop, Snapshot};
 use super::{PROGRAM, SlaveLive, SlaveReport};
 use crate::end::{SlaveEnd, session_config};
@@ -39,7 +38,7 @@ use crate::slave::{Slave, SlaveConfig};
 use end::{End, SILENCE_MAX};
 
 /// What the read of the master's farewell gives.
-type MastersFarewell = Result<ReceivedFarewell<MasterTotals>, FarewellError>;
+type MastersFarewell = Result<ReceivedFarewell<MasterHalf>, FarewellError>;
 
 /// How long the stream may take to take a message of ours.
 const WRITE_WAIT: Duration = Duration::from_secs(2);
@@ -50,7 +49,7 @@ const THREAD: &str = "mmt-slave";
 
 /// A session that has begun.
 struct Session<'a> {
-    shared: &'a Shared,
+    context: &'a Context,
     config: SlaveConfig,
     connection: Connection,
     send: SendStream,
@@ -61,19 +60,19 @@ struct Session<'a> {
 /// Serves an admitted master. No report if no session came about. `socket_before` is what the socket had
 /// counted when nobody had connected for this session yet: the handshake is part of what a session costs.
 pub(super) async fn serve(
-    shared: &Shared,
+    context: &Context,
     admitted: Admitted,
     socket_before: SocketCounters,
     stop: &mut watch::Receiver<bool>,
     live: &LiveCell<SlaveLive>,
 ) -> Result<Option<SlaveReport>, SlaveHostError> {
     let body = |slave_loop: SlaveLoop, side, ticker, clock| slave_loop.run(side, ticker, clock);
-    serve_with(shared, admitted, socket_before, stop, live, body).await
+    serve_with(context, admitted, socket_before, stop, live, body).await
 }
 
 /// Serves with a loop of the caller's making.
 pub(super) async fn serve_with(
-    shared: &Shared,
+    context: &Context,
     admitted: Admitted,
     socket_before: SocketCounters,
     stop: &mut watch::Receiver<bool>,
@@ -87,8 +86,8 @@ pub(super) async fn serve_with(
         hello,
         lease: _lease,
     } = admitted;
-    let clock = shared.clock;
-    let end = match SlaveEnd::of_session(clock.now(), &shared.config, &hello) {
+    let clock = context.clock;
+    let end = match SlaveEnd::of_session(clock.now(), &context.config, &hello) {
         Ok(end) => end,
         Err(error) => {
             tracing::warn!("no slave for a device of {:?}: {error}", hello.coupling);
@@ -98,7 +97,7 @@ pub(super) async fn serve_with(
     };
     // Datagrams from before the welcome belong to no session.
     discard(&connection).await;
-    if let Err(error) = welcome(&mut send, &shared.config, end.slave()).await {
+    if let Err(error) = welcome(&mut send, &context.config, end.slave()).await {
         tracing::warn!(
             "{} left before its welcome: {error}",
             connection.remote_address()
@@ -106,15 +105,15 @@ pub(super) async fn serve_with(
         return Ok(None);
     }
     announce(&connection, &hello);
-    let mut slave_loop = SlaveLoop::new(end, shared.take_truth());
-    if let Some(wanted) = &shared.record {
+    let mut slave_loop = SlaveLoop::new(end, context.take_truth());
+    if let Some(wanted) = &context.record {
         slave_loop = slave_loop.recorded(wanted.inputs, hello);
     }
     let body = move |side, ticker| body(slave_loop, side, ticker, clock);
     let handle = loop_thread::spawn(THREAD, clock, &Snapshot::default(), body)?;
     let session = Session {
-        shared,
-        config: session_config(&shared.config, &hello),
+        context,
+        config: session_config(&context.config, &hello),
         task: NetworkTask::new(clock, connection.clone(), handle),
         connection,
         send,
@@ -174,7 +173,7 @@ impl Session<'_> {
         stop: &mut watch::Receiver<bool>,
         live: &LiveCell<SlaveLive>,
     ) -> Result<SlaveReport, SlaveHostError> {
-        let began = self.shared.clock.now();
+        let began = self.context.clock.now();
         let farewell = receive_farewell(&mut receive, Side::Master);
         tokio::pin!(farewell);
         let end = self.until_end(farewell.as_mut(), stop, live).await;
@@ -189,10 +188,14 @@ impl Session<'_> {
             End::Farewell(theirs) => theirs.ending,
             _ => Ending::Failed,
         };
-        let duration = self.shared.clock.now().saturating_since(began);
-        let mut outcome = self.outcome(ending, duration, finished);
-        let totals = outcome.totals();
-        let sent = send_farewell(&mut self.send, ending, &totals, FAREWELL_WAIT).await;
+        let duration = self.context.clock.now().saturating_since(began);
+        let duration_s = duration.as_secs_f64();
+        let own = finished
+            .as_ref()
+            .map(|finished| self.half(finished, duration_s));
+        let nothing = SlaveHalf::default();
+        let report = own.as_ref().unwrap_or(&nothing);
+        let sent = send_farewell(&mut self.send, ending, report, FAREWELL_WAIT).await;
         let theirs = async {
             match end {
                 End::Farewell(theirs) => Some(*theirs),
@@ -206,19 +209,17 @@ impl Session<'_> {
         let theirs = answer(theirs, self.connection.closed(), sleep(FAREWELL_WAIT)).await;
         self.connection
             .close(CLOSE_FINISHED, b"the session is over");
-        if let (Some(wanted), Some(finished)) = (&self.shared.record, &mut outcome.finished) {
-            *wanted.kept.lock().unwrap_or_else(PoisonError::into_inner) = finished.record.take();
+        if let (Some(wanted), Some(finished)) = (&self.context.record, finished) {
+            *wanted.kept.lock().unwrap_or_else(PoisonError::into_inner) = finished.record;
         }
-        match &outcome.finished {
-            Some(finished) => Ok(report::report(
-                self.shared,
-                &self.config,
-                &outcome,
-                finished,
-                theirs.and_then(|theirs| theirs.report).as_ref(),
-            )),
-            None => Err(SlaveHostError::Panicked),
-        }
+        Ok(SlaveReport {
+            seed: self.config.seed,
+            duration_s,
+            ending,
+            own: own.ok_or(SlaveHostError::Panicked)?,
+            other: theirs.and_then(|theirs| theirs.report),
+            configuration: self.context.configuration(&self.config),
+        })
     }
 
     /// Moves datagrams until something ends the session.
@@ -249,7 +250,7 @@ impl Session<'_> {
 
     /// Shows the newest snapshot; whether it ends the session.
     fn beat(&mut self, live: &LiveCell<SlaveLive>) -> Option<End> {
-        let now = self.shared.clock.now();
+        let now = self.context.clock.now();
         let snapshot = *self.task.handle().snapshot();
         live.set(snapshot.live);
         let silent = |heard| now.saturating_since(heard) > SILENCE_MAX;
@@ -262,30 +263,15 @@ impl Session<'_> {
         }
     }
 
-    fn outcome(
-        &mut self,
-        ending: Ending,
-        duration: Duration,
-        finished: Option<Finished>,
-    ) -> Outcome {
-        let passed = self.connection.datagrams();
-        let counts = *self.task.counts();
-        Outcome {
-            ending,
-            duration,
-            finished,
-            unsent: counts.given.saturating_sub(passed.sent),
-            unread: passed.received.saturating_sub(counts.read),
-            counts,
-            arrivals_dropped: self.task.handle().arrivals_dropped(),
-            before: self.socket_before,
-            after: self.shared.meter.snapshot(),
-            over_ipv4: self
-                .connection
-                .remote_address()
-                .ip()
-                .to_canonical()
-                .is_ipv4(),
-        }
+    /// What the slave counted and measured: the farewell carries it, the report prints it.
+    fn half(&self, finished: &Finished, duration_s: f64) -> SlaveHalf {
+        let mut half = finished.end.half(duration_s);
+        let (session, peer) = (&mut half.session, self.connection.remote_address());
+        session.timing = (&finished.ticker).into();
+        session.add_drops(self.task.drops());
+        session.add_drops(self.context.refusals());
+        let meter = &self.context.meter;
+        meter.add_to(session, &self.socket_before, peer, duration_s);
+        half
     }
 }

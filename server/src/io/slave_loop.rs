@@ -33,8 +33,6 @@ pub(super) struct Finished {
     pub(super) end: SlaveEnd,
     /// How the loop kept its time.
     pub(super) ticker: TickerReport,
-    /// Datagrams for which there was no room before the network task.
-    pub(super) departures_dropped: u64,
     pub(super) record: Option<SlaveRecord>,
 }
 
@@ -100,7 +98,6 @@ impl SlaveLoop {
         Finished {
             end: self.end,
             ticker: ticker.report(),
-            departures_dropped: side.departures_dropped(),
             record: self.record,
         }
     }

@@ -7,9 +7,9 @@ use std::time::Duration;
 
 use crate::channel::peer::{Arrival, NumbersSpent, Peer};
 use crate::channel::rate_control::{RateController, StretchMax};
-use crate::stats::session::{KindCounts, Traffic};
+use crate::stats::session::ChannelCounts;
 use crate::time::Time;
-use crate::wire::{Datagram, EncodeError, Message, Side};
+use crate::wire::{Datagram, Message, Side};
 
 /// Each side sends at least this often: what is needed to call a link dead within a second and to keep
 /// the round-trip time fresh, and twenty small packets a second at the most.
@@ -24,32 +24,19 @@ pub struct Received {
     pub is_newest: bool,
 }
 
-/// Why nothing could be sent.
-#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-pub enum SendError {
-    /// The session has used up its datagram numbers.
-    #[error(transparent)]
-    Numbers(#[from] NumbersSpent),
-    /// The message breaks a rule of the wire.
-    #[error(transparent)]
-    Encode(#[from] EncodeError),
-}
-
 /// One end of the channel.
 #[derive(Clone, Debug)]
 pub struct DatagramChannel {
     side: Side,
     peer: Peer,
-    sent: KindCounts,
-    received: KindCounts,
-    malformed: u32,
+    counts: ChannelCounts,
     began: Time,
     last_sent: Time,
     rate: RateController,
 }
 
 impl DatagramChannel {
-    /// The end of `side`, from `now` on, that never says less because of congestion.
+    /// The end of `side`, from `now` on, that never sends less because of congestion.
     #[must_use]
     pub fn new(side: Side, now: Time) -> Self {
         Self::with_rate_control(side, now, StretchMax::OFF)
@@ -61,33 +48,34 @@ impl DatagramChannel {
         Self {
             side,
             peer: Peer::new(),
-            sent: KindCounts::default(),
-            received: KindCounts::default(),
-            malformed: 0,
+            counts: ChannelCounts::default(),
             began: now,
             last_sent: now,
             rate: RateController::new(stretch_max),
         }
     }
 
-    /// Reads a datagram that arrived at `now`. None, and counted, if it does not decode, was seen before
-    /// or is too old to tell.
+    /// Reads a datagram that arrived at `now`. None, and counted, if it does not decode, was received before
+    /// or is too old to judge.
     pub fn handle(&mut self, now: Time, bytes: &[u8]) -> Option<Received> {
         let Ok(Datagram { envelope, message }) = Datagram::decode(bytes, self.side.other()) else {
-            self.malformed = self.malformed.saturating_add(1);
+            self.counts.datagrams_malformed += 1;
             return None;
         };
         let measured = self.peer.round_trip().histogram().total();
-        let is_newest = match self.peer.handle(now, &envelope, bytes.len()) {
-            Arrival::Newest => true,
-            Arrival::Reordered => false,
-            Arrival::Duplicate | Arrival::TooOld => return None,
-        };
+        let arrival = self.peer.handle(now, &envelope);
+        match arrival {
+            Arrival::Newest | Arrival::Reordered => self.counts.received.count(message.kind()),
+            Arrival::Duplicate => self.counts.datagrams_duplicate += 1,
+            Arrival::TooOld => self.counts.datagrams_too_old += 1,
+        }
         if self.peer.round_trip().histogram().total() > measured {
             self.control_rate(now);
         }
-        self.received.count(message.kind());
-        Some(Received { message, is_newest })
+        matches!(arrival, Arrival::Newest | Arrival::Reordered).then_some(Received {
+            message,
+            is_newest: arrival == Arrival::Newest,
+        })
     }
 
     fn control_rate(&mut self, now: Time) {
@@ -97,27 +85,31 @@ impl DatagramChannel {
         }
     }
 
-    /// By how much to stretch what is said, 1 without congestion ([`RateController`]).
+    /// By how much to stretch the times between messages, 1 without congestion ([`RateController`]).
     #[must_use]
     pub fn stretch(&self) -> f64 {
         self.rate.stretch()
     }
 
-    /// Writes a datagram to be sent at `now`; returns its length.
+    /// Writes a datagram to be sent at `now`; returns its length. None, and counted, if the message breaks a rule of the
+    /// wire.
     ///
     /// # Errors
-    /// When no number is left or the message breaks a rule of the wire.
+    /// The session has used up its datagram numbers.
     pub fn encode(
         &mut self,
         now: Time,
         message: Message,
         out: &mut [u8],
-    ) -> Result<usize, SendError> {
+    ) -> Result<Option<usize>, NumbersSpent> {
         let envelope = self.peer.stamp(now)?;
-        let length = Datagram { envelope, message }.encode(out)?;
-        self.sent.count(message.kind());
+        let Ok(length) = Datagram { envelope, message }.encode(out) else {
+            self.counts.messages_unsendable += 1;
+            return Ok(None);
+        };
+        self.counts.sent.count(message.kind());
         self.last_sent = now;
-        Ok(length)
+        Ok(Some(length))
     }
 
     /// When a heartbeat must go out if nothing else does before.
@@ -150,17 +142,10 @@ impl DatagramChannel {
         &self.peer
     }
 
-    /// Messages sent and received so far; what the socket counts is not known here and 0.
+    /// What it sent, received and dropped.
     #[must_use]
-    pub fn traffic(&self) -> Traffic {
-        Traffic {
-            sent: self.sent,
-            received: self.received,
-            duplicates: self.peer.duplicates(),
-            too_old: self.peer.too_old(),
-            malformed: self.malformed,
-            ..Traffic::default()
-        }
+    pub fn counts(&self) -> &ChannelCounts {
+        &self.counts
     }
 }
 
@@ -177,7 +162,8 @@ mod tests {
         );
         let mut buffer = [0; DATAGRAM_MAX];
         let now = Time::from_millis(5);
-        let length = up.encode(now, Message::Heartbeat, &mut buffer).unwrap();
+        let length = up.encode(now, Message::Heartbeat, &mut buffer);
+        let length = length.unwrap().unwrap();
         let opened = down.handle(now, &buffer[..length]).unwrap();
         assert_eq!(
             (opened.message, opened.is_newest),
@@ -185,10 +171,11 @@ mod tests {
         );
         assert_eq!(down.handle(now, &buffer[..length]), None, "a duplicate");
         assert_eq!(down.handle(now, &buffer[..length - 1]), None, "cut short");
-        let traffic = down.traffic();
-        assert_eq!(traffic.received.heartbeats, 1);
-        assert_eq!((traffic.duplicates, traffic.malformed), (1, 1));
-        assert_eq!(up.traffic().sent.heartbeats, 1);
+        let counts = down.counts();
+        assert_eq!(counts.received.heartbeats, 1);
+        let dropped = (counts.datagrams_duplicate, counts.datagrams_malformed);
+        assert_eq!(dropped, (1, 1));
+        assert_eq!(up.counts().sent.heartbeats, 1);
         // the master's own messages do not open at the master
         assert_eq!(up.handle(now, &buffer[..length - 1]), None);
     }

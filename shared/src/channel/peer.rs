@@ -77,12 +77,8 @@ pub struct Peer {
     newest: Option<Newest>,
     last_arrival: Option<Time>,
     received: u32,
-    received_bytes: u64,
-    reordered: u32,
-    duplicates: u32,
-    too_old: u32,
     their_report: Loss,
-    echoes_implausible: u32,
+    echoes_implausible: u64,
     round_trip: RoundTrip,
 }
 
@@ -102,10 +98,6 @@ impl Peer {
             newest: None,
             last_arrival: None,
             received: 0,
-            received_bytes: 0,
-            reordered: 0,
-            duplicates: 0,
-            too_old: 0,
             their_report: Loss::default(),
             echoes_implausible: 0,
             round_trip: RoundTrip::new(),
@@ -137,37 +129,27 @@ impl Peer {
         })
     }
 
-    /// Takes note of a datagram of `bytes` bytes that arrived at `now`.
-    pub fn handle(&mut self, now: Time, envelope: &Envelope, bytes: usize) -> Arrival {
+    /// Takes note of a datagram that arrived at `now`.
+    pub fn handle(&mut self, now: Time, envelope: &Envelope) -> Arrival {
         let arrival = match self.window.note(envelope.number) {
             window::Place::Ahead => Arrival::Newest,
             window::Place::Gap => Arrival::Reordered,
             window::Place::Taken => Arrival::Duplicate,
             window::Place::Behind => Arrival::TooOld,
         };
-        match arrival {
-            Arrival::Duplicate => self.duplicates = self.duplicates.saturating_add(1),
-            Arrival::TooOld => self.too_old = self.too_old.saturating_add(1),
-            Arrival::Newest | Arrival::Reordered => {
-                self.received = self.received.saturating_add(1);
-                let bytes = u64::try_from(bytes).unwrap_or(u64::MAX);
-                self.received_bytes = self.received_bytes.saturating_add(bytes);
-                self.last_arrival = self.last_arrival.max(Some(now));
-                if let Some(echo) = envelope.echo {
-                    self.handle_echo(now, &echo, arrival);
-                }
+        if matches!(arrival, Arrival::Newest | Arrival::Reordered) {
+            self.received = self.received.saturating_add(1);
+            self.last_arrival = self.last_arrival.max(Some(now));
+            if let Some(echo) = envelope.echo {
+                self.handle_echo(now, &echo, arrival);
             }
         }
-        match arrival {
-            Arrival::Newest => {
-                self.newest = Some(Newest {
-                    number: envelope.number,
-                    sent: envelope.sent,
-                    arrived: now,
-                });
-            }
-            Arrival::Reordered => self.reordered = self.reordered.saturating_add(1),
-            Arrival::Duplicate | Arrival::TooOld => {}
+        if arrival == Arrival::Newest {
+            self.newest = Some(Newest {
+                number: envelope.number,
+                sent: envelope.sent,
+                arrived: now,
+            });
         }
         arrival
     }
@@ -178,7 +160,7 @@ impl Peer {
         let round_trip = away.and_then(|away| away.checked_sub(echo.held_ns));
         let possible = echo.number <= self.sent && echo.received <= echo.number;
         let Some(round_trip) = round_trip.filter(|_| possible) else {
-            self.echoes_implausible = self.echoes_implausible.saturating_add(1);
+            self.echoes_implausible += 1;
             return;
         };
         self.round_trip.note(now, Duration::from_nanos(round_trip));
@@ -190,15 +172,8 @@ impl Peer {
         }
     }
 
-    /// Number of the last datagram sent: how many have been sent.
-    #[must_use]
-    pub fn sent(&self) -> u32 {
-        self.sent
-    }
-
     /// Number of the newest datagram received, 0 before the first.
-    #[must_use]
-    pub fn newest(&self) -> u32 {
+    fn newest(&self) -> u32 {
         self.newest.map_or(0, |newest| newest.number)
     }
 
@@ -208,39 +183,9 @@ impl Peer {
         self.last_arrival
     }
 
-    /// Datagrams received, each once.
-    #[must_use]
-    pub fn received(&self) -> u32 {
-        self.received
-    }
-
-    /// Their bytes.
-    #[must_use]
-    pub fn received_bytes(&self) -> u64 {
-        self.received_bytes
-    }
-
-    /// Received after a newer one.
-    #[must_use]
-    pub fn reordered(&self) -> u32 {
-        self.reordered
-    }
-
-    /// Dropped as seen before.
-    #[must_use]
-    pub fn duplicates(&self) -> u32 {
-        self.duplicates
-    }
-
-    /// Dropped as more than [`WINDOW`] numbers late.
-    #[must_use]
-    pub fn too_old(&self) -> u32 {
-        self.too_old
-    }
-
     /// Echoes that cannot be true: of a number never sent, or held for longer than it was away.
     #[must_use]
-    pub fn echoes_implausible(&self) -> u32 {
+    pub fn echoes_implausible(&self) -> u64 {
         self.echoes_implausible
     }
 

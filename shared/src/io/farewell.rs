@@ -9,18 +9,17 @@ use serde::de::DeserializeOwned;
 
 use super::stream::{ReadFrameError, WriteFrameError};
 use super::transport::{ReadError, RecvStream, SendStream};
-use crate::report::totals::{of_report, to_report};
 use crate::wire::{DecodeError, Ending, Farewell, Kind, STREAM_MESSAGE_MAX, Side, StreamMessage};
 
 /// How long each side waits for the other's farewell and close after its own farewell (docs/protocol.md, section 2).
 pub const FAREWELL_WAIT: Duration = Duration::from_secs(1);
 
 /// The other side's farewell.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct ReceivedFarewell<T> {
     /// Why the other side ended.
     pub ending: Ending,
-    /// What it counted; none if it reported nothing that can be read.
+    /// What it counted: of its JSON the keys that are known, the others absent; none if it cannot be read.
     pub report: Option<T>,
 }
 
@@ -62,7 +61,7 @@ pub async fn send_farewell(
     report: &impl Serialize,
     limit: Duration,
 ) -> Result<(), WriteFrameError> {
-    let report = to_report(report);
+    let report = serde_json::to_vec(report).unwrap_or_default();
     let mut out = [0; STREAM_MESSAGE_MAX];
     let mut write = |report| StreamMessage::Farewell(Farewell { ending, report }).encode(&mut out);
     // a report too long for the frame stays behind
@@ -85,7 +84,7 @@ pub async fn receive_farewell<T: DeserializeOwned>(
     match StreamMessage::decode(&message, from)? {
         StreamMessage::Farewell(Farewell { ending, report }) => Ok(ReceivedFarewell {
             ending,
-            report: of_report(report),
+            report: serde_json::from_slice(report).ok(),
         }),
         other => Err(FarewellError::Unexpected { kind: other.kind() }),
     }

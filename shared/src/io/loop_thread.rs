@@ -5,7 +5,7 @@
 
 use std::io;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::thread;
 
 use rtrb::{Consumer, Producer, RingBuffer};
@@ -67,6 +67,7 @@ pub struct LoopHandle<S: Send, T> {
     snapshots: Output<S>,
     stop: Arc<AtomicBool>,
     arrivals_dropped: u64,
+    departures_dropped: Arc<AtomicU64>,
     /// Woken when frames are to leave.
     pub wakeup: Wakeup,
     /// What the loop ends with; closed without a value if it panicked.
@@ -81,7 +82,7 @@ pub struct LoopSide<S: Send> {
     snapshots: Input<S>,
     stop: Arc<AtomicBool>,
     waker: Waker,
-    departures_dropped: u64,
+    departures_dropped: Arc<AtomicU64>,
 }
 
 /// Both sides, and where the loop leaves what it ends with.
@@ -98,6 +99,7 @@ pub fn pair<S: Clone + Send, T>(first: &S) -> io::Result<Boundary<S, T>> {
     let (snapshots, snapshots_out) = triple_buffer(first);
     let (waker, wakeup) = wake::pair()?;
     let stop = Arc::new(AtomicBool::new(false));
+    let departures_dropped = Arc::new(AtomicU64::new(0));
     let (done, finished) = oneshot::channel();
     let side = LoopSide {
         arrivals,
@@ -105,7 +107,7 @@ pub fn pair<S: Clone + Send, T>(first: &S) -> io::Result<Boundary<S, T>> {
         snapshots,
         stop: Arc::clone(&stop),
         waker,
-        departures_dropped: 0,
+        departures_dropped: Arc::clone(&departures_dropped),
     };
     let handle = LoopHandle {
         arrivals: arrivals_in,
@@ -113,6 +115,7 @@ pub fn pair<S: Clone + Send, T>(first: &S) -> io::Result<Boundary<S, T>> {
         snapshots: snapshots_out,
         stop,
         arrivals_dropped: 0,
+        departures_dropped,
         wakeup,
         finished,
     };
@@ -178,10 +181,10 @@ impl<S: Send, T> LoopHandle<S, T> {
         self.stop.store(true, Ordering::Release);
     }
 
-    /// Datagrams that found no room before the loop.
+    /// Datagrams that found no room in a ring, before the loop or before the network task.
     #[must_use]
-    pub fn arrivals_dropped(&self) -> u64 {
-        self.arrivals_dropped
+    pub fn dropped(&self) -> u64 {
+        self.arrivals_dropped + self.departures_dropped.load(Ordering::Relaxed)
     }
 }
 
@@ -207,7 +210,7 @@ impl<S: Send> LoopSide<S> {
             if self.departures.push(frame).is_ok() {
                 leaves = true;
             } else {
-                self.departures_dropped += 1;
+                self.departures_dropped.fetch_add(1, Ordering::Relaxed);
             }
         }
         if leaves {
@@ -226,12 +229,6 @@ impl<S: Send> LoopSide<S> {
     pub fn is_stopped(&self) -> bool {
         self.stop.load(Ordering::Acquire)
     }
-
-    /// Datagrams that found no room before the network task.
-    #[must_use]
-    pub fn departures_dropped(&self) -> u64 {
-        self.departures_dropped
-    }
 }
 
 #[cfg(test)]
@@ -246,7 +243,7 @@ mod tests {
         for n in 0..ARRIVALS_MAX as u64 + 3 {
             handle.deliver(AT(n), &n.to_le_bytes());
         }
-        assert_eq!(handle.arrivals_dropped(), 3);
+        assert_eq!(handle.dropped(), 3);
         for n in 0..ARRIVALS_MAX as u64 {
             let frame = side.next_arrival().unwrap();
             assert_eq!((frame.at, frame.bytes()), (AT(n), &n.to_le_bytes()[..]));
@@ -258,7 +255,7 @@ mod tests {
             left -= 1;
             (left > 0).then_some(2)
         });
-        assert_eq!(side.departures_dropped(), 1);
+        assert_eq!(handle.dropped(), 3 + 1);
         handle.wakeup.wait().await.unwrap();
         assert_eq!(handle.next_departure().unwrap().bytes(), b"up");
     }

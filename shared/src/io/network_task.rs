@@ -21,17 +21,17 @@ pub const WAITING_MAX: usize = 4096;
 
 /// What the task counts besides what the ends count.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct NetworkCounts {
+struct NetworkCounts {
     /// Datagrams read from the connection; what it received and nobody read it dropped itself.
-    pub read: u64,
+    read: u64,
     /// Datagrams that the connection took; what it did not send it dropped itself.
-    pub given: u64,
+    given: u64,
     /// Longer than the path takes.
-    pub too_large: u64,
+    send_too_large: u64,
     /// The peer takes no datagrams, or the connection sends none.
-    pub unsupported: u64,
+    send_unsupported: u64,
     /// The connection was gone.
-    pub disconnected: u64,
+    send_disconnected: u64,
 }
 
 /// What happened that a session must know. Each of the first four happens once at most.
@@ -89,10 +89,25 @@ impl<S: Send, T> NetworkTask<S, T> {
         }
     }
 
-    /// What it counted.
+    /// Datagrams dropped between the loop and the network so far, by name.
     #[must_use]
-    pub fn counts(&self) -> &NetworkCounts {
-        &self.counts
+    pub fn drops(&self) -> [(&'static str, u64); 6] {
+        let (counts, passed) = (&self.counts, self.connection.datagrams());
+        [
+            // displaced by newer ones, or still held
+            (
+                "datagrams_displaced",
+                counts.given.saturating_sub(passed.sent),
+            ),
+            ("datagrams_ring_full", self.handle.dropped()),
+            (
+                "datagrams_unread",
+                passed.received.saturating_sub(counts.read),
+            ),
+            ("send_disconnected", counts.send_disconnected),
+            ("send_too_large", counts.send_too_large),
+            ("send_unsupported", counts.send_unsupported),
+        ]
     }
 
     /// The loop's handle.
@@ -183,10 +198,10 @@ impl<S: Send, T> NetworkTask<S, T> {
                 .send_datagram(Bytes::copy_from_slice(frame.bytes()));
             let counter = match &given {
                 Ok(()) => &mut self.counts.given,
-                Err(SendDatagramError::TooLarge) => &mut self.counts.too_large,
-                Err(SendDatagramError::ConnectionLost(_)) => &mut self.counts.disconnected,
+                Err(SendDatagramError::TooLarge) => &mut self.counts.send_too_large,
+                Err(SendDatagramError::ConnectionLost(_)) => &mut self.counts.send_disconnected,
                 Err(SendDatagramError::UnsupportedByPeer | SendDatagramError::Disabled) => {
-                    &mut self.counts.unsupported
+                    &mut self.counts.send_unsupported
                 }
             };
             *counter += 1;

@@ -8,6 +8,7 @@ use std::time::Duration;
 
 use super::clock::{Clock, thread_cpu_time};
 use super::schedule::{Schedule, Tick};
+use crate::report::LoopReport;
 use crate::stats::histogram::{Histogram, Quantiles};
 
 /// How a loop did.
@@ -21,6 +22,17 @@ pub struct TickerReport {
     pub lateness: Quantiles,
     /// CPU time of the thread from the wake to the next wait.
     pub cpu: Quantiles,
+}
+
+impl From<&TickerReport> for LoopReport {
+    fn from(of: &TickerReport) -> Self {
+        Self {
+            ticks: Some(of.ticks),
+            skipped: Some(of.skipped),
+            cpu_us: (&of.cpu).into(),
+            lateness_us: (&of.lateness).into(),
+        }
+    }
 }
 
 /// A loop with absolute deadlines. Belongs to one thread: CPU time is that of the thread that calls

@@ -1,6 +1,18 @@
-//! A number of a report: finite, or absent.
+//! What stands under a key of a report: a number that is finite or absent, or counts by name.
+
+use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
+
+/// Counts by name; every known name is there, with 0 if it never happened.
+pub type Counts = BTreeMap<String, u64>;
+
+/// Counts by name.
+#[must_use]
+pub fn named<'a>(counts: impl IntoIterator<Item = (&'a str, u64)>) -> Counts {
+    let counts = counts.into_iter();
+    counts.map(|(name, n)| (name.to_owned(), n)).collect()
+}
 
 /// A finite number, or none. NaN and infinity become none on the way in, so no report can hold them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]

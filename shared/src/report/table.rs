@@ -14,11 +14,16 @@ const CELL: usize = 19;
 
 /// What stands in one place of a row; nothing if there is no number.
 type Cell = Option<String>;
+/// A label and its cells.
+type Row = (String, Vec<Cell>);
+
+fn row(label: &str, cells: impl Into<Vec<Cell>>) -> Row {
+    (label.replace('_', " "), cells.into())
+}
 
 fn number(number: Number, decimals: usize, unit: &str) -> Cell {
-    number
-        .get()
-        .map(|value| format!("{value:.decimals$}{unit}"))
+    let number = number.get();
+    number.map(|value| format!("{value:.decimals$}{unit}"))
 }
 
 fn share(value: Number) -> Cell {
@@ -33,285 +38,187 @@ fn after(word: &str, cell: Cell) -> Cell {
     cell.map(|text| format!("{word} {text}"))
 }
 
-/// Rows under a title; the title is written with the first row.
-struct Section<'a, 'f> {
-    out: &'a mut fmt::Formatter<'f>,
-    title: Option<&'static str>,
+/// One row per name, after a word.
+fn counts(word: &str, counts: Option<&Counts>) -> impl Iterator<Item = Row> {
+    let counts = counts.into_iter().flatten();
+    counts.map(move |(name, n)| row(&format!("{word}{name}"), [count(Some(*n), "")]))
 }
 
-impl Section<'_, '_> {
-    fn row(&mut self, label: &str, cells: &[Cell]) -> fmt::Result {
-        if cells.iter().all(Option::is_none) {
-            return Ok(());
+/// The same without the names that never happened.
+fn happened(word: &str, of: Option<&Counts>) -> impl Iterator<Item = Row> {
+    let never = [count(Some(0), "")];
+    counts(word, of).filter(move |(_, cells)| *cells != never)
+}
+
+/// Rows under a title; no title without a row.
+fn section(out: &mut fmt::Formatter<'_>, title: &str, rows: Vec<Row>) -> fmt::Result {
+    let mut title = Some(title);
+    let known = |(_, cells): &Row| cells.iter().any(Option::is_some);
+    for (label, cells) in rows.into_iter().filter(known) {
+        if let Some(title) = title.take() {
+            writeln!(out, "\n{title}")?;
         }
-        if let Some(title) = self.title.take() {
-            writeln!(self.out, "\n{title}")?;
-        }
-        // a label that is full still ends with a space
+        // a label or a cell that is full still ends with a space
         let mut line = format!("  {label:width$} ", width = LABEL - 1);
         for cell in cells {
             let text = cell.as_deref().unwrap_or("-");
-            // a cell that is full still ends with a space
             line.push_str(&format!("{text:width$} ", width = CELL - 1));
         }
-        writeln!(self.out, "{}", line.trim_end())
+        writeln!(out, "{}", line.trim_end())?;
     }
-
-    /// One row per name, after a word.
-    fn counts(&mut self, word: &str, counts: Option<&Counts>) -> fmt::Result {
-        for (name, n) in counts.into_iter().flatten() {
-            let name = name.replace('_', " ");
-            self.row(&format!("{word}{name}"), &[count(Some(*n), "")])?;
-        }
-        Ok(())
-    }
+    Ok(())
 }
 
 impl<C> fmt::Display for RunReport<C> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        self.head(f)?;
-        self.work(f)?;
-        self.architecture(f)?;
-        self.updates(f)?;
-        self.force(f)?;
-        self.model(f)?;
-        self.tool(f)?;
-        self.passivity(f)?;
-        self.network(f)?;
-        self.emulation(f)?;
-        loop_rows(f, "Haptic loop", &self.haptic_loop)?;
-        loop_rows(f, "Slave loop", &self.slave_loop)?;
-        self.drops(f)
-    }
-}
-
-fn section<'a, 'f>(out: &'a mut fmt::Formatter<'f>, title: &'static str) -> Section<'a, 'f> {
-    Section {
-        out,
-        title: Some(title),
-    }
-}
-
-impl<C> RunReport<C> {
-    /// Only what happened: there are dozens of names, and in a sound run all counts are 0.
-    fn drops(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let mut rows = section(f, "Dropped or refused");
-        let happened = self.drops.iter().flatten().filter(|(_, n)| **n > 0);
-        for (name, n) in happened {
-            rows.row(&name.replace('_', " "), &[count(Some(*n), "")])?;
-        }
-        Ok(())
-    }
-
-    fn head(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "mmt {} {}", self.command, self.version)?;
         let parts = [
             after("seed", count(self.seed, "")),
             number(self.duration_s, 1, " s"),
-            self.ending.clone(),
+            self.ending.map(str::to_owned),
         ];
         for part in parts.into_iter().flatten() {
             write!(f, ", {part}")?;
         }
-        writeln!(f)
+        writeln!(f)?;
+        section(f, "Pushes", self.pushes())?;
+        section(f, "Felt", self.felt())?;
+        section(f, "Updates", self.updates())?;
+        section(f, "Force", self.force())?;
+        section(f, "Model", self.model())?;
+        section(f, "Tool", self.tool())?;
+        section(f, "Energy at the hand", self.passivity())?;
+        section(f, "Network (up: master to slave)", self.network())?;
+        section(f, "Emulated network: released late", self.emulation())?;
+        section(f, "Haptic loop", timing(&self.haptic_loop))?;
+        section(f, "Slave loop", timing(&self.slave_loop))?;
+        // only what happened: there are dozens of names, and in a sound run all counts are 0
+        let drops = happened("", self.drops.as_ref());
+        section(f, "Dropped or refused", drops.collect())
     }
+}
 
-    fn work(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let mut rows = section(f, "Pushes");
-        rows.row("completed", &[count(self.pushes.completed, "")])?;
-        rows.row(
-            "contact breaks per push",
-            &[number(self.pushes.contact_breaks_per_push, 2, "")],
-        )
+// A row a line: that is how the table looks.
+#[rustfmt::skip]
+impl<C> RunReport<C> {
+    fn pushes(&self) -> Vec<Row> {
+        vec![
+            row("completed", [count(self.pushes.completed, "")]),
+            row("contact breaks per push", [number(self.pushes.contact_breaks_per_push, 2, "")]),
+        ]
     }
 
     /// Only where the hand felt the tool.
-    fn architecture(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+    fn felt(&self) -> Vec<Row> {
         let of = &self.architecture;
-        let (Some(name), Some(_)) = (&of.name, of.round_trip_ms.get()) else {
-            return Ok(());
-        };
-        let mut rows = section(f, "Felt");
-        rows.row("architecture", &[Some(name.clone())])?;
-        let round_trip = number(of.round_trip_ms, 1, " ms");
-        rows.row("round trip as felt", &[round_trip])
+        if of.round_trip_ms.get().is_none() {
+            return Vec::new();
+        }
+        vec![
+            row("architecture", [of.name.clone()]),
+            row("round trip as felt", [number(of.round_trip_ms, 1, " ms")]),
+        ]
     }
 
-    fn updates(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let updates = &self.updates;
-        let mut rows = section(f, "Updates");
-        rows.row("sent", &[count(updates.sent, "")])?;
-        rows.row(
-            "rate",
-            &[
-                number(updates.rate_hz, 2, " /s"),
-                number(updates.contact_rate_hz, 2, " /s of contact"),
-            ],
-        )?;
-        rows.counts("for ", updates.by_cause.as_ref())?;
-        rows.row("repeats", &[count(updates.repeated, "")])?;
+    fn updates(&self) -> Vec<Row> {
+        let (sent, received) = (&self.updates.sent, &self.updates.received);
+        let contact = number(sent.contact_rate_hz, 2, " /s of contact");
+        let mut rows = vec![
+            row("sent", [count(sent.sent, "")]),
+            row("rate", [number(sent.rate_hz, 2, " /s"), contact]),
+        ];
+        rows.extend(counts("for ", sent.by_cause.as_ref()));
+        rows.push(row("repeats", [count(sent.repeated, "")]));
         // only what happened: the causes stand above already
-        let repeated = updates.repeated_by_cause.iter().flatten();
-        for (name, n) in repeated.filter(|(_, n)| **n > 0) {
-            let name = name.replace('_', " ");
-            rows.row(&format!("repeats, {name}"), &[count(Some(*n), "")])?;
-        }
-        rows.row("applied", &[count(updates.applied, "")])?;
-        rows.counts("dropped, ", updates.dropped.as_ref())?;
-        rows.row(
-            "age of information",
-            &[
-                after("mean", number(updates.age_ms.mean, 0, " ms")),
-                after("max", number(updates.age_ms.max, 0, " ms")),
-            ],
-        )
+        rows.extend(happened("repeats, ", sent.repeated_by_cause.as_ref()));
+        rows.push(row("applied", [count(received.applied, "")]));
+        rows.extend(counts("dropped, ", received.dropped.as_ref()));
+        let (mean, max) = (number(received.age_ms.mean, 0, " ms"), number(received.age_ms.max, 0, " ms"));
+        rows.push(row("age of information", [after("mean", mean), after("max", max)]));
+        rows
     }
 
-    fn force(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let force = &self.force;
-        let mut rows = section(f, "Force");
-        rows.row(
-            "relative error",
-            &[
-                number(force.relative_error, 4, ""),
-                after("r.m.s.", number(force.error_rms_n, 3, " N")),
-            ],
-        )?;
-        rows.row(
-            "PMSE",
-            &[
-                number(force.pmse, 4, ""),
-                after("x", number(force.pmse_x, 4, "")),
-                after("y", number(force.pmse_y, 4, "")),
-            ],
-        )?;
-        rows.row("PMSE of |f|", &[number(force.pmse_magnitude, 4, "")])?;
-        rows.row(
-            "contact outside the JND",
-            &[
-                after("7 %:", share(force.jnd7_share)),
-                after("10 %:", share(force.jnd10_share)),
-            ],
-        )?;
-        rows.row(
-            "largest on the hand",
-            &[
-                number(force.largest_n, 2, " N"),
-                number(force.largest_step_n, 2, " N in a tick"),
-            ],
-        )
+    fn force(&self) -> Vec<Row> {
+        let (of, hand) = (&self.force.errors, &self.force.hand);
+        let rms = after("r.m.s.", number(of.error_rms_n, 3, " N"));
+        let (x, y) = (after("x", number(of.pmse_x, 4, "")), after("y", number(of.pmse_y, 4, "")));
+        let jnd = [after("7 %:", share(of.jnd7_share)), after("10 %:", share(of.jnd10_share))];
+        let step = number(hand.largest_step_n, 2, " N in a tick");
+        vec![
+            row("relative error", [number(of.relative_error, 4, ""), rms]),
+            row("PMSE", [number(of.pmse, 4, ""), x, y]),
+            row("PMSE of |f|", [number(of.pmse_magnitude, 4, "")]),
+            row("contact outside the JND", jnd),
+            row("largest on the hand", [number(hand.largest_n, 2, " N"), step]),
+        ]
     }
 
-    fn model(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+    fn model(&self) -> Vec<Row> {
         let (model, pose) = (&self.model, &self.pose);
-        let mut rows = section(f, "Model");
-        for (label, unit, estimate) in [
-            ("mass m", " kg", &model.mass_kg),
-            ("damping b", " N s/m", &model.damping_ns_per_m),
-            ("friction c", " N", &model.friction_n),
-        ] {
-            rows.row(label, &estimate_cells(estimate, unit))?;
-        }
-        let mm = |number: Number| number.times(1e3);
-        rows.row(
-            "position error",
-            &[
-                after("r.m.s.", number(mm(pose.position_rms_m), 1, " mm")),
-                after("max", number(mm(pose.position_max_m), 1, " mm")),
-            ],
-        )?;
-        rows.row(
-            "orientation error",
-            &[
-                after("r.m.s.", number(mm(pose.angle_rms_rad), 1, " mrad")),
-                after("max", number(mm(pose.angle_max_rad), 1, " mrad")),
-            ],
-        )
+        let thousandths = |rms: Number, max: Number, unit| {
+            let of = |of: Number| number(of.times(1e3), 1, unit);
+            [after("r.m.s.", of(rms)), after("max", of(max))]
+        };
+        vec![
+            row("mass m", estimate(&model.mass_kg, " kg")),
+            row("damping b", estimate(&model.damping_ns_per_m, " N s/m")),
+            row("friction c", estimate(&model.friction_n, " N")),
+            row("position error", thousandths(pose.position_rms_m, pose.position_max_m, " mm")),
+            row("orientation error", thousandths(pose.angle_rms_rad, pose.angle_max_rad, " mrad")),
+        ]
     }
 
-    fn tool(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let mut rows = section(f, "Tool");
-        let largest = number(self.tool.force_peak_n, 2, " N");
-        rows.row("largest force", &[largest])?;
-        let held = number(self.tool.held_s, 3, " s");
-        rows.row("held back for", &[held])
+    fn tool(&self) -> Vec<Row> {
+        vec![
+            row("largest force", [number(self.tool.force_peak_n, 2, " N")]),
+            row("held back for", [number(self.tool.held_s, 3, " s")]),
+        ]
     }
 
-    fn passivity(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let mut rows = section(f, "Energy at the hand");
-        let mj = |number: Number| number.times(1e3);
-        let injected = number(mj(self.passivity.energy_injected_j), 3, " mJ");
-        rows.row("injected by updates", &[injected])?;
-        let least = number(mj(self.passivity.observer_min_j), 3, " mJ");
-        rows.row("observer, least", &[least])
+    fn passivity(&self) -> Vec<Row> {
+        let mj = |of: Number| number(of.times(1e3), 3, " mJ");
+        vec![
+            row("injected by updates", [mj(self.passivity.energy_injected_j)]),
+            row("observer, least", [mj(self.passivity.observer_min_j)]),
+        ]
     }
 
-    fn network(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+    fn network(&self) -> Vec<Row> {
         let (link, wire, messages) = (&self.link, &self.wire, &self.messages);
-        let mut rows = section(f, "Network (up: master to slave)");
-        rows.row(
-            "round trip",
-            &[
-                after("p50", number(link.rtt_ms.p50, 1, " ms")),
-                after("p99", number(link.rtt_ms.p99, 1, " ms")),
-            ],
-        )?;
-        rows.row(
-            "loss",
-            &[
-                after("up", share(link.loss_up)),
-                after("down", share(link.loss_down)),
-            ],
-        )?;
-        let playout = &link.playout_delay_ms;
-        rows.row(
-            "play-out delay",
-            &[
-                after("p50", number(playout.p50, 1, " ms")),
-                after("p99", number(playout.p99, 1, " ms")),
-            ],
-        )?;
-        for (way, of) in [("up", &messages.up), ("down", &messages.down)] {
-            rows.row(&format!("messages {way}"), &message_cells(of))?;
-        }
-        rows.row("datagrams up", &wire_cells(&wire.up))?;
-        rows.row("datagrams down", &wire_cells(&wire.down))
+        let (rtt, playout) = (&link.rtt_ms, &link.playout_delay_ms);
+        let p = |name, of| after(name, number(of, 1, " ms"));
+        vec![
+            row("round trip", [p("p50", rtt.p50), p("p99", rtt.p99)]),
+            row("loss", [after("up", share(link.loss_up)), after("down", share(link.loss_down))]),
+            row("play-out delay", [p("p50", playout.p50), p("p99", playout.p99)]),
+            row("messages up", kinds(&messages.up)),
+            row("messages down", kinds(&messages.down)),
+            row("datagrams up", datagrams(&wire.up)),
+            row("datagrams down", datagrams(&wire.down)),
+        ]
     }
 
-    fn emulation(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let directions = [&self.emulation.up, &self.emulation.down];
-        let mut rows = section(f, "Emulated network: released late");
-        for (label, emulation) in ["up", "down"].into_iter().zip(directions) {
-            let [p50, p99, max, degraded] = emulation_cells(emulation);
-            let mut cells = vec![p50, p99, max];
-            // a dash in this place would ask to be read
-            cells.extend(degraded.map(Some));
-            rows.row(label, &cells)?;
+    fn emulation(&self) -> Vec<Row> {
+        let (up, down) = (&self.emulation.up, &self.emulation.down);
+        let mut rows = vec![row("up", lateness(up)), row("down", lateness(down))];
+        if [up, down].iter().any(|one| one.degraded == Some(true)) {
+            let note = "This host was too slow for the emulation: delays and force errors are partly the host's.";
+            rows.push(row(note, [Some(String::new())]));
         }
-        if directions.iter().any(|one| one.degraded == Some(true)) {
-            writeln!(
-                f,
-                "  This host was too slow for the emulation: delays and force errors are partly the host's."
-            )?;
-        }
-        Ok(())
+        rows
     }
 }
 
-fn emulation_cells(emulation: &EmulationReport) -> [Cell; 4] {
+fn lateness(emulation: &EmulationReport) -> Vec<Cell> {
     let late = &emulation.late_us;
-    [
-        after("p50", number(late.p50, 0, " us")),
-        after("p99", number(late.p99, 0, " us")),
-        after("max", number(late.max, 0, " us")),
-        emulation
-            .degraded
-            .unwrap_or(false)
-            .then(|| "degraded".to_owned()),
-    ]
+    let of = [("p50", late.p50), ("p99", late.p99), ("max", late.max)];
+    let mut cells = Vec::from(of.map(|(name, of)| after(name, number(of, 0, " us"))));
+    // a dash in this place would ask to be read
+    cells.extend((emulation.degraded == Some(true)).then(|| Some("degraded".to_owned())));
+    cells
 }
 
-fn estimate_cells(estimate: &EstimateReport, unit: &str) -> [Cell; 3] {
+fn estimate(estimate: &EstimateReport, unit: &str) -> [Cell; 3] {
     [
         number(estimate.estimate, 3, unit),
         after("truth", number(estimate.truth, 3, unit)),
@@ -319,8 +226,8 @@ fn estimate_cells(estimate: &EstimateReport, unit: &str) -> [Cell; 3] {
     ]
 }
 
-/// The rate, and only the kinds that go this way; scenes only if there were any.
-fn message_cells(messages: &MessagesReport) -> Vec<Cell> {
+/// The rate, and only the kinds that go this way; scenes and the tool's only if there were any.
+fn kinds(messages: &MessagesReport) -> Vec<Cell> {
     let kinds = [
         number(messages.rate_hz, 1, " /s"),
         count(messages.commands, " commands"),
@@ -332,7 +239,7 @@ fn message_cells(messages: &MessagesReport) -> Vec<Cell> {
     kinds.into_iter().filter(Option::is_some).collect()
 }
 
-fn wire_cells(wire: &WireReport) -> [Cell; 4] {
+fn datagrams(wire: &WireReport) -> [Cell; 4] {
     [
         count(wire.datagrams, ""),
         number(wire.rate_hz, 1, " /s"),
@@ -341,20 +248,17 @@ fn wire_cells(wire: &WireReport) -> [Cell; 4] {
     ]
 }
 
-fn loop_rows(f: &mut fmt::Formatter<'_>, title: &'static str, loop_: &LoopReport) -> fmt::Result {
-    let mut rows = section(f, title);
-    rows.row(
-        "ticks",
-        &[count(loop_.ticks, ""), count(loop_.skipped, " skipped")],
-    )?;
-    rows.row("computing", &quantile_cells(&loop_.cpu_us))?;
-    rows.row("late", &quantile_cells(&loop_.lateness_us))
-}
-
-fn quantile_cells(quantiles: &QuantilesReport) -> [Cell; 3] {
-    [
-        after("p50", number(quantiles.p50, 1, " us")),
-        after("p99", number(quantiles.p99, 1, " us")),
-        after("p99.9", number(quantiles.p999, 1, " us")),
+fn timing(of: &LoopReport) -> Vec<Row> {
+    let quantiles = |of: &QuantilesReport| {
+        let of = [("p50", of.p50), ("p99", of.p99), ("p99.9", of.p999)];
+        of.map(|(name, of)| after(name, number(of, 1, " us")))
+    };
+    vec![
+        row(
+            "ticks",
+            [count(of.ticks, ""), count(of.skipped, " skipped")],
+        ),
+        row("computing", quantiles(&of.cpu_us)),
+        row("late", quantiles(&of.lateness_us)),
     ]
 }

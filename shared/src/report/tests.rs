@@ -1,14 +1,19 @@
 //! The document's keys, its nulls, and the table.
 
 use super::*;
-use crate::metrics::ForceMetrics;
+use crate::metrics::{
+    AgeOfInformation, ContactBreaks, ForceMetrics, ForcePeak, PoseError, UpdateCounts,
+};
 use crate::model::geometry::{Pose, Vec2};
 use crate::model::update::Cause;
+use crate::stats::histogram::Histogram;
+use crate::stats::session::KindCounts;
 use crate::time::Time;
+use crate::wire::Architecture;
 use serde_json::{Value, json};
 
 fn empty() -> RunReport<Value> {
-    RunReport::new("0.1.0", "demo", json!({ "mode": "recommended" }))
+    RunReport::new("demo", json!({ "mode": "recommended" }))
 }
 
 /// A report in which every key has a meaning.
@@ -34,19 +39,17 @@ fn full() -> RunReport<Value> {
     let mut report = empty();
     report.seed = Some(1);
     report.duration_s = 20.0.into();
-    report.ending = Some(ending_name(Ending::Finished).to_owned());
-    report.architecture = ArchitectureReport {
-        round_trip_ms: 14.9.into(),
-        ..ArchitectureReport::named(Architecture::Tdpa)
-    };
+    report.ending = Some(Ending::Finished.name());
+    report.architecture = ArchitectureReport::new(Architecture::Tdpa, Some(0.0149));
     report.pushes = PushesReport::new(2, &breaks);
-    report.updates.set_sent(&counts);
-    report.updates.applied = Some(30);
-    report.updates.dropped = Some(Counts::from([("stale".to_owned(), 1)]));
-    report.updates.age_ms = AgeReport::from(&age);
     let mut repeated = UpdateCounts::default();
     (0..20).for_each(|_| repeated.sent(Cause::Deadband));
-    report.updates.set_repeated(&repeated);
+    report.updates.sent = SentUpdates::new(&counts, &repeated);
+    report.updates.received = ReceivedUpdates {
+        applied: Some(30),
+        dropped: Some(named([("stale", 1)])),
+        age_ms: (&age).into(),
+    };
     let mut kinds = KindCounts {
         commands: 2000,
         heartbeats: 3,
@@ -62,7 +65,10 @@ fn full() -> RunReport<Value> {
     report.messages.down = MessagesReport::down(&kinds, 20, 20.0);
     report.wire.up = WireReport::new(2100, 336_000, 28, 20.0);
     report.wire.down = WireReport::new(1100, 110_000, 28, 20.0);
-    report.force = ForceReport::new(&force.summary(), Some(&peak));
+    report.force = ForceReport {
+        errors: (&force.summary()).into(),
+        hand: (&peak).into(),
+    };
     report.model.mass_kg = EstimateReport::new(0.707, 0.7);
     report.model.damping_ns_per_m = EstimateReport::new(3.03, 3.0);
     report.model.friction_n = EstimateReport::new(2.06, 2.0601);
@@ -81,7 +87,7 @@ fn full() -> RunReport<Value> {
     };
     let mut delays = Histogram::new();
     delays.record(std::time::Duration::from_millis(16));
-    report.link.playout_delay_ms = DelayReport::of(&delays);
+    report.link.playout_delay_ms = DelayReport::from(&delays);
     (report.link.loss_up, report.link.loss_down) = (0.01.into(), 0.012.into());
     report.emulation.up = EmulationReport {
         released: Some(2100),
@@ -103,7 +109,7 @@ fn full() -> RunReport<Value> {
         lateness_us: quantiles(12.0),
     };
     report.slave_loop = report.haptic_loop;
-    report.drops = Some(Counts::from([("malformed".to_owned(), 0)]));
+    report.drops = Some(named([("datagrams_malformed", 0)]));
     report
 }
 
@@ -255,7 +261,7 @@ fn numbers_that_are_not_finite_become_null() {
 #[test]
 fn what_was_felt_is_shown_where_that_was_the_tool_and_the_tools_messages_where_there_were_any() {
     let mut report = full();
-    report.architecture = ArchitectureReport::named(Architecture::Mmt);
+    report.architecture = ArchitectureReport::new(Architecture::Mmt, None);
     assert!(!report.to_string().contains("Felt"));
     let kinds = KindCounts {
         updates: 33,
@@ -268,30 +274,169 @@ fn what_was_felt_is_shown_where_that_was_the_tool_and_the_tools_messages_where_t
     assert!(shown.lines().any(|line| line == row), "{shown}");
 }
 
+/// Halves of a session in which the master received an update less than the slave sent, and each dropped something.
+fn halves() -> (MasterSession<u8>, SlaveSession<u8>) {
+    let session = |sent, received| SessionStats {
+        sent,
+        received,
+        drops: named([("datagrams_malformed", 1)]),
+        ..SessionStats::default()
+    };
+    let down = |updates| MessagesReport {
+        updates: Some(updates),
+        ..MessagesReport::default()
+    };
+    let up = |commands| MessagesReport {
+        commands: Some(commands),
+        ..MessagesReport::default()
+    };
+    let master = MasterHalf {
+        session: session(up(2000), down(233)),
+        ..MasterHalf::default()
+    };
+    let mut slave = SlaveHalf {
+        session: session(down(234), up(1990)),
+        ..SlaveHalf::default()
+    };
+    (slave.updates.sent, slave.updates.repeated) = (Some(84), Some(150));
+    let report = |own, other, configuration| SessionReport {
+        seed: 1,
+        duration_s: 20.0,
+        ending: Ending::Finished,
+        own,
+        other,
+        configuration,
+    };
+    let theirs = (Some(slave.clone()), Some(master.clone()));
+    let of_slave = SessionReport {
+        seed: 1,
+        duration_s: 20.5,
+        ending: Ending::Finished,
+        own: slave,
+        other: theirs.1,
+        configuration: 2,
+    };
+    (report(master, theirs.0, 1), of_slave)
+}
+
 #[test]
-fn a_document_that_was_written_is_read_back_the_same() {
-    for report in [empty(), full()] {
-        let document = serde_json::to_value(&report).unwrap();
-        let back: RunReport<Value> = serde_json::from_value(document).unwrap();
-        assert_eq!(back, report);
+fn in_a_demo_each_direction_is_counted_where_it_is_sent() {
+    let (master, slave) = halves();
+    let report = RunReport::of_both(master, Some(slave));
+    let (messages, updates) = (&report.messages, &report.updates.sent);
+    assert_eq!(messages.up.commands, Some(2000));
+    let sent = updates
+        .sent
+        .zip(updates.repeated)
+        .map(|(new, again)| new + again);
+    assert_eq!(messages.down.updates, sent);
+    let drops = [
+        ("master_datagrams_malformed", 1),
+        ("slave_datagrams_malformed", 1),
+    ];
+    assert_eq!(report.drops, Some(named(drops)));
+    let both = Both {
+        master: 1,
+        slave: Some(2),
+    };
+    assert_eq!((report.command, report.configuration), ("demo", both));
+}
+
+#[test]
+fn an_end_reports_what_it_sent_and_received_itself_and_takes_the_rest_from_the_others_farewell() {
+    let (master, slave) = halves();
+    let of_master = RunReport::from(master.clone());
+    let messages = &of_master.messages;
+    assert_eq!(
+        (messages.up.commands, messages.down.updates),
+        (Some(2000), Some(233))
+    );
+    assert_eq!(of_master.updates.sent.sent, Some(84), "the slave's");
+    assert_eq!(
+        (of_master.command, of_master.duration_s.get()),
+        ("master", Some(20.0))
+    );
+    let of_slave = RunReport::from(slave);
+    let messages = &of_slave.messages;
+    assert_eq!(
+        (messages.up.commands, messages.down.updates),
+        (Some(1990), Some(234))
+    );
+    assert_eq!(
+        (of_slave.command, of_slave.duration_s.get()),
+        ("slave", Some(20.5))
+    );
+    let alone = RunReport::from(SessionReport {
+        other: None,
+        ..master
+    });
+    assert_eq!(alone.updates.sent, SentUpdates::default(), "never guessed");
+}
+
+#[test]
+fn a_half_of_another_program_gives_what_it_has_and_the_rest_is_absent() {
+    let foreign = r#"{"updates": {"applied": 7}, "session": {"timing": {"ticks": 9}}, "new": [1]}"#;
+    let half: MasterHalf = serde_json::from_str(foreign).unwrap();
+    let (applied, timing) = (half.updates.applied, half.session.timing);
+    assert_eq!((applied, timing.ticks), (Some(7), Some(9)));
+    assert_eq!(timing.cpu_us.p50.get(), None);
+    assert!(serde_json::from_str::<SlaveHalf>("not JSON").is_err());
+}
+
+#[test]
+fn the_longest_half_fits_into_a_farewell_and_is_read_back_the_same() {
+    // every key of a slave's half with the longest number that a session can reach
+    let mut half = serde_json::to_value(halves().1.own).unwrap();
+    fn fill(value: &mut Value) {
+        match value {
+            Value::Object(keys) => keys.values_mut().for_each(fill),
+            _ => *value = json!(4_294_967_295_u32),
+        }
     }
+    fill(&mut half);
+    let (up, yes) = (json!("tdpa"), json!(true));
+    half["session"]["architecture"]["name"] = up;
+    half["session"]["emulation"]["degraded"] = yes;
+    let causes: Counts = Cause::ALL
+        .map(|cause| (cause.name().to_owned(), u64::MAX))
+        .into();
+    half["updates"]["by_cause"] = json!(causes);
+    half["updates"]["repeated_by_cause"] = json!(causes);
+    // a slave has 39 names of drops
+    let drops: Counts = (10..50)
+        .map(|n| (format!("handshakes_unreadable{n}"), 99_999))
+        .collect();
+    half["session"]["drops"] = json!(drops);
+    let written = serde_json::to_vec(&half).unwrap();
+    let room = crate::wire::STREAM_MESSAGE_MAX - 8 - 1 - 2;
+    assert!(written.len() < room, "{} bytes", written.len());
+    let read: SlaveHalf = serde_json::from_slice(&written).unwrap();
+    assert_eq!(read.session.drops, drops);
+    assert_eq!(
+        serde_json::from_value::<SlaveHalf>(json!(read)).unwrap(),
+        read
+    );
 }
 
 #[test]
 fn the_table_shows_what_is_known_and_leaves_out_what_is_not() {
-    assert_eq!(empty().to_string(), "mmt demo 0.1.0\n");
+    let version = env!("CARGO_PKG_VERSION");
+    assert_eq!(empty().to_string(), format!("mmt demo {version}\n"));
     let mut report = empty();
     report.model.mass_kg = EstimateReport::new(0.707, None);
     assert_eq!(
         report.to_string(),
-        "mmt demo 0.1.0\n\nModel\n  mass m                    0.707 kg           -                  -\n"
+        format!(
+            "mmt demo {version}\n\nModel\n  mass m                    0.707 kg           -                  -\n"
+        )
     );
 }
 
 #[test]
 fn the_table_of_a_full_report_is_aligned_and_stays_within_100_columns() {
     let shown = full().to_string();
-    assert!(shown.starts_with("mmt demo 0.1.0, seed 1, 20.0 s, finished\n"));
+    let version = env!("CARGO_PKG_VERSION");
+    assert!(shown.starts_with(&format!("mmt demo {version}, seed 1, 20.0 s, finished\n")));
     for row in [
         "  rate                      1.55 /s            3.10 /s of contact",
         "  for deadband              30",

@@ -1,4 +1,5 @@
-//! What each side counts of a session's messages and updates.
+//! What each end of a session counts of messages and updates, each where it happens. A field's name is the name of what
+//! it counts everywhere: in the code, in reports and on the screen.
 
 use serde::{Deserialize, Serialize};
 
@@ -9,80 +10,69 @@ use crate::wire::Kind;
 #[serde(default)]
 pub struct KindCounts {
     /// Commands.
-    pub commands: u32,
+    pub commands: u64,
     /// Updates, repeats included.
-    pub updates: u32,
+    pub updates: u64,
     /// Scenes.
-    pub scenes: u32,
+    pub scenes: u64,
     /// Heartbeats.
-    pub heartbeats: u32,
+    pub heartbeats: u64,
     /// What the tool feels.
-    pub tools: u32,
+    pub tools: u64,
 }
 
 impl KindCounts {
     /// One more of this type; what is never in a datagram is not counted.
     pub fn count(&mut self, kind: Kind) {
-        let count = match kind {
+        *match kind {
             Kind::Command => &mut self.commands,
             Kind::Update => &mut self.updates,
             Kind::Scene => &mut self.scenes,
             Kind::Heartbeat => &mut self.heartbeats,
             Kind::Tool => &mut self.tools,
             Kind::Hello | Kind::Welcome | Kind::Refused | Kind::Farewell => return,
-        };
-        *count = count.saturating_add(1);
+        } += 1;
     }
 
     /// All of them.
     #[must_use]
     pub fn total(&self) -> u64 {
-        u64::from(self.commands)
-            + u64::from(self.updates)
-            + u64::from(self.scenes)
-            + u64::from(self.heartbeats)
-            + u64::from(self.tools)
+        self.commands + self.updates + self.scenes + self.heartbeats + self.tools
     }
 }
 
-/// What a side sent and received. `received` counts each datagram once.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(default)]
-pub struct Traffic {
-    /// Messages sent in datagrams.
+/// What one end of the datagram channel sent, received and dropped.
+///
+/// What arrived is `received.total() + datagrams_duplicate + datagrams_too_old + datagrams_malformed`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct ChannelCounts {
+    /// Messages sent.
     pub sent: KindCounts,
-    /// Messages received in datagrams, duplicates and too old ones left out.
+    /// Messages received, each once.
     pub received: KindCounts,
-    /// Datagrams dropped because their number had been received before.
-    pub duplicates: u32,
-    /// Datagrams dropped because their number was too old to tell.
-    pub too_old: u32,
+    /// Datagrams dropped because their number was received before.
+    pub datagrams_duplicate: u64,
+    /// Datagrams dropped because their number was too old to judge.
+    pub datagrams_too_old: u64,
     /// Datagrams dropped because they did not decode.
-    pub malformed: u32,
-    /// The socket's UDP datagrams sent: QUIC's own packets included.
-    pub udp_datagrams_sent: u64,
-    /// Their payload, bytes, without UDP and IP headers.
-    pub udp_bytes_sent: u64,
-    /// The socket's UDP datagrams received.
-    pub udp_datagrams_received: u64,
-    /// Their payload, bytes, without UDP and IP headers.
-    pub udp_bytes_received: u64,
+    pub datagrams_malformed: u64,
+    /// Messages that break a rule of the wire and were not sent.
+    pub messages_unsendable: u64,
 }
 
 /// Updates that the master received and did not apply, by cause.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(default)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct UpdateDrops {
-    /// Its sequence number had been seen: a repeat did its work, or the network duplicated.
-    pub duplicate: u32,
-    /// A newer one had been seen.
-    pub stale: u32,
+    /// Its sequence number was received before: a repeat did its work, or the network duplicated.
+    pub duplicate: u64,
+    /// A newer one was received before.
+    pub stale: u64,
     /// Its numbers were not accepted.
-    pub rejected: u32,
+    pub rejected: u64,
     /// A newer one took its place before a tick could apply it.
-    pub superseded: u32,
+    pub superseded: u64,
     /// The session's state did not allow it.
-    pub frozen: u32,
+    pub frozen: u64,
 }
 
 impl UpdateDrops {
@@ -96,6 +86,5 @@ impl UpdateDrops {
             ("superseded", self.superseded),
             ("frozen", self.frozen),
         ]
-        .map(|(name, count)| (name, u64::from(count)))
     }
 }

@@ -2,7 +2,7 @@
 
 use mmt_lab::replay::{Law, ReplayConfig, ReplayReport};
 use mmt_shared::model::update::Cause;
-use mmt_shared::report::{Counts, Number, RunReport};
+use mmt_shared::report::{Number, RunReport, SentUpdates, named};
 use serde::Serialize;
 
 /// The law of the run report's own keys; all laws are in the section `replay`.
@@ -46,9 +46,9 @@ impl Document {
             files: replayed.iter().map(|one| one.file.clone()).collect(),
             replay: *config,
         };
-        let mut run = RunReport::new(env!("CARGO_PKG_VERSION"), "replay", configuration);
+        let mut run = RunReport::new("replay", configuration);
         run.seed = Some(config.seed);
-        run.ending = Some("finished".to_owned());
+        run.ending = Some("finished");
         let sum = |of: fn(&ReplayReport) -> f64| replayed.iter().map(|one| of(&one.report)).sum();
         let (duration_s, contact_s): (f64, f64) = (
             sum(|report| report.duration_s),
@@ -57,7 +57,7 @@ impl Document {
         run.duration_s = duration_s.into();
         let pushes: usize = replayed.iter().map(|one| one.report.pushes.len()).sum();
         run.pushes.completed = Some(pushes as u64);
-        set_updates(&mut run, &replayed, duration_s, contact_s);
+        run.updates.sent = sent_updates(&replayed, duration_s, contact_s);
         // one estimate has a meaning for one object only
         if let [only] = replayed.as_slice() {
             let law = only.report.law(LAW);
@@ -73,7 +73,7 @@ impl Document {
     }
 }
 
-fn set_updates<C>(run: &mut RunReport<C>, replayed: &[Replayed], duration_s: f64, contact_s: f64) {
+fn sent_updates(replayed: &[Replayed], duration_s: f64, contact_s: f64) -> SentUpdates {
     let laws = || replayed.iter().filter_map(|one| one.report.law(LAW));
     let sent: u64 = laws().map(|law| law.updates.sent).sum();
     let by = |cause| match cause {
@@ -82,9 +82,11 @@ fn set_updates<C>(run: &mut RunReport<C>, replayed: &[Replayed], duration_s: f64
         // the replay's trigger has no other cause
         _ => 0,
     };
-    let named = Cause::ALL.map(|cause| (cause.name().to_owned(), by(cause)));
-    run.updates.sent = Some(sent);
-    run.updates.rate_hz = Number::rate(sent as f64, duration_s);
-    run.updates.contact_rate_hz = Number::rate(sent as f64, contact_s);
-    run.updates.by_cause = Some(Counts::from(named));
+    SentUpdates {
+        sent: Some(sent),
+        rate_hz: Number::rate(sent as f64, duration_s),
+        contact_rate_hz: Number::rate(sent as f64, contact_s),
+        by_cause: Some(named(Cause::ALL.map(|cause| (cause.name(), by(cause))))),
+        ..SentUpdates::default()
+    }
 }

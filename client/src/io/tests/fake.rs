@@ -14,7 +14,7 @@ use mmt_shared::io::stream::{read_frame, write_frame};
 use mmt_shared::model::geometry::{BoxFootprint, Pose};
 use mmt_shared::model::settings::Mode;
 use mmt_shared::model::update::Update;
-use mmt_shared::report::totals::{MasterTotals, of_report, to_report};
+use mmt_shared::report::MasterHalf;
 use mmt_shared::time::Time;
 use mmt_shared::wire::{
     DATAGRAM_MAX, Farewell, Hello, Label, Message, STREAM_MESSAGE_MAX, Side, StreamMessage, Welcome,
@@ -130,8 +130,8 @@ impl Session {
         self.say(&StreamMessage::Refused(refusal)).await;
     }
 
-    pub(super) async fn say_farewell(&mut self, ending: Ending, totals: SlaveTotals) {
-        let report = &to_report(&totals);
+    pub(super) async fn say_farewell(&mut self, ending: Ending, totals: SlaveHalf) {
+        let report = &serde_json::to_vec(&totals).unwrap();
         self.say(&StreamMessage::Farewell(Farewell { ending, report }))
             .await;
     }
@@ -145,7 +145,7 @@ impl Session {
     }
 
     /// Takes samples in and sends an update every 20 ms, until the master says farewell.
-    pub(super) async fn serve(&mut self) -> ReceivedFarewell<MasterTotals> {
+    pub(super) async fn serve(&mut self) -> ReceivedFarewell<MasterHalf> {
         timeout(FOR_EVER, self.serve_until_farewell())
             .await
             .unwrap()
@@ -159,7 +159,7 @@ impl Session {
         }
     }
 
-    async fn serve_until_farewell(&mut self) -> ReceivedFarewell<MasterTotals> {
+    async fn serve_until_farewell(&mut self) -> ReceivedFarewell<MasterHalf> {
         let mut receive = self.receive.take().unwrap();
         let message =
             tokio::spawn(
@@ -172,7 +172,7 @@ impl Session {
         match StreamMessage::decode(&message, Side::Master).unwrap() {
             StreamMessage::Farewell(Farewell { ending, report }) => ReceivedFarewell {
                 ending,
-                report: of_report(report),
+                report: serde_json::from_slice(report).ok(),
             },
             other => panic!("{other:?} instead of a farewell"),
         }
@@ -210,7 +210,7 @@ impl Session {
     pub(super) fn tell(&mut self, message: Message) {
         let mut out = [0; DATAGRAM_MAX];
         let length = self.link.encode(self.clock.now(), message, &mut out);
-        let bytes = out[..length.unwrap()].to_vec();
+        let bytes = out[..length.unwrap().unwrap()].to_vec();
         // a master that has gone does not matter here
         let _ = self.connection.send_datagram(bytes.into());
     }

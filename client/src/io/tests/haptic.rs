@@ -62,7 +62,7 @@ impl Ticked {
     fn hear(&mut self, index: u64, message: Message) {
         let mut out = [0; DATAGRAM_MAX];
         let at = Time::from_millis(index + 1);
-        let length = self.slave.encode(at, message, &mut out).unwrap();
+        let length = self.slave.encode(at, message, &mut out).unwrap().unwrap();
         self.handle.deliver(at, &out[..length]);
     }
 

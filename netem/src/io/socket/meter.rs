@@ -1,8 +1,10 @@
 //! The counters of a wrapped socket: what the program offered, what really went out, what came in.
 
 use std::io;
+use std::net::SocketAddr;
 use std::sync::{Arc, Mutex};
 
+use mmt_shared::report::{SessionStats, WireReport};
 use quinn::udp::{RecvMeta, Transmit};
 use serde::Serialize;
 
@@ -41,6 +43,32 @@ impl SocketMeter {
     #[must_use]
     pub fn lateness(&self) -> Lateness {
         self.lateness.summary()
+    }
+
+    /// Adds to what an end of a session counted what its socket counted since `before`, in `duration_s` (s) towards `peer`.
+    pub fn add_to(
+        &self,
+        session: &mut SessionStats,
+        before: &SocketCounters,
+        peer: SocketAddr,
+        duration_s: f64,
+    ) {
+        let now = self.snapshot();
+        // IP and UDP headers
+        let header_bytes = if peer.ip().to_canonical().is_ipv4() {
+            28
+        } else {
+            48
+        };
+        let wire = |now: Tally, before: Tally| {
+            let datagrams = now.packets.saturating_sub(before.packets);
+            let bytes = now.bytes.saturating_sub(before.bytes);
+            WireReport::new(datagrams, bytes, header_bytes, duration_s)
+        };
+        session.wire_sent = wire(now.outgoing.sent, before.outgoing.sent);
+        session.wire_received = wire(now.received, before.received);
+        session.emulation = self.lateness().report();
+        session.add_drops(now.outgoing.drops_since(&before.outgoing));
     }
 
     pub(super) fn recorder(&self) -> Arc<Recorder> {

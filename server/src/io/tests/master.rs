@@ -16,7 +16,7 @@ use mmt_shared::model::sample::{HipCounts, HipSample};
 use mmt_shared::model::tool::HandPort;
 use mmt_shared::model::update::Update;
 use mmt_shared::pairing::{Pairing, Token};
-use mmt_shared::report::totals::{MasterTotals, SlaveTotals, of_report, to_report};
+use mmt_shared::report::{MasterHalf, ReceivedUpdates, SlaveHalf};
 use mmt_shared::time::{TICK, Time};
 use mmt_shared::wire::{
     Architecture, Command, DATAGRAM_MAX, Ending, Farewell, Hello, Label, Message, RawState,
@@ -141,9 +141,9 @@ impl Master {
     }
 
     /// Reads until the slave has sent `heartbeats` heartbeats.
-    pub(super) async fn listen(&mut self, heartbeats: u32) {
-        let heard = self.link.traffic().received.heartbeats;
-        while self.link.traffic().received.heartbeats < heard + heartbeats {
+    pub(super) async fn listen(&mut self, heartbeats: u64) {
+        let before = self.link.counts().received.heartbeats;
+        while self.link.counts().received.heartbeats < before + heartbeats {
             let datagram = self.connection.read_datagram().await.unwrap();
             self.take(&datagram);
         }
@@ -179,7 +179,7 @@ impl Master {
         let mut out = [0; DATAGRAM_MAX];
         let now = self.clock.now();
         let length = self.link.encode(now, Message::Command(command), &mut out);
-        let bytes = Bytes::copy_from_slice(&out[..length.unwrap()]);
+        let bytes = Bytes::copy_from_slice(&out[..length.unwrap().unwrap()]);
         self.connection.send_datagram(bytes).unwrap();
     }
 
@@ -190,7 +190,7 @@ impl Master {
     }
 
     /// Says farewell, and hears the slave's: its report.
-    pub(super) async fn farewell(mut self) -> (Ending, SlaveTotals) {
+    pub(super) async fn farewell(mut self) -> (Ending, SlaveHalf) {
         self.say_farewell().await;
         let theirs = self.hear_farewell().await;
         self.connection.close(0u32.into(), b"");
@@ -199,21 +199,24 @@ impl Master {
     }
 
     pub(super) async fn say_farewell(&mut self) {
-        let totals = MasterTotals {
-            updates_applied: 7,
-            ..MasterTotals::default()
+        let half = MasterHalf {
+            updates: ReceivedUpdates {
+                applied: Some(7),
+                ..ReceivedUpdates::default()
+            },
+            ..MasterHalf::default()
         };
         let farewell = Farewell {
             ending: Ending::Finished,
-            report: &to_report(&totals),
+            report: &serde_json::to_vec(&half).unwrap(),
         };
         self.say(&encoded(&StreamMessage::Farewell(farewell))).await;
     }
 
-    pub(super) async fn hear_farewell(&mut self) -> (Ending, SlaveTotals) {
+    pub(super) async fn hear_farewell(&mut self) -> (Ending, SlaveHalf) {
         match StreamMessage::decode(&self.hear().await, Side::Slave) {
             Ok(StreamMessage::Farewell(Farewell { ending, report })) => {
-                (ending, of_report(report).unwrap())
+                (ending, serde_json::from_slice(report).unwrap())
             }
             other => panic!("{other:?}"),
         }

@@ -106,8 +106,8 @@ pub enum Freshness {
 #[derive(Clone, Debug)]
 pub struct SequenceWindow {
     window: Window,
-    duplicate: u32,
-    stale: u32,
+    duplicate: u64,
+    stale: u64,
 }
 
 impl Default for SequenceWindow {
@@ -135,11 +135,11 @@ impl SequenceWindow {
         match self.window.note(sequence) {
             Place::Ahead => Freshness::Fresh,
             Place::Taken => {
-                self.duplicate = self.duplicate.saturating_add(1);
+                self.duplicate += 1;
                 Freshness::Duplicate
             }
             Place::Gap | Place::Behind => {
-                self.stale = self.stale.saturating_add(1);
+                self.stale += 1;
                 Freshness::Stale
             }
         }
@@ -158,13 +158,13 @@ impl SequenceWindow {
 
     /// How many were stopped as seen before.
     #[must_use]
-    pub fn duplicate(&self) -> u32 {
+    pub fn duplicate(&self) -> u64 {
         self.duplicate
     }
 
     /// How many were stopped as older than one seen.
     #[must_use]
-    pub fn stale(&self) -> u32 {
+    pub fn stale(&self) -> u64 {
         self.stale
     }
 }

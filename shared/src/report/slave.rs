@@ -1,0 +1,154 @@
+//! The slave's half of a session.
+
+use serde::{Deserialize, Serialize};
+
+use super::number::{Counts, Number, named};
+use super::session::{DelayReport, SessionStats};
+use crate::metrics::{ForceSummary, UpdateCounts};
+
+/// What the slave alone counts and measures.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct SlaveHalf {
+    /// What each end counts.
+    pub session: SessionStats,
+    /// What the trigger sent.
+    pub updates: SentUpdates,
+    /// The model's force against the measured one.
+    pub force: ForceErrors,
+    /// What the estimator found.
+    pub model: ModelReport,
+    /// The tool.
+    pub tool: ToolReport,
+    /// Delay of the play-out, over the ticks.
+    pub playout_delay_ms: DelayReport,
+}
+
+fn by_cause(counts: &UpdateCounts) -> Option<Counts> {
+    Some(named(counts.by_cause().map(|(cause, n)| (cause.name(), n))))
+}
+
+/// Updates as the slave sent them.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct SentUpdates {
+    /// Updates that the slave sent.
+    pub sent: Option<u64>,
+    /// Per second of the run, 1/s.
+    pub rate_hz: Number,
+    /// All updates of the run per second of contact, 1/s.
+    pub contact_rate_hz: Number,
+    /// Sent, by cause.
+    pub by_cause: Option<Counts>,
+    /// Repeats of them that the slave sent.
+    pub repeated: Option<u64>,
+    /// Repeats, by the cause of what they repeat.
+    pub repeated_by_cause: Option<Counts>,
+}
+
+impl SentUpdates {
+    /// From what the slave sent for the first time and what it repeated.
+    #[must_use]
+    pub fn new(sent: &UpdateCounts, repeated: &UpdateCounts) -> Self {
+        Self {
+            sent: Some(sent.total()),
+            rate_hz: sent.rate_hz().into(),
+            contact_rate_hz: sent.contact_rate_hz().into(),
+            by_cause: by_cause(sent),
+            repeated: Some(repeated.total()),
+            repeated_by_cause: by_cause(repeated),
+        }
+    }
+}
+
+/// The model's force against the measured one, at the slave; each metric is defined in `docs/metrics.md`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct ForceErrors {
+    /// Pairs of f_s and f_m.
+    pub samples: Option<u64>,
+    /// Pairs with a force on either side.
+    pub contact_samples: Option<u64>,
+    /// (15).
+    pub pmse: Number,
+    /// (13).
+    pub pmse_x: Number,
+    /// (14).
+    pub pmse_y: Number,
+    /// (13) of the magnitudes.
+    pub pmse_magnitude: Number,
+    /// Relative vector error.
+    pub relative_error: Number,
+    /// Root mean square error, N.
+    pub error_rms_n: Number,
+    /// Share of contact outside the 7 % JND, 0 to 1.
+    pub jnd7_share: Number,
+    /// Share of contact outside the 10 % JND, 0 to 1.
+    pub jnd10_share: Number,
+}
+
+impl From<&ForceSummary> for ForceErrors {
+    fn from(summary: &ForceSummary) -> Self {
+        Self {
+            samples: Some(summary.samples),
+            contact_samples: Some(summary.contact_samples),
+            pmse: summary.pmse.into(),
+            pmse_x: summary.pmse_x.into(),
+            pmse_y: summary.pmse_y.into(),
+            pmse_magnitude: summary.pmse_magnitude.into(),
+            relative_error: summary.relative_error.into(),
+            error_rms_n: summary.error_rms_n.into(),
+            jnd7_share: summary.jnd7_share.into(),
+            jnd10_share: summary.jnd10_share.into(),
+        }
+    }
+}
+
+/// What the estimator found, beside the truth where it is known.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct ModelReport {
+    /// Mass m, kg.
+    pub mass_kg: EstimateReport,
+    /// Viscous damping b, N s/m.
+    pub damping_ns_per_m: EstimateReport,
+    /// Coulomb friction c, N.
+    pub friction_n: EstimateReport,
+}
+
+/// An estimate and the truth.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct EstimateReport {
+    /// The last estimate; absent if the data could not show it.
+    pub estimate: Number,
+    /// The truth; absent outside simulation.
+    pub truth: Number,
+}
+
+impl EstimateReport {
+    /// From numbers that may be absent.
+    pub fn new(estimate: impl Into<Number>, truth: impl Into<Number>) -> Self {
+        Self {
+            estimate: estimate.into(),
+            truth: truth.into(),
+        }
+    }
+
+    /// (estimate − truth)/truth; absent when either is, or the truth is 0.
+    #[must_use]
+    pub fn relative_error(&self) -> Number {
+        let ratio = |(estimate, truth): (f64, f64)| (estimate - truth) / truth;
+        self.estimate.get().zip(self.truth.get()).map(ratio).into()
+    }
+}
+
+/// The slave's tool and the limit of its force.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct ToolReport {
+    /// For how long the limit shortened its way, s.
+    pub held_s: Number,
+    /// Largest force that was measured between tool and object, N.
+    pub force_peak_n: Number,
+}
