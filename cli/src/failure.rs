@@ -56,7 +56,6 @@ impl Failure {
     }
 
     /// Adds what to do about it.
-    #[must_use]
     pub(crate) fn remedy(mut self, remedy: impl fmt::Display) -> Self {
         self.remedy = Some(remedy.to_string());
         self

@@ -29,7 +29,6 @@ use failure::Failure;
 use log::Messages;
 
 /// Runs the command line of this process.
-#[must_use]
 pub fn run() -> ExitCode {
     restore_terminal_on_panic();
     let arguments = match Arguments::try_parse() {

@@ -51,7 +51,6 @@ impl CommandConfig {
     }
 
     /// The most samples that a command can have.
-    #[must_use]
     pub fn samples_at_most(&self) -> usize {
         let news = usize::from(self.samples_per_command).max(1);
         (news * (1 + usize::from(self.repeat_samples))).min(SAMPLES_MAX)

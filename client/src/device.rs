@@ -135,43 +135,36 @@ impl DeviceProfile {
     }
 
     /// Name of the profile.
-    #[must_use]
     pub fn name(&self) -> &'static str {
         self.name
     }
 
     /// k_p, N/m, world metres.
-    #[must_use]
     pub fn stiffness_n_per_m(&self) -> f64 {
         self.stiffness_n_per_m
     }
 
     /// F_max, N.
-    #[must_use]
     pub fn force_max_n(&self) -> f64 {
         self.force_max_n
     }
 
     /// Side of the cube that the device reaches, m, device metres.
-    #[must_use]
     pub fn workspace_m(&self) -> f64 {
         self.workspace_m
     }
 
     /// s: world metres per device metre.
-    #[must_use]
     pub fn scale(&self) -> f64 {
         self.scale
     }
 
     /// k_p with the damping that belongs to it.
-    #[must_use]
     pub fn coupling(&self) -> Coupling {
         Coupling::for_stiffness(self.stiffness_n_per_m)
     }
 
     /// The limits for the force on this device.
-    #[must_use]
     pub fn limits(&self) -> Limits {
         Limits {
             force_max_n: self.force_max_n,
@@ -180,7 +173,6 @@ impl DeviceProfile {
     }
 
     /// A point of the device's room in the world, m.
-    #[must_use]
     pub fn hip_in_world(&self, hip_in_device: Vec2) -> Vec2 {
         hip_in_device * self.scale
     }

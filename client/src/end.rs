@@ -56,7 +56,6 @@ pub struct MasterEnd {
 
 impl MasterEnd {
     /// An end from `now` on.
-    #[must_use]
     pub fn new(now: Time, master: Master, config: CommandConfig) -> Self {
         Self {
             master,
@@ -72,26 +71,22 @@ impl MasterEnd {
     }
 
     /// The core.
-    #[must_use]
     pub fn master(&self) -> &Master {
         &self.master
     }
 
     /// The datagram channel: round trip, loss, counts.
-    #[must_use]
     pub fn channel(&self) -> &DatagramChannel {
         &self.channel
     }
 
     /// What it counted.
-    #[must_use]
     pub fn counts(&self) -> &MasterCounts {
         &self.counts
     }
 
     /// Updates that arrived and were not applied, by cause. One that waits for a tick counts as frozen: at the end of a
     /// session none will come.
-    #[must_use]
     pub fn update_drops(&self) -> UpdateDrops {
         UpdateDrops {
             duplicate: self.window.duplicate(),
@@ -103,7 +98,6 @@ impl MasterEnd {
     }
 
     /// What it counted and measured in the `duration_s` (s) since it began.
-    #[must_use]
     pub fn half(&self, duration_s: f64) -> MasterHalf {
         let (master, counts, drops) = (&self.master, &self.counts, self.update_drops());
         // an update that was received before is a repeat, whether the slave or the network repeated it
@@ -135,7 +129,6 @@ impl MasterEnd {
     }
 
     /// The newest scene; none where nobody asked for scenes.
-    #[must_use]
     pub fn scene(&self) -> Option<&Scene> {
         self.scene.as_ref()
     }
@@ -225,7 +218,6 @@ impl MasterEnd {
     }
 
     /// When a heartbeat must go out if nothing else does before.
-    #[must_use]
     pub fn poll_timeout(&self) -> Time {
         self.channel.heartbeat_due()
     }

@@ -39,7 +39,6 @@ pub enum LinkState {
 
 impl LinkState {
     /// The state for the time since something last came from the slave.
-    #[must_use]
     pub fn of_silence(silence: Duration) -> Self {
         if silence >= RELEASE {
             Self::Released
@@ -53,7 +52,6 @@ impl LinkState {
     }
 
     /// The name shown on screens.
-    #[must_use]
     pub fn name(self) -> &'static str {
         match self {
             Self::Fresh => "fresh",

@@ -2,22 +2,6 @@
 //!
 //! The crate is pure; its QUIC endpoint and its haptic thread live in `io` behind the feature of that name.
 
-#![cfg_attr(
-    not(feature = "io"),
-    forbid(
-        unsafe_code,
-        clippy::disallowed_macros,
-        clippy::disallowed_methods,
-        clippy::disallowed_types,
-        clippy::unwrap_used,
-        clippy::expect_used,
-        clippy::indexing_slicing,
-        clippy::panic,
-        clippy::print_stderr,
-        clippy::print_stdout
-    )
-)]
-
 pub mod commands;
 pub mod device;
 pub mod end;

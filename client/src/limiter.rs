@@ -83,25 +83,21 @@ impl ForceLimiter {
     }
 
     /// Whether force may grow.
-    #[must_use]
     pub fn engaged(&self) -> bool {
         self.engaged
     }
 
     /// Whether it is released and the ramp has ended: no force leaves.
-    #[must_use]
     pub fn at_rest(&self) -> bool {
         !self.engaged && self.ramp == 0
     }
 
     /// Ticks on which the wanted force was not finite.
-    #[must_use]
     pub fn rejected(&self) -> u64 {
         self.rejected
     }
 
     /// Ticks on which F_max or S_max made the force another than the ramped one.
-    #[must_use]
     pub fn limited(&self) -> u64 {
         self.limited
     }

@@ -55,13 +55,11 @@ pub struct Master {
 
 impl Master {
     /// A master that renders what the slave's welcome says, its force limited by `limiter`.
-    #[must_use]
     pub fn new(welcome: &Welcome, limiter: ForceLimiter) -> Self {
         Self::with_architecture(welcome, limiter, Architecture::Mmt)
     }
 
     /// A master whose hand feels the force of this architecture.
-    #[must_use]
     pub fn with_architecture(
         welcome: &Welcome,
         mut limiter: ForceLimiter,
@@ -82,55 +80,46 @@ impl Master {
     }
 
     /// The hand's port, where the hand feels the tool's force.
-    #[must_use]
     pub fn tdpa(&self) -> Option<&TdpaHand> {
         self.tdpa.as_ref()
     }
 
     /// The local model, felt or not.
-    #[must_use]
     pub fn model(&self) -> &LocalModel {
         &self.model
     }
 
     /// The force limiter.
-    #[must_use]
     pub fn limiter(&self) -> &ForceLimiter {
         &self.limiter
     }
 
     /// Device readings that were not finite and were replaced by the one before.
-    #[must_use]
     pub fn bad_readings(&self) -> u64 {
         self.bad_readings
     }
 
     /// Updates that reached the model.
-    #[must_use]
     pub fn applied(&self) -> u32 {
         self.applied
     }
 
     /// Updates that came after the hand had been released and were not applied.
-    #[must_use]
     pub fn frozen(&self) -> u32 {
         self.frozen
     }
 
     /// Energy that updates have added to the model so far beyond what its tank paid, J.
-    #[must_use]
     pub fn energy_injected_j(&self) -> f64 {
         self.model.energy_injected_j()
     }
 
     /// The passivity observer at the hand.
-    #[must_use]
     pub fn port(&self) -> &PortObserver {
         &self.port
     }
 
     /// What the operator sees: the local model. In contact is what is felt.
-    #[must_use]
     pub fn view(&self) -> View {
         let state = self.model.state();
         let touches_model = self.model.rendered().in_contact();

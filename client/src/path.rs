@@ -24,7 +24,6 @@ pub struct PathRecorder {
 
 impl PathRecorder {
     /// A recorder that never allocates: all samples have their room from the start.
-    #[must_use]
     pub fn with_room() -> Self {
         Self {
             samples: Vec::with_capacity(SAMPLES_MAX),

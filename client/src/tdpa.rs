@@ -47,20 +47,17 @@ impl Default for TdpaHand {
 
 impl TdpaHand {
     /// Whether the tool touches the object, as far as is known.
-    #[must_use]
     pub fn tool_in_contact(&self) -> bool {
         self.tool_in_contact
     }
 
     /// The smoothed round trip of the force, s: from a HIP sample to its answer, play-out included. None before the
     /// first answer.
-    #[must_use]
     pub fn round_trip_s(&self) -> Option<f64> {
         self.round_trip_s
     }
 
     /// What goes to the tool's port after this tick.
-    #[must_use]
     pub fn port(&self) -> HandPort {
         HandPort {
             in_j: self.energy.in_j,

@@ -1,21 +1,5 @@
 //! Experiments in virtual time: everything that is computed about the system rather than by it.
 
-#![cfg_attr(
-    not(feature = "io"),
-    forbid(
-        unsafe_code,
-        clippy::disallowed_macros,
-        clippy::disallowed_methods,
-        clippy::disallowed_types,
-        clippy::unwrap_used,
-        clippy::expect_used,
-        clippy::indexing_slicing,
-        clippy::panic,
-        clippy::print_stderr,
-        clippy::print_stdout
-    )
-)]
-
 pub mod architecture;
 pub mod baselines;
 mod digest;

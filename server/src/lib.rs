@@ -3,22 +3,6 @@
 //! The crate is pure; its QUIC endpoint and its 1 kHz thread live in `io` behind the feature of that
 //! name. Only `environment` names the physics engine.
 
-#![cfg_attr(
-    not(feature = "io"),
-    forbid(
-        unsafe_code,
-        clippy::disallowed_macros,
-        clippy::disallowed_methods,
-        clippy::disallowed_types,
-        clippy::unwrap_used,
-        clippy::expect_used,
-        clippy::indexing_slicing,
-        clippy::panic,
-        clippy::print_stderr,
-        clippy::print_stdout
-    )
-)]
-
 pub mod contact;
 pub mod end;
 pub mod environment;

@@ -17,7 +17,6 @@ pub const COUPLING: Coupling = Coupling {
 ///
 /// # Panics
 /// The parameters are not accepted.
-#[must_use]
 pub fn square_at_rest(m: f64, b: f64, c: f64, side_m: f64) -> ModelState {
     let params = ModelParams::of_square(m, b, c, side_m, &COUPLING).unwrap();
     let footprint = BoxFootprint::square(side_m);
@@ -25,7 +24,6 @@ pub fn square_at_rest(m: f64, b: f64, c: f64, side_m: f64) -> ModelState {
 }
 
 /// An update that answers the sample of so many milliseconds, while the slave's tool touches the object.
-#[must_use]
 pub fn update(sequence: u32, cause: Cause, answers_ms: u64, state: ModelState) -> Update {
     Update {
         sequence,

@@ -4,22 +4,6 @@
 //! the local model, metrics, statistics, wire messages. The crate is pure; clocks, threads and sockets live in `io`
 //! behind the feature of that name.
 
-#![cfg_attr(
-    not(feature = "io"),
-    forbid(
-        unsafe_code,
-        clippy::disallowed_macros,
-        clippy::disallowed_methods,
-        clippy::disallowed_types,
-        clippy::unwrap_used,
-        clippy::expect_used,
-        clippy::indexing_slicing,
-        clippy::panic,
-        clippy::print_stderr,
-        clippy::print_stdout
-    )
-)]
-
 pub mod channel;
 #[cfg(any(test, feature = "fixtures"))]
 pub mod fixtures;

@@ -29,7 +29,6 @@ pub struct PortEnergy {
 
 impl PortEnergy {
     /// A port that begins in debt by `reserve_j`, J: what is paid for it covers later errors and is nobody's credit.
-    #[must_use]
     pub fn with_reserve(reserve_j: f64) -> Self {
         Self {
             in_j: 0.0,
@@ -53,7 +52,6 @@ impl PortEnergy {
     }
 
     /// W = E_in of the other port − E_out of this one, J: what may still leave here.
-    #[must_use]
     pub fn margin_j(&self, other_in_j: f64) -> f64 {
         other_in_j - self.out_j
     }
@@ -63,7 +61,6 @@ impl PortEnergy {
 ///
 /// `f` is the force on the object to be displayed (N), `v` the velocity that the hand is expected to keep for the next
 /// tick (m/s), `margin_j` W. Where the network would give more than W it gives W; a debt (W < 0) is paid back by damping.
-#[must_use]
 pub fn impedance_controller(f: Vec2, v: Vec2, margin_j: f64) -> Vec2 {
     let speed2 = v.norm_squared();
     if speed2 < AT_REST_M_PER_S * AT_REST_M_PER_S {
@@ -82,7 +79,6 @@ pub fn impedance_controller(f: Vec2, v: Vec2, margin_j: f64) -> Vec2 {
 ///
 /// `step` is the way that the tool is to go in this tick (m), `f` the force that it exerts on the object (N), `margin_j`
 /// W. Only the part of the way along the force is shortened, and never turned round.
-#[must_use]
 pub fn admittance_controller(step: Vec2, f: Vec2, margin_j: f64) -> Vec2 {
     let out_j = f.dot(&step);
     let excess_j = out_j - margin_j.max(0.0);

@@ -241,7 +241,6 @@ impl<C> From<SlaveSession<C>> for RunReport<C> {
 impl<M, S> RunReport<Both<M, S>> {
     /// The report of a demo, both ends of which live in one process. Each direction is counted where it is sent; what
     /// both ends measured is the master's.
-    #[must_use]
     pub fn of_both(master: MasterSession<M>, slave: Option<SlaveSession<S>>) -> Self {
         let (half, slave) = slave.map(|slave| (slave.own, slave.configuration)).unzip();
         let half = half.or(master.other);

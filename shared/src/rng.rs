@@ -16,7 +16,6 @@ impl Substream {
     ///
     /// The `ChaCha8` key is the seed in little endian followed by the name, padded with zeros; the index
     /// is the stream number (RFC 8439's nonce, 64-bit variant).
-    #[must_use]
     pub fn new(seed: u64, name: &str, index: u64) -> Self {
         let mut key = [0u8; 32];
         let named = seed.to_le_bytes().into_iter().chain(name.bytes());

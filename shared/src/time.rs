@@ -27,25 +27,21 @@ impl Time {
     pub const MAX: Self = Self(u64::MAX);
 
     /// The point `nanos` nanoseconds after the epoch.
-    #[must_use]
     pub const fn from_nanos(nanos: u64) -> Self {
         Self(nanos)
     }
 
     /// The point `millis` milliseconds after the epoch.
-    #[must_use]
     pub const fn from_millis(millis: u64) -> Self {
         Self(millis.saturating_mul(1_000_000))
     }
 
     /// Nanoseconds since the epoch.
-    #[must_use]
     pub const fn as_nanos(self) -> u64 {
         self.0
     }
 
     /// Seconds since the epoch.
-    #[must_use]
     pub fn as_secs_f64(self) -> f64 {
         self.0 as f64 * 1e-9
     }
@@ -57,7 +53,6 @@ impl Time {
     }
 
     /// Signed difference `self - other` in nanoseconds, saturating.
-    #[must_use]
     pub const fn signed_since(self, other: Self) -> i64 {
         if self.0 >= other.0 {
             let d = self.0 - other.0;
@@ -84,7 +79,6 @@ impl Time {
 }
 
 /// Nanoseconds of a duration, saturating at `u64::MAX` (585 years).
-#[must_use]
 pub fn duration_nanos(duration: Duration) -> u64 {
     u64::try_from(duration.as_nanos()).unwrap_or(u64::MAX)
 }

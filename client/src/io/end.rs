@@ -25,7 +25,6 @@ pub enum SessionEnd {
 
 impl SessionEnd {
     /// What the farewell and the report say.
-    #[must_use]
     pub fn ending(self) -> Ending {
         match self {
             Self::DurationOver | Self::OperatorFinished => Ending::Finished,

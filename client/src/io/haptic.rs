@@ -78,7 +78,6 @@ pub struct HapticLoop {
 
 impl HapticLoop {
     /// A loop around an end, with somebody who moves the HIP, for a while or for ever.
-    #[must_use]
     pub fn new(end: MasterEnd, operator: Operator, duration: Option<Duration>) -> Self {
         Self {
             end,
@@ -174,7 +173,6 @@ impl HapticLoop {
     }
 
     /// The master's end.
-    #[must_use]
     pub fn end(&self) -> &MasterEnd {
         &self.end
     }

@@ -27,13 +27,11 @@ impl PortObserver {
     }
 
     /// Energy that the hand has put in so far, J.
-    #[must_use]
     pub fn energy_j(&self) -> f64 {
         self.energy_j
     }
 
     /// The least that it ever was, J: at most 0, and below 0 by what the port has given for nothing.
-    #[must_use]
     pub fn least_j(&self) -> f64 {
         self.least_j
     }

@@ -48,7 +48,6 @@ pub struct Hand {
 
 impl Hand {
     /// A hand at rest at `hip` (m, world frame). The tremor's phases are drawn from `seed`.
-    #[must_use]
     pub fn new(config: HandConfig, seed: u64, hip: Vec2) -> Self {
         let mut stream = Substream::new(seed, "operator/tremor", 0);
         Self {
@@ -83,13 +82,11 @@ impl Hand {
     }
 
     /// Where the HIP is, m.
-    #[must_use]
     pub fn hip(&self) -> Vec2 {
         self.position
     }
 
     /// The spring's pull on the HIP, N, with the operator's wish at `wanted` (m).
-    #[must_use]
     pub fn pull(&self, wanted: Vec2) -> Vec2 {
         (wanted - self.position) * self.config.stiffness_n_per_m
     }

@@ -23,7 +23,6 @@ pub enum Operator {
 
 impl Operator {
     /// Where the HIP is before the first tick, m, world.
-    #[must_use]
     pub fn start(&self) -> Vec2 {
         match self {
             Self::Scripted(scripted) => scripted.hip(),
@@ -43,7 +42,6 @@ impl Operator {
     }
 
     /// Pushes that went over their whole length; none for a path, in which no push is marked.
-    #[must_use]
     pub fn pushes_completed(&self) -> Option<u64> {
         match self {
             Self::Scripted(scripted) => Some(scripted.pushes_completed()),
@@ -52,7 +50,6 @@ impl Operator {
     }
 
     /// Whether there is nothing more to do.
-    #[must_use]
     pub fn finished(&self, elapsed: Duration) -> bool {
         match self {
             Self::Scripted(_) => false,

@@ -98,25 +98,21 @@ impl Scripted {
     }
 
     /// Where the HIP is now, m, world frame.
-    #[must_use]
     pub fn hip(&self) -> Vec2 {
         self.hand.hip()
     }
 
     /// What it is doing.
-    #[must_use]
     pub fn phase(&self) -> Phase {
         self.phase
     }
 
     /// The face that it pushes, or will push next.
-    #[must_use]
     pub fn face(&self) -> Face {
         self.face
     }
 
     /// Pushes that went over their whole length.
-    #[must_use]
     pub fn pushes_completed(&self) -> u64 {
         self.pushes_completed
     }

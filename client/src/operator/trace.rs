@@ -181,7 +181,6 @@ impl Trace {
     }
 
     /// The tool point (world, m) at a time since the start: linear between samples, held after the last.
-    #[must_use]
     pub fn at(&self, elapsed: Duration) -> Vec2 {
         let t_s = elapsed.as_secs_f64();
         let next = self
@@ -200,14 +199,12 @@ impl Trace {
     }
 
     /// Time from the first to the last sample.
-    #[must_use]
     pub fn duration(&self) -> Duration {
         let last_s = self.samples.last().map_or(0.0, |(t_s, _)| *t_s);
         Duration::try_from_secs_f64(last_s).unwrap_or(Duration::ZERO)
     }
 
     /// The samples: time since the start (s, strictly increasing from 0) and tool point (world, m).
-    #[must_use]
     pub fn samples(&self) -> &[(f64, Vec2)] {
         &self.samples
     }

@@ -96,14 +96,12 @@ impl SlaveHost {
     }
 
     /// Where it listens, with the port that the system chose if it was asked to.
-    #[must_use]
     pub fn address(&self) -> SocketAddr {
         self.address
     }
 
     /// What a master needs. Without `host` it names the address listened on; if that is a wildcard, the
     /// address that this machine reaches the world with, or loopback if it reaches none.
-    #[must_use]
     pub fn pairing(&self, host: Option<Host>) -> Pairing {
         let mut pairing = self.pairing.clone();
         if let Some(host) = host {

@@ -37,13 +37,11 @@ pub struct DatagramChannel {
 
 impl DatagramChannel {
     /// The end of `side`, from `now` on, that never sends less because of congestion.
-    #[must_use]
     pub fn new(side: Side, now: Time) -> Self {
         Self::with_rate_control(side, now, StretchMax::OFF)
     }
 
     /// The end of `side`, from `now` on, that asks for at most this stretch under congestion.
-    #[must_use]
     pub fn with_rate_control(side: Side, now: Time, stretch_max: StretchMax) -> Self {
         Self {
             side,
@@ -86,7 +84,6 @@ impl DatagramChannel {
     }
 
     /// By how much to stretch the times between messages, 1 without congestion ([`RateController`]).
-    #[must_use]
     pub fn stretch(&self) -> f64 {
         self.rate.stretch()
     }
@@ -113,37 +110,31 @@ impl DatagramChannel {
     }
 
     /// When a heartbeat must go out if nothing else does before.
-    #[must_use]
     pub fn heartbeat_due(&self) -> Time {
         self.last_sent + HEARTBEAT
     }
 
     /// Time since the other side was last heard, or since the beginning.
-    #[must_use]
     pub fn silence(&self, now: Time) -> Duration {
         now.saturating_since(self.last_heard())
     }
 
     /// When the other side was last heard, or the beginning.
-    #[must_use]
     pub fn last_heard(&self) -> Time {
         self.peer.last_arrival().unwrap_or(self.began)
     }
 
     /// When this end began.
-    #[must_use]
     pub fn began(&self) -> Time {
         self.began
     }
 
     /// Round trip, loss, reordering.
-    #[must_use]
     pub fn peer(&self) -> &Peer {
         &self.peer
     }
 
     /// What it sent, received and dropped.
-    #[must_use]
     pub fn counts(&self) -> &ChannelCounts {
         &self.counts
     }

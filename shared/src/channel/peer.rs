@@ -48,13 +48,11 @@ pub struct Loss {
 
 impl Loss {
     /// How many did not arrive, or not yet.
-    #[must_use]
     pub fn lost(&self) -> u32 {
         self.expected.saturating_sub(self.received)
     }
 
     /// Share that did not arrive, 0 to 1; none before the first.
-    #[must_use]
     pub fn share(&self) -> Option<f64> {
         let share = f64::from(self.lost()) / f64::from(self.expected);
         (self.expected > 0).then_some(share)
@@ -90,7 +88,6 @@ impl Default for Peer {
 
 impl Peer {
     /// Nothing sent, nothing received.
-    #[must_use]
     pub fn new() -> Self {
         Self {
             sent: 0,
@@ -118,7 +115,6 @@ impl Peer {
     }
 
     /// The answer to the newest datagram from the other side; none before the first.
-    #[must_use]
     pub fn echo(&self, now: Time) -> Option<Echo> {
         let newest = self.newest?;
         Some(Echo {
@@ -178,19 +174,16 @@ impl Peer {
     }
 
     /// When a datagram last arrived, duplicates and too old ones left out: what liveness goes by.
-    #[must_use]
     pub fn last_arrival(&self) -> Option<Time> {
         self.last_arrival
     }
 
     /// Echoes that cannot be true: of a number never sent, or held for longer than it was away.
-    #[must_use]
     pub fn echoes_implausible(&self) -> u64 {
         self.echoes_implausible
     }
 
     /// Loss from the other side to this one. Reordering is no loss once the late ones are there.
-    #[must_use]
     pub fn incoming(&self) -> Loss {
         Loss {
             expected: self.newest(),
@@ -199,13 +192,11 @@ impl Peer {
     }
 
     /// Loss from this side to the other, by the other's report.
-    #[must_use]
     pub fn outgoing(&self) -> Loss {
         self.their_report
     }
 
     /// The round trip without the time that the other side held the answer.
-    #[must_use]
     pub fn round_trip(&self) -> &RoundTrip {
         &self.round_trip
     }

@@ -53,7 +53,6 @@ impl StretchMax {
     pub const RECOMMENDED: Self = Self(3.0);
 
     /// The factor.
-    #[must_use]
     pub fn get(self) -> f64 {
         self.0
     }
@@ -116,7 +115,6 @@ pub struct RateController {
 
 impl RateController {
     /// A controller that stretches by at most `max`.
-    #[must_use]
     pub fn new(max: StretchMax) -> Self {
         Self {
             max: max.get(),
@@ -128,7 +126,6 @@ impl RateController {
     }
 
     /// By how much to stretch now: 1 without congestion, never above the greatest.
-    #[must_use]
     pub fn stretch(&self) -> f64 {
         self.stretch
     }

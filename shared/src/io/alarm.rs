@@ -55,7 +55,6 @@ impl Alarm {
     }
 
     /// For a wait that is for other descriptors as well.
-    #[must_use]
     pub fn as_poll_fd(&self) -> PollFd<'_> {
         PollFd::from_borrowed_fd(self.0.as_fd(), PollFlags::IN)
     }

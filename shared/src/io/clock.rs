@@ -24,7 +24,6 @@ pub struct Clock {
 
 impl Clock {
     /// A clock whose epoch is now.
-    #[must_use]
     pub fn start() -> Self {
         Self {
             epoch_ns: nanos(clock_gettime(ClockId::Monotonic)),
@@ -32,13 +31,11 @@ impl Clock {
     }
 
     /// A clock that counts from the boot of the host, for times that never leave the process.
-    #[must_use]
     pub const fn since_boot() -> Self {
         Self { epoch_ns: 0 }
     }
 
     /// Now. Neither locks nor allocates; does not enter the kernel where it has a vDSO.
-    #[must_use]
     pub fn now(&self) -> Time {
         let now_ns = nanos(clock_gettime(ClockId::Monotonic));
         Time::from_nanos(now_ns.saturating_sub(self.epoch_ns))
@@ -57,7 +54,6 @@ impl Clock {
 }
 
 /// CPU time that the calling thread has used so far. Costs a system call (about 0.2 µs).
-#[must_use]
 pub fn thread_cpu_time() -> Duration {
     Duration::from_nanos(nanos(clock_gettime(ClockId::ThreadCPUTime)))
 }

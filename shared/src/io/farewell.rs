@@ -42,7 +42,6 @@ pub enum FarewellError {
 
 impl FarewellError {
     /// Whether the connection went and the other side is not to blame.
-    #[must_use]
     pub fn is_loss(&self) -> bool {
         matches!(
             self,

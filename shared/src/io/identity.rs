@@ -115,32 +115,27 @@ impl Identity {
     }
 
     /// What a master pins.
-    #[must_use]
     pub fn pin(&self) -> Pin {
         self.pin
     }
 
     /// What a master proves itself with.
-    #[must_use]
     pub fn token(&self) -> &Token {
         &self.token
     }
 
     /// The certificate, for the handshake.
-    #[must_use]
     pub fn certificate(&self) -> CertificateDer<'static> {
         self.certificate.clone()
     }
 
     /// The private key, for the handshake.
-    #[must_use]
     pub fn key(&self) -> PrivateKeyDer<'static> {
         PrivateKeyDer::Pkcs8(self.key.clone_key())
     }
 
     /// A key for `purpose`, the same in every process with this identity; it shows nothing of the
     /// private key that it comes from (HMAC-SHA-256, RFC 2104).
-    #[must_use]
     pub fn derive(&self, purpose: &str) -> [u8; 32] {
         let key = hmac::Key::new(hmac::HMAC_SHA256, self.key.secret_pkcs8_der());
         let tag = hmac::sign(&key, purpose.as_bytes());

@@ -36,7 +36,6 @@ pub struct InputLog<G, T> {
 
 impl<G: Copy, T> InputLog<G, T> {
     /// Room for so many inputs.
-    #[must_use]
     pub fn with_room(inputs: usize) -> Self {
         Self {
             inputs: Vec::with_capacity(inputs),
@@ -70,13 +69,11 @@ impl<G: Copy, T> InputLog<G, T> {
     }
 
     /// The inputs, oldest first.
-    #[must_use]
     pub fn inputs(&self) -> &[Input<G>] {
         &self.inputs
     }
 
     /// What the ticks gave, oldest first.
-    #[must_use]
     pub fn ticks(&self) -> &[T] {
         &self.ticks
     }

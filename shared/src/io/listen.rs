@@ -93,7 +93,6 @@ fn admission(places_left: usize, address_proven: bool) -> Admission {
 
 impl Listener {
     /// A listener on an endpoint that accepts.
-    #[must_use]
     pub fn new(endpoint: Endpoint) -> Self {
         Self {
             endpoint,
@@ -105,7 +104,6 @@ impl Listener {
     }
 
     /// What was turned away so far.
-    #[must_use]
     pub fn turned_away(&self) -> TurnedAway {
         TurnedAway {
             refused: self.refused.load(Ordering::Relaxed),
@@ -163,7 +161,6 @@ impl Listener {
 
 impl Handshake {
     /// Who connects.
-    #[must_use]
     pub fn address(&self) -> SocketAddr {
         self.address
     }

@@ -17,7 +17,6 @@ impl<T: Clone + Default> Default for LiveCell<T> {
 
 impl<T: Clone> LiveCell<T> {
     /// A cell that shows `first` until something is set.
-    #[must_use]
     pub fn new(first: T) -> Self {
         Self(watch::Sender::new(first))
     }
@@ -28,13 +27,11 @@ impl<T: Clone> LiveCell<T> {
     }
 
     /// The newest snapshot. From any thread; waits only while another one copies it in or out.
-    #[must_use]
     pub fn get(&self) -> T {
         self.0.borrow().clone()
     }
 
     /// A receiver, to wait for changes.
-    #[must_use]
     pub fn subscribe(&self) -> watch::Receiver<T> {
         self.0.subscribe()
     }

@@ -37,7 +37,6 @@ pub struct Frame {
 
 impl Frame {
     /// The front of `bytes`, as much as a frame keeps.
-    #[must_use]
     pub fn new(at: Time, bytes: &[u8]) -> Self {
         let mut frame = Self {
             at,
@@ -53,7 +52,6 @@ impl Frame {
     }
 
     /// The datagram.
-    #[must_use]
     pub fn bytes(&self) -> &[u8] {
         self.bytes.get(..self.length.into()).unwrap_or_default()
     }
@@ -182,7 +180,6 @@ impl<S: Send, T> LoopHandle<S, T> {
     }
 
     /// Datagrams that found no room in a ring, before the loop or before the network task.
-    #[must_use]
     pub fn dropped(&self) -> u64 {
         self.arrivals_dropped + self.departures_dropped.load(Ordering::Relaxed)
     }
@@ -225,7 +222,6 @@ impl<S: Send> LoopSide<S> {
     }
 
     /// Whether the network task wants the loop to end.
-    #[must_use]
     pub fn is_stopped(&self) -> bool {
         self.stop.load(Ordering::Acquire)
     }

@@ -72,7 +72,6 @@ pub async fn asked_to_stop(stop: &mut watch::Receiver<bool>) {
 
 impl<S: Send, T> NetworkTask<S, T> {
     /// The task of a session that begins. Call it inside of a tokio runtime with time.
-    #[must_use]
     pub fn new(clock: Clock, connection: Connection, handle: LoopHandle<S, T>) -> Self {
         let mut beat = interval(BEAT);
         beat.set_missed_tick_behavior(MissedTickBehavior::Delay);
@@ -90,7 +89,6 @@ impl<S: Send, T> NetworkTask<S, T> {
     }
 
     /// Datagrams dropped between the loop and the network so far, by name.
-    #[must_use]
     pub fn drops(&self) -> [(&'static str, u64); 6] {
         let (counts, passed) = (&self.counts, self.connection.datagrams());
         [
@@ -116,13 +114,11 @@ impl<S: Send, T> NetworkTask<S, T> {
     }
 
     /// Whether the connection is up.
-    #[must_use]
     pub fn is_connected(&self) -> bool {
         self.connected
     }
 
     /// Whether the read of the other side's farewell still waits.
-    #[must_use]
     pub fn awaits_farewell(&self) -> bool {
         self.awaits_farewell
     }

@@ -113,7 +113,6 @@ pub(super) fn client_config(
 }
 
 /// The transport settings of both sides (docs/transport.md names the measurements behind them).
-#[must_use]
 pub fn transport(traffic: Traffic) -> TransportConfig {
     let carries_datagrams = traffic.datagram_max > 0;
     let mut config = TransportConfig::default();

@@ -43,7 +43,6 @@ pub struct RealTime {
 
 /// Asks for everything that makes the calling thread's deadlines sharper. Call it on the loop's own thread,
 /// once, before the first deadline.
-#[must_use]
 pub fn request() -> RealTime {
     RealTime {
         fifo: Obtained::from(
@@ -72,7 +71,6 @@ impl Obtained {
     }
 
     /// Whether it was granted.
-    #[must_use]
     pub fn granted(&self) -> bool {
         matches!(self, Self::Yes)
     }

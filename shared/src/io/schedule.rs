@@ -35,7 +35,6 @@ pub struct Schedule {
 
 impl Schedule {
     /// A grid that starts at `first`; a zero period counts as 1 ns.
-    #[must_use]
     pub fn new(first: Time, period: Duration) -> Self {
         Self {
             first,
@@ -47,7 +46,6 @@ impl Schedule {
 
     /// The deadline to sleep for, seen from `now`: the next one, or, after an overrun, the first that is
     /// still to come.
-    #[must_use]
     pub fn next_deadline(&mut self, now: Time) -> Time {
         self.awaited = match self.latest_at(now) {
             Some(latest) if latest >= self.next => latest.saturating_add(1),
@@ -57,7 +55,6 @@ impl Schedule {
     }
 
     /// The tick that a wake at `now` begins; `None` if it came before its deadline and must sleep again.
-    #[must_use]
     pub fn wake(&mut self, now: Time) -> Option<Tick> {
         let index = self.latest_at(now).filter(|&at| at >= self.awaited)?;
         let tick = Tick {

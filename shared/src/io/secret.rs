@@ -12,7 +12,6 @@ pub struct NoRandomness;
 
 impl Pin {
     /// The pin of a public key, given as `SubjectPublicKeyInfo` in DER.
-    #[must_use]
     pub fn of_public_key(spki_der: &[u8]) -> Self {
         Self::new(Sha256::digest(spki_der).into())
     }

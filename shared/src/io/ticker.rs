@@ -51,7 +51,6 @@ pub struct Ticker {
 
 impl Ticker {
     /// A loop whose first deadline is one `period` from now.
-    #[must_use]
     pub fn new(clock: Clock, period: Duration) -> Self {
         Self {
             schedule: Schedule::new(clock.now() + period, period),
@@ -89,7 +88,6 @@ impl Ticker {
     }
 
     /// How the loop did so far. Does not allocate; takes some microseconds.
-    #[must_use]
     pub fn report(&self) -> TickerReport {
         TickerReport {
             ticks: self.ticks,

@@ -86,7 +86,6 @@ pub struct PinVerifier {
 
 impl PinVerifier {
     /// A verifier for one connection attempt.
-    #[must_use]
     pub fn new(pin: Pin) -> Self {
         Self {
             pin,
@@ -96,7 +95,6 @@ impl PinVerifier {
     }
 
     /// The pin that was offered instead, if the attempt failed for that.
-    #[must_use]
     pub fn refused(&self) -> Option<Pin> {
         self.refused.get().copied()
     }

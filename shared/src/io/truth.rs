@@ -20,7 +20,6 @@ pub struct TruthSender(rtrb::Producer<(Time, Pose)>);
 pub struct TruthReceiver(Mutex<rtrb::Consumer<(Time, Pose)>>);
 
 /// Both ends of one way.
-#[must_use]
 pub fn pair() -> (TruthSender, TruthReceiver) {
     let (sender, receiver) = rtrb::RingBuffer::new(WAITING);
     (TruthSender(sender), TruthReceiver(Mutex::new(receiver)))

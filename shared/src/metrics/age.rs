@@ -24,7 +24,6 @@ impl AgeOfInformation {
     }
 
     /// Mean over the ticks since the first update; absent without one.
-    #[must_use]
     pub fn mean(&self) -> Option<Duration> {
         let mean = self.sum_ns.checked_div(u128::from(self.n))?;
         Some(Duration::from_nanos(
@@ -33,7 +32,6 @@ impl AgeOfInformation {
     }
 
     /// Largest age; absent without an update.
-    #[must_use]
     pub fn largest(&self) -> Option<Duration> {
         (self.n > 0).then(|| Duration::from_nanos(self.largest_ns))
     }

@@ -15,13 +15,11 @@ impl ContactBreaks {
     }
 
     /// Ticks on which contact ended.
-    #[must_use]
     pub fn total(&self) -> u64 {
         self.breaks
     }
 
     /// Contact breaks per completed push; absent before the first push is completed.
-    #[must_use]
     pub fn per_push(&self, pushes_completed: u64) -> Option<f64> {
         (pushes_completed > 0).then(|| self.breaks as f64 / pushes_completed as f64)
     }

@@ -93,19 +93,16 @@ impl ForceMetrics {
 
     /// PMSE_x (13), dimensionless: mean of (ln |f_s^x / f_m^x|)² over the samples on which both exceed
     /// F_min; absent when there is none.
-    #[must_use]
     pub fn pmse_x(&self) -> Option<f64> {
         self.x.mean()
     }
 
     /// PMSE_y (14): as [`ForceMetrics::pmse_x`] for y.
-    #[must_use]
     pub fn pmse_y(&self) -> Option<f64> {
         self.y.mean()
     }
 
     /// PMSE (15), dimensionless: the sum of the axes that are present; absent when neither is.
-    #[must_use]
     pub fn pmse(&self) -> Option<f64> {
         // (15)
         match (self.pmse_x(), self.pmse_y()) {
@@ -115,7 +112,6 @@ impl ForceMetrics {
     }
 
     /// |f|-PMSE, dimensionless: (13) with the magnitudes |f_s| and |f_m| in place of an axis.
-    #[must_use]
     pub fn pmse_magnitude(&self) -> Option<f64> {
         self.magnitude.mean()
     }
@@ -123,50 +119,42 @@ impl ForceMetrics {
     /// Relative vector error, dimensionless: sqrt(Σ|f_s − f_m|² / Σ|f_s|²) over the contact samples.
     ///
     /// Absent when the slave felt no force on any of them (the ratio has no denominator).
-    #[must_use]
     pub fn relative_error(&self) -> Option<f64> {
         (self.sum_measured2 > 0.0).then(|| (self.sum_error2 / self.sum_measured2).sqrt())
     }
 
     /// Root mean square of |f_s − f_m| over the contact samples, N; absent without contact.
-    #[must_use]
     pub fn error_rms_n(&self) -> Option<f64> {
         mean(self.sum_error2, self.in_contact).map(f64::sqrt)
     }
 
     /// Share of the contact samples with |f_s − f_m| > 7 % of |f_s|, 0 to 1; absent without contact.
-    #[must_use]
     pub fn jnd7_share(&self) -> Option<f64> {
         mean(self.outside_low as f64, self.in_contact)
     }
 
     /// Share of the contact samples with |f_s − f_m| > 10 % of |f_s|, 0 to 1; absent without contact.
-    #[must_use]
     pub fn jnd10_share(&self) -> Option<f64> {
         mean(self.outside_high as f64, self.in_contact)
     }
 
     /// Pairs taken.
-    #[must_use]
     pub fn samples(&self) -> u64 {
         self.samples
     }
 
     /// Contact samples: pairs with |f_s| > F_min or |f_m| > F_min, so that a touch that only one side
     /// feels counts as an error.
-    #[must_use]
     pub fn contact_samples(&self) -> u64 {
         self.in_contact
     }
 
     /// Pairs that were not finite.
-    #[must_use]
     pub fn rejected(&self) -> u64 {
         self.rejected
     }
 
     /// All metrics at once, as the farewell and the report carry them.
-    #[must_use]
     pub fn summary(&self) -> ForceSummary {
         ForceSummary {
             samples: self.samples,

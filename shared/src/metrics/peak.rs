@@ -24,13 +24,11 @@ impl ForcePeak {
     }
 
     /// Largest |f|, N; absent before the first tick.
-    #[must_use]
     pub fn largest_n(&self) -> Option<f64> {
         self.largest
     }
 
     /// Largest |f(n) − f(n−1)|, N; absent before the second tick.
-    #[must_use]
     pub fn largest_step_n(&self) -> Option<f64> {
         self.largest_step
     }

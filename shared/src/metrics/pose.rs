@@ -30,25 +30,21 @@ impl PoseError {
     }
 
     /// Root mean square distance of the two centres, m; absent without samples.
-    #[must_use]
     pub fn position_rms_m(&self) -> Option<f64> {
         mean(self.sum_position2, self.n).map(f64::sqrt)
     }
 
     /// Root mean square orientation error, wrapped to at most half a turn, rad; absent without samples.
-    #[must_use]
     pub fn angle_rms_rad(&self) -> Option<f64> {
         mean(self.sum_angle2, self.n).map(f64::sqrt)
     }
 
     /// Largest distance of the two centres, m; absent without samples.
-    #[must_use]
     pub fn position_max_m(&self) -> Option<f64> {
         (self.n > 0).then_some(self.position_max)
     }
 
     /// Largest orientation error, rad; absent without samples.
-    #[must_use]
     pub fn angle_max_rad(&self) -> Option<f64> {
         (self.n > 0).then_some(self.angle_max)
     }

@@ -37,13 +37,11 @@ impl Staleness {
     }
 
     /// The time of each update that became known, in the order in which they were sent.
-    #[must_use]
     pub fn times(&self) -> &[Duration] {
         &self.known
     }
 
     /// The time that the share `q` (0 to 1) of all `times` does not exceed (nearest rank); none without times.
-    #[must_use]
     pub fn quantile(times: &mut [Duration], q: f64) -> Option<Duration> {
         times.sort_unstable();
         let rank = libm::ceil(q.clamp(0.0, 1.0) * times.len() as f64) as usize;

@@ -44,7 +44,6 @@ impl UpdateCounts {
     }
 
     /// Updates sent for a cause.
-    #[must_use]
     pub fn of(&self, cause: Cause) -> u64 {
         self.by_cause()
             .find(|(of, _)| *of == cause)
@@ -57,31 +56,26 @@ impl UpdateCounts {
     }
 
     /// Updates sent.
-    #[must_use]
     pub fn total(&self) -> u64 {
         self.by_cause.iter().sum()
     }
 
     /// Time that passed, s.
-    #[must_use]
     pub fn duration_s(&self) -> f64 {
         self.ticks as f64 * TICK_S
     }
 
     /// Time in contact, s.
-    #[must_use]
     pub fn contact_s(&self) -> f64 {
         self.contact_ticks as f64 * TICK_S
     }
 
     /// Updates per second of the run; absent before the first tick.
-    #[must_use]
     pub fn rate_hz(&self) -> Option<f64> {
         (self.ticks > 0).then(|| self.total() as f64 / self.duration_s())
     }
 
     /// All updates of the run per second of contact; absent without contact.
-    #[must_use]
     pub fn contact_rate_hz(&self) -> Option<f64> {
         (self.contact_ticks > 0).then(|| self.total() as f64 / self.contact_s())
     }

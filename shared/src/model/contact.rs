@@ -23,7 +23,6 @@ pub struct Coupling {
 impl Coupling {
     /// The coupling of a given stiffness k_p with the damping that keeps the contact from ringing:
     /// 10 N s/m at 1000 N/m, 20 N s/m at 3000 N/m, linear between and beyond, never negative.
-    #[must_use]
     pub fn for_stiffness(k_p: f64) -> Self {
         Self {
             stiffness_n_per_m: k_p,
@@ -34,14 +33,12 @@ impl Coupling {
     /// Size of the contact force, N, never negative.
     ///
     /// `penetration` is pen in m, `penetration_rate` its rate d(pen)/dt in m/s.
-    #[must_use]
     pub fn force(&self, penetration: f64, penetration_rate: f64) -> f64 {
         // (6), with the damping term; (·)⁺ because a smooth tool cannot pull
         (self.stiffness_n_per_m * penetration + self.damping_ns_per_m * penetration_rate).max(0.0)
     }
 
     /// Elastic energy stored in the coupling at a penetration (m), J.
-    #[must_use]
     pub fn energy(&self, penetration: f64) -> f64 {
         0.5 * self.stiffness_n_per_m * penetration * penetration
     }
@@ -70,7 +67,6 @@ pub struct GodObject {
 
 impl GodObject {
     /// The face that is touched now.
-    #[must_use]
     pub fn touched(&self) -> Option<Face> {
         self.touched
     }
@@ -104,7 +100,6 @@ impl GodObject {
     }
 
     /// What the HIP touches, if it keeps its face, with the box at another pose. Changes nothing.
-    #[must_use]
     pub fn touch_at(&self, footprint: &BoxFootprint, pose: &Pose, hip: Vec2) -> Option<Touch> {
         let mut copy = *self;
         copy.follow(footprint, pose, hip)
@@ -125,7 +120,6 @@ fn touch(footprint: &BoxFootprint, pose: &Pose, face: Face, hip_in_object: Vec2)
 /// Contact force on the object, N, world frame: (6) with damping along the face's inward normal.
 ///
 /// `hip_velocity` is the HIP's velocity in the world, m/s; `twist` and `centre` are the box's.
-#[must_use]
 pub fn contact_force(
     coupling: &Coupling,
     touch: &Touch,

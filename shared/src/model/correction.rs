@@ -54,7 +54,6 @@ pub struct Tank {
 
 impl Tank {
     /// What it holds, J.
-    #[must_use]
     pub fn level_j(&self) -> f64 {
         self.level
     }

@@ -27,7 +27,6 @@ pub struct Motion {
 impl Motion {
     /// The motion one sample period T later, under a force (N, world) that acts at `lever` from the
     /// centre (m, world).
-    #[must_use]
     pub fn step(&self, law: FrictionLaw, params: &ModelParams, force: Vec2, lever: Vec2) -> Self {
         // (10)
         let moment = cross(lever, force);
@@ -43,7 +42,6 @@ impl Motion {
     }
 
     /// Power (W, never negative) that the ground takes from this motion by friction and damping.
-    #[must_use]
     pub fn dissipation(&self, law: FrictionLaw, params: &ModelParams) -> f64 {
         let speed2 = self.twist.linear.norm_squared();
         let friction = match law {

@@ -9,26 +9,22 @@ use serde::{Deserialize, Serialize};
 pub type Vec2 = nalgebra::Vector2<f64>;
 
 /// z component of `a × b`: the moment of force `b` at lever arm `a`.
-#[must_use]
 pub fn cross(a: Vec2, b: Vec2) -> f64 {
     a.x * b.y - a.y * b.x
 }
 
 /// `omega × r`: the velocity that turning at `omega` (rad/s, counter-clockwise) gives at lever arm `r`.
-#[must_use]
 pub fn spin(omega: f64, r: Vec2) -> Vec2 {
     Vec2::new(-omega * r.y, omega * r.x)
 }
 
 /// `v` turned by `angle` (rad, counter-clockwise).
-#[must_use]
 pub fn rotate(angle: f64, v: Vec2) -> Vec2 {
     let (sin, cos) = libm::sincos(angle);
     Vec2::new(cos * v.x - sin * v.y, sin * v.x + cos * v.y)
 }
 
 /// `angle` wrapped into (−π, π].
-#[must_use]
 pub fn wrap_angle(angle: f64) -> f64 {
     let turn = std::f64::consts::TAU;
     let wrapped = angle - turn * libm::round(angle / turn);
@@ -50,7 +46,6 @@ pub struct Pose {
 
 impl Pose {
     /// The pose at (`x`, `y`) m, turned by `angle` rad.
-    #[must_use]
     pub fn new(x: f64, y: f64, angle: f64) -> Self {
         Self {
             position: Vec2::new(x, y),
@@ -59,19 +54,16 @@ impl Pose {
     }
 
     /// A point of the object's frame in the world.
-    #[must_use]
     pub fn point_to_world(&self, point_in_object: Vec2) -> Vec2 {
         self.position + rotate(self.angle, point_in_object)
     }
 
     /// A point of the world in the object's frame.
-    #[must_use]
     pub fn point_to_object(&self, point_in_world: Vec2) -> Vec2 {
         rotate(-self.angle, point_in_world - self.position)
     }
 
     /// Whether every number in it is finite.
-    #[must_use]
     pub fn is_finite(&self) -> bool {
         self.position.x.is_finite() && self.position.y.is_finite() && self.angle.is_finite()
     }
@@ -88,7 +80,6 @@ pub struct Twist {
 
 impl Twist {
     /// The twist (`vx`, `vy`) m/s, `angular` rad/s.
-    #[must_use]
     pub fn new(vx: f64, vy: f64, angular: f64) -> Self {
         Self {
             linear: Vec2::new(vx, vy),
@@ -97,13 +88,11 @@ impl Twist {
     }
 
     /// Velocity of the body's point at lever arm `r` from the centre (world frame), m/s.
-    #[must_use]
     pub fn velocity_at(&self, r: Vec2) -> Vec2 {
         self.linear + spin(self.angular, r)
     }
 
     /// Whether every number in it is finite.
-    #[must_use]
     pub fn is_finite(&self) -> bool {
         self.linear.x.is_finite() && self.linear.y.is_finite() && self.angular.is_finite()
     }
@@ -127,7 +116,6 @@ impl Face {
     pub const ALL: [Self; 4] = [Self::East, Self::North, Self::West, Self::South];
 
     /// Outward unit normal in the object's frame.
-    #[must_use]
     pub fn outward(self) -> Vec2 {
         match self {
             Self::East => Vec2::new(1.0, 0.0),
@@ -138,7 +126,6 @@ impl Face {
     }
 
     /// Angle of the outward normal in the object's frame, rad.
-    #[must_use]
     pub fn outward_angle(self) -> f64 {
         use std::f64::consts::{FRAC_PI_2, PI};
         match self {
@@ -165,7 +152,6 @@ pub struct PerFace<T> {
 
 impl<T: Copy> PerFace<T> {
     /// The same value for all four.
-    #[must_use]
     pub const fn all(value: T) -> Self {
         Self {
             east: value,
@@ -176,7 +162,6 @@ impl<T: Copy> PerFace<T> {
     }
 
     /// The value of a face.
-    #[must_use]
     pub const fn get(&self, face: Face) -> T {
         match face {
             Face::East => self.east,
@@ -202,13 +187,11 @@ pub type BoxFootprint = PerFace<f64>;
 
 impl BoxFootprint {
     /// A square of the given side l (m), its reference point in the middle.
-    #[must_use]
     pub const fn square(side: f64) -> Self {
         Self::all(side / 2.0)
     }
 
     /// Distance from the reference point to a face, m.
-    #[must_use]
     pub const fn offset(&self, face: Face) -> f64 {
         self.get(face)
     }
@@ -219,19 +202,16 @@ impl BoxFootprint {
     }
 
     /// Mean of the two extents (x and y): the side l of the square that (8) and (9) are written for, m.
-    #[must_use]
     pub fn mean_side(&self) -> f64 {
         (self.east + self.north + self.west + self.south) / 2.0
     }
 
     /// Signed distance of a point of the object's frame to the line of a face, m: positive outside.
-    #[must_use]
     pub fn distance(&self, face: Face, point_in_object: Vec2) -> f64 {
         face.outward().dot(&point_in_object) - self.offset(face)
     }
 
     /// Whether a point of the object's frame, projected on a face's line, lies between the face's ends.
-    #[must_use]
     pub fn within_ends(&self, face: Face, point_in_object: Vec2) -> bool {
         Face::ALL
             .into_iter()
@@ -241,7 +221,6 @@ impl BoxFootprint {
 
     /// The face that a point outside is in front of, or that a point inside is nearest to, with its
     /// signed distance (m).
-    #[must_use]
     pub fn nearest(&self, point_in_object: Vec2) -> (Face, f64) {
         let mut best = (Face::East, self.distance(Face::East, point_in_object));
         for face in [Face::North, Face::West, Face::South] {

@@ -49,7 +49,6 @@ pub struct History {
 
 impl History {
     /// An empty ring for `capacity` moments (at least one).
-    #[must_use]
     pub fn with_capacity(capacity: usize) -> Self {
         let moments = vec![Moment::default(); capacity.max(1)].into_boxed_slice();
         Self {
@@ -60,13 +59,11 @@ impl History {
     }
 
     /// Number of moments held.
-    #[must_use]
     pub fn len(&self) -> usize {
         self.len
     }
 
     /// Whether nothing has been recorded.
-    #[must_use]
     pub fn is_empty(&self) -> bool {
         self.len == 0
     }
@@ -88,19 +85,16 @@ impl History {
     }
 
     /// The newest moment.
-    #[must_use]
     pub fn newest(&self) -> Option<&Moment> {
         self.nth(self.len.checked_sub(1)?)
     }
 
     /// The newest moment whose stamp is not later than `stamp`; the oldest held if all are later.
-    #[must_use]
     pub fn at(&self, stamp: Time) -> Option<&Moment> {
         self.nth(self.first_after(stamp).saturating_sub(1))
     }
 
     /// The moment whose stamp is nearest to `stamp`; none if that lies before the oldest held.
-    #[must_use]
     pub fn nearest(&self, stamp: Time) -> Option<&Moment> {
         let after = self.first_after(stamp);
         let before = self.nth(after.checked_sub(1)?)?;
@@ -112,13 +106,11 @@ impl History {
 
     /// Number of the first moment, counted from the oldest held, whose stamp is later than `stamp`; the
     /// number of moments held if there is none.
-    #[must_use]
     pub fn first_after(&self, stamp: Time) -> usize {
         self.partition(|moment| moment.stamp <= stamp)
     }
 
     /// The same for the first moment whose stamp is not before `stamp`.
-    #[must_use]
     pub fn first_not_before(&self, stamp: Time) -> usize {
         self.partition(|moment| moment.stamp < stamp)
     }
@@ -138,7 +130,6 @@ impl History {
     }
 
     /// The moment number `index`, counted from the oldest held.
-    #[must_use]
     pub fn nth(&self, index: usize) -> Option<&Moment> {
         if index >= self.len {
             return None;

@@ -35,7 +35,6 @@ pub struct Rendered {
 
 impl Rendered {
     /// Whether the HIP touches the model.
-    #[must_use]
     pub fn in_contact(&self) -> bool {
         self.touch.is_some()
     }
@@ -62,7 +61,6 @@ pub struct LocalModel {
 
 impl LocalModel {
     /// A model at rest in `start`, with an empty history.
-    #[must_use]
     pub fn new(settings: ModelSettings, start: ModelState) -> Self {
         Self {
             settings,
@@ -78,44 +76,37 @@ impl LocalModel {
     }
 
     /// The settings that it is run by.
-    #[must_use]
     pub fn settings(&self) -> &ModelSettings {
         &self.settings
     }
 
     /// Parameters in use, footprint, pose and velocity now.
-    #[must_use]
     pub fn state(&self) -> &BodyState {
         &self.body.state
     }
 
     /// What the last HIP sample rendered.
-    #[must_use]
     pub fn rendered(&self) -> &Rendered {
         &self.rendered
     }
 
     /// What remains of the pose correction, and its tank.
-    #[must_use]
     pub fn correction(&self) -> &Correction {
         &self.correction
     }
 
     /// What the model was at each sample.
-    #[must_use]
     pub fn history(&self) -> &History {
         &self.history
     }
 
     /// Energy that updates (parameters, pose, face offsets) have added to the model so far beyond what
     /// the tank paid, J: the sum over all ticks of every excess, so that a loss never hides a gain.
-    #[must_use]
     pub fn energy_injected_j(&self) -> f64 {
         self.injected_j
     }
 
     /// Whether a received pose has been replayed up to the newest sample.
-    #[must_use]
     pub fn is_replayed(&self) -> bool {
         self.replay.is_live()
     }

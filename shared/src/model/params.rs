@@ -142,37 +142,31 @@ impl ModelParams {
     }
 
     /// The raw numbers (m, b, c, I, e) in SI units.
-    #[must_use]
     pub fn to_array(&self) -> [f64; 5] {
         [self.m, self.b, self.c, self.inertia, self.e]
     }
 
     /// Mass m, kg.
-    #[must_use]
     pub fn m(&self) -> f64 {
         self.m
     }
 
     /// Viscous damping b, N s/m.
-    #[must_use]
     pub fn b(&self) -> f64 {
         self.b
     }
 
     /// Coulomb friction force c = mu m g, N.
-    #[must_use]
     pub fn c(&self) -> f64 {
         self.c
     }
 
     /// Inertia I about z, kg m².
-    #[must_use]
     pub fn inertia(&self) -> f64 {
         self.inertia
     }
 
     /// Friction torque e about z, N m.
-    #[must_use]
     pub fn e(&self) -> f64 {
         self.e
     }
@@ -181,7 +175,6 @@ impl ModelParams {
     ///
     /// The accepted set is convex (the stability bound is linear in m and b), so the blend of two
     /// accepted sets is accepted.
-    #[must_use]
     pub fn blend(&self, target: &Self, keep: f64) -> Self {
         let keep = keep.clamp(0.0, 1.0);
         let mix = |own: f64, other: f64| own * keep + other * (1.0 - keep);
@@ -197,7 +190,6 @@ impl ModelParams {
 
 /// Least mass (kg) accepted for damping b under a coupling: the bound
 /// `4 m > (1 + rho) k_p T² + 2 (b + (1 + rho) k_d) T` of the semi-implicit local model, with margin.
-#[must_use]
 pub fn least_stable_mass(b: f64, coupling: &Coupling) -> f64 {
     let k_p = coupling.stiffness_n_per_m;
     let k_d = coupling.damping_ns_per_m;
@@ -207,14 +199,12 @@ pub fn least_stable_mass(b: f64, coupling: &Coupling) -> f64 {
 }
 
 /// Inertia about z of a square of mass m (kg) and side l (m), kg m².
-#[must_use]
 pub fn inertia_of_square(m: f64, side: f64) -> f64 {
     // (8)
     m * side * side / 6.0
 }
 
 /// Friction torque about z of a square of side l (m) under uniform pressure with friction c (N), N m.
-#[must_use]
 pub fn friction_torque_of_square(c: f64, side: f64) -> f64 {
     // (9) in closed form: e = c l (sqrt 2 + asinh 1) / 6
     c * side * (std::f64::consts::SQRT_2 + libm::asinh(1.0)) / 6.0
@@ -303,25 +293,21 @@ impl ModelState {
     }
 
     /// The impedance.
-    #[must_use]
     pub const fn params(&self) -> ModelParams {
         self.params
     }
 
     /// One distance from the reference point to each face.
-    #[must_use]
     pub const fn footprint(&self) -> BoxFootprint {
         self.footprint
     }
 
     /// `world_from_object`.
-    #[must_use]
     pub const fn pose(&self) -> Pose {
         self.pose
     }
 
     /// Velocity of the reference point and turning rate.
-    #[must_use]
     pub const fn twist(&self) -> Twist {
         self.twist
     }

@@ -20,7 +20,6 @@ impl HipCounts {
     pub const METRES: f64 = 1e-7;
 
     /// The grid point nearest to `hip` (m), saturating at ±214 m; a NaN becomes 0.
-    #[must_use]
     pub fn nearest(hip: Vec2) -> Self {
         let count = |metres: f64| libm::round(metres / Self::METRES) as i32;
         Self {
@@ -30,7 +29,6 @@ impl HipCounts {
     }
 
     /// The point, m.
-    #[must_use]
     pub fn metres(self) -> Vec2 {
         Vec2::new(
             f64::from(self.x) * Self::METRES,
@@ -53,7 +51,6 @@ impl ForceCounts {
     pub const NEWTONS: f64 = 1e-4;
 
     /// The grid point nearest to `force` (N), saturating; a NaN becomes 0.
-    #[must_use]
     pub fn nearest(force: Vec2) -> Self {
         let count = |newtons: f64| libm::round(newtons / Self::NEWTONS) as i32;
         Self {
@@ -63,7 +60,6 @@ impl ForceCounts {
     }
 
     /// The force, N.
-    #[must_use]
     pub fn newtons(self) -> Vec2 {
         Vec2::new(
             f64::from(self.x) * Self::NEWTONS,

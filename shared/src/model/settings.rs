@@ -110,7 +110,6 @@ impl Mode {
     ///
     /// Smoothing: lambda = 0.5 is the paper's (section II-A); tau = 20 ms is short against a push and
     /// long against a tick.
-    #[must_use]
     pub fn model_settings(self, coupling: Coupling) -> ModelSettings {
         match self {
             Self::Paper => ModelSettings {

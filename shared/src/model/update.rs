@@ -35,13 +35,11 @@ impl Cause {
     ];
 
     /// Its number on the wire and its place in [`Cause::ALL`].
-    #[must_use]
     pub const fn number(self) -> usize {
         self as usize
     }
 
     /// The name used in reports, files and on screens.
-    #[must_use]
     pub fn name(self) -> &'static str {
         match self {
             Self::Deadband => "deadband",

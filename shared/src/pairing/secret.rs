@@ -39,7 +39,6 @@ pub struct Pin([u8; SECRET_BYTES]);
 
 impl Pin {
     /// A pin of these bytes.
-    #[must_use]
     pub const fn new(bytes: [u8; SECRET_BYTES]) -> Self {
         Self(bytes)
     }
@@ -72,7 +71,6 @@ pub struct Token([u8; SECRET_BYTES]);
 
 impl Token {
     /// A token of these bytes; they must come from the system's source of randomness.
-    #[must_use]
     pub const fn new(bytes: [u8; SECRET_BYTES]) -> Self {
         Self(bytes)
     }

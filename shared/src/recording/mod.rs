@@ -60,14 +60,12 @@ pub struct Push {
 impl Push {
     /// Mean force on the block times the displacement of its reference point, N m: positive when force
     /// and motion are in the same frame with the same sign.
-    #[must_use]
     pub fn force_times_displacement(&self) -> f64 {
         let sum: Vec2 = self.force.iter().map(|sample| sample.force).sum();
         sum.dot(&(self.after.position - self.before.position)) / self.force.len().max(1) as f64
     }
 
     /// Time from the first to the last force sample, s.
-    #[must_use]
     pub fn duration_s(&self) -> f64 {
         self.force.last().map_or(0.0, |sample| sample.t_s)
     }

@@ -36,7 +36,6 @@ pub struct PushesReport {
 
 impl PushesReport {
     /// From the pushes completed and the contact of the master's model.
-    #[must_use]
     pub fn new(completed: u64, breaks: &ContactBreaks) -> Self {
         Self {
             completed: Some(completed),

@@ -8,7 +8,6 @@ use serde::{Deserialize, Serialize};
 pub type Counts = BTreeMap<String, u64>;
 
 /// Counts by name.
-#[must_use]
 pub fn named<'a>(counts: impl IntoIterator<Item = (&'a str, u64)>) -> Counts {
     let counts = counts.into_iter();
     counts.map(|(name, n)| (name.to_owned(), n)).collect()
@@ -24,7 +23,6 @@ impl Number {
     pub const ABSENT: Self = Self(None);
 
     /// The number, if there is one.
-    #[must_use]
     pub fn get(self) -> Option<f64> {
         self.0
     }
@@ -36,7 +34,6 @@ impl Number {
     }
 
     /// `amount / duration`, absent when the duration is not positive.
-    #[must_use]
     pub fn rate(amount: f64, duration_s: f64) -> Self {
         (duration_s > 0.0).then(|| amount / duration_s).into()
     }

@@ -40,7 +40,6 @@ pub struct SessionStats {
 
 impl SessionStats {
     /// What the channel of an end counted in `duration_s` (s), with so many repeats among the updates.
-    #[must_use]
     pub fn new(side: Side, channel: &DatagramChannel, repeats: u64, duration_s: f64) -> Self {
         let (counts, peer) = (channel.counts(), channel.peer());
         let up = |counts| MessagesReport::up(counts, duration_s);
@@ -118,7 +117,6 @@ pub struct MessagesReport {
 
 impl MessagesReport {
     /// What goes from master to slave in `duration_s` (s).
-    #[must_use]
     pub fn up(counts: &KindCounts, duration_s: f64) -> Self {
         Self {
             commands: Some(counts.commands),
@@ -129,7 +127,6 @@ impl MessagesReport {
     }
 
     /// What goes from slave to master in `duration_s` (s), with so many repeats among the updates.
-    #[must_use]
     pub fn down(counts: &KindCounts, repeats: u64, duration_s: f64) -> Self {
         Self {
             updates: Some(counts.updates),
@@ -161,7 +158,6 @@ pub struct WireReport {
 
 impl WireReport {
     /// From a socket's own counts over a duration (s).
-    #[must_use]
     pub fn new(datagrams: u64, bytes: u64, header_bytes: u64, duration_s: f64) -> Self {
         let all_bytes = bytes as f64 + header_bytes as f64 * datagrams as f64;
         Self {

@@ -48,7 +48,6 @@ pub struct SentUpdates {
 
 impl SentUpdates {
     /// From what the slave sent for the first time and what it repeated.
-    #[must_use]
     pub fn new(sent: &UpdateCounts, repeated: &UpdateCounts) -> Self {
         Self {
             sent: Some(sent.total()),
@@ -136,7 +135,6 @@ impl EstimateReport {
     }
 
     /// (estimate − truth)/truth; absent when either is, or the truth is 0.
-    #[must_use]
     pub fn relative_error(&self) -> Number {
         let ratio = |(estimate, truth): (f64, f64)| (estimate - truth) / truth;
         self.estimate.get().zip(self.truth.get()).map(ratio).into()

@@ -47,7 +47,6 @@ impl Default for Histogram {
 
 impl Histogram {
     /// Nothing counted. Allocates, and nothing does afterwards but a clone.
-    #[must_use]
     pub fn new() -> Self {
         Self {
             counts: vec![0; BUCKETS].into(),
@@ -66,14 +65,12 @@ impl Histogram {
     }
 
     /// How many have been counted.
-    #[must_use]
     pub fn total(&self) -> u64 {
         self.total
     }
 
     /// The least duration (within 0.8 %) that a share `q` (0 to 1) of all does not exceed; none if
     /// nothing has been counted or `q` is no number.
-    #[must_use]
     pub fn quantile(&self, q: f64) -> Option<Duration> {
         if self.total == 0 || q.is_nan() {
             return None;
@@ -91,7 +88,6 @@ impl Histogram {
     }
 
     /// The quantiles so far. Takes some microseconds.
-    #[must_use]
     pub fn quantiles(&self) -> Quantiles {
         // the middle of a bucket may lie above all that is in it
         let at = |q| self.quantile(q).unwrap_or_default().min(self.max);

@@ -29,19 +29,16 @@ impl RoundTrips {
     }
 
     /// How many there are.
-    #[must_use]
     pub fn count(&self) -> u32 {
         self.count
     }
 
     /// How much longer than the path's shortest round trip, `base`, the quickest took.
-    #[must_use]
     pub fn excess(&self, base: Duration) -> Duration {
         self.quickest.saturating_sub(base)
     }
 
     /// The queue that there is for certain: the excess less the jitter.
-    #[must_use]
     pub fn queue(&self, base: Duration) -> Duration {
         // jitter: how much longer than the quickest they took on average
         let mean = self.sum.checked_div(self.count).unwrap_or_default();

@@ -16,7 +16,6 @@ pub struct Recent<T, const N: usize> {
 
 impl<T: Copy, const N: usize> Recent<T, N> {
     /// A window whose slices are `empty` until something is put into them.
-    #[must_use]
     pub fn new(empty: T) -> Self {
         Self {
             empty,

@@ -35,7 +35,6 @@ impl KindCounts {
     }
 
     /// All of them.
-    #[must_use]
     pub fn total(&self) -> u64 {
         self.commands + self.updates + self.scenes + self.heartbeats + self.tools
     }
@@ -77,7 +76,6 @@ pub struct UpdateDrops {
 
 impl UpdateDrops {
     /// Each cause by its name in reports.
-    #[must_use]
     pub fn by_name(&self) -> [(&'static str, u64); 5] {
         [
             ("duplicate", self.duplicate),

@@ -70,7 +70,6 @@ pub enum Message {
 
 impl Message {
     /// Its type.
-    #[must_use]
     pub const fn kind(&self) -> Kind {
         match self {
             Self::Command(_) => Kind::Command,

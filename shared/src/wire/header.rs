@@ -34,7 +34,6 @@ pub enum Side {
 
 impl Side {
     /// The name used in messages.
-    #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
             Self::Master => "master",
@@ -43,7 +42,6 @@ impl Side {
     }
 
     /// The end across.
-    #[must_use]
     pub const fn other(self) -> Self {
         match self {
             Self::Master => Self::Slave,
@@ -110,31 +108,26 @@ impl Kind {
     ];
 
     /// The number in the header.
-    #[must_use]
     pub const fn number(self) -> u8 {
         self as u8
     }
 
     /// The type with this number.
-    #[must_use]
     pub fn from_number(number: u8) -> Option<Self> {
         Self::ALL.into_iter().find(|kind| kind.number() == number)
     }
 
     /// The name used in messages and golden vectors.
-    #[must_use]
     pub const fn name(self) -> &'static str {
         self.properties().0
     }
 
     /// The road that it travels.
-    #[must_use]
     pub const fn channel(self) -> Channel {
         self.properties().1
     }
 
     /// Whether `side` may send it.
-    #[must_use]
     pub fn is_sent_by(self, side: Side) -> bool {
         self.properties().2.is_none_or(|sender| sender == side)
     }

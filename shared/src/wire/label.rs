@@ -18,7 +18,6 @@ pub struct Label {
 
 impl Label {
     /// The longest label that `text` begins with; control characters become `?`.
-    #[must_use]
     pub fn clipped(text: &str) -> Self {
         let mut label = Self {
             length: 0,
@@ -33,14 +32,12 @@ impl Label {
     }
 
     /// `text` as it is, or none if it is too long or has control characters.
-    #[must_use]
     pub fn exact(text: &str) -> Option<Self> {
         let label = Self::clipped(text);
         (label.as_str() == text).then_some(label)
     }
 
     /// The text.
-    #[must_use]
     pub fn as_str(&self) -> &str {
         let bytes = self.bytes.get(..self.length).unwrap_or_default();
         std::str::from_utf8(bytes).unwrap_or_default()

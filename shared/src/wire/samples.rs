@@ -40,7 +40,6 @@ pub struct SampleBlock {
 
 impl SampleBlock {
     /// A block without samples.
-    #[must_use]
     pub fn new() -> Self {
         Self {
             length: 0,
@@ -66,31 +65,26 @@ impl SampleBlock {
     }
 
     /// The samples, oldest first.
-    #[must_use]
     pub fn as_slice(&self) -> &[HipSample] {
         self.samples.get(..self.length).unwrap_or_default()
     }
 
     /// The newest sample.
-    #[must_use]
     pub fn last(&self) -> Option<&HipSample> {
         self.as_slice().last()
     }
 
     /// How many samples it holds.
-    #[must_use]
     pub fn len(&self) -> usize {
         self.length
     }
 
     /// Whether it holds none.
-    #[must_use]
     pub fn is_empty(&self) -> bool {
         self.length == 0
     }
 
     /// Whether no more fit.
-    #[must_use]
     pub fn is_full(&self) -> bool {
         self.length == SAMPLES_MAX
     }

@@ -41,7 +41,6 @@ impl Architecture {
     pub const ALL: [Self; 2] = [Self::Mmt, Self::Tdpa];
 
     /// Name in options and reports.
-    #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
             Self::Mmt => "mmt",
@@ -50,7 +49,6 @@ impl Architecture {
     }
 
     /// Whether the hand feels the tool's force, so that the two ports exchange their energies.
-    #[must_use]
     pub const fn feels_tool(self) -> bool {
         matches!(self, Self::Tdpa)
     }
@@ -212,7 +210,6 @@ pub enum Ending {
 
 impl Ending {
     /// Its name in reports.
-    #[must_use]
     pub fn name(self) -> &'static str {
         match self {
             Self::Finished => "finished",
@@ -246,7 +243,6 @@ pub enum StreamMessage<'a> {
 
 impl<'a> StreamMessage<'a> {
     /// Its type.
-    #[must_use]
     pub const fn kind(&self) -> Kind {
         match self {
             Self::Hello(_) => Kind::Hello,

@@ -29,7 +29,6 @@ impl Default for RoundTrip {
 
 impl RoundTrip {
     /// Nothing measured.
-    #[must_use]
     pub fn new() -> Self {
         Self {
             latest: None,
@@ -47,19 +46,16 @@ impl RoundTrip {
     }
 
     /// The last one measured.
-    #[must_use]
     pub fn latest(&self) -> Option<Duration> {
         self.latest
     }
 
     /// The least of the last 9 to 10 s; none if nothing was measured in that time.
-    #[must_use]
     pub fn least(&self, now: Time) -> Option<Duration> {
         self.minima.iter_at(now).flatten().min().copied()
     }
 
     /// All that have been measured.
-    #[must_use]
     pub fn histogram(&self) -> &Histogram {
         &self.histogram
     }

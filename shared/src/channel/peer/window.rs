@@ -118,7 +118,6 @@ impl Default for SequenceWindow {
 
 impl SequenceWindow {
     /// Nothing seen.
-    #[must_use]
     pub fn new() -> Self {
         Self {
             window: Window::new(),
@@ -151,19 +150,16 @@ impl SequenceWindow {
     }
 
     /// The greatest sequence number accepted, 0 before the first.
-    #[must_use]
     pub fn newest(&self) -> u32 {
         self.window.newest()
     }
 
     /// How many were stopped as seen before.
-    #[must_use]
     pub fn duplicate(&self) -> u64 {
         self.duplicate
     }
 
     /// How many were stopped as older than one seen.
-    #[must_use]
     pub fn stale(&self) -> u64 {
         self.stale
     }

@@ -28,7 +28,6 @@ pub struct Insecure {
 
 impl Transport {
     /// As the command line and reports spell it.
-    #[must_use]
     pub fn name(self) -> &'static str {
         match self {
             Self::Quic => "quic",

@@ -40,7 +40,6 @@ pub struct DatagramCounts {
 
 impl Connection {
     /// Who is at the other end.
-    #[must_use]
     pub fn remote_address(&self) -> SocketAddr {
         self.quic.remote_address()
     }
@@ -96,7 +95,6 @@ impl Connection {
     }
 
     /// What passed so far.
-    #[must_use]
     pub fn datagrams(&self) -> DatagramCounts {
         let (sent, received) = match &self.raw {
             Some(raw) => (

@@ -139,7 +139,6 @@ pub struct Handshake {
 
 impl Listener {
     /// A listener on an endpoint that accepts.
-    #[must_use]
     pub fn new(endpoint: Endpoint) -> Self {
         Self {
             quic: listen::Listener::new(endpoint.quic),
@@ -148,7 +147,6 @@ impl Listener {
     }
 
     /// What was turned away so far.
-    #[must_use]
     pub fn turned_away(&self) -> TurnedAway {
         self.quic.turned_away()
     }
@@ -162,7 +160,6 @@ impl Listener {
 
 impl Handshake {
     /// Who connects.
-    #[must_use]
     pub fn address(&self) -> SocketAddr {
         self.quic.address()
     }
