@@ -6,7 +6,8 @@ use postcard::ser_flavors::Flavor;
 use serde::{Deserialize, Serialize};
 
 use super::error::{DecodeError, EncodeError, reason};
-use super::header::{HEADER_BYTES, Kind, header};
+use super::header::header;
+use super::kind::{HEADER_BYTES, Kind};
 
 /// Writes header and body to the front of `out`; returns how many bytes that took.
 pub(super) fn write(

@@ -6,7 +6,8 @@ use serde::{Deserialize, Serialize};
 
 use super::body::{read, write};
 use super::error::{DecodeError, EncodeError, FieldError, demand, finite};
-use super::header::{Channel, Kind, Side, open};
+use super::header::open;
+use super::kind::{Channel, Kind, Side};
 use super::samples::SampleBlock;
 use super::state::RawState;
 use crate::model::tool::{HandPort, Scene, Tool};

@@ -1,6 +1,6 @@
 //! Why a message was not written or not read.
 
-use super::header::{DATAGRAM_MAX, HEADER_BYTES, Kind, PROTOCOL_VERSION, STREAM_MESSAGE_MAX, Side};
+use super::kind::{DATAGRAM_MAX, HEADER_BYTES, Kind, PROTOCOL_VERSION, STREAM_MESSAGE_MAX, Side};
 
 /// A field that breaks a rule of its message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]

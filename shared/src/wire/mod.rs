@@ -8,6 +8,7 @@ mod body;
 mod datagram;
 mod error;
 mod header;
+mod kind;
 mod label;
 mod samples;
 mod session;
@@ -17,7 +18,7 @@ mod tests;
 
 pub use datagram::{Command, Datagram, Echo, Envelope, Message};
 pub use error::{DecodeError, EncodeError, FieldError};
-pub use header::{
+pub use kind::{
     ALPN, Channel, DATAGRAM_MAX, HEADER_BYTES, Kind, MAGIC, PROTOCOL_VERSION, STREAM_MESSAGE_MAX,
     Side,
 };

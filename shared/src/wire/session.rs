@@ -8,7 +8,8 @@ use serde::{Deserialize, Serialize};
 
 use super::body::{read, write};
 use super::error::{DecodeError, EncodeError, FieldError, finite};
-use super::header::{Channel, Kind, Side, open};
+use super::header::open;
+use super::kind::{Channel, Kind, Side};
 use super::label::Label;
 use super::samples::SAMPLES_MAX;
 use super::state::RawState;
