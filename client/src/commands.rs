@@ -14,7 +14,7 @@ const SPACING_MAX: u32 = 4;
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct CommandConfig {
-    /// New samples in a command, 1 to 32; at least one whatever it says.
+    /// New samples in a command, 1 to 32; 0 counts as 1.
     pub samples_per_command: u8,
     /// How many commands before it each command repeats the samples of, as far as 32 samples hold them.
     pub repeat_samples: u8,
@@ -74,8 +74,8 @@ impl CommandPacker {
     pub(crate) fn new(config: CommandConfig) -> Self {
         Self {
             config,
-            block: SampleBlock::new(),
-            repeated: SampleBlock::new(),
+            block: SampleBlock::default(),
+            repeated: SampleBlock::default(),
             to_skip: 0,
             off_grid: 0,
             skipped: 0,
@@ -139,7 +139,7 @@ impl CommandPacker {
 fn joined(older: &SampleBlock, newer: &SampleBlock, most: usize) -> SampleBlock {
     let skip = (older.len() + newer.len()).saturating_sub(most);
     let all = older.as_slice().iter().chain(newer.as_slice()).skip(skip);
-    let mut block = SampleBlock::new();
+    let mut block = SampleBlock::default();
     match all.copied().try_for_each(|sample| block.push(sample)) {
         Ok(()) => block,
         Err(_) => *newer,

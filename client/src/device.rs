@@ -4,7 +4,6 @@
 //! stiffness limit applies to that. No profile may exceed its device's limits.
 
 use mmt_shared::model::contact::Coupling;
-use mmt_shared::model::geometry::Vec2;
 use mmt_shared::range::{OutOfRange, in_range};
 use serde::Serialize;
 
@@ -144,21 +143,6 @@ impl DeviceProfile {
         self.stiffness_n_per_m
     }
 
-    /// F_max, N.
-    pub fn force_max_n(&self) -> f64 {
-        self.force_max_n
-    }
-
-    /// Side of the cube that the device reaches, m, device metres.
-    pub fn workspace_m(&self) -> f64 {
-        self.workspace_m
-    }
-
-    /// s: world metres per device metre.
-    pub fn scale(&self) -> f64 {
-        self.scale
-    }
-
     /// k_p with the damping that belongs to it.
     pub fn coupling(&self) -> Coupling {
         Coupling::for_stiffness(self.stiffness_n_per_m)
@@ -170,11 +154,6 @@ impl DeviceProfile {
             force_max_n: self.force_max_n,
             ..Limits::default()
         }
-    }
-
-    /// A point of the device's room in the world, m.
-    pub fn hip_in_world(&self, hip_in_device: Vec2) -> Vec2 {
-        hip_in_device * self.scale
     }
 }
 
@@ -206,11 +185,11 @@ mod tests {
         let default = DeviceProfile::default();
         let c = default.coupling();
         assert_eq!((c.stiffness_n_per_m, c.damping_ns_per_m), (1000.0, 10.0));
-        assert_eq!((default.force_max_n(), default.scale()), (8.0, 1.0));
+        assert_eq!((default.force_max_n, default.scale), (8.0, 1.0));
         let falcon = DeviceProfile::by_name("falcon").unwrap();
         let c = falcon.coupling();
         assert_eq!((c.stiffness_n_per_m, c.damping_ns_per_m), (3000.0, 20.0));
-        assert_eq!((falcon.force_max_n(), falcon.workspace_m()), (8.0, 0.10));
+        assert_eq!((falcon.force_max_n, falcon.workspace_m), (8.0, 0.10));
     }
 
     #[test]
@@ -219,10 +198,7 @@ mod tests {
         assert!(falcon.used_with(Some(3000.0), None).is_ok());
         assert!(falcon.used_with(Some(3000.0_f64.next_up()), None).is_err());
         let scaled = falcon.used_with(Some(1500.0), Some(2.0)).unwrap();
-        assert_eq!(
-            scaled.hip_in_world(Vec2::new(0.05, 0.0)),
-            Vec2::new(0.1, 0.0)
-        );
+        assert_eq!(scaled.scale, 2.0);
         assert!(falcon.used_with(Some(1501.0), Some(2.0)).is_err());
         assert!(falcon.used_with(None, Some(13.0)).is_err());
         let error = falcon.used_with(Some(1501.0), Some(2.0)).unwrap_err();

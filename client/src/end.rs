@@ -60,7 +60,7 @@ impl MasterEnd {
         Self {
             master,
             channel: DatagramChannel::with_rate_control(Side::Master, now, config.stretch_max),
-            window: SequenceWindow::new(),
+            window: SequenceWindow::default(),
             commands: CommandPacker::new(config),
             port: None,
             update: None,

@@ -54,7 +54,7 @@ pub struct Master {
 }
 
 impl Master {
-    /// A master that renders what the slave's welcome says, its force limited by `limiter`.
+    /// A master that renders the model of the slave's welcome, its force limited by `limiter`.
     pub fn new(welcome: &Welcome, limiter: ForceLimiter) -> Self {
         Self::with_architecture(welcome, limiter, Architecture::Mmt)
     }
@@ -136,7 +136,7 @@ impl Master {
         self.limiter.release();
     }
 
-    /// Applies an accepted update, unless the link has been taken for dead; says whether it did.
+    /// Applies an accepted update, unless the hand has been released; returns whether it did.
     pub fn apply(&mut self, update: &Update) -> bool {
         let alive = self.link < LinkState::Released;
         if alive {
@@ -156,7 +156,7 @@ impl Master {
     }
 
     /// One sample period. `stamp` is the tick's time, `reading` the device's HIP (m, world), `silence`
-    /// the time since anything was heard of the slave.
+    /// the time since a datagram of the slave arrived.
     pub fn tick(&mut self, stamp: Time, reading: Vec2, silence: Duration) -> MasterTick {
         if reading.x.is_finite() && reading.y.is_finite() {
             self.hip = HipCounts::nearest(reading);
@@ -266,10 +266,10 @@ mod tests {
         let tick = push(&mut master(), 1..=2000, Duration::ZERO);
         assert!((tick.rendered.force.x - 2.36).abs() < 1e-3);
         assert!((tick.hand_force + tick.rendered.force).norm() < 1e-12);
-        let said = tick.sample.force.newtons();
+        let sent = tick.sample.force.newtons();
         assert!(
-            (said - tick.rendered.force).norm() <= 1e-4,
-            "told on the wire's grid"
+            (sent - tick.rendered.force).norm() <= 1e-4,
+            "sent on the wire's grid"
         );
     }
 

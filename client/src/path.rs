@@ -86,7 +86,7 @@ mod tests {
 
     #[test]
     fn half_of_each_round_trip_and_what_never_came_make_the_path() {
-        let (mut here, mut there) = (Peer::new(), Peer::new());
+        let (mut here, mut there) = (Peer::default(), Peer::default());
         let mut recorder = PathRecorder::default();
         assert!(recorder.path().is_err());
         let ms = Time::from_millis;
@@ -112,7 +112,7 @@ mod tests {
 
     #[test]
     fn what_comes_late_was_not_lost() {
-        let (mut here, mut there) = (Peer::new(), Peer::new());
+        let (mut here, mut there) = (Peer::default(), Peer::default());
         let mut recorder = PathRecorder::default();
         let ms = Time::from_millis;
         let mut answers = Vec::new();

@@ -51,7 +51,7 @@ impl PlayoutBuffer {
             interpolator: Interpolator::new(&config),
             limiter: SpeedLimiter::new(config.speed_max_m_per_s),
             counts: PlayoutCounts::default(),
-            delays: Histogram::new(),
+            delays: Histogram::default(),
         })
     }
 

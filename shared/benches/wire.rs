@@ -32,7 +32,7 @@ const ENVELOPE: Envelope = Envelope {
 };
 
 fn command() -> Command {
-    let mut samples = SampleBlock::new();
+    let mut samples = SampleBlock::default();
     for k in 0..10_u32 {
         let t = f64::from(k) * 1e-3;
         let _ = samples.push(HipSample {
@@ -95,7 +95,7 @@ fn wire(criterion: &mut Criterion) {
 }
 
 fn peer(criterion: &mut Criterion) {
-    let (mut here, mut there, mut now) = (Peer::new(), Peer::new(), Time::ZERO);
+    let (mut here, mut there, mut now) = (Peer::default(), Peer::default(), Time::ZERO);
     criterion.bench_function("peer/stamp and handle, both ways", |b| {
         b.iter(|| {
             now += Duration::from_millis(1);

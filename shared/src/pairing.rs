@@ -228,7 +228,7 @@ impl FromStr for Pairing {
                 return Err(PairingError::Twice { key });
             }
         }
-        // An address can hold what was meant as a secret only if the ? is missing: look at it last.
+        // An address can hold what was meant as a secret only if the ? is missing: it is read last.
         let pin = pin.ok_or(PairingError::Missing { key: "pin" })?;
         let token = token.ok_or(PairingError::Missing { key: "token" })?;
         Ok(Self {

@@ -14,6 +14,7 @@ mod table;
 
 use serde::Serialize;
 
+use crate::metrics::ForceSummary;
 use crate::wire::Ending;
 
 pub use master::{
@@ -24,7 +25,7 @@ pub use session::{
     ArchitectureReport, DelayReport, EmulationReport, LateReport, LoopReport, MessagesReport,
     QuantilesReport, SessionStats, WireReport,
 };
-pub use slave::{EstimateReport, ForceErrors, ModelReport, SentUpdates, SlaveHalf, ToolReport};
+pub use slave::{EstimateReport, ModelReport, SentUpdates, SlaveHalf, ToolReport};
 
 /// What happened in a run. `C` is the configuration that it ran with.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -299,7 +300,7 @@ pub struct UpdatesReport {
 pub struct ForceReport {
     /// The slave's part.
     #[serde(flatten)]
-    pub errors: ForceErrors,
+    pub errors: ForceSummary,
     /// The master's part.
     #[serde(flatten)]
     pub hand: HandForce,

@@ -24,8 +24,7 @@ use mmt_server::end::SlaveEnd;
 use mmt_server::io::{SlaveHost, SlaveLive, SlaveOptions, SlaveRecord};
 use mmt_server::slave::SlaveConfig;
 use mmt_shared::io::identity::Identity;
-use mmt_shared::io::input_log::Input;
-use mmt_shared::io::live::LiveCell;
+use mmt_shared::io::input_log::{Input, RecordWanted};
 use mmt_shared::io::transport::Transport;
 use mmt_shared::wire::{Architecture, DATAGRAM_MAX};
 use tokio::sync::watch;
@@ -50,7 +49,7 @@ async fn session(architecture: Architecture) -> (MasterRecord, SlaveRecord) {
         netem_extras: SocketExtras::default(),
         once: true,
         truth: None,
-        record: Some(mmt_server::io::RecordWanted {
+        record: Some(RecordWanted {
             inputs: INPUTS,
             kept: Arc::clone(&from_slave),
         }),
@@ -69,7 +68,7 @@ async fn session(architecture: Architecture) -> (MasterRecord, SlaveRecord) {
         netem_seed: 2,
         netem_extras: SocketExtras::default(),
         path: None,
-        record: Some(mmt_client::io::RecordWanted {
+        record: Some(RecordWanted {
             inputs: INPUTS,
             kept: Arc::clone(&from_master),
         }),
@@ -77,7 +76,8 @@ async fn session(architecture: Architecture) -> (MasterRecord, SlaveRecord) {
     };
     let (_stop, stopped) = watch::channel(false);
     let (live, _shown) = watch::channel(MasterLive::default());
-    let served = tokio::spawn(host.run(stopped.clone(), Arc::<LiveCell<SlaveLive>>::default()));
+    let served =
+        tokio::spawn(host.run(stopped.clone(), Arc::<watch::Sender<SlaveLive>>::default()));
     mmt_client::io::run(options, stopped, live).await.unwrap();
     served.await.unwrap().unwrap();
     (taken(&from_master), taken(&from_slave))

@@ -104,7 +104,7 @@ pub(crate) struct DemoArguments {
     /// What carries the session.
     #[command(flatten)]
     pub(crate) transport: TransportArguments,
-    /// When an update is said again, such as "10ms 30ms", or none [default: the mode's]
+    /// When an update is repeated, such as "10ms 30ms", or none [default: the mode's]
     #[arg(long, value_name = "WORDS")]
     pub(crate) repeats: Option<Repeats>,
     /// How many commands before it each command repeats the samples of
@@ -131,7 +131,7 @@ pub(crate) struct SlaveArguments {
     /// When updates are sent, such as "hybrid 10% 150ms" [default: the file's, else the mode's]
     #[arg(long, value_name = "WORDS", value_parser = values::scheme)]
     pub(crate) scheme: Option<Scheme>,
-    /// When an update is said again, such as "10ms 30ms", or none [default: the file's, else the mode's]
+    /// When an update is repeated, such as "10ms 30ms", or none [default: the file's, else the mode's]
     #[arg(long, value_name = "WORDS")]
     pub(crate) repeats: Option<Repeats>,
     /// Greatest factor that congestion may stretch Delta and T_update by; 1: off [default: the file's, else the
@@ -162,7 +162,7 @@ pub(crate) struct SlaveArguments {
     /// Print the report of the last session as JSON, after the pairing string
     #[arg(long)]
     pub(crate) json: bool,
-    /// Host name or address that the pairing string tells masters [default: the address listened on]
+    /// Host name or address in the pairing string [default: the address listened on]
     #[arg(long, value_name = "HOST", value_parser = values::host)]
     pub(crate) advertise: Option<Host>,
 }
@@ -241,7 +241,7 @@ pub(crate) struct NetemArguments {
     /// Seed of both
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub(crate) seed: u64,
-    /// Packets per second for which the effect of the networks is told at the start
+    /// Packets per second for which the effect of the networks is printed at the start
     #[arg(long, value_name = "N", default_value_t = 100.0)]
     pub(crate) rate: f64,
     /// Record every packet in this file: CSV if its name ends in .csv, else a compact form

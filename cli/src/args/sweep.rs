@@ -1,4 +1,4 @@
-//! The arguments of `mmt sweep`. They say where and how rows run, never what a row is: that is the plan's.
+//! The arguments of `mmt sweep`. They choose where and how rows run, never what a row is: that is the plan's.
 
 use std::num::NonZero;
 use std::path::PathBuf;

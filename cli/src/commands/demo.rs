@@ -66,10 +66,10 @@ pub(crate) fn run(arguments: &DemoArguments, messages: &Messages) -> Result<(), 
     let mut viewer = Viewer::new(caption, dashboard, messages, &stop);
     let mut master_ended = None;
     while master.is_running() || slave.is_running() {
-        // looked at first: a borrow that lives through the viewer's wait would stop the master's task
-        let master_now = *master_live.borrow();
+        // copied first: a borrow that lives through the viewer's wait would stop the hosts' tasks
+        let (slave_now, master_now) = (*started.live.borrow(), *master_live.borrow());
         viewer.look(Snapshot {
-            slave: Some(started.live.get()).filter(|slave| slave.connected),
+            slave: Some(slave_now).filter(|slave| slave.connected),
             master: Some(master_now),
         });
         if !master.is_running() {

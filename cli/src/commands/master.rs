@@ -82,13 +82,13 @@ pub(crate) fn run(arguments: MasterArguments, messages: &Messages) -> Result<(),
     judge(live.borrow().ended)
 }
 
-/// A master host at work and the looks at it.
+/// A master host at work and its snapshots.
 type Started = (Host<MasterReport>, watch::Receiver<MasterLive>);
 
 /// Starts a master host.
 ///
 /// # Errors
-/// No thread; what the host fails of is told when it is joined.
+/// No thread; joining the host returns why it failed.
 pub(super) fn start(
     options: MasterOptions,
     stop: watch::Receiver<bool>,

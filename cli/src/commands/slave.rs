@@ -10,7 +10,6 @@ use mmt_server::io::{
 };
 use mmt_server::slave::SlaveConfig;
 use mmt_shared::io::identity_file::{default_directory, load_or_create};
-use mmt_shared::io::live::LiveCell;
 use mmt_shared::pairing::{Host as HostName, Pairing};
 use mmt_shared::report::RunReport;
 use mmt_shared::wire::Ending;
@@ -61,13 +60,13 @@ pub(crate) fn run(arguments: SlaveArguments, messages: &Messages) -> Result<(), 
 /// Plain lines while a master is connected.
 fn watch_sessions(
     host: &Host<Option<SlaveReport>>,
-    live: &LiveCell<SlaveLive>,
+    live: &watch::Sender<SlaveLive>,
     messages: &Messages,
     stop: &Stop,
 ) {
     let mut viewer = Viewer::new(Caption::default(), false, messages, stop);
     while host.is_running() {
-        let slave = Some(live.get()).filter(|slave| slave.connected);
+        let slave = Some(*live.borrow()).filter(|slave| slave.connected);
         viewer.look(Snapshot {
             slave,
             master: None,
@@ -80,13 +79,13 @@ pub(super) struct Listening {
     /// What a master needs.
     pub(super) pairing: Pairing,
     /// Looks at it.
-    pub(super) live: Arc<LiveCell<SlaveLive>>,
+    pub(super) live: Arc<watch::Sender<SlaveLive>>,
 }
 
 /// A slave host and, once it listens, its pairing.
 type Started = (Host<Option<SlaveReport>>, mpsc::Receiver<Listening>);
 
-/// Starts a slave host. If it cannot listen, the receiver gives nothing and joining the host tells why.
+/// Starts a slave host. If it cannot listen, the receiver gives nothing and joining the host gives the reason.
 ///
 /// # Errors
 /// No thread.
@@ -99,7 +98,7 @@ pub(super) fn start(
     let work = move |runtime: &Runtime| {
         let _inside = runtime.enter();
         let host = SlaveHost::bind(options).map_err(|error| host_failure(&error))?;
-        let live = Arc::new(LiveCell::default());
+        let live = Arc::new(watch::Sender::default());
         let listening = Listening {
             pairing: host.pairing(advertise),
             live: Arc::clone(&live),

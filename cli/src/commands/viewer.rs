@@ -7,9 +7,9 @@ use crate::output::note;
 use crate::stop::Stop;
 use crate::view::{Caption, History, Screen, Snapshot, line};
 
-/// Time between two looks: 20 a second are as much as an eye can use.
+/// Time between two frames: 20 a second are as much as an eye can use.
 const LOOK: Duration = Duration::from_millis(50);
-/// Scenes a second that a dashboard asks for: one a look.
+/// Scenes a second that a dashboard asks for: one a frame.
 const SCENE_HZ: u8 = 20;
 /// Time between two plain lines.
 const LINE: Duration = Duration::from_secs(1);
@@ -44,7 +44,7 @@ impl Viewer {
         }
     }
 
-    /// Shows what is seen now, hears the keys, and returns when it is time for the next look.
+    /// Shows the snapshot, reads the keys, and returns when it is time for the next frame.
     pub(super) fn look(&mut self, snapshot: Snapshot) {
         self.history.push(snapshot);
         let Some(screen) = &mut self.screen else {

@@ -1,7 +1,7 @@
 //! What the operator sees, from above: the local model with the HIP, and behind it, as a ghost, the remote scene as it
 //! last came.
 //!
-//! The model is where it is felt; the ghost is as old as the title says. Draws; moves nothing.
+//! The model is where it is felt; the title has the age of the ghost. Draws; moves nothing.
 
 use mmt_client::io::MasterLive;
 use mmt_shared::model::geometry::{BoxFootprint, Pose, Vec2, rotate};

@@ -22,7 +22,7 @@ static TAKEN: AtomicBool = AtomicBool::new(false);
 /// Gives the terminal back if this process took it; may be called from anywhere, any number of times.
 pub(crate) fn restore_terminal() {
     if TAKEN.swap(false, Ordering::AcqRel) {
-        // there is nothing else to try, and nobody to tell
+        // there is nothing else to try
         let _ = disable_raw_mode();
         let _ = execute!(io::stderr(), LeaveAlternateScreen, Show);
     }

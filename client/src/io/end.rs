@@ -13,9 +13,9 @@ pub enum SessionEnd {
     OperatorFinished,
     /// A person or the system asked for it here.
     Stopped,
-    /// The slave said farewell first.
+    /// The slave sent its farewell first.
     SlaveEnded(Ending),
-    /// Nothing was heard of the slave for so long that the hand was released.
+    /// Nothing arrived from the slave for so long that the hand was released.
     LinkSilent,
     /// The connection broke or was closed.
     ConnectionLost,
@@ -24,7 +24,7 @@ pub enum SessionEnd {
 }
 
 impl SessionEnd {
-    /// What the farewell and the report say.
+    /// The ending in the farewell and in the report.
     pub fn ending(self) -> Ending {
         match self {
             Self::DurationOver | Self::OperatorFinished => Ending::Finished,
@@ -43,9 +43,9 @@ impl fmt::Display for SessionEnd {
             Self::Stopped => "it was asked to end",
             Self::SlaveEnded(Ending::Finished) => "the slave has finished",
             Self::SlaveEnded(Ending::Interrupted) => "the slave was asked to end",
-            Self::SlaveEnded(Ending::Failed) => "the slave failed: its own log says why",
+            Self::SlaveEnded(Ending::Failed) => "the slave failed: see its own log",
             Self::LinkSilent => {
-                "nothing was heard of the slave for 1 s and the hand was released: see whether the \
+                "nothing came from the slave for 1 s and the hand was released: see whether the \
                  slave and the network are alive, and start again"
             }
             Self::ConnectionLost => {

@@ -11,7 +11,7 @@ use mmt_shared::io::socket::BindError;
 use mmt_shared::io::stream::{ReadFrameError, WriteFrameError};
 use mmt_shared::io::transport::Insecure;
 use mmt_shared::range::OutOfRange;
-use mmt_shared::wire::{DecodeError, EncodeError, Kind, WelcomeError};
+use mmt_shared::wire::{DecodeError, Kind, WelcomeError};
 
 /// Why there is no report.
 #[derive(Debug, thiserror::Error)]
@@ -26,7 +26,7 @@ pub enum MasterHostError {
     Lookup {
         /// The address of the pairing string.
         address: String,
-        /// What the system said.
+        /// The system's error.
         source: io::Error,
     },
     /// The name has no address.
@@ -63,9 +63,6 @@ pub enum MasterHostError {
     /// No connection.
     #[error(transparent)]
     Connect(#[from] ConnectError),
-    /// The hello breaks a rule of the wire.
-    #[error("the hello cannot be sent: {0}")]
-    Hello(#[from] EncodeError),
     /// The slave did not take the hello.
     #[error("the hello did not reach the slave at {address}: {source}")]
     HelloUnsent {

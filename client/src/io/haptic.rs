@@ -132,7 +132,7 @@ impl HapticLoop {
         self
     }
 
-    /// One sample period; `now` says when what it sends leaves. Breaks when the session is over and no force is left on
+    /// One sample period; `now` is when what it sends leaves. Breaks when the session is over and no force is left on
     /// the hand, which is 200 ticks after its end at the latest.
     pub fn tick(
         &mut self,

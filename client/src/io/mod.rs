@@ -22,6 +22,7 @@ use std::time::Duration;
 
 use mmt_netem::LinkConfig;
 use mmt_netem::io::socket::SocketExtras;
+use mmt_shared::io::input_log::RecordWanted;
 use mmt_shared::io::transport::Transport;
 use mmt_shared::io::truth::TruthReceiver;
 use mmt_shared::model::geometry::{BoxFootprint, Pose, Vec2};
@@ -83,15 +84,6 @@ impl OperatorChoice {
 /// A record of the path that a session fills and whoever started it reads.
 pub type SharedPath = Arc<Mutex<PathRecorder>>;
 
-/// How many inputs of the haptic loop are to be kept, and where a session leaves them at its end.
-#[derive(Clone, Debug)]
-pub struct RecordWanted {
-    /// So many of the first inputs.
-    pub inputs: usize,
-    /// Where they are left.
-    pub kept: Arc<Mutex<Option<MasterRecord>>>,
-}
-
 /// How a master host runs.
 #[derive(Debug)]
 pub struct MasterOptions {
@@ -120,12 +112,12 @@ pub struct MasterOptions {
     /// Where the path of the session is kept, if anybody wants it.
     pub path: Option<SharedPath>,
     /// A record of the loop's inputs, if anybody wants to run them again.
-    pub record: Option<RecordWanted>,
+    pub record: Option<RecordWanted<MasterRecord>>,
     /// The object's true pose, where the slave lives in this process: for the report.
     pub truth: Option<TruthReceiver>,
 }
 
-/// A look at a running master, for a screen.
+/// A snapshot of a running master, for a screen.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct MasterLive {
     /// Seconds since the session began.

@@ -10,6 +10,7 @@ use mmt_shared::io::congestion::RateCap;
 use mmt_shared::io::connect::ConnectError;
 use mmt_shared::io::quic::Traffic;
 use mmt_shared::io::socket;
+use mmt_shared::io::stream::{read_frame, write_message};
 use mmt_shared::io::transport::{
     CLOSE_FINISHED, Connection, Endpoint, RecvStream, SendStream, WriteError,
 };
@@ -118,7 +119,7 @@ async fn look_up(
             addresses.push(one);
         }
     }
-    // a slave listens on IPv4 unless told otherwise, and a wrong first address costs the whole wait
+    // a slave listens on IPv4 unless it is given another address, and a wrong first address costs the whole wait
     addresses.sort_by_key(SocketAddr::is_ipv6);
     Ok(addresses)
 }
@@ -200,15 +201,10 @@ async fn greet(
     let opened = connection.open_bi().await;
     let (mut send, mut receive) = opened.map_err(|error| unsent(WriteError::from(error).into()))?;
     let hello = hello(options, hip);
-    let mut message = [0; STREAM_MESSAGE_MAX];
-    let length = StreamMessage::Hello(hello).encode(&mut message)?;
-    let message = message.get(..length).unwrap_or_default();
-    let written = send.write_frame(message, limit).await;
+    let written = write_message(&mut send, &StreamMessage::Hello(hello), limit).await;
     written.map_err(unsent)?;
-    let answer = receive
-        .read_frame(STREAM_MESSAGE_MAX, limit)
-        .await
-        .map_err(|source| MasterHostError::NoWelcome { address, source })?;
+    let answer = read_frame(&mut receive, STREAM_MESSAGE_MAX, limit).await;
+    let answer = answer.map_err(|source| MasterHostError::NoWelcome { address, source })?;
     let welcome = judge(&answer, address, &hello)?;
     Ok((send, receive, welcome))
 }

@@ -7,6 +7,7 @@ use mmt_shared::io::clock::Clock;
 use mmt_shared::io::farewell::{FarewellError, ReceivedFarewell, receive_farewell, send_farewell};
 use mmt_shared::io::loop_thread;
 use mmt_shared::io::network_task::{Event, NetworkTask, asked_to_stop};
+use mmt_shared::io::stream::delivered;
 use mmt_shared::model::geometry::{BoxFootprint, Pose};
 use mmt_shared::report::SlaveHalf;
 use mmt_shared::wire::Side;
@@ -29,7 +30,7 @@ const THREAD: &str = "mmt-haptic";
 
 /// Runs a master against the slave of a pairing string until its duration is over, its operator has
 /// finished, `stop` becomes true, or the other side or the link ends it. `live` gets a snapshot 25 times a
-/// second; the last one says why the session ended.
+/// second; the last one has the reason why the session ended.
 ///
 /// A session that began always gives a report: one that the link or the slave broke has the ending
 /// `failed`, and what only the slave counts is absent from it.
@@ -135,8 +136,7 @@ pub(super) async fn operate(
         if session.task.awaits_farewell() {
             session.farewell = answer(timeout_at(deadline, farewell).await);
         } else {
-            send.delivered(deadline.saturating_duration_since(Instant::now()))
-                .await;
+            delivered(&send, deadline.saturating_duration_since(Instant::now())).await;
         }
     }
     connected.close(&why.to_string(), timeouts.idle).await;
@@ -147,7 +147,7 @@ pub(super) async fn operate(
         *kept.lock().unwrap_or_else(PoisonError::into_inner) = path;
     }
     if let Some(wanted) = &options.record {
-        *wanted.kept.lock().unwrap_or_else(PoisonError::into_inner) = haptic.record.take();
+        wanted.keep(haptic.record.take());
     }
     Ok(MasterReport {
         seed: options.netem_seed,

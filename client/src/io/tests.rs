@@ -6,14 +6,13 @@ use mmt_netem::LinkConfig;
 use mmt_shared::io::clock::Clock;
 use mmt_shared::io::connect::ConnectError;
 use mmt_shared::io::transport::Transport;
+use mmt_shared::metrics::ForceSummary;
 use mmt_shared::model::contact::Coupling;
 use mmt_shared::model::geometry::{Pose, Twist, Vec2};
 use mmt_shared::model::params::{ModelParams, ModelState};
 use mmt_shared::model::update::Cause;
 use mmt_shared::pairing::{Pin, Token};
-use mmt_shared::report::{
-    EstimateReport, ForceErrors, ModelReport, RunReport, SentUpdates, SlaveHalf, named,
-};
+use mmt_shared::report::{EstimateReport, ModelReport, RunReport, SentUpdates, SlaveHalf, named};
 use mmt_shared::time::{TICK, Time};
 use mmt_shared::wire::{Architecture, Ending, Message, Refusal};
 use tokio::sync::watch;
@@ -82,11 +81,11 @@ fn totals() -> SlaveHalf {
             by_cause: Some(named([("deadband", 3), ("timer", 5), ("contact_lost", 1)])),
             ..SentUpdates::default()
         },
-        force: ForceErrors {
-            pmse: 0.125.into(),
-            pmse_x: 0.25.into(),
-            relative_error: 0.1.into(),
-            ..ForceErrors::default()
+        force: ForceSummary {
+            pmse: Some(0.125),
+            pmse_x: Some(0.25),
+            relative_error: Some(0.1),
+            ..ForceSummary::default()
         },
         model: ModelReport {
             mass_kg: EstimateReport::new(0.75, 0.7),
@@ -124,8 +123,8 @@ async fn a_session_goes_from_hello_to_farewell_and_both_sides_are_in_the_report(
     assert_eq!(report.updates.sent.sent, Some(9));
     assert_eq!(report.updates.sent.rate_hz.get(), Some(4.5));
     assert_eq!(report.updates.sent.by_cause.as_ref().unwrap()["timer"], 5);
-    assert_eq!(report.force.errors.pmse.get(), Some(0.125));
-    assert_eq!(report.force.errors.pmse_y.get(), None);
+    assert_eq!(report.force.errors.pmse, Some(0.125));
+    assert_eq!(report.force.errors.pmse_y, None);
     assert_eq!(report.model.mass_kg.estimate.get(), Some(0.75));
     assert!(report.force.hand.largest_n.get().is_some());
     let ticks = report.haptic_loop.ticks.unwrap();
@@ -364,7 +363,7 @@ async fn a_silent_slave_releases_the_hand_and_what_it_counted_stays_unknown() {
     assert_eq!(last.hand_force, Vec2::zeros());
     assert_eq!(report.updates.sent.sent, None);
     assert_eq!(report.updates.sent.by_cause, None);
-    assert_eq!(report.force.errors.pmse.get(), None);
+    assert_eq!(report.force.errors.pmse, None);
     assert_eq!(report.model, Default::default());
     assert!(report.updates.received.applied.is_some() && report.haptic_loop.ticks.is_some());
 }

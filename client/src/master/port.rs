@@ -1,7 +1,7 @@
 //! The passivity observer at the haptic port: what the hand has put in, less what it got back.
 //!
 //! It watches the force that is really sent and where the HIP really goes, so that the model, the limiter
-//! and the sampling all count. It must never take part in anything: it only looks.
+//! and the sampling all count. It observes and changes nothing.
 
 use mmt_shared::model::geometry::Vec2;
 

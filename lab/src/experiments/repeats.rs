@@ -165,7 +165,7 @@ fn columns<'a>() -> Vec<Column<'a, Row<'a>>> {
         column("stale_p99_ms", "ms", 0, |group| stale_ms(group, 0.99)),
         column("stale_p999_ms", "ms", 0, |group| stale_ms(group, 0.999)),
         column("stale_max_ms", "ms", 0, |group| stale_ms(group, 1.0)),
-        mean("known_share", "", 4, |run| Some(run.force.samples as f64 * 1e-3 / run.duration_s)),
+        mean("known_share", "", 4, |run| Some(run.force.samples? as f64 * 1e-3 / run.duration_s)),
         mean("pmse", "", 4, |run| run.force.pmse),
         mean("relative_error", "", 4, |run| run.force.relative_error),
     ];
@@ -279,7 +279,8 @@ mod tests {
         let (without, with) = (p95(&none), p95(&updates));
         println!("95 % of updates within {without:?}, with repeats {with:?}");
         assert!(with < without.mul_f64(0.7));
-        let known = |runs: &[Measured]| runs.iter().map(|run| run.force.samples).sum::<u64>();
+        let known =
+            |runs: &[Measured]| runs.iter().filter_map(|run| run.force.samples).sum::<u64>();
         let both = runs(Repeats::recommended(), 1);
         let lost = 60_000 - known(&updates).min(60_000);
         let left = 60_000 - known(&both).min(60_000);

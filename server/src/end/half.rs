@@ -28,7 +28,7 @@ impl SlaveEnd {
         SlaveHalf {
             session,
             updates: SentUpdates::new(&counts.updates, &counts.repeated),
-            force: (&slave.force().summary()).into(),
+            force: slave.force().summary(),
             model: model(slave),
             tool: ToolReport {
                 held_s: (slave.tool_force().held_ticks() as f64 * TICK_S).into(),

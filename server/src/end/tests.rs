@@ -72,7 +72,7 @@ fn command(
     newest_update: u32,
     port: Option<HandPort>,
 ) -> Vec<u8> {
-    let mut samples = SampleBlock::new();
+    let mut samples = SampleBlock::default();
     for ms in stamps {
         let stamp = AT(ms);
         samples

@@ -1,6 +1,6 @@
 //! The acceptor: who connects is judged here, beside the session that may be going on.
 //!
-//! The order is the protocol's: token, ranges, whether another master operates. Who is refused is told why and
+//! The order is the protocol's: token, ranges, whether another master operates. Who is refused gets the reason and is
 //! counted; nobody waits for anybody else. No session begins here.
 
 use std::net::SocketAddr;
@@ -8,7 +8,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
-use mmt_shared::io::stream::ReadFrameError;
+use mmt_shared::io::stream::{ReadFrameError, delivered, read_frame, write_message};
 use mmt_shared::io::transport::{
     CLOSE_FINISHED, CLOSE_NO_HELLO, CLOSE_NOT_A_HELLO, Connection, ConnectionError, Handshake,
     Listener, RecvStream, SendStream,
@@ -23,7 +23,7 @@ use tokio::time::timeout;
 const HELLO_WAIT: Duration = Duration::from_secs(8);
 /// How long a refusal may take to arrive before the connection is closed all the same.
 const REFUSAL_WAIT: Duration = Duration::from_secs(2);
-/// Who has finished the handshake and not yet said hello: more are turned away.
+/// Who has finished the handshake and not yet sent a hello: more are turned away.
 const JUDGED_AT_ONCE: usize = 16;
 
 /// A master that may operate. Holding it is holding the slave: others are refused as long as it lives.
@@ -195,16 +195,12 @@ impl Acceptor {
     }
 }
 
-/// Says no, and gives it some time to arrive: a close overtakes what the stream still holds.
+/// Refuses, and gives the refusal some time to arrive: a close overtakes what the stream still holds.
 pub(super) async fn refuse(connection: &Connection, mut send: SendStream, refusal: Refusal) {
-    let mut out = [0; STREAM_MESSAGE_MAX];
-    let length = StreamMessage::Refused(refusal)
-        .encode(&mut out)
-        .unwrap_or_default();
-    let message = out.get(..length).unwrap_or_default();
-    if send.write_frame(message, REFUSAL_WAIT).await.is_ok() {
-        send.finish();
-        send.delivered(REFUSAL_WAIT).await;
+    let message = StreamMessage::Refused(refusal);
+    let written = write_message(&mut send, &message, REFUSAL_WAIT).await;
+    if written.is_ok() && send.finish().is_ok() {
+        delivered(&send, REFUSAL_WAIT).await;
     }
     connection.close(CLOSE_FINISHED, b"refused");
 }
@@ -213,7 +209,7 @@ async fn hello_of(
     connection: &Connection,
 ) -> Result<(SendStream, RecvStream, Hello), HandshakeError> {
     let (send, mut receive) = connection.accept_bi().await?;
-    let frame = receive.read_frame(STREAM_MESSAGE_MAX, HELLO_WAIT).await?;
+    let frame = read_frame(&mut receive, STREAM_MESSAGE_MAX, HELLO_WAIT).await?;
     match StreamMessage::decode(&frame, Side::Master)? {
         StreamMessage::Hello(hello) => Ok((send, receive, hello)),
         _ => Err(HandshakeError::NoHello),

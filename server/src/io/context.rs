@@ -7,13 +7,15 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use mmt_netem::io::socket::{SocketMeter, WrapError};
 use mmt_shared::io::clock::Clock;
+use mmt_shared::io::input_log::RecordWanted;
 use mmt_shared::io::quic::EndpointError;
 use mmt_shared::io::socket::BindError;
 use mmt_shared::io::transport::{Insecure, Listener, Transport};
 use mmt_shared::io::truth::TruthSender;
 
+use super::SlaveConfiguration;
 use super::acceptor::Refusals;
-use super::{RecordWanted, SlaveConfiguration};
+use super::slave_loop::SlaveRecord;
 use crate::slave::{SlaveConfig, SlaveError};
 
 /// Why a slave host could not start or go on.
@@ -30,7 +32,7 @@ pub enum SlaveHostError {
     Socket {
         /// Where.
         address: SocketAddr,
-        /// What the system said.
+        /// The system's error.
         source: io::Error,
     },
     /// The emulated network cannot be made.
@@ -62,7 +64,7 @@ pub(super) struct Context {
     pub(super) refusals: Arc<Refusals>,
     /// Until a session has taken it.
     pub(super) truth: Mutex<Option<TruthSender>>,
-    pub(super) record: Option<RecordWanted>,
+    pub(super) record: Option<RecordWanted<SlaveRecord>>,
 }
 
 impl Context {

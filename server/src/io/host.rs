@@ -8,7 +8,6 @@ use mmt_netem::io::socket::EmulatedSocket;
 use mmt_netem::link::LinkId;
 use mmt_shared::io::clock::Clock;
 use mmt_shared::io::congestion::RateCap;
-use mmt_shared::io::live::LiveCell;
 use mmt_shared::io::network_task::asked_to_stop;
 use mmt_shared::io::quic::Traffic;
 use mmt_shared::io::socket;
@@ -34,7 +33,7 @@ const TRAFFIC: Traffic = Traffic {
 };
 /// k_p of the default device, N/m: the configuration is tried with it before anybody connects.
 const TRIAL_STIFFNESS: f64 = 1000.0;
-/// How long closed connections may take to say so.
+/// How long the last packets of closed connections may take.
 const CLOSING: Duration = Duration::from_secs(1);
 
 /// A slave that listens. One session at a time; others are refused meanwhile.
@@ -119,7 +118,7 @@ impl SlaveHost {
     pub async fn run(
         self,
         mut stop: watch::Receiver<bool>,
-        live: Arc<LiveCell<SlaveLive>>,
+        live: Arc<watch::Sender<SlaveLive>>,
     ) -> Result<Option<SlaveReport>, SlaveHostError> {
         let (token, refusals) = (self.pairing.token, Arc::clone(&self.context.refusals));
         let (acceptor, masters) = Acceptor::new(token, refusals, stop.clone());
@@ -132,7 +131,7 @@ impl SlaveHost {
             },
             acceptor.run(listener),
         );
-        live.set(SlaveLive::default());
+        live.send_replace(SlaveLive::default());
         // Whoever does not answer is left alone.
         let _ = timeout(CLOSING, self.endpoint.wait_idle()).await;
         served
@@ -142,7 +141,7 @@ impl SlaveHost {
         &self,
         mut masters: mpsc::Receiver<Admitted>,
         stop: &mut watch::Receiver<bool>,
-        live: &LiveCell<SlaveLive>,
+        live: &watch::Sender<SlaveLive>,
     ) -> Result<Option<SlaveReport>, SlaveHostError> {
         let mut last = None;
         let mut socket_before = self.context.meter.snapshot();
@@ -157,7 +156,7 @@ impl SlaveHost {
             };
             let report = session::serve(&self.context, admitted, socket_before, stop, live).await?;
             socket_before = self.context.meter.snapshot();
-            live.set(SlaveLive::default());
+            live.send_replace(SlaveLive::default());
             let served = report.is_some();
             last = report.or(last);
             if served && self.once {

@@ -17,11 +17,11 @@ mod slave_loop;
 mod tests;
 
 use std::net::SocketAddr;
-use std::sync::{Arc, Mutex};
 
 use mmt_netem::LinkConfig;
 use mmt_netem::io::socket::SocketExtras;
 use mmt_shared::io::identity::Identity;
+use mmt_shared::io::input_log::RecordWanted;
 use mmt_shared::io::transport::Transport;
 use mmt_shared::io::truth::TruthSender;
 use mmt_shared::model::geometry::{BoxFootprint, Pose, Vec2};
@@ -34,15 +34,6 @@ use crate::slave::SlaveConfig;
 pub use context::SlaveHostError;
 pub use host::SlaveHost;
 pub use slave_loop::SlaveRecord;
-
-/// How many inputs of the slave's loop are to be kept, and where a session leaves them at its end.
-#[derive(Clone, Debug)]
-pub struct RecordWanted {
-    /// So many of the first inputs.
-    pub inputs: usize,
-    /// Where they are left.
-    pub kept: Arc<Mutex<Option<SlaveRecord>>>,
-}
 
 /// Name and version of this program, as it gives them to the other side.
 const PROGRAM: &str = concat!("mmt ", env!("CARGO_PKG_VERSION"));
@@ -69,10 +60,10 @@ pub struct SlaveOptions {
     /// Takes the object's true pose to a master of this process, for its report; of the first session only.
     pub truth: Option<TruthSender>,
     /// A record of the loop's inputs, if anybody wants to run them again.
-    pub record: Option<RecordWanted>,
+    pub record: Option<RecordWanted<SlaveRecord>>,
 }
 
-/// A look at a running slave, for a screen.
+/// A snapshot of a running slave, for a screen.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SlaveLive {
     /// Whether a master is connected.

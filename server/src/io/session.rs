@@ -5,7 +5,6 @@
 mod end;
 
 use std::pin::Pin;
-use std::sync::PoisonError;
 use std::time::Duration;
 
 use mmt_netem::io::socket::SocketCounters;
@@ -14,17 +13,14 @@ use mmt_shared::io::clock::Clock;
 use mmt_shared::io::farewell::{
     FAREWELL_WAIT, FarewellError, ReceivedFarewell, answer, receive_farewell, send_farewell,
 };
-use mmt_shared::io::live::LiveCell;
 use mmt_shared::io::loop_thread::{self, LoopSide};
 use mmt_shared::io::network_task::{Event, NetworkTask, WAITING_MAX};
-use mmt_shared::io::stream::WriteFrameError;
+use mmt_shared::io::stream::{WriteFrameError, write_message};
 use mmt_shared::io::ticker::Ticker;
 use mmt_shared::io::transport::{CLOSE_FINISHED, Connection, RecvStream, SendStream};
 use mmt_shared::model::contact::Coupling;
 use mmt_shared::report::{MasterHalf, SlaveHalf};
-use mmt_shared::wire::{
-    Ending, Hello, Label, Refusal, STREAM_MESSAGE_MAX, Side, StreamMessage, Welcome,
-};
+use mmt_shared::wire::{Ending, Hello, Label, Refusal, Side, StreamMessage, Welcome};
 use tokio::sync::watch;
 use tokio::time::{sleep, timeout};
 
@@ -64,7 +60,7 @@ pub(super) async fn serve(
     admitted: Admitted,
     socket_before: SocketCounters,
     stop: &mut watch::Receiver<bool>,
-    live: &LiveCell<SlaveLive>,
+    live: &watch::Sender<SlaveLive>,
 ) -> Result<Option<SlaveReport>, SlaveHostError> {
     let body = |slave_loop: SlaveLoop, side, ticker, clock| slave_loop.run(side, ticker, clock);
     serve_with(context, admitted, socket_before, stop, live, body).await
@@ -76,7 +72,7 @@ pub(super) async fn serve_with(
     admitted: Admitted,
     socket_before: SocketCounters,
     stop: &mut watch::Receiver<bool>,
-    live: &LiveCell<SlaveLive>,
+    live: &watch::Sender<SlaveLive>,
     body: impl FnOnce(SlaveLoop, LoopSide<Snapshot>, Ticker, Clock) -> Finished + Send + 'static,
 ) -> Result<Option<SlaveReport>, SlaveHostError> {
     let Admitted {
@@ -145,12 +141,8 @@ async fn welcome(
         scheme: Label::clipped(&config.trigger.scheme.to_string()),
         program: Label::clipped(PROGRAM),
     };
-    let mut out = [0; STREAM_MESSAGE_MAX];
-    // A slave that could be made has numbers that can be told.
     let welcome = StreamMessage::Welcome((&welcome).into());
-    let length = welcome.encode(&mut out).unwrap_or_default();
-    let message = out.get(..length).unwrap_or_default();
-    send.write_frame(message, WRITE_WAIT).await
+    write_message(send, &welcome, WRITE_WAIT).await
 }
 
 fn announce(connection: &Connection, hello: &Hello) {
@@ -171,7 +163,7 @@ impl Session<'_> {
         mut self,
         mut receive: RecvStream,
         stop: &mut watch::Receiver<bool>,
-        live: &LiveCell<SlaveLive>,
+        live: &watch::Sender<SlaveLive>,
     ) -> Result<SlaveReport, SlaveHostError> {
         let began = self.context.clock.now();
         let farewell = receive_farewell(&mut receive, Side::Master);
@@ -210,7 +202,7 @@ impl Session<'_> {
         self.connection
             .close(CLOSE_FINISHED, b"the session is over");
         if let (Some(wanted), Some(finished)) = (&self.context.record, finished) {
-            *wanted.kept.lock().unwrap_or_else(PoisonError::into_inner) = finished.record;
+            wanted.keep(finished.record);
         }
         Ok(SlaveReport {
             seed: self.config.seed,
@@ -227,7 +219,7 @@ impl Session<'_> {
         &mut self,
         mut farewell: Pin<&mut F>,
         stop: &mut watch::Receiver<bool>,
-        live: &LiveCell<SlaveLive>,
+        live: &watch::Sender<SlaveLive>,
     ) -> End
     where
         F: Future<Output = MastersFarewell>,
@@ -249,14 +241,14 @@ impl Session<'_> {
     }
 
     /// Shows the newest snapshot; whether it ends the session.
-    fn beat(&mut self, live: &LiveCell<SlaveLive>) -> Option<End> {
+    fn beat(&mut self, live: &watch::Sender<SlaveLive>) -> Option<End> {
         let now = self.context.clock.now();
         let snapshot = *self.task.handle().snapshot();
-        live.set(snapshot.live);
+        live.send_replace(snapshot.live);
         let silent = |heard| now.saturating_since(heard) > SILENCE_MAX;
         if snapshot.numbers_spent {
             Some(End::Numbers(NumbersSpent))
-        } else if snapshot.last_heard.is_some_and(silent) {
+        } else if snapshot.last_arrival.is_some_and(silent) {
             Some(End::Silence)
         } else {
             None

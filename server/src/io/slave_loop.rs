@@ -21,8 +21,8 @@ const SNAPSHOT_TICKS: u64 = 20;
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Snapshot {
     pub(super) live: SlaveLive,
-    /// When the master was last heard; none before the loop's first snapshot.
-    pub(super) last_heard: Option<Time>,
+    /// When a datagram of the master last arrived; none before the loop's first snapshot.
+    pub(super) last_arrival: Option<Time>,
     /// The session has used up its datagram numbers.
     pub(super) numbers_spent: bool,
 }
@@ -102,7 +102,7 @@ impl SlaveLoop {
         }
     }
 
-    /// One tick, at its deadline: the stamp is free of wake-up jitter. `now` says when what it sends leaves.
+    /// One tick, at its deadline: the stamp is free of wake-up jitter. `now` is when what it sends leaves.
     pub(super) fn tick(
         &mut self,
         deadline: Time,
@@ -167,7 +167,7 @@ impl SlaveLoop {
         }
         Snapshot {
             live,
-            last_heard: Some(channel.last_heard()),
+            last_arrival: Some(channel.last_arrival()),
             numbers_spent: self.numbers_spent,
         }
     }

@@ -7,7 +7,6 @@ use std::time::Duration;
 
 use mmt_netem::LinkConfig;
 use mmt_shared::io::identity::Identity;
-use mmt_shared::io::live::LiveCell;
 use mmt_shared::io::transport::Transport;
 use mmt_shared::pairing::{Pairing, Token};
 use mmt_shared::report::RunReport;
@@ -24,7 +23,7 @@ type Served = Result<Option<SlaveReport>, SlaveHostError>;
 
 struct Running {
     pairing: Pairing,
-    live: Arc<LiveCell<SlaveLive>>,
+    live: Arc<watch::Sender<SlaveLive>>,
     stop: watch::Sender<bool>,
     served: JoinHandle<Served>,
 }
@@ -47,7 +46,7 @@ fn options() -> SlaveOptions {
 fn run(options: SlaveOptions) -> Running {
     let host = SlaveHost::bind(options).unwrap();
     let (stop, stopped) = watch::channel(false);
-    let live = Arc::<LiveCell<SlaveLive>>::default();
+    let live = Arc::<watch::Sender<SlaveLive>>::default();
     Running {
         pairing: host.pairing(None),
         served: tokio::spawn(host.run(stopped, Arc::clone(&live))),
@@ -82,7 +81,7 @@ async fn a_session_goes_from_the_welcome_to_a_report_that_agrees_with_the_master
     assert_eq!(welcome.scheme.as_str(), scheme);
     master.push(100).await;
     master.listen(1).await;
-    let look = host.live.get();
+    let look = *host.live.borrow();
     assert!(look.connected && look.elapsed_s > 0.5 && look.rtt_ms.is_some());
     let mut sequences: Vec<_> = master.updates.iter().map(|u| u.sequence).collect();
     assert!(sequences.is_sorted(), "{sequences:?}");
@@ -272,7 +271,7 @@ async fn a_lost_connection_ends_the_session_and_the_next_master_is_served() {
     let mut next = patiently(eventually_welcome(&host.pairing)).await;
     patiently(next.push(5)).await;
     patiently(async {
-        while !host.live.get().connected {
+        while !host.live.borrow().connected {
             sleep(Duration::from_millis(1)).await;
         }
     })
@@ -328,7 +327,7 @@ async fn a_panic_of_the_thread_ends_the_session_as_failed_and_is_an_error() {
         ending
     });
     let admitted = patiently(masters.recv()).await.unwrap();
-    let live = LiveCell::default();
+    let live = watch::Sender::default();
     let served = session::serve_with(
         context,
         admitted,

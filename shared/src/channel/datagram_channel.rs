@@ -45,7 +45,7 @@ impl DatagramChannel {
     pub fn with_rate_control(side: Side, now: Time, stretch_max: StretchMax) -> Self {
         Self {
             side,
-            peer: Peer::new(),
+            peer: Peer::default(),
             counts: ChannelCounts::default(),
             began: now,
             last_sent: now,
@@ -114,13 +114,13 @@ impl DatagramChannel {
         self.last_sent + HEARTBEAT
     }
 
-    /// Time since the other side was last heard, or since the beginning.
+    /// Time since a datagram of the other side last arrived, or since the beginning.
     pub fn silence(&self, now: Time) -> Duration {
-        now.saturating_since(self.last_heard())
+        now.saturating_since(self.last_arrival())
     }
 
-    /// When the other side was last heard, or the beginning.
-    pub fn last_heard(&self) -> Time {
+    /// When a datagram of the other side last arrived, or the beginning.
+    pub fn last_arrival(&self) -> Time {
         self.peer.last_arrival().unwrap_or(self.began)
     }
 

@@ -29,11 +29,11 @@ pub struct NumbersSpent;
 pub enum Arrival {
     /// The newest so far.
     Newest,
-    /// Older than the newest, seen for the first time: what it carries may still be news.
+    /// Older than the newest, seen for the first time: what it carries may still be new.
     Reordered,
     /// Seen before: drop it.
     Duplicate,
-    /// So old that it cannot be told whether it was seen before: drop it. It stays counted as lost.
+    /// So old that nobody knows whether it was received before: drop it. It stays counted as lost.
     TooOld,
 }
 
@@ -67,8 +67,8 @@ struct Newest {
     arrived: Time,
 }
 
-/// One side's knowledge of the other.
-#[derive(Clone, Debug)]
+/// One side's knowledge of the other: at first nothing is sent and nothing received.
+#[derive(Clone, Debug, Default)]
 pub struct Peer {
     sent: u32,
     window: Window,
@@ -80,27 +80,7 @@ pub struct Peer {
     round_trip: RoundTrip,
 }
 
-impl Default for Peer {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
 impl Peer {
-    /// Nothing sent, nothing received.
-    pub fn new() -> Self {
-        Self {
-            sent: 0,
-            window: Window::new(),
-            newest: None,
-            last_arrival: None,
-            received: 0,
-            their_report: Loss::default(),
-            echoes_implausible: 0,
-            round_trip: RoundTrip::new(),
-        }
-    }
-
     /// The envelope of the next outgoing datagram: its number, `now`, and the echo.
     ///
     /// # Errors

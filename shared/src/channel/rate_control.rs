@@ -1,4 +1,4 @@
-//! The deadband as a rate controller: by how much an end says less while the path is congested.
+//! The deadband as a rate controller: by how much an end sends less while the path is congested.
 //!
 //! Pure and of fixed size. Both ends run it on their own round trips: the slave stretches Delta and T_update, the
 //! master the time between samples. It must never act on loss, on jitter or on a path that is merely long.
@@ -162,7 +162,7 @@ impl RateController {
         }
         self.congested = 0;
         if queue < QUEUE_CLEAR {
-            // a round without answers says nothing
+            // a round without answers shows nothing
             let seconds = lasted.as_secs_f64().min(1.0);
             self.stretch = (self.stretch - RETURN_PER_S * seconds).max(1.0);
         }

@@ -7,7 +7,7 @@ use std::time::Duration;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
-use super::stream::{ReadFrameError, WriteFrameError};
+use super::stream::{ReadFrameError, WriteFrameError, read_frame, write_message};
 use super::transport::{ReadError, RecvStream, SendStream};
 use crate::wire::{DecodeError, Ending, Farewell, Kind, STREAM_MESSAGE_MAX, Side, StreamMessage};
 
@@ -61,13 +61,16 @@ pub async fn send_farewell(
     limit: Duration,
 ) -> Result<(), WriteFrameError> {
     let report = serde_json::to_vec(report).unwrap_or_default();
-    let mut out = [0; STREAM_MESSAGE_MAX];
-    let mut write = |report| StreamMessage::Farewell(Farewell { ending, report }).encode(&mut out);
-    // a report too long for the frame stays behind
-    let length = write(&report).or_else(|_| write(&[])).unwrap_or_default();
-    let message = out.get(..length).unwrap_or_default();
-    stream.write_frame(message, limit).await?;
-    stream.finish();
+    let farewell = |report| StreamMessage::Farewell(Farewell { ending, report });
+    let written = write_message(stream, &farewell(&report), limit).await;
+    if let Err(WriteFrameError::Encode(_)) = written {
+        // a report too long for the frame stays behind
+        write_message(stream, &farewell(&[]), limit).await?;
+    } else {
+        written?;
+    }
+    // fails only on a stream that has ended
+    drop(stream.finish());
     Ok(())
 }
 
@@ -79,7 +82,7 @@ pub async fn receive_farewell<T: DeserializeOwned>(
     stream: &mut RecvStream,
     from: Side,
 ) -> Result<ReceivedFarewell<T>, FarewellError> {
-    let message = stream.read_frame(STREAM_MESSAGE_MAX, Duration::MAX).await?;
+    let message = read_frame(stream, STREAM_MESSAGE_MAX, Duration::MAX).await?;
     match StreamMessage::decode(&message, from)? {
         StreamMessage::Farewell(Farewell { ending, report }) => Ok(ReceivedFarewell {
             ending,

@@ -3,6 +3,8 @@
 //! All room is taken at the start: keeping an input neither allocates nor waits. Once the room is used up nothing more is
 //! kept, so that a log is always the beginning of a session.
 
+use std::sync::{Arc, Mutex, PoisonError};
+
 use super::loop_thread::Frame;
 use crate::time::Time;
 
@@ -76,6 +78,22 @@ impl<G: Copy, T> InputLog<G, T> {
     /// What the ticks gave, oldest first.
     pub fn ticks(&self) -> &[T] {
         &self.ticks
+    }
+}
+
+/// How many inputs of a loop are to be kept, and where its session leaves the record at its end.
+#[derive(Clone, Debug)]
+pub struct RecordWanted<R> {
+    /// So many of the first inputs.
+    pub inputs: usize,
+    /// Where the record is left.
+    pub kept: Arc<Mutex<Option<R>>>,
+}
+
+impl<R> RecordWanted<R> {
+    /// Leaves the record of a session that has ended.
+    pub fn keep(&self, record: Option<R>) {
+        *self.kept.lock().unwrap_or_else(PoisonError::into_inner) = record;
     }
 }
 

@@ -18,8 +18,6 @@ pub mod farewell;
 pub mod identity;
 pub mod identity_file;
 pub mod input_log;
-pub mod listen;
-pub mod live;
 pub mod loop_thread;
 pub mod network_task;
 pub mod quic;

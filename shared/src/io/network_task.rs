@@ -14,7 +14,7 @@ use super::clock::Clock;
 use super::loop_thread::LoopHandle;
 use super::transport::{Connection, ConnectionError, SendDatagramError};
 
-/// Between two beats, at which a caller looks at the loop's snapshot: 25 a second.
+/// Between two beats, at which a caller reads the loop's snapshot: 25 a second.
 pub const BEAT: Duration = Duration::from_millis(40);
 /// More datagrams than QUIC's queue holds.
 pub const WAITING_MAX: usize = 4096;
@@ -45,7 +45,7 @@ pub enum Event<T, F> {
     Disconnected(ConnectionError),
     /// The loop has ended, by itself or by a panic (none).
     LoopEnded(Option<T>),
-    /// It is time to look at the snapshot.
+    /// It is time to read the snapshot.
     Beat,
 }
 

@@ -8,6 +8,8 @@ use std::time::Duration;
 use quinn::{ReadExactError, RecvStream, SendStream, WriteError};
 use tokio::time::timeout;
 
+use crate::wire::{EncodeError, STREAM_MESSAGE_MAX, StreamMessage};
+
 /// Why a message was not written.
 #[derive(Debug, thiserror::Error)]
 pub enum WriteFrameError {
@@ -17,6 +19,9 @@ pub enum WriteFrameError {
         /// Length of the message.
         bytes: usize,
     },
+    /// The message breaks a rule of the wire.
+    #[error(transparent)]
+    Encode(#[from] EncodeError),
     /// The peer took nothing for too long.
     #[error("the peer took no message for {limit:?}: it hangs or the link is down")]
     Slow {
@@ -73,6 +78,26 @@ pub async fn write_frame(
     let written = timeout(limit, stream.write_all(&frame)).await;
     written.map_err(|_| WriteFrameError::Slow { limit })??;
     Ok(())
+}
+
+/// Writes one message of the wire as [`write_frame`] does.
+///
+/// # Errors
+/// Those of [`write_frame`]; or the message breaks a rule of the wire, and nothing of it was written.
+pub async fn write_message(
+    stream: &mut SendStream,
+    message: &StreamMessage<'_>,
+    limit: Duration,
+) -> Result<(), WriteFrameError> {
+    let mut out = [0; STREAM_MESSAGE_MAX];
+    let length = message.encode(&mut out)?;
+    write_frame(stream, out.get(..length).unwrap_or_default(), limit).await
+}
+
+/// Waits, at most `limit`, until the peer has all that was written, or wants no more of it.
+pub async fn delivered(stream: &SendStream, limit: Duration) {
+    // either way there is nothing more to wait for
+    drop(timeout(limit, stream.stopped()).await);
 }
 
 /// Reads one message of at most `max` bytes, within `limit`.

@@ -10,9 +10,9 @@ use tokio::time::timeout;
 use super::congestion::RateCap;
 use super::connect::connect;
 use super::identity::Identity;
-use super::listen::{AcceptError, Listener};
 use super::quic::{Traffic, client_endpoint, server_endpoint};
 use super::socket;
+use super::transport::{AcceptError, Listener};
 
 pub(super) const TRAFFIC: Traffic = Traffic {
     datagram_max: 100,
@@ -45,7 +45,8 @@ pub(super) fn slave() -> Slave {
 
 impl Slave {
     pub(super) async fn accept(&self) -> Result<Connection, AcceptError> {
-        self.listener.next().await.unwrap().finish().await
+        let handshake = self.listener.next().await.unwrap();
+        handshake.finish().await.map(|connection| connection.quic)
     }
 }
 

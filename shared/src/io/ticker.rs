@@ -57,8 +57,8 @@ impl Ticker {
             clock,
             ticks: 0,
             skipped: 0,
-            lateness: Histogram::new(),
-            cpu: Histogram::new(),
+            lateness: Histogram::default(),
+            cpu: Histogram::default(),
             woken_cpu: None,
         }
     }

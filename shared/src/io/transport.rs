@@ -6,13 +6,16 @@
 mod choice;
 mod connection;
 mod endpoint;
+mod listen;
 #[cfg(test)]
 mod tests;
 
 pub use choice::{Insecure, Transport};
 pub use connection::{
-    CLOSE_FINISHED, CLOSE_NO_HELLO, CLOSE_NOT_A_HELLO, Connection, DatagramCounts, RecvStream,
-    SendStream,
+    CLOSE_FINISHED, CLOSE_NO_HELLO, CLOSE_NOT_A_HELLO, Connection, DatagramCounts,
 };
-pub use endpoint::{Endpoint, Handshake, Listener};
-pub use quinn::{ConnectionError, ReadError, SendDatagramError, VarInt, WriteError};
+pub use endpoint::Endpoint;
+pub use listen::{AcceptError, Handshake, Listener, TurnedAway};
+pub use quinn::{
+    ConnectionError, ReadError, RecvStream, SendDatagramError, SendStream, VarInt, WriteError,
+};

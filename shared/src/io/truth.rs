@@ -1,7 +1,7 @@
 //! The object's true pose on a way beside the network, where both sides live in one process.
 //!
-//! A demonstration can say how far the master's model was from the object; two hosts cannot, since nobody sends the
-//! truth. It must never reach anything but the report: no model, no operator and no estimator looks at it.
+//! A demonstration can report how far the master's model was from the object; two hosts cannot, since nobody sends the
+//! truth. It must never reach anything but the report: no model, no operator and no estimator reads it.
 
 use std::sync::Mutex;
 

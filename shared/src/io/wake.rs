@@ -1,7 +1,7 @@
 //! A wake from the loop thread to tokio: an [`Alarm`].
 //!
 //! The loop's side takes no lock, allocates nothing and never waits, which tokio's own notifiers do not promise.
-//! Wakes between two waits count as one: look at what there is.
+//! Wakes between two waits count as one.
 
 use std::io;
 use std::sync::Arc;

@@ -1,4 +1,4 @@
-//! Age of information: how old the news is that the master's model rests on.
+//! Age of information: how old the update is that the master's model rests on.
 
 use std::time::Duration;
 

@@ -91,108 +91,59 @@ impl ForceMetrics {
         self.outside_high += outside(JND_HIGH);
     }
 
-    /// PMSE_x (13), dimensionless: mean of (ln |f_s^x / f_m^x|)² over the samples on which both exceed
-    /// F_min; absent when there is none.
-    pub fn pmse_x(&self) -> Option<f64> {
-        self.x.mean()
-    }
-
-    /// PMSE_y (14): as [`ForceMetrics::pmse_x`] for y.
-    pub fn pmse_y(&self) -> Option<f64> {
-        self.y.mean()
-    }
-
-    /// PMSE (15), dimensionless: the sum of the axes that are present; absent when neither is.
-    pub fn pmse(&self) -> Option<f64> {
-        // (15)
-        match (self.pmse_x(), self.pmse_y()) {
-            (None, None) => None,
-            (x, y) => Some(x.unwrap_or(0.0) + y.unwrap_or(0.0)),
-        }
-    }
-
-    /// |f|-PMSE, dimensionless: (13) with the magnitudes |f_s| and |f_m| in place of an axis.
-    pub fn pmse_magnitude(&self) -> Option<f64> {
-        self.magnitude.mean()
-    }
-
-    /// Relative vector error, dimensionless: sqrt(Σ|f_s − f_m|² / Σ|f_s|²) over the contact samples.
-    ///
-    /// Absent when the slave felt no force on any of them (the ratio has no denominator).
-    pub fn relative_error(&self) -> Option<f64> {
-        (self.sum_measured2 > 0.0).then(|| (self.sum_error2 / self.sum_measured2).sqrt())
-    }
-
-    /// Root mean square of |f_s − f_m| over the contact samples, N; absent without contact.
-    pub fn error_rms_n(&self) -> Option<f64> {
-        mean(self.sum_error2, self.in_contact).map(f64::sqrt)
-    }
-
-    /// Share of the contact samples with |f_s − f_m| > 7 % of |f_s|, 0 to 1; absent without contact.
-    pub fn jnd7_share(&self) -> Option<f64> {
-        mean(self.outside_low as f64, self.in_contact)
-    }
-
-    /// Share of the contact samples with |f_s − f_m| > 10 % of |f_s|, 0 to 1; absent without contact.
-    pub fn jnd10_share(&self) -> Option<f64> {
-        mean(self.outside_high as f64, self.in_contact)
-    }
-
-    /// Pairs taken.
-    pub fn samples(&self) -> u64 {
-        self.samples
-    }
-
-    /// Contact samples: pairs with |f_s| > F_min or |f_m| > F_min, so that a touch that only one side
-    /// feels counts as an error.
-    pub fn contact_samples(&self) -> u64 {
-        self.in_contact
-    }
-
     /// Pairs that were not finite.
     pub fn rejected(&self) -> u64 {
         self.rejected
     }
 
-    /// All metrics at once, as the farewell and the report carry them.
+    /// The metrics so far.
     pub fn summary(&self) -> ForceSummary {
+        let (pmse_x, pmse_y) = (self.x.mean(), self.y.mean());
+        let of_contact = |sum| mean(sum, self.in_contact);
+        let ratio = (self.sum_measured2 > 0.0).then(|| self.sum_error2 / self.sum_measured2);
         ForceSummary {
-            samples: self.samples,
-            contact_samples: self.in_contact,
-            pmse: self.pmse(),
-            pmse_x: self.pmse_x(),
-            pmse_y: self.pmse_y(),
-            pmse_magnitude: self.pmse_magnitude(),
-            relative_error: self.relative_error(),
-            error_rms_n: self.error_rms_n(),
-            jnd7_share: self.jnd7_share(),
-            jnd10_share: self.jnd10_share(),
+            samples: Some(self.samples),
+            contact_samples: Some(self.in_contact),
+            // (15)
+            pmse: match (pmse_x, pmse_y) {
+                (None, None) => None,
+                (x, y) => Some(x.unwrap_or(0.0) + y.unwrap_or(0.0)),
+            },
+            pmse_x,
+            pmse_y,
+            pmse_magnitude: self.magnitude.mean(),
+            relative_error: ratio.map(f64::sqrt),
+            error_rms_n: of_contact(self.sum_error2).map(f64::sqrt),
+            jnd7_share: of_contact(self.outside_low as f64),
+            jnd10_share: of_contact(self.outside_high as f64),
         }
     }
 }
 
-/// The force metrics of a run; each field is the method of [`ForceMetrics`] of the same name.
+/// The force metrics of a run, dimensionless where no unit stands; each finite, or absent where it has no meaning.
+/// A contact sample is a pair with |f_s| > F_min or |f_m| > F_min: a touch that only one side feels is an error.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
 pub struct ForceSummary {
-    /// Pairs taken.
-    pub samples: u64,
-    /// Pairs on which either side felt a force.
-    pub contact_samples: u64,
-    /// (15).
+    /// Pairs of f_s and f_m.
+    pub samples: Option<u64>,
+    /// Contact samples.
+    pub contact_samples: Option<u64>,
+    /// PMSE (15): the sum of the axes that are present.
     pub pmse: Option<f64>,
-    /// (13).
+    /// PMSE_x (13): mean of (ln |f_s^x / f_m^x|)² over the samples on which both exceed F_min.
     pub pmse_x: Option<f64>,
-    /// (14).
+    /// PMSE_y (14).
     pub pmse_y: Option<f64>,
-    /// (13) of the magnitudes.
+    /// (13) with the magnitudes |f_s| and |f_m| in place of an axis.
     pub pmse_magnitude: Option<f64>,
-    /// Relative vector error.
+    /// Relative vector error, sqrt(Σ|f_s − f_m|² / Σ|f_s|²) over the contact samples; absent if f_s is 0 on all of them.
     pub relative_error: Option<f64>,
-    /// Root mean square force error, N.
+    /// Root mean square of |f_s − f_m| over the contact samples, N.
     pub error_rms_n: Option<f64>,
-    /// Share of contact outside the 7 % JND.
+    /// Share of the contact samples with |f_s − f_m| > 7 % of |f_s|, 0 to 1.
     pub jnd7_share: Option<f64>,
-    /// Share of contact outside the 10 % JND.
+    /// Share of the contact samples with |f_s − f_m| > 10 % of |f_s|, 0 to 1.
     pub jnd10_share: Option<f64>,
 }
 
@@ -200,7 +151,11 @@ pub struct ForceSummary {
 mod tests {
     use super::*;
 
-    fn metrics(pairs: &[([f64; 2], [f64; 2])]) -> ForceMetrics {
+    fn metrics(pairs: &[([f64; 2], [f64; 2])]) -> ForceSummary {
+        accumulated(pairs).summary()
+    }
+
+    fn accumulated(pairs: &[([f64; 2], [f64; 2])]) -> ForceMetrics {
         let mut metrics = ForceMetrics::default();
         for (s, m) in pairs {
             metrics.push(Vec2::new(s[0], s[1]), Vec2::new(m[0], m[1]));
@@ -223,9 +178,9 @@ mod tests {
             ([0.02, 0.01], [0.5, 0.5]),
         ]);
         let ln2 = std::f64::consts::LN_2;
-        assert!(close(run.pmse_x(), ln2 * ln2));
-        assert!(close(run.pmse_y(), ln2 * ln2));
-        assert!(close(run.pmse(), 2.0 * ln2 * ln2));
+        assert!(close(run.pmse_x, ln2 * ln2));
+        assert!(close(run.pmse_y, ln2 * ln2));
+        assert!(close(run.pmse, 2.0 * ln2 * ln2));
     }
 
     #[test]
@@ -236,43 +191,43 @@ mod tests {
             ([4.0, 0.0], [1.0, 0.0]),
         ]);
         let ln2 = std::f64::consts::LN_2;
-        assert!(close(run.pmse_x(), 4.0 * ln2 * ln2 / 3.0));
-        assert!(close(run.pmse_y(), ln2 * ln2));
+        assert!(close(run.pmse_x, 4.0 * ln2 * ln2 / 3.0));
+        assert!(close(run.pmse_y, ln2 * ln2));
     }
 
     #[test]
     fn f_min_itself_is_not_above_f_min() {
         let above = F_MIN_N.next_up();
-        assert_eq!(metrics(&[([F_MIN_N, 0.0], [1.0, 0.0])]).pmse_x(), None);
-        assert_eq!(metrics(&[([1.0, 0.0], [-F_MIN_N, 0.0])]).pmse_x(), None);
-        assert!(metrics(&[([above, 0.0], [-above, 0.0])]).pmse_x() == Some(0.0));
+        assert_eq!(metrics(&[([F_MIN_N, 0.0], [1.0, 0.0])]).pmse_x, None);
+        assert_eq!(metrics(&[([1.0, 0.0], [-F_MIN_N, 0.0])]).pmse_x, None);
+        assert!(metrics(&[([above, 0.0], [-above, 0.0])]).pmse_x == Some(0.0));
     }
 
     #[test]
     fn an_axis_without_samples_is_absent_and_not_zero() {
-        assert_eq!(ForceMetrics::default().summary(), ForceSummary::default());
+        assert_eq!(metrics(&[]).pmse, None);
         let only_x = metrics(&[([2.0, 0.0], [1.0, 0.0])]);
-        assert_eq!(only_x.pmse_y(), None);
-        assert_eq!(only_x.pmse(), only_x.pmse_x());
-        assert!(only_x.pmse_x().is_some());
+        assert_eq!(only_x.pmse_y, None);
+        assert_eq!(only_x.pmse, only_x.pmse_x);
+        assert!(only_x.pmse_x.is_some());
     }
 
     #[test]
     fn every_sample_at_the_deadband_has_pmse_ln_1_minus_delta_squared() {
         let run = metrics(&[([2.0, 0.0], [1.8, 0.0]), ([1.0, 0.0], [0.9, 0.0])]);
-        assert!(close(run.pmse(), libm::log(0.9) * libm::log(0.9)));
+        assert!(close(run.pmse, libm::log(0.9) * libm::log(0.9)));
     }
 
     #[test]
     fn magnitude_pmse_sees_size_and_the_vector_error_sees_direction() {
         // f_m is f_s turned by a quarter turn: as large, and as wrong as can be
         let turned = metrics(&[([3.0, 4.0], [-4.0, 3.0])]);
-        assert!(close(turned.pmse_magnitude(), 0.0));
-        assert!(close(turned.relative_error(), std::f64::consts::SQRT_2));
+        assert!(close(turned.pmse_magnitude, 0.0));
+        assert!(close(turned.relative_error, std::f64::consts::SQRT_2));
         let half = metrics(&[([3.0, 4.0], [1.5, 2.0])]);
-        assert!(close(half.relative_error(), 0.5));
+        assert!(close(half.relative_error, 0.5));
         let ln2 = std::f64::consts::LN_2;
-        assert!(close(half.pmse_magnitude(), ln2 * ln2));
+        assert!(close(half.pmse_magnitude, ln2 * ln2));
     }
 
     #[test]
@@ -289,25 +244,25 @@ mod tests {
             // free space on both sides: no contact sample
             ([0.01, 0.0], [0.0, 0.0]),
         ]);
-        assert_eq!((run.samples(), run.contact_samples()), (5, 4));
-        assert!(close(run.jnd7_share(), 0.75));
-        assert!(close(run.jnd10_share(), 0.5));
+        assert_eq!((run.samples, run.contact_samples), (Some(5), Some(4)));
+        assert!(close(run.jnd7_share, 0.75));
+        assert!(close(run.jnd10_share, 0.5));
         let error2 = 0.0064 + 0.25 + 0.0025 + 0.09;
-        assert!(close(run.relative_error(), (error2 / 30.0_f64).sqrt()));
-        assert!(close(run.error_rms_n(), (error2 / 4.0_f64).sqrt()));
+        assert!(close(run.relative_error, (error2 / 30.0_f64).sqrt()));
+        assert!(close(run.error_rms_n, (error2 / 4.0_f64).sqrt()));
     }
 
     #[test]
     fn a_model_that_alone_feels_a_force_has_no_relative_error_but_is_outside_the_jnd() {
         let run = metrics(&[([0.0, 0.0], [1.0, 0.0])]);
-        assert_eq!(run.relative_error(), None);
-        assert!(close(run.jnd10_share(), 1.0));
-        assert!(close(run.error_rms_n(), 1.0));
+        assert_eq!(run.relative_error, None);
+        assert!(close(run.jnd10_share, 1.0));
+        assert!(close(run.error_rms_n, 1.0));
     }
 
     #[test]
     fn numbers_that_are_not_finite_are_counted_and_change_nothing() {
-        let good = metrics(&[([1.0, 2.0], [1.1, 2.1])]);
+        let good = accumulated(&[([1.0, 2.0], [1.1, 2.1])]);
         for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, f64::MAX] {
             for place in 0..4 {
                 let mut run = good;

@@ -1,4 +1,4 @@
-//! Staleness: how long the master does not know what the slave has said.
+//! Staleness: how long an update takes to become known at the master.
 //!
 //! Only where both ends' clock is one: in virtual time. It must never count an update that is still on its way.
 
@@ -12,7 +12,7 @@ const WAITING_MAX: usize = 4096;
 
 /// Accumulates, update by update, the time from its being sent until the master knows it or a newer one.
 ///
-/// Unlike the age of information it does not grow while nothing new is said: it is what loss costs.
+/// Unlike the age of information it does not grow while nothing new is sent: it is what loss costs.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Staleness {
     waiting: VecDeque<(u32, Time)>,
@@ -62,7 +62,7 @@ mod tests {
         staleness.sent(at(20), 3);
         staleness.known(at(50), 1);
         assert_eq!(staleness.times(), [Duration::from_millis(50)]);
-        // the second was lost, the third says it as well
+        // the second was lost, the third carries it as well
         staleness.known(at(70), 3);
         staleness.known(at(80), 3);
         let ms = [50, 60, 50].map(Duration::from_millis);

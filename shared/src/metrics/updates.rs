@@ -1,7 +1,5 @@
 //! How many updates were sent and why: the paper's packet rate.
 
-use super::F_MIN_N;
-use crate::model::geometry::Vec2;
 use crate::model::update::Cause;
 use crate::time::TICK_S;
 
@@ -18,11 +16,6 @@ impl UpdateCounts {
     pub fn tick(&mut self, slave_in_contact: bool) {
         self.ticks += 1;
         self.contact_ticks += u64::from(slave_in_contact);
-    }
-
-    /// One slave tick T passed; contact is a measured force f_s (N) above F_min.
-    pub fn tick_with_force(&mut self, f_s: Vec2) {
-        self.tick(f_s.norm() > F_MIN_N);
     }
 
     /// An update was sent.
@@ -130,10 +123,10 @@ mod tests {
         let mut counts = UpdateCounts::default();
         counts.sent(Cause::Timer);
         assert_eq!((counts.rate_hz(), counts.contact_rate_hz()), (None, None));
-        counts.tick_with_force(Vec2::new(F_MIN_N, 0.0));
+        counts.tick(false);
         assert!(counts.rate_hz().is_some());
         assert_eq!(counts.contact_rate_hz(), None);
-        counts.tick_with_force(Vec2::new(F_MIN_N.next_up(), 0.0));
+        counts.tick(true);
         assert!(counts.contact_rate_hz().is_some());
     }
 }

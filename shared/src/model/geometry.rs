@@ -5,7 +5,7 @@
 
 use serde::{Deserialize, Serialize};
 
-/// A planar vector, in metres, m/s, N … as the context says.
+/// A planar vector, in metres, m/s, N … by its context.
 pub type Vec2 = nalgebra::Vector2<f64>;
 
 /// z component of `a × b`: the moment of force `b` at lever arm `a`.

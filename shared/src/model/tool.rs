@@ -1,4 +1,4 @@
-//! What the two sides tell each other of the tool and of the hand: port energies, force, and the scene for viewers.
+//! What the two sides send each other about the tool and the hand: port energies, force, and the scene for viewers.
 
 use serde::{Deserialize, Serialize};
 
@@ -6,7 +6,7 @@ use crate::model::geometry::{Pose, Vec2};
 use crate::model::sample::ForceCounts;
 use crate::time::Time;
 
-/// What the hand's port says to the tool's: time-domain passivity control (TDPA) holds each side to what went in at
+/// What the hand's port sends to the tool's: time-domain passivity control (TDPA) holds each side to what went in at
 /// the other (`docs/baselines.md`).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct HandPort {

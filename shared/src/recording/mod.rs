@@ -16,9 +16,7 @@ pub use words::ParseError;
 use crate::model::geometry::{Pose, Vec2, rotate, wrap_angle};
 use words::Words;
 
-/// Length of the two legs of the block, a right triangle, m.
-pub const BLOCK_LEG_M: f64 = 0.150;
-/// The block's reference point in the frame of the recorded pose, m: the triangle's centroid.
+/// The block's reference point in the frame of the recorded pose, m: the centroid of a right triangle with legs of 150 mm.
 pub const REFERENCE_M: (f64, f64) = (0.050, 0.050);
 
 /// The most pushes that a recording may hold.

@@ -171,7 +171,7 @@ impl<'a> Words<'a> {
             None => Ok(()),
             Some(_) => Err(self.error(
                 "what follows the last push",
-                "nothing (does the first number say how many pushes there are?)".to_owned(),
+                "nothing (is the first number that of the pushes?)".to_owned(),
             )),
         }
     }

@@ -15,7 +15,7 @@ pub struct SlaveHalf {
     /// What the trigger sent.
     pub updates: SentUpdates,
     /// The model's force against the measured one.
-    pub force: ForceErrors,
+    pub force: ForceSummary,
     /// What the estimator found.
     pub model: ModelReport,
     /// The tool.
@@ -56,49 +56,6 @@ impl SentUpdates {
             by_cause: by_cause(sent),
             repeated: Some(repeated.total()),
             repeated_by_cause: by_cause(repeated),
-        }
-    }
-}
-
-/// The model's force against the measured one, at the slave; each metric is defined in `docs/metrics.md`.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(default)]
-pub struct ForceErrors {
-    /// Pairs of f_s and f_m.
-    pub samples: Option<u64>,
-    /// Pairs with a force on either side.
-    pub contact_samples: Option<u64>,
-    /// (15).
-    pub pmse: Number,
-    /// (13).
-    pub pmse_x: Number,
-    /// (14).
-    pub pmse_y: Number,
-    /// (13) of the magnitudes.
-    pub pmse_magnitude: Number,
-    /// Relative vector error.
-    pub relative_error: Number,
-    /// Root mean square error, N.
-    pub error_rms_n: Number,
-    /// Share of contact outside the 7 % JND, 0 to 1.
-    pub jnd7_share: Number,
-    /// Share of contact outside the 10 % JND, 0 to 1.
-    pub jnd10_share: Number,
-}
-
-impl From<&ForceSummary> for ForceErrors {
-    fn from(summary: &ForceSummary) -> Self {
-        Self {
-            samples: Some(summary.samples),
-            contact_samples: Some(summary.contact_samples),
-            pmse: summary.pmse.into(),
-            pmse_x: summary.pmse_x.into(),
-            pmse_y: summary.pmse_y.into(),
-            pmse_magnitude: summary.pmse_magnitude.into(),
-            relative_error: summary.relative_error.into(),
-            error_rms_n: summary.error_rms_n.into(),
-            jnd7_share: summary.jnd7_share.into(),
-            jnd10_share: summary.jnd10_share.into(),
         }
     }
 }

@@ -21,13 +21,15 @@ fn row(label: &str, cells: impl Into<Vec<Cell>>) -> Row {
     (label.replace('_', " "), cells.into())
 }
 
-fn number(number: Number, decimals: usize, unit: &str) -> Cell {
-    let number = number.get();
-    number.map(|value| format!("{value:.decimals$}{unit}"))
+fn number(number: impl Into<Number>, decimals: usize, unit: &str) -> Cell {
+    let number: Number = number.into();
+    number
+        .get()
+        .map(|value| format!("{value:.decimals$}{unit}"))
 }
 
-fn share(value: Number) -> Cell {
-    number(value.times(100.0), 1, " %")
+fn share(value: impl Into<Number>) -> Cell {
+    number(value.into().times(100.0), 1, " %")
 }
 
 fn count(value: Option<u64>, of: &str) -> Cell {
@@ -98,7 +100,7 @@ impl<C> fmt::Display for RunReport<C> {
     }
 }
 
-// A row a line: that is how the table looks.
+// A row a line, as in the table.
 #[rustfmt::skip]
 impl<C> RunReport<C> {
     fn pushes(&self) -> Vec<Row> {

@@ -66,7 +66,7 @@ fn full() -> RunReport<Value> {
     report.wire.up = WireReport::new(2100, 336_000, 28, 20.0);
     report.wire.down = WireReport::new(1100, 110_000, 28, 20.0);
     report.force = ForceReport {
-        errors: (&force.summary()).into(),
+        errors: force.summary(),
         hand: (&peak).into(),
     };
     report.model.mass_kg = EstimateReport::new(0.707, 0.7);
@@ -85,7 +85,7 @@ fn full() -> RunReport<Value> {
         p50: 100.2.into(),
         p99: 117.9.into(),
     };
-    let mut delays = Histogram::new();
+    let mut delays = Histogram::default();
     delays.record(std::time::Duration::from_millis(16));
     report.link.playout_delay_ms = DelayReport::from(&delays);
     (report.link.loss_up, report.link.loss_down) = (0.01.into(), 0.012.into());

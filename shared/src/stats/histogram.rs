@@ -40,21 +40,17 @@ pub struct Quantiles {
 }
 
 impl Default for Histogram {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
-impl Histogram {
     /// Nothing counted. Allocates, and nothing does afterwards but a clone.
-    pub fn new() -> Self {
+    fn default() -> Self {
         Self {
             counts: vec![0; BUCKETS].into(),
             total: 0,
             max: Duration::ZERO,
         }
     }
+}
 
+impl Histogram {
     /// Counts one duration.
     pub fn record(&mut self, duration: Duration) {
         if let Some(count) = self.counts.get_mut(bucket(duration_nanos(duration))) {
@@ -137,7 +133,7 @@ mod tests {
 
     #[test]
     fn quantiles_are_nearest_ranks_and_absent_without_values() {
-        let mut histogram = Histogram::new();
+        let mut histogram = Histogram::default();
         assert_eq!(histogram.quantile(0.5), None);
         for ms in 1..=100 {
             histogram.record(Duration::from_millis(ms));
@@ -155,7 +151,7 @@ mod tests {
 
     #[test]
     fn an_empty_histogram_has_no_count_and_extremes_are_counted() {
-        let mut histogram = Histogram::new();
+        let mut histogram = Histogram::default();
         assert_eq!(histogram.quantiles(), Quantiles::default());
         histogram.record(Duration::ZERO);
         histogram.record(Duration::MAX);
@@ -166,7 +162,7 @@ mod tests {
     proptest! {
         #[test]
         fn one_value_is_reported_within_0_8_percent(nanos in 1_u64..(1 << 36)) {
-            let mut histogram = Histogram::new();
+            let mut histogram = Histogram::default();
             histogram.record(Duration::from_nanos(nanos));
             let found = histogram.quantile(0.5).unwrap().as_nanos() as f64;
             prop_assert!((found / nanos as f64 - 1.0).abs() <= 0.5 / 64.0);

@@ -1,4 +1,4 @@
-//! The queue in the round trips of one round, told apart from jitter and from the length of the path.
+//! The queue in the round trips of one round, apart from jitter and from the length of the path.
 //!
 //! Jitter spreads the round trips and lifts even the quickest of a few above the shortest of thousands, by less than
 //! it lies below their mean; a queue lifts all alike (cf. the delay of LEDBAT, RFC 6817, section 3.4).

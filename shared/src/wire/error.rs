@@ -126,7 +126,7 @@ pub enum DecodeError {
         /// How many.
         extra: usize,
     },
-    /// The bytes say the same as shorter ones would: an over-long varint.
+    /// Shorter bytes would mean the same: an over-long varint.
     #[error("a {} is not in its one canonical form", kind.name())]
     NotCanonical {
         /// The message.

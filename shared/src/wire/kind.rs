@@ -80,9 +80,9 @@ pub enum Kind {
     Tool = 5,
     /// First message on the stream; up.
     Hello = 16,
-    /// The slave's yes; down.
+    /// The slave accepts; down.
     Welcome = 17,
-    /// The slave's no; down.
+    /// The slave refuses; down.
     Refused = 18,
     /// The last message of a side, with its report; both ways.
     Farewell = 19,

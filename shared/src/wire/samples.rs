@@ -39,14 +39,6 @@ pub struct SampleBlock {
 }
 
 impl SampleBlock {
-    /// A block without samples.
-    pub fn new() -> Self {
-        Self {
-            length: 0,
-            samples: [HipSample::default(); SAMPLES_MAX],
-        }
-    }
-
     /// Adds a sample.
     ///
     /// # Errors
@@ -96,8 +88,12 @@ impl SampleBlock {
 }
 
 impl Default for SampleBlock {
+    /// A block without samples.
     fn default() -> Self {
-        Self::new()
+        Self {
+            length: 0,
+            samples: [HipSample::default(); SAMPLES_MAX],
+        }
     }
 }
 
@@ -194,7 +190,7 @@ impl<'de> Visitor<'de> for Packed {
     }
 
     fn visit_seq<A: SeqAccess<'de>>(self, mut seq: A) -> Result<SampleBlock, A::Error> {
-        let mut block = SampleBlock::new();
+        let mut block = SampleBlock::default();
         let Some(mut sample) = seq.next_element::<HipSample>()? else {
             return Ok(block);
         };
@@ -231,7 +227,7 @@ mod tests {
 
     #[test]
     fn stamps_in_a_block_increase_by_whole_ticks_or_the_sample_stays_out() {
-        let mut block = SampleBlock::new();
+        let mut block = SampleBlock::default();
         block.push(sample(5, 0, 0)).unwrap();
         let before = block;
         for stamp in [0, 4_000_000, 5_000_000, 5_999_999, 6_000_001] {
@@ -249,7 +245,7 @@ mod tests {
 
     #[test]
     fn a_full_block_takes_no_more_until_cleared() {
-        let mut block = SampleBlock::new();
+        let mut block = SampleBlock::default();
         for k in 0..SAMPLES_MAX as u64 {
             assert!(!block.is_full());
             block.push(sample(k, 0, 0)).unwrap();
@@ -263,7 +259,7 @@ mod tests {
 
     #[test]
     fn the_widest_steps_survive_packing() {
-        let mut block = SampleBlock::new();
+        let mut block = SampleBlock::default();
         block.push(sample(0, i32::MIN + 1, i32::MAX)).unwrap();
         block
             .push(sample(u64::from(u32::MAX), i32::MAX, i32::MIN))
@@ -292,7 +288,7 @@ mod tests {
     fn a_stamp_that_leaves_its_type_is_refused() {
         let mut late = sample(0, 0, 0);
         late.stamp = Time::MAX;
-        let mut block = SampleBlock::new();
+        let mut block = SampleBlock::default();
         block.push(late).unwrap();
         let mut bytes = packed(&block);
         bytes[0] = 2;

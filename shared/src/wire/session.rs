@@ -119,7 +119,7 @@ impl Hello {
     }
 }
 
-/// The slave's yes. Off the wire its state is a [`RawState`].
+/// The slave's answer to a hello that it accepts. Off the wire its state is a [`RawState`].
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Welcome<S = ModelState> {
     /// How both sides run the local model; the coupling is the hello's.
@@ -185,7 +185,7 @@ impl Welcome<RawState> {
     }
 }
 
-/// Why a slave said no.
+/// Why a slave refused a hello.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Refusal {
     /// Another master operates this slave.
@@ -234,9 +234,9 @@ pub struct Farewell<'a> {
 pub enum StreamMessage<'a> {
     /// The master asks.
     Hello(Hello),
-    /// The slave says yes.
+    /// The slave accepts.
     Welcome(Welcome<RawState>),
-    /// The slave says no.
+    /// The slave refuses.
     Refused(Refusal),
     /// A side ends.
     Farewell(Farewell<'a>),

@@ -95,7 +95,7 @@ fn on_stream(message: &StreamMessage<'_>) -> Vec<u8> {
 }
 
 fn block(samples: impl IntoIterator<Item = HipSample>) -> SampleBlock {
-    let mut block = SampleBlock::new();
+    let mut block = SampleBlock::default();
     samples.into_iter().for_each(|s| block.push(s).unwrap());
     block
 }

@@ -26,7 +26,7 @@ pub(super) struct RecordReport {
     down: DirectionReport,
 }
 
-/// One direction: what the settings say, and what came of it.
+/// One direction: its settings, and what came of them.
 #[derive(Debug, Serialize)]
 struct DirectionReport {
     words: String,

@@ -7,10 +7,10 @@ use mmt_shared::io::clock::Clock;
 use mmt_shared::io::congestion::RateCap;
 use mmt_shared::io::farewell::ReceivedFarewell;
 use mmt_shared::io::identity::Identity;
-use mmt_shared::io::listen::Listener;
 use mmt_shared::io::quic::{Traffic, server_endpoint};
 use mmt_shared::io::socket;
 use mmt_shared::io::stream::{read_frame, write_frame};
+use mmt_shared::io::transport::{Connection, Listener, RecvStream, SendStream};
 use mmt_shared::model::geometry::{BoxFootprint, Pose};
 use mmt_shared::model::settings::Mode;
 use mmt_shared::model::update::Update;
@@ -19,7 +19,6 @@ use mmt_shared::time::Time;
 use mmt_shared::wire::{
     DATAGRAM_MAX, Farewell, Hello, Label, Message, STREAM_MESSAGE_MAX, Side, StreamMessage, Welcome,
 };
-use quinn::{Connection, RecvStream, SendStream};
 
 use super::*;
 
@@ -88,7 +87,7 @@ pub(super) fn welcome_for(coupling: Coupling) -> Welcome {
 }
 
 impl Session {
-    /// A master that has said hello.
+    /// A master that has sent its hello.
     pub(super) async fn connected(fake: &Fake) -> Self {
         let handshake = timeout(FOR_EVER, fake.listener.next()).await.unwrap();
         let connection = handshake.unwrap().finish().await.unwrap();
@@ -144,7 +143,7 @@ impl Session {
             .unwrap();
     }
 
-    /// Takes samples in and sends an update every 20 ms, until the master says farewell.
+    /// Takes samples in and sends an update every 20 ms, until the master sends its farewell.
     pub(super) async fn serve(&mut self) -> ReceivedFarewell<MasterHalf> {
         timeout(FOR_EVER, self.serve_until_farewell())
             .await

@@ -24,7 +24,7 @@ const COUPLING: Coupling = Coupling {
     damping_ns_per_m: 10.0,
 };
 
-/// A loop, its network task's side, and a slave that it hears.
+/// A loop, its network task's side, and a slave.
 struct Ticked {
     haptic: HapticLoop,
     side: LoopSide<MasterLive>,
@@ -66,7 +66,7 @@ impl Ticked {
         self.handle.deliver(at, &out[..length]);
     }
 
-    /// Ticks until the loop breaks; the slave is heard all the time. Returns the number of ticks.
+    /// Ticks until the loop breaks; the slave sends all the time. Returns the number of ticks.
     fn run_out(&mut self) -> u64 {
         let broke = |&index: &u64| {
             self.hear(index, Message::Heartbeat);
@@ -158,7 +158,7 @@ async fn silence_of_one_second_releases_and_one_tick_less_does_not() {
     assert_eq!(ticked.haptic.why, None);
     assert!(ticked.tick(999).is_continue());
     assert_eq!(ticked.haptic.why, Some(SessionEnd::LinkSilent));
-    // being heard again does not bring the force back
+    // datagrams that come again do not bring the force back
     let ticks = (1000..2000).find(|&index| {
         ticked.hear(index, Message::Heartbeat);
         ticked.tick(index).is_break()

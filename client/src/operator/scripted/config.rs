@@ -18,7 +18,7 @@ pub enum Picture {
     Delayed,
 }
 
-/// What the scripted operator does. The defaults are those of the design study unless said otherwise.
+/// What the scripted operator does. The defaults are those of the design study unless another source is named.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct ScriptedConfig {

@@ -7,7 +7,7 @@ use mmt_shared::io::farewell::{FarewellError, ReceivedFarewell};
 use mmt_shared::io::transport::ConnectionError;
 use mmt_shared::report::MasterHalf;
 
-/// A master that has not been heard for this long has lost its lease (reliability.md, section 1).
+/// A master from which nothing arrived for this long has lost its lease (docs/protocol.md, section 2).
 pub(super) const SILENCE_MAX: Duration = Duration::from_secs(10);
 
 /// Why a session ended.
@@ -15,9 +15,9 @@ pub(super) const SILENCE_MAX: Duration = Duration::from_secs(10);
 pub(in crate::io) enum End {
     #[error("this side was asked to end")]
     Asked,
-    #[error("the master said farewell ({:?})", .0.ending)]
+    #[error("the master ended ({:?})", .0.ending)]
     Farewell(Box<ReceivedFarewell<MasterHalf>>),
-    #[error("the master was not heard for {SILENCE_MAX:?}")]
+    #[error("nothing came from the master for {SILENCE_MAX:?}")]
     Silence,
     #[error("the connection was lost: {0}")]
     Disconnected(#[from] ConnectionError),

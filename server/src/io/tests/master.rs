@@ -1,4 +1,4 @@
-//! A master of the tests: what the protocol's document says, and no more.
+//! A master of the tests: what the protocol's document demands, and no more.
 
 use std::time::Duration;
 
@@ -54,7 +54,7 @@ pub(super) async fn patiently<T>(future: impl Future<Output = T>) -> T {
 }
 
 impl Master {
-    /// Connects and opens the stream; says nothing yet.
+    /// Connects and opens the stream; sends nothing yet.
     pub(super) async fn connect(pairing: &Pairing) -> Self {
         let address = pairing.address.to_string().parse().unwrap();
         let own = socket::bind("127.0.0.1:0".parse().unwrap()).unwrap();
@@ -157,7 +157,7 @@ impl Master {
     }
 
     fn send_command(&mut self) {
-        let mut samples = SampleBlock::new();
+        let mut samples = SampleBlock::default();
         for _ in 0..PACKED {
             self.stamp += TICK;
             self.hip.x += 0.0002;
@@ -189,7 +189,7 @@ impl Master {
             .unwrap();
     }
 
-    /// Says farewell, and hears the slave's: its report.
+    /// Sends its farewell and reads the slave's: its report.
     pub(super) async fn farewell(mut self) -> (Ending, SlaveHalf) {
         self.say_farewell().await;
         let theirs = self.hear_farewell().await;

@@ -23,20 +23,15 @@ pub struct RoundTrip {
 
 impl Default for RoundTrip {
     fn default() -> Self {
-        Self::new()
+        Self {
+            latest: None,
+            minima: Recent::new(None),
+            histogram: Histogram::default(),
+        }
     }
 }
 
 impl RoundTrip {
-    /// Nothing measured.
-    pub fn new() -> Self {
-        Self {
-            latest: None,
-            minima: Recent::new(None),
-            histogram: Histogram::new(),
-        }
-    }
-
     pub(super) fn note(&mut self, now: Time, round_trip: Duration) {
         self.latest = Some(round_trip);
         self.histogram.record(round_trip);
@@ -67,7 +62,7 @@ mod tests {
 
     #[test]
     fn the_least_is_remembered_for_nine_seconds_and_forgotten_after_ten() {
-        let (ms, mut round_trip) = (Duration::from_millis, RoundTrip::new());
+        let (ms, mut round_trip) = (Duration::from_millis, RoundTrip::default());
         let at = Time::from_millis;
         assert_eq!(round_trip.least(at(0)), None);
         round_trip.note(at(500), ms(20));

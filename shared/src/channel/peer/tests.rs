@@ -21,7 +21,7 @@ fn plain(number: u32) -> Envelope {
 
 #[test]
 fn round_trip_leaves_out_the_time_that_the_answer_was_held_whatever_the_other_clock_says() {
-    let (mut here, mut there) = (Peer::new(), Peer::new());
+    let (mut here, mut there) = (Peer::default(), Peer::default());
     let epoch = 1_000_000; // the other clock is far ahead
     for k in 0..100 {
         let question = here.stamp(ms(k * 100)).unwrap();
@@ -40,7 +40,7 @@ fn round_trip_leaves_out_the_time_that_the_answer_was_held_whatever_the_other_cl
 
 #[test]
 fn numbers_begin_at_one_and_never_wrap() {
-    let mut peer = Peer::new();
+    let mut peer = Peer::default();
     assert_eq!(peer.stamp(ms(0)).unwrap().number, 1);
     peer.sent = NUMBER_LAST - 1;
     assert_eq!(peer.stamp(ms(0)).unwrap().number, NUMBER_LAST);
@@ -51,7 +51,7 @@ fn numbers_begin_at_one_and_never_wrap() {
 
 #[test]
 fn loss_reordering_and_duplicates_are_told_apart() {
-    let mut peer = Peer::new();
+    let mut peer = Peer::default();
     let arrivals: Vec<_> = [1, 2, 2, 5, 4, 4, 8]
         .into_iter()
         .map(|number| peer.handle(ms(9), &plain(number)))
@@ -76,7 +76,7 @@ fn loss_reordering_and_duplicates_are_told_apart() {
 
 #[test]
 fn what_comes_too_late_to_tell_is_dropped_and_stays_lost() {
-    let mut peer = Peer::new();
+    let mut peer = Peer::default();
     peer.handle(ms(0), &plain(WINDOW + 1));
     assert_eq!(peer.handle(ms(0), &plain(1)), Arrival::TooOld);
     assert_eq!(peer.handle(ms(0), &plain(2)), Arrival::Reordered);
@@ -86,7 +86,7 @@ fn what_comes_too_late_to_tell_is_dropped_and_stays_lost() {
 
 #[test]
 fn the_other_direction_s_loss_is_what_the_other_side_reports() {
-    let (mut here, mut there) = (Peer::new(), Peer::new());
+    let (mut here, mut there) = (Peer::default(), Peer::default());
     for k in 1..=20 {
         let question = here.stamp(ms(k)).unwrap();
         if k % 4 != 0 {
@@ -103,7 +103,7 @@ fn the_other_direction_s_loss_is_what_the_other_side_reports() {
 
 #[test]
 fn an_older_report_never_replaces_a_newer_one() {
-    let (mut here, mut there) = (Peer::new(), Peer::new());
+    let (mut here, mut there) = (Peer::default(), Peer::default());
     let question = here.stamp(ms(0)).unwrap();
     there.handle(ms(1), &question);
     let old = there.stamp(ms(1)).unwrap();
@@ -155,7 +155,7 @@ fn an_echo_that_cannot_be_true_teaches_nothing() {
         },
     ];
     let handled = |echo| {
-        let mut peer = Peer::new();
+        let mut peer = Peer::default();
         peer.stamp(ms(0)).unwrap();
         peer.stamp(ms(0)).unwrap();
         let echo = Some(echo);
@@ -173,7 +173,7 @@ fn an_echo_that_cannot_be_true_teaches_nothing() {
 
 #[test]
 fn an_echo_counts_the_newest_and_says_how_long_it_was_held() {
-    let mut peer = Peer::new();
+    let mut peer = Peer::default();
     assert_eq!(peer.echo(ms(0)), None);
     peer.handle(ms(10), &plain(2));
     peer.handle(ms(11), &plain(1));

@@ -26,16 +26,19 @@ pub(super) struct Window {
     seen: [u64; WORDS],
 }
 
-impl Window {
-    pub(super) fn new() -> Self {
-        // The number 0, which nothing has, counts as the newest at first.
-        let mut seen = [0; WORDS];
-        if let Some(word) = seen.first_mut() {
-            *word = 1;
-        }
-        Self { newest: 0, seen }
+impl Default for Window {
+    /// The number 0, which nothing has, counts as the newest at first.
+    fn default() -> Self {
+        let mut window = Self {
+            newest: 0,
+            seen: [0; WORDS],
+        };
+        window.set(0, true);
+        window
     }
+}
 
+impl Window {
     pub(super) fn newest(&self) -> u32 {
         self.newest
     }
@@ -92,40 +95,25 @@ fn position(number: u32) -> (usize, u64) {
 /// What an update's sequence number is to the ones before it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Freshness {
-    /// Beyond all before: look at it.
+    /// Beyond all before: it goes on.
     Fresh,
     /// Seen before: a repeat, or the network duplicated it. Drop it.
     Duplicate,
-    /// A newer one has been seen: it says nothing any more. Drop it.
+    /// A newer one was received: it is out of date. Drop it.
     Stale,
 }
 
 /// Lets updates through in strictly increasing sequence and counts what it stops.
 ///
 /// Numbers never wrap. A sequence of 0, which no update has, is a duplicate.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct SequenceWindow {
     window: Window,
     duplicate: u64,
     stale: u64,
 }
 
-impl Default for SequenceWindow {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
 impl SequenceWindow {
-    /// Nothing seen.
-    pub fn new() -> Self {
-        Self {
-            window: Window::new(),
-            duplicate: 0,
-            stale: 0,
-        }
-    }
-
     /// Judges an update's sequence number. Only [`Freshness::Fresh`] may go on, to be [accepted](Self::accept) or not.
     pub fn judge(&mut self, sequence: u32) -> Freshness {
         if sequence > self.window.newest() {
@@ -184,7 +172,7 @@ mod tests {
 
     #[test]
     fn what_is_not_accepted_stays_fresh() {
-        let mut window = SequenceWindow::new();
+        let mut window = SequenceWindow::default();
         window.accept(3);
         assert_eq!(window.judge(5), Freshness::Fresh);
         assert_eq!((window.judge(5), window.newest()), (Freshness::Fresh, 3));
@@ -194,7 +182,7 @@ mod tests {
 
     #[test]
     fn a_window_forgets_exactly_after_its_length() {
-        let mut window = Window::new();
+        let mut window = Window::default();
         assert_eq!(window.note(2), Place::Ahead);
         assert_eq!(window.note(1 + WINDOW), Place::Ahead);
         assert_eq!(window.note(2), Place::Taken, "{} back", WINDOW - 1);
@@ -206,7 +194,7 @@ mod tests {
 
     #[test]
     fn the_last_numbers_of_all_work_and_do_not_wrap() {
-        let mut window = SequenceWindow::new();
+        let mut window = SequenceWindow::default();
         assert_eq!(window.offer(u32::MAX - 1), Freshness::Fresh);
         assert_eq!(window.offer(u32::MAX), Freshness::Fresh);
         assert_eq!(window.offer(0), Freshness::Stale);
@@ -217,7 +205,7 @@ mod tests {
 
     #[test]
     fn an_older_update_never_passes_and_is_counted_by_its_cause() {
-        let mut window = SequenceWindow::new();
+        let mut window = SequenceWindow::default();
         assert_eq!(window.offer(0), Freshness::Duplicate);
         for (sequence, expected) in [
             (1, Freshness::Fresh),
@@ -238,7 +226,7 @@ mod tests {
             start in prop_oneof![Just(0_u32), Just(u32::MAX - 6000)],
             numbers in prop::collection::vec(1_u32..6000, 1..300),
         ) {
-            let (mut window, mut all) = (Window::new(), BTreeSet::new());
+            let (mut window, mut all) = (Window::default(), BTreeSet::new());
             let mut newest = 0;
             for number in numbers.into_iter().map(|n| start + n) {
                 let place = window.note(number);

@@ -6,10 +6,10 @@ use bytes::Bytes;
 
 use super::*;
 use crate::io::identity::Identity;
-use crate::io::listen::AcceptError;
 use crate::io::quic::{client_endpoint, transport};
 use crate::io::tests::{PATIENCE, Slave, TRAFFIC, open, pair, patiently, slave};
 use crate::io::tls;
+use crate::io::transport::AcceptError;
 use crate::wire::ALPN;
 
 /// Connects as a program whose protocol is `protocol`.

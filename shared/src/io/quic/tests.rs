@@ -6,9 +6,9 @@ use tokio::time::timeout;
 
 use super::*;
 use crate::io::connect::connect;
-use crate::io::listen::Listener;
 use crate::io::socket;
 use crate::io::tests::{PATIENCE, TRAFFIC, open, pair, patiently};
+use crate::io::transport::Listener;
 
 #[tokio::test]
 async fn of_datagrams_that_cannot_leave_only_the_newest_two_are_kept() {
@@ -62,7 +62,7 @@ async fn a_slave_that_was_killed_and_restarted_resets_the_old_connection() {
             connection.read_datagram().await.unwrap();
             connection
         });
-        // The runtime first: without it the connection cannot say farewell.
+        // The runtime first: without it the connection cannot close.
         drop(runtime);
         drop(connection);
     });

@@ -3,14 +3,11 @@
 use std::net::SocketAddr;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
-use std::time::Duration;
 
 use bytes::Bytes;
-use quinn::{ConnectionError, SendDatagramError, VarInt};
-use tokio::time::timeout;
+use quinn::{ConnectionError, RecvStream, SendDatagramError, SendStream, VarInt};
 
 use crate::io::raw_udp::Flow;
-use crate::io::stream::{ReadFrameError, WriteFrameError, read_frame, write_frame};
 
 /// Close code: the session is over, or none came about.
 pub const CLOSE_FINISHED: VarInt = VarInt::from_u32(0);
@@ -24,7 +21,7 @@ pub(super) const CLOSE_OTHER_TRANSPORT: VarInt = VarInt::from_u32(1);
 /// A connection; clones are the same one.
 #[derive(Clone, Debug)]
 pub struct Connection {
-    pub(super) quic: quinn::Connection,
+    pub(in crate::io) quic: quinn::Connection,
     /// Its datagrams, if they are raw UDP.
     pub(super) raw: Option<Arc<Flow>>,
 }
@@ -71,8 +68,7 @@ impl Connection {
     /// # Errors
     /// The connection is over.
     pub async fn open_bi(&self) -> Result<(SendStream, RecvStream), ConnectionError> {
-        let (send, receive) = self.quic.open_bi().await?;
-        Ok((SendStream(send), RecvStream(receive)))
+        self.quic.open_bi().await
     }
 
     /// The one stream, once the master has opened it.
@@ -80,8 +76,7 @@ impl Connection {
     /// # Errors
     /// The connection is over.
     pub async fn accept_bi(&self) -> Result<(SendStream, RecvStream), ConnectionError> {
-        let (send, receive) = self.quic.accept_bi().await?;
-        Ok((SendStream(send), RecvStream(receive)))
+        self.quic.accept_bi().await
     }
 
     /// Ends it, with a reason for the other side.
@@ -107,53 +102,5 @@ impl Connection {
             }
         };
         DatagramCounts { sent, received }
-    }
-}
-
-/// The stream of framed messages to the other side.
-#[derive(Debug)]
-pub struct SendStream(quinn::SendStream);
-
-/// The stream of framed messages from the other side.
-#[derive(Debug)]
-pub struct RecvStream(quinn::RecvStream);
-
-impl SendStream {
-    /// Writes one message, within `limit`. Not cancel-safe.
-    ///
-    /// # Errors
-    /// See [`WriteFrameError`]; the stream is of no use afterwards.
-    pub async fn write_frame(
-        &mut self,
-        message: &[u8],
-        limit: Duration,
-    ) -> Result<(), WriteFrameError> {
-        write_frame(&mut self.0, message, limit).await
-    }
-
-    /// Ends the stream after the last message; does nothing on a stream that has ended.
-    pub fn finish(&mut self) {
-        // fails only on a stream that has ended
-        drop(self.0.finish());
-    }
-
-    /// Waits, at most `limit`, until the other side has all of it or refuses it.
-    pub async fn delivered(&self, limit: Duration) {
-        // either way there is nothing more to wait for
-        drop(timeout(limit, self.0.stopped()).await);
-    }
-}
-
-impl RecvStream {
-    /// Reads one message of at most `max` bytes, within `limit`. Not cancel-safe.
-    ///
-    /// # Errors
-    /// See [`ReadFrameError`]; after any but [`ReadFrameError::Finished`] the stream is of no use.
-    pub async fn read_frame(
-        &mut self,
-        max: usize,
-        limit: Duration,
-    ) -> Result<Vec<u8>, ReadFrameError> {
-        read_frame(&mut self.0, max, limit).await
     }
 }

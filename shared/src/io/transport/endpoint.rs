@@ -13,19 +13,25 @@ use super::choice::Transport;
 use super::connection::{CLOSE_OTHER_TRANSPORT, Connection};
 use crate::io::connect::{ConnectError, connect};
 use crate::io::identity::Identity;
-use crate::io::listen::{self, AcceptError, TurnedAway};
 use crate::io::quic::{EndpointError, Traffic, client_endpoint, server_endpoint};
 use crate::io::raw_udp::SharedSocket;
 use crate::pairing::Pin;
 
 /// The socket that raw datagrams share with QUIC; none if they go by QUIC.
-type Raw = Option<Arc<SharedSocket>>;
+pub(super) type Raw = Option<Arc<SharedSocket>>;
 
 /// An endpoint; clones are the same one.
 #[derive(Clone, Debug)]
 pub struct Endpoint {
-    quic: quinn::Endpoint,
-    raw: Raw,
+    pub(super) quic: quinn::Endpoint,
+    pub(super) raw: Raw,
+}
+
+impl From<quinn::Endpoint> for Endpoint {
+    /// An endpoint whose datagrams go by QUIC.
+    fn from(quic: quinn::Endpoint) -> Self {
+        Self { quic, raw: None }
+    }
 }
 
 /// The socket for QUIC and for raw datagrams.
@@ -46,7 +52,7 @@ fn by_quic(raw: &Raw, mut traffic: Traffic) -> Traffic {
 }
 
 /// The connection, if both sides use the same transport: one that has its datagrams beside QUIC takes none by QUIC.
-fn join(quic: quinn::Connection, raw: &Raw) -> Option<Connection> {
+pub(super) fn join(quic: quinn::Connection, raw: &Raw) -> Option<Connection> {
     if quic.max_datagram_size().is_some() == raw.is_some() {
         quic.close(CLOSE_OTHER_TRANSPORT, b"the transports differ");
         return None;
@@ -120,57 +126,5 @@ impl Endpoint {
     /// Waits until the ends of all connections have gone out.
     pub async fn wait_idle(&self) {
         self.quic.wait_idle().await;
-    }
-}
-
-/// Takes the connections of masters at a slave's endpoint.
-#[derive(Debug)]
-pub struct Listener {
-    quic: listen::Listener,
-    raw: Raw,
-}
-
-/// A master that connects. Let it finish in a task of its own, so that a slow one holds up nobody.
-#[derive(Debug)]
-pub struct Handshake {
-    quic: listen::Handshake,
-    raw: Raw,
-}
-
-impl Listener {
-    /// A listener on an endpoint that accepts.
-    pub fn new(endpoint: Endpoint) -> Self {
-        Self {
-            quic: listen::Listener::new(endpoint.quic),
-            raw: endpoint.raw,
-        }
-    }
-
-    /// What was turned away so far.
-    pub fn turned_away(&self) -> TurnedAway {
-        self.quic.turned_away()
-    }
-
-    /// The next handshake that is let in; `None` once the endpoint is closed. Cancel-safe.
-    pub async fn next(&self) -> Option<Handshake> {
-        let (quic, raw) = (self.quic.next().await?, self.raw.clone());
-        Some(Handshake { quic, raw })
-    }
-}
-
-impl Handshake {
-    /// Who connects.
-    pub fn address(&self) -> SocketAddr {
-        self.quic.address()
-    }
-
-    /// The connection, once the handshake is over. Its master is not trusted yet.
-    ///
-    /// # Errors
-    /// See [`AcceptError`].
-    pub async fn finish(self) -> Result<Connection, AcceptError> {
-        let address = self.address();
-        let quic = self.quic.finish().await?;
-        join(quic, &self.raw).ok_or(AcceptError::OtherTransport { address })
     }
 }

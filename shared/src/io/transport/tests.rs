@@ -7,6 +7,7 @@ use bytes::Bytes;
 use super::*;
 use crate::io::identity::Identity;
 use crate::io::raw_udp::{HEADER, PACKET_MAX};
+use crate::io::stream::{delivered, read_frame, write_frame};
 use crate::io::tests::{PATIENCE, TRAFFIC, open, patiently};
 
 const RAW_UDP: Transport = Transport::RawUdp { insist: false };
@@ -22,11 +23,17 @@ async fn session(transport: Transport) {
         assert_eq!(handshake.address(), master.local_addr().unwrap());
         let down = handshake.finish().await.unwrap();
         let (mut send, mut receive) = down.accept_bi().await.unwrap();
-        assert_eq!(receive.read_frame(10, PATIENCE).await.unwrap(), b"hello");
-        send.write_frame(b"welcome", PATIENCE).await.unwrap();
+        assert_eq!(
+            read_frame(&mut receive, 10, PATIENCE).await.unwrap(),
+            b"hello"
+        );
+        write_frame(&mut send, b"welcome", PATIENCE).await.unwrap();
         assert_eq!(down.read_datagram().await.unwrap(), "command");
         down.send_datagram("update".into()).unwrap();
-        assert_eq!(receive.read_frame(10, PATIENCE).await.unwrap(), b"farewell");
+        assert_eq!(
+            read_frame(&mut receive, 10, PATIENCE).await.unwrap(),
+            b"farewell"
+        );
         let end = down.closed().await;
         let passed = DatagramCounts {
             sent: 1,
@@ -40,13 +47,16 @@ async fn session(transport: Transport) {
         let up = connecting.await.unwrap();
         assert_eq!(up.remote_address(), address);
         let (mut send, mut receive) = up.open_bi().await.unwrap();
-        send.write_frame(b"hello", PATIENCE).await.unwrap();
-        assert_eq!(receive.read_frame(10, PATIENCE).await.unwrap(), b"welcome");
+        write_frame(&mut send, b"hello", PATIENCE).await.unwrap();
+        assert_eq!(
+            read_frame(&mut receive, 10, PATIENCE).await.unwrap(),
+            b"welcome"
+        );
         up.send_datagram("command".into()).unwrap();
         assert_eq!(up.read_datagram().await.unwrap(), "update");
-        send.write_frame(b"farewell", PATIENCE).await.unwrap();
-        send.finish();
-        send.delivered(PATIENCE).await;
+        write_frame(&mut send, b"farewell", PATIENCE).await.unwrap();
+        send.finish().unwrap();
+        delivered(&send, PATIENCE).await;
         up.close(CLOSE_FINISHED, b"over");
         master.wait_idle().await;
     };

@@ -93,7 +93,7 @@ fn a_received_pose_is_never_set_on_arrival() {
 
 #[test]
 fn the_pose_is_held_against_what_the_model_was_at_the_stamp() {
-    // the slave says, late, exactly what the model was: nothing must be corrected
+    // the slave reports, late, exactly what the model was: nothing must be corrected
     let mut model = model(Mode::Recommended, PoseCorrection::MatchedStamps);
     push(&mut model, 1..=1000);
     let then = model

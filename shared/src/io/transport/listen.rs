@@ -8,9 +8,12 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
-use quinn::{Connecting, Connection, ConnectionError, Endpoint, Incoming};
+use quinn::{Connecting, ConnectionError, Incoming};
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 use tokio::time::timeout;
+
+use super::connection::Connection;
+use super::endpoint::{Endpoint, Raw, join};
 
 /// Handshakes at once. More are refused: a slave has one master, and a flood must not cost it its ticks.
 const HANDSHAKES_MAX: usize = 8;
@@ -71,6 +74,7 @@ pub struct TurnedAway {
 pub struct Handshake {
     connecting: Connecting,
     address: SocketAddr,
+    raw: Raw,
     _place: OwnedSemaphorePermit,
 }
 
@@ -93,9 +97,9 @@ fn admission(places_left: usize, address_proven: bool) -> Admission {
 
 impl Listener {
     /// A listener on an endpoint that accepts.
-    pub fn new(endpoint: Endpoint) -> Self {
+    pub fn new(endpoint: impl Into<Endpoint>) -> Self {
         Self {
-            endpoint,
+            endpoint: endpoint.into(),
             places: Arc::new(Semaphore::new(HANDSHAKES_MAX)),
             refused: AtomicU64::new(0),
             asked_to_prove: AtomicU64::new(0),
@@ -115,7 +119,7 @@ impl Listener {
     /// The next handshake that is let in; `None` once the endpoint is closed. Cancel-safe.
     pub async fn next(&self) -> Option<Handshake> {
         loop {
-            let incoming = self.endpoint.accept().await?;
+            let incoming = self.endpoint.quic.accept().await?;
             if let Some(handshake) = self.admit(incoming) {
                 return Some(handshake);
             }
@@ -147,6 +151,7 @@ impl Listener {
             Ok(connecting) => Some(Handshake {
                 connecting,
                 address,
+                raw: self.endpoint.raw.clone(),
                 _place: place,
             }),
             // quinn has answered with the reason
@@ -171,10 +176,11 @@ impl Handshake {
     /// See [`AcceptError`].
     pub async fn finish(self) -> Result<Connection, AcceptError> {
         let address = self.address;
-        timeout(HANDSHAKE_MAX, self.connecting)
+        let quic = timeout(HANDSHAKE_MAX, self.connecting)
             .await
             .map_err(|_| AcceptError::Slow { address })?
-            .map_err(|source| AcceptError::Failed { address, source })
+            .map_err(|source| AcceptError::Failed { address, source })?;
+        join(quic, &self.raw).ok_or(AcceptError::OtherTransport { address })
     }
 }
 
