@@ -28,17 +28,16 @@ use crate::trace::path::Replay;
 
 /// The most steps of a profile, and the most outages of a link.
 pub const STEPS_MAX: usize = 1000;
-/// The default limit, packets in flight: 10 s at 1 kHz, 15 MB of full-sized packets. `tc` has 1000,
-/// which is 1 s at 1 kHz and drops silently beyond it.
-pub const LIMIT_DEFAULT: u32 = 10_000;
-/// The largest limit, packets in flight: 1.5 GB of full-sized packets.
+/// The largest limit in packets.
 pub const LIMIT_MAX: u32 = 1_000_000;
+/// The largest limit in bytes: 1 TiB.
+pub const LIMIT_MAX_BYTES: u64 = 1 << 40;
 
 /// The settings of one direction of a path.
 ///
 /// Reads and prints as `tc netem` words: [`std::str::FromStr`] and [`std::fmt::Display`] are inverses,
 /// but for settings that name a file ([`crate::words::parse`]). The default passes everything at once.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "String", into = "String")]
 pub struct LinkConfig {
     /// Propagation delay with its jitter.
@@ -68,14 +67,34 @@ pub struct LinkConfig {
     pub rate: Option<Rate>,
     /// What may wait before the bottleneck; without a rate nothing ever waits.
     pub queue: Queue,
-    /// Packets in flight at most, 1 to [`LIMIT_MAX`]; one more is dropped ([`crate::DropCause::Limit`]).
-    pub limit: u32,
+    /// What may be in flight; one packet more is dropped ([`crate::DropCause::Limit`]).
+    pub limit: Limit,
     /// A recorded path that stands in the place of `delay` and `loss`.
     pub replay: Option<Replay>,
     /// The seed of this link's draws, in the place of the one that the link is made with.
     pub seed: Option<u64>,
     /// What changes as time goes by.
     pub profile: Profile,
+}
+
+/// What may be in flight on a link.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Limit {
+    /// Packets, 1 to [`LIMIT_MAX`].
+    pub packets: u32,
+    /// Bytes in them, 1 to [`LIMIT_MAX_BYTES`].
+    pub bytes: u64,
+}
+
+impl Default for Limit {
+    /// 10 s at 1 kHz, 15 MB of full-sized packets (`tc` has 1000, which is 1 s at 1 kHz and drops silently beyond
+    /// it); and 64 MiB, whatever the sizes.
+    fn default() -> Self {
+        Self {
+            packets: 10_000,
+            bytes: 64 << 20,
+        }
+    }
 }
 
 /// What changes as time goes by, counted from the start of the link.
@@ -97,30 +116,6 @@ pub struct Step {
     pub ramp: Duration,
     /// The settings, without a profile of their own.
     pub settings: LinkConfig,
-}
-
-impl Default for LinkConfig {
-    fn default() -> Self {
-        Self {
-            delay: Delay::default(),
-            correlation: Correlation::default(),
-            order: Order::default(),
-            reorder: None,
-            slot: None,
-            loss: Loss::default(),
-            ecn: false,
-            outages: Vec::new(),
-            duplicate: Chance::default(),
-            corrupt: Chance::default(),
-            mtu: None,
-            rate: None,
-            queue: Queue::default(),
-            limit: LIMIT_DEFAULT,
-            replay: None,
-            seed: None,
-            profile: Profile::default(),
-        }
-    }
 }
 
 impl LinkConfig {

@@ -1,36 +1,45 @@
 //! What the settings of a link really do to a stream of packets: measured, not read off the words.
 //!
-//! The link itself is run in virtual time on an even stream, with a seed of its own, so the answer holds
-//! for what the emulator does, order, cut at zero and limit included. Pure.
+//! The link itself is run in virtual time, with a seed of its own, on an even stream or on packets that were
+//! recorded, so the answer holds for what the emulator does, order, cut at zero and limit included. Pure.
 
+use std::collections::BTreeMap;
 use std::fmt;
 use std::time::Duration;
 
+use mmt_shared::rng::Substream;
 use mmt_shared::time::Time;
 use serde::Serialize;
 
-use crate::config::{ConfigError, Correlation, LinkConfig, Loss, Order};
+use crate::config::{ConfigError, Correlation, LinkConfig, Loss, Order, Outage, Service};
 use crate::counters::Drops;
 use crate::direction::LinkId;
 use crate::link::Link;
 use crate::packet::{DropCause, Fate, Packet};
 use crate::record::summary::{mean_run, nearest_rank, runs};
 
-/// Packets sampled. The mean of a delay is then known to 0.4 % of its standard deviation; where delays or
-/// losses hang together in time, ten times as many are.
+/// Packets sampled. The mean of a delay is then known to 0.4 % of its standard deviation.
 pub const PACKETS: u32 = 60_000;
-/// The length of the packets sampled, bytes: that of a small update. It matters where there is a rate.
+/// The most packets sampled: where delays or losses hang together in time, or a queue follows a long trace.
+const PACKETS_MAX: u32 = 10 * PACKETS;
+/// The stretches of an even stream; each begins at a random point of the time between two packets, so that a
+/// stream does not keep step with a trace.
+const STRETCHES: u32 = 100;
+/// The length of the packets that are taken if nobody gives one, bytes: that of a small update. It matters where
+/// there is a rate.
 pub const BYTES: usize = 100;
 /// The rates that can be asked for, packets per second; others are taken to the nearest.
 pub const RATE_RANGE_HZ: (f64, f64) = (0.01, 1e6);
 
 const SEED: u64 = 0x6d6d_745f_6e65_7465;
 
-/// What a link does to an even stream of packets.
+/// What a link does to a stream of packets.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Effect {
     /// The rate of the stream, packets per second.
     pub rate_hz: f64,
+    /// The mean length of its packets, bytes.
+    pub bytes: f64,
     /// Mean delay of what arrives, ms.
     pub mean_ms: f64,
     /// Standard deviation of the delay, ms.
@@ -57,50 +66,164 @@ pub struct Effect {
 }
 
 impl LinkConfig {
-    /// What these settings do to packets sent at `packet_rate_hz`.
+    /// What these settings do to packets of this length sent at `packet_rate_hz`, over the whole of what they
+    /// name: traces, outages, profiles.
     ///
     /// # Errors
     /// A setting out of its range.
-    pub fn expected(&self, packet_rate_hz: f64) -> Result<Effect, ConfigError> {
-        let (config, rate_hz) = (self, clamp_rate(packet_rate_hz));
-        let stream = Stream::through(config, rate_hz)?;
-        let unordered = LinkConfig {
-            order: Order::Free,
-            ..config.clone()
-        };
+    pub fn expected(&self, packet_rate_hz: f64, bytes: usize) -> Result<Effect, ConfigError> {
+        let rate_hz = clamp_rate(packet_rate_hz);
+        self.effect(&Offers::even(self, rate_hz, bytes))
+    }
+
+    /// What these settings do to packets that were offered at these times, with these lengths in bytes; times
+    /// count from the start of the link.
+    ///
+    /// # Errors
+    /// A setting out of its range.
+    pub fn expected_of(&self, packets: &[(Time, usize)]) -> Result<Effect, ConfigError> {
+        self.effect(&Offers::recorded(packets))
+    }
+
+    fn effect(&self, offers: &Offers) -> Result<Effect, ConfigError> {
+        let stream = Stream::through(self, offers)?;
         let mean_ms = mean(&stream.delays_ms);
-        let free_mean_ms = match config.order {
-            // a wait is only that of the order where nothing else waits
-            Order::Fifo if config.profile.steps.is_empty() => {
-                mean(&Stream::through(&unordered, rate_hz)?.delays_ms)
-            }
-            Order::Fifo | Order::Free => mean_ms,
+        // a wait is only that of the order where nothing else waits
+        let in_order = self.order == Order::Fifo && self.profile.steps.is_empty();
+        let free_mean_ms = if in_order && self.jitter_span() > Duration::ZERO {
+            let unordered = LinkConfig {
+                order: Order::Free,
+                ..self.clone()
+            };
+            mean(&Stream::through(&unordered, offers)?.delays_ms)
+        } else {
+            mean_ms
         };
-        let of_all = |packets: u64| packets as f64 / f64::from(sample_size(config));
-        let only_the_model = config.outages.is_empty()
-            && config.mtu.is_none()
-            && config.replay.is_none()
-            && !config.ecn
-            && config.profile.steps.is_empty();
-        let known = config.loss.share().filter(|_| only_the_model);
-        let known_burst = config.loss.mean_burst(rate_hz).filter(|_| only_the_model);
+        let of_all = |packets: u64| packets as f64 / offers.packets.len().max(1) as f64;
+        let only_the_model = self.only_the_model();
+        let known = self.loss.share().filter(|_| only_the_model);
+        let known_burst = self.loss.mean_burst(offers.rate_hz);
+        let known_burst = known_burst.filter(|_| only_the_model);
         let drops = &stream.drops;
         let sampled = drops.loss.plus(drops.outage).plus(drops.mtu).packets;
+        let lengths = offers.packets.iter().map(|(_, bytes)| *bytes as f64);
         Ok(Effect {
-            rate_hz,
+            rate_hz: offers.rate_hz,
+            bytes: mean(&lengths.collect::<Vec<_>>()),
             mean_ms,
             sd_ms: standard_deviation(&stream.delays_ms, mean_ms),
             p99_ms: p99(&stream.delays_ms),
-            waiting_ms: (mean_ms - free_mean_ms).max(0.0),
+            waiting_ms: (mean_ms - free_mean_ms).max(0.0) + 0.0,
             loss: known.unwrap_or(of_all(sampled)),
-            burst_packets: known_burst
-                .unwrap_or_else(|| mean_run(&runs(stream.lost.iter().copied()))),
+            burst_packets: known_burst.unwrap_or_else(|| mean_run(&offers.runs(&stream.lost))),
             queue_drops: of_all(drops.queue.plus(drops.codel).packets),
             over_limit: of_all(drops.limit.packets),
             marked: of_all(stream.marked),
             reordered: stream.reordered as f64 / stream.delays_ms.len().max(1) as f64,
         })
     }
+
+    /// Whether nothing but the loss model loses packets.
+    fn only_the_model(&self) -> bool {
+        self.outages.is_empty()
+            && self.mtu.is_none()
+            && self.replay.is_none()
+            && !self.ecn
+            && self.profile.steps.is_empty()
+    }
+
+    /// After how long all that these settings name has come once; zero where nothing changes with time.
+    fn period(&self) -> Duration {
+        let outage = |outage: &Outage| {
+            let once = outage.at.saturating_add(outage.length.saturating_mul(2));
+            outage.every.map_or(once, |every| outage.at + every)
+        };
+        let trace = self.rate.as_ref().and_then(|rate| match &rate.service {
+            Service::Opportunities(trace) => Some(trace.period()),
+            Service::Constant { .. } => None,
+        });
+        let steps = &self.profile.steps;
+        let end = steps.last().map(|step| (step.at + step.ramp) * 2);
+        let own = [
+            self.outages.iter().map(outage).max(),
+            self.replay.as_ref().map(|replay| replay.path.period()),
+            trace,
+            self.profile.repeat.or(end),
+        ];
+        let of_steps = steps.iter().map(|step| step.settings.period());
+        own.into_iter()
+            .flatten()
+            .chain(of_steps)
+            .max()
+            .unwrap_or_default()
+    }
+}
+
+/// The packets that an effect is worked out for.
+struct Offers {
+    rate_hz: f64,
+    packets: Vec<(Time, usize)>,
+    /// After how many packets there is a gap, if there are gaps.
+    unbroken: Option<usize>,
+}
+
+impl Offers {
+    fn recorded(packets: &[(Time, usize)]) -> Self {
+        let (first, last) = (packets.first(), packets.last());
+        let length = first
+            .zip(last)
+            .map(|((first, _), (last, _))| last.saturating_since(*first));
+        let length = length.unwrap_or_default().as_secs_f64();
+        let intervals = packets.len().saturating_sub(1) as f64;
+        Self {
+            rate_hz: clamp_rate(if length > 0.0 {
+                intervals / length
+            } else {
+                0.0
+            }),
+            packets: packets.to_vec(),
+            unbroken: None,
+        }
+    }
+
+    /// An even stream in stretches over the whole period of the settings: without a gap where a queue carries
+    /// what one packet did to the next, else anywhere in it.
+    fn even(config: &LinkConfig, rate_hz: f64, bytes: usize) -> Self {
+        let number = sample_size(config, rate_hz);
+        let interval = 1.0 / rate_hz;
+        let natural = f64::from(number) * interval;
+        let (period, queue) = (config.period().as_secs_f64(), has_rate(config));
+        let span = if queue { natural } else { natural.max(period) };
+        let each = number / STRETCHES;
+        let length = span / f64::from(STRETCHES);
+        let slack = (length - f64::from(each) * interval).max(interval);
+        let mut dither = Substream::new(SEED, "netem/effect", 0);
+        let packets = (0..STRETCHES).flat_map(|stretch| {
+            let begin = f64::from(stretch) * length + slack * dither.uniform();
+            (0..each).map(move |packet| {
+                let at = Duration::from_secs_f64(begin + f64::from(packet) * interval);
+                (Time::ZERO + at, bytes)
+            })
+        });
+        Self {
+            rate_hz,
+            packets: packets.collect(),
+            unbroken: (span > natural).then_some(each as usize),
+        }
+    }
+
+    /// Runs of lost packets; none goes on across a gap.
+    fn runs(&self, lost: &[bool]) -> BTreeMap<u64, u64> {
+        let gap = self.unbroken.map(|_| false);
+        let stretches = lost.chunks(self.unbroken.unwrap_or(usize::MAX));
+        runs(stretches.flat_map(|stretch| stretch.iter().copied().chain(gap)))
+    }
+}
+
+/// Whether there is a bottleneck at any time.
+fn has_rate(config: &LinkConfig) -> bool {
+    let steps = &mut config.profile.steps.iter();
+    config.rate.is_some() || steps.any(|step| step.settings.rate.is_some())
 }
 
 fn clamp_rate(rate_hz: f64) -> f64 {
@@ -114,15 +237,28 @@ fn clamp_rate(rate_hz: f64) -> f64 {
 }
 
 /// How many packets show what these settings do.
-fn sample_size(config: &LinkConfig) -> u32 {
-    let in_time = matches!(config.correlation, Correlation::InTime(_))
-        || matches!(config.loss, Loss::Bursts(_))
-        || !config.outages.is_empty()
-        || !config.profile.steps.is_empty();
-    if in_time { 10 * PACKETS } else { PACKETS }
+fn sample_size(config: &LinkConfig, rate_hz: f64) -> u32 {
+    // a thousand times the time over which delays hang together, and a whole trace with its queue
+    let together = match config.correlation {
+        Correlation::InTime(tau) => tau.saturating_mul(1000),
+        Correlation::None | Correlation::PerPacket(_) => Duration::ZERO,
+    };
+    let whole = if has_rate(config) {
+        config.period()
+    } else {
+        Duration::ZERO
+    };
+    let needed = together.max(whole).as_secs_f64() * rate_hz;
+    let sampled_bursts = matches!(config.loss, Loss::Bursts(_)) && !config.only_the_model();
+    let needed = if sampled_bursts {
+        needed.max(f64::from(PACKETS_MAX))
+    } else {
+        needed
+    };
+    needed.clamp(PACKETS.into(), PACKETS_MAX.into()) as u32
 }
 
-/// An even stream after the link.
+/// A stream after the link.
 struct Stream {
     /// Delays of what arrived, ms, in order of arrival.
     delays_ms: Vec<f64>,
@@ -134,26 +270,24 @@ struct Stream {
 }
 
 impl Stream {
-    fn through(config: &LinkConfig, rate_hz: f64) -> Result<Self, ConfigError> {
+    fn through(config: &LinkConfig, offers: &Offers) -> Result<Self, ConfigError> {
         let mut link = Link::try_new(config.clone(), SEED, LinkId::UP)?;
-        let packets = sample_size(config);
         let mut stream = Self {
-            delays_ms: Vec::with_capacity(PACKETS as usize),
+            delays_ms: Vec::with_capacity(offers.packets.len()),
             reordered: 0,
             drops: Drops::default(),
             marked: 0,
-            lost: vec![false; packets as usize],
+            lost: vec![false; offers.packets.len()],
         };
         let mut newest = 0;
         let ecn_capable = config.ecn || config.profile.steps.iter().any(|step| step.settings.ecn);
-        for packet in 0..packets {
-            let now = Time::ZERO + Duration::from_secs_f64(f64::from(packet) / rate_hz);
-            stream.collect(&mut link, now, &mut newest);
+        for (now, bytes) in &offers.packets {
+            stream.collect(&mut link, *now, &mut newest);
             let packet = Packet {
                 ecn_capable,
-                ..Packet::new(BYTES, ())
+                ..Packet::new(*bytes, ())
             };
-            link.offer(now, packet);
+            link.offer(*now, packet);
         }
         stream.collect(&mut link, Time::MAX, &mut newest);
         stream.drops = link.counters().dropped;
@@ -183,12 +317,13 @@ impl Stream {
 }
 
 fn mean(values: &[f64]) -> f64 {
-    values.iter().sum::<f64>() / values.len().max(1) as f64
+    // the sum of nothing is minus zero
+    (values.iter().sum::<f64>() + 0.0) / values.len().max(1) as f64
 }
 
 fn standard_deviation(values: &[f64], mean: f64) -> f64 {
     let sum: f64 = values.iter().map(|x| (x - mean) * (x - mean)).sum();
-    (sum / values.len().max(1) as f64).sqrt()
+    ((sum + 0.0) / values.len().max(1) as f64).sqrt()
 }
 
 /// Nearest-rank 99th percentile; zero if nothing arrived.
@@ -201,10 +336,13 @@ fn p99(values: &[f64]) -> f64 {
 /// One line for a person.
 impl fmt::Display for Effect {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "at {} packets/s", self.rate_hz)?;
+        if self.bytes != BYTES as f64 {
+            write!(f, " of {:.0} bytes", self.bytes)?;
+        }
         write!(
             f,
-            "at {} packets/s: delay mean {:.2} ms, s.d. {:.2} ms, p99 {:.2} ms; loss {:.3} %",
-            self.rate_hz,
+            ": delay mean {:.2} ms, s.d. {:.2} ms, p99 {:.2} ms; loss {:.3} %",
             self.mean_ms,
             self.sd_ms,
             self.p99_ms,

@@ -48,7 +48,7 @@ impl<T: Clone> Link<T> {
         config.check()?;
         let seed = config.seed.unwrap_or(seed);
         Ok(Self {
-            stages: Stages::new(seed, id, config.limit),
+            stages: Stages::new(seed, id, config.limit.packets),
             timeline: Timeline::new(Time::ZERO, config),
         })
     }

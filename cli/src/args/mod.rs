@@ -244,13 +244,19 @@ pub(crate) struct NetemArguments {
     /// Packets per second for which the effect of the networks is printed at the start
     #[arg(long, value_name = "N", default_value_t = 100.0)]
     pub(crate) rate: f64,
+    /// Length of these packets, bytes of UDP payload
+    #[arg(long, value_name = "N", default_value_t = mmt_netem::effect::BYTES)]
+    pub(crate) bytes: usize,
+    /// Masters at one time; datagrams of one more are dropped and counted
+    #[arg(long, value_name = "N", default_value_t = mmt_netem::io::relay::CLIENTS)]
+    pub(crate) clients: usize,
     /// Record every packet in this file: CSV if its name ends in .csv, else a compact form
     #[arg(long, value_name = "FILE")]
     pub(crate) record: Option<PathBuf>,
     /// Give every master a new port toward the slave this often, as a NAT that forgets
     #[arg(long, value_name = "TIME", value_parser = values::duration)]
     pub(crate) rebind: Option<Duration>,
-    /// Take orders from stdin while running, one a line: up WORDS, down WORDS, rebind
+    /// Take commands from stdin while running, one a line: up WORDS, down WORDS, rebind
     #[arg(long)]
     pub(crate) control: bool,
     /// How long [default: until Ctrl-C]

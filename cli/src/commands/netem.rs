@@ -3,8 +3,10 @@
 use std::net::{SocketAddr, ToSocketAddrs};
 use std::path::Path;
 use std::sync::mpsc::{Receiver, channel};
+use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
+use mmt_netem::config::ConfigError;
 use mmt_netem::io::record_file::RecordFile;
 use mmt_netem::io::relay::{Extras, Relay, RelayError, RelayHandle, RelaySnapshot};
 use mmt_netem::record::Heading;
@@ -41,6 +43,8 @@ pub(crate) struct NetemReport {
     ending: &'static str,
     /// Whether this host was too slow for the run to be about these networks.
     degraded: bool,
+    /// Whether a master was turned away because there were as many as --clients allows.
+    refused_clients: bool,
     counters: RelaySnapshot,
     configuration: NetemConfiguration,
 }
@@ -67,8 +71,6 @@ pub(crate) fn run(arguments: &NetemArguments) -> Result<(), Failure> {
     let (Some(listen), Some(to)) = (arguments.listen, &arguments.to) else {
         return Err(Failure::usage("a relay needs --listen and --to").remedy("give both"));
     };
-    let effect_of = |link: &LinkConfig| link.expected(arguments.rate).map_err(Failure::usage);
-    let (effect_up, effect_down) = (effect_of(&arguments.up)?, effect_of(&arguments.down)?);
     let to = resolve(to)?;
     let stop = Stop::on_signals()?;
     let (up, down) = (arguments.up.clone(), arguments.down.clone());
@@ -78,14 +80,14 @@ pub(crate) fn run(arguments: &NetemArguments) -> Result<(), Failure> {
     let extras = Extras {
         record: record.as_ref().map(RecordFile::writer),
         rebind_every: arguments.rebind,
+        clients: Some(arguments.clients),
     };
     let relay = Relay::bind(listen, to, up, down, arguments.seed, extras);
     let relay = relay.map_err(start_error)?;
     let local = relay.local_addr();
-    note(format_args!("up   (to {to}): {effect_up}"));
-    note(format_args!("down (to masters): {effect_down}"));
     print(local)?;
     let began = Instant::now();
+    let effects = announce(arguments, to);
     let commands = arguments.control.then(lines_of_stdin);
     wait(&relay, &stop, arguments, commands.as_ref());
     let duration_s = began.elapsed().as_secs_f64();
@@ -95,6 +97,10 @@ pub(crate) fn run(arguments: &NetemArguments) -> Result<(), Failure> {
         "finished"
     };
     let counters = relay.stop().map_err(Failure::failed)?;
+    let effects = effects.join();
+    let effects =
+        effects.map_err(|_| Failure::failed("the effect of the networks is not known"))?;
+    let (effect_up, effect_down) = effects.map_err(Failure::usage)?;
     let written = record.map(RecordFile::finish).transpose();
     written.map_err(|error| Failure::failed(format!("the record: {error}")))?;
     let report = NetemReport {
@@ -104,6 +110,7 @@ pub(crate) fn run(arguments: &NetemArguments) -> Result<(), Failure> {
         duration_s,
         ending,
         degraded: counters.lateness.degraded(),
+        refused_clients: counters.refused.packets > 0,
         counters,
         configuration: NetemConfiguration {
             listen: local.to_string(),
@@ -119,6 +126,22 @@ pub(crate) fn run(arguments: &NetemArguments) -> Result<(), Failure> {
     } else {
         print(format_args!("\n{report}"))
     }
+}
+
+/// What the networks will do, worked out and printed while the relay is at work already.
+fn announce(
+    arguments: &NetemArguments,
+    to: SocketAddr,
+) -> JoinHandle<Result<(Effect, Effect), ConfigError>> {
+    let (up, down) = (arguments.up.clone(), arguments.down.clone());
+    let (rate, bytes) = (arguments.rate, arguments.bytes);
+    std::thread::spawn(move || {
+        let effect_up = up.expected(rate, bytes)?;
+        note(format_args!("up   (to {to}): {effect_up}"));
+        let effect_down = down.expected(rate, bytes)?;
+        note(format_args!("down (to masters): {effect_down}"));
+        Ok((effect_up, effect_down))
+    })
 }
 
 fn heading(arguments: &NetemArguments) -> Heading {
@@ -156,12 +179,20 @@ fn wait(
 ) {
     let (began, duration) = (Instant::now(), arguments.duration);
     let mut links = (arguments.up.clone(), arguments.down.clone());
+    let mut refused = false;
     let over = || duration.is_some_and(|duration| began.elapsed() >= duration);
     while !stop.asked() && !over() && relay.is_running() {
         for line in commands.into_iter().flat_map(Receiver::try_iter) {
             if let Err(what) = apply(&line, relay, &mut links) {
                 note(what);
             }
+        }
+        if !refused && relay.snapshot().refused.packets > 0 {
+            refused = true;
+            let most = arguments.clients;
+            note(format_args!(
+                "a master was turned away: there are {most} already (--clients), or no socket is to be had"
+            ));
         }
         let left = duration.map(|duration| duration.saturating_sub(began.elapsed()));
         std::thread::sleep(left.map_or(CHECK_EVERY, |left| left.min(CHECK_EVERY)));

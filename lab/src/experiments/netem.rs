@@ -44,7 +44,9 @@ type Group = grid::Group<Case, Met>;
 fn case(preset: &'static Preset) -> Result<Case, ExperimentError> {
     let refused = |error: &dyn std::fmt::Display| ExperimentError::network(preset.name, error);
     let config: LinkConfig = preset.words.parse().map_err(|error| refused(&error))?;
-    let configured = config.expected(RATE_HZ).map_err(|error| refused(&error))?;
+    let configured = config
+        .expected(RATE_HZ, BYTES)
+        .map_err(|error| refused(&error))?;
     Ok(Case {
         preset,
         config,
@@ -87,7 +89,8 @@ fn columns<'a>() -> [Column<'a, Group>; 14] {
         column("loss", "", 5, |group| group.case.configured.loss),
         mean("loss_achieved", "", 5, |met| Some(met.summary.loss)),
         column("burst_packets", "", 1, |group| group.case.configured.burst_packets),
-        mean("burst_packets_achieved", "", 1, |met| Some(met.summary.burst_packets)),
+        // a seed without a burst has no mean length of one
+        mean("burst_packets_achieved", "", 1, |met| (!met.summary.loss_bursts.is_empty()).then_some(met.summary.burst_packets)),
         column("reordered", "", 4, |group| group.case.configured.reordered),
         mean("reordered_achieved", "", 4, |met| Some(met.summary.reordered)),
     ]

@@ -2,7 +2,9 @@
 
 use std::time::Duration;
 
-use super::{DELAY_MAX, LIMIT_MAX, LinkConfig, Loss, RATE_MAX_BIT_S, STEPS_MAX, Service};
+use super::{
+    DELAY_MAX, LIMIT_MAX, LIMIT_MAX_BYTES, LinkConfig, Loss, RATE_MAX_BIT_S, STEPS_MAX, Service,
+};
 
 /// A setting of a link out of its range.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
@@ -48,9 +50,12 @@ impl LinkConfig {
     /// The first setting out of its range, with the range.
     pub fn check(&self) -> Result<(), ConfigError> {
         self.check_delay()?;
-        if !(1..=LIMIT_MAX).contains(&self.limit) {
-            return Err(ConfigError::LimitOutOfRange { limit: self.limit });
+        let limit = self.limit.packets;
+        if !(1..=LIMIT_MAX).contains(&limit) {
+            return Err(ConfigError::LimitOutOfRange { limit });
         }
+        let bytes = (1..=LIMIT_MAX_BYTES).contains(&self.limit.bytes);
+        holds(bytes, "the limit in bytes", "between 1 and 1 TiB")?;
         self.check_loss()?;
         self.check_bottleneck()?;
         self.check_profile()
@@ -82,6 +87,8 @@ impl LinkConfig {
     fn check_loss(&self) -> Result<(), ConfigError> {
         let outages = self.outages.len() <= STEPS_MAX;
         holds(outages, "the outages", "1000 at most")?;
+        let last = self.outages.iter().all(|outage| !outage.length.is_zero());
+        holds(last, "an outage", "longer than nothing")?;
         match &self.loss {
             Loss::FourState(chain) => holds(
                 chain.is_chain(),

@@ -42,7 +42,10 @@ fn settings_out_of_range_are_refused_with_their_value() {
     assert_eq!(config.check(), Err(ConfigError::DelayTooLong { delay }));
     for limit in [0, LIMIT_MAX + 1] {
         let config = LinkConfig {
-            limit,
+            limit: Limit {
+                packets: limit,
+                ..Limit::default()
+            },
             ..LinkConfig::default()
         };
         assert_eq!(config.check(), Err(ConfigError::LimitOutOfRange { limit }));

@@ -6,7 +6,7 @@ fn at_1_khz(words: &str) -> Effect {
     words
         .parse::<LinkConfig>()
         .unwrap()
-        .expected(1000.0)
+        .expected(1000.0, BYTES)
         .unwrap()
 }
 
@@ -47,9 +47,9 @@ fn the_share_reordered_is_the_one_known_of_tc_and_falls_with_the_rate() {
     let config: LinkConfig = "delay 50ms 5ms distribution normal order free"
         .parse()
         .unwrap();
-    let fast = config.expected(1000.0).unwrap().reordered;
+    let fast = config.expected(1000.0, BYTES).unwrap().reordered;
     assert!((fast - 0.72).abs() < 0.02, "{fast}");
-    assert_eq!(config.expected(7.0).unwrap().reordered, 0.0);
+    assert_eq!(config.expected(7.0, BYTES).unwrap().reordered, 0.0);
 }
 
 #[test]
@@ -70,7 +70,7 @@ fn rates_without_sense_are_taken_to_the_nearest_with_sense() {
         (0.0, low),
         (f64::INFINITY, high),
     ] {
-        assert_eq!(config.expected(asked).unwrap().rate_hz, used);
+        assert_eq!(config.expected(asked, BYTES).unwrap().rate_hz, used);
     }
 }
 
@@ -93,8 +93,12 @@ fn the_formula_for_bursts_is_what_a_stream_meets() {
         ("loss burst 30% 40ms", 10.0),
     ] {
         let config: LinkConfig = words.parse().unwrap();
-        let known = config.expected(rate_hz).unwrap().burst_packets;
-        let stream = Stream::through(&config, rate_hz).unwrap();
+        let known = config.expected(rate_hz, BYTES).unwrap().burst_packets;
+        let interval = Duration::from_secs_f64(1.0 / rate_hz);
+        let packets: Vec<_> = (0..PACKETS_MAX)
+            .map(|packet| (Time::ZERO + interval * packet, BYTES))
+            .collect();
+        let stream = Stream::through(&config, &Offers::recorded(&packets)).unwrap();
         let met = mean_run(&runs(stream.lost.iter().copied()));
         assert!((met / known - 1.0).abs() < 0.15, "{words}: {met} {known}");
     }
@@ -123,4 +127,71 @@ fn what_is_marked_is_not_lost() {
     assert!((effect.marked - 0.02).abs() < 0.003, "{}", effect.marked);
     assert!(effect.to_string().contains("% marked (ECN)"), "{effect}");
     assert!(!at_1_khz("loss 2%").to_string().contains("marked"));
+}
+
+#[test]
+fn the_sizes_of_the_packets_count_and_so_do_their_times() {
+    // iperf3's 1448 bytes at 2 Mbit/s into 1 Mbit/s with 100 ms of queue
+    let config: LinkConfig = "rate 1mbit 28 queue 100ms".parse().unwrap();
+    let even = config.expected(2e6 / 8.0 / 1448.0, 1448).unwrap();
+    assert!((even.queue_drops - 0.51).abs() < 0.01, "{even}");
+    assert!((100.0..125.0).contains(&even.mean_ms), "{even}");
+    assert!(
+        even.to_string().contains("packets/s of 1448 bytes"),
+        "{even}"
+    );
+    // ten at once, every 100 ms: each waits for those before it
+    let burst = |packet: u64| (Time::from_millis(packet / 10 * 100), 972);
+    let bursts: Vec<_> = (0..1000).map(burst).collect();
+    let effect = config.expected_of(&bursts).unwrap();
+    assert!((effect.mean_ms - 8.0 * 5.5).abs() < 1e-6, "{effect}");
+    assert_eq!((effect.queue_drops, effect.bytes), (0.0, 972.0));
+}
+
+#[test]
+fn a_whole_trace_shows_and_no_stream_keeps_step_with_it() {
+    use crate::trace::Sample;
+    use crate::trace::path::{PathTrace, Replay};
+    use std::sync::Arc;
+    let replayed = |samples: Vec<Sample>| {
+        let path = Arc::new(PathTrace::try_new(samples).unwrap());
+        LinkConfig {
+            replay: Some(Replay {
+                name: "t".to_owned(),
+                direction: None,
+                path,
+            }),
+            ..LinkConfig::default()
+        }
+    };
+    // an hour whose last half is 60 ms instead of 20
+    let sample = |s: u64, ms| Sample {
+        at: Duration::from_secs(s),
+        delay: Some(Duration::from_millis(ms)),
+    };
+    let hour = (0..3600).map(|s| sample(s, if s < 1800 { 20 } else { 60 }));
+    let effect = replayed(hour.collect()).expected(1000.0, BYTES).unwrap();
+    assert!((effect.mean_ms - 40.0).abs() < 0.5, "{effect}");
+    // every other sample of a trace as fast as the stream is lost
+    let beat = (0..2000).map(|at| Sample {
+        at: Duration::from_millis(5 * at),
+        delay: (at % 2 == 0).then_some(Duration::from_millis(9)),
+    });
+    let effect = replayed(beat.collect()).expected(100.0, BYTES).unwrap();
+    assert!((effect.loss - 0.5).abs() < 0.2, "{effect}");
+}
+
+#[test]
+fn nothing_is_less_than_zero() {
+    for words in [
+        "loss 100%",
+        "none",
+        "outage 0ms for 1h every 3600s delay 1ms",
+    ] {
+        let text = match words.parse::<LinkConfig>() {
+            Ok(config) => config.expected(100.0, BYTES).unwrap().to_string(),
+            Err(_) => continue,
+        };
+        assert!(!text.contains("-0"), "{words}: {text}");
+    }
 }

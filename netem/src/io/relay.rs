@@ -32,8 +32,9 @@ use clients::Clients;
 use port::Port;
 use worker::Worker;
 
-/// Clients at one time; datagrams of one more are dropped and counted. Each holds one descriptor.
-pub const CLIENTS_MAX: usize = 64;
+/// Clients at one time unless [`Extras::clients`] sets another number; datagrams of one more are dropped and
+/// counted. Each holds one descriptor.
+pub const CLIENTS: usize = 64;
 /// A client without a datagram in either direction for this long is forgotten: four times QUIC's own
 /// idle timeout in this project.
 pub const CLIENT_IDLE: Duration = Duration::from_secs(60);
@@ -83,7 +84,7 @@ pub struct RelaySnapshot {
     pub clients: u64,
     /// Clients that the relay met since its start.
     pub clients_met: u64,
-    /// Datagrams from clients beyond [`CLIENTS_MAX`], or without a socket to be had: never offered.
+    /// Datagrams from clients beyond the most at one time, or without a socket to be had: never offered.
     pub refused: Tally,
     /// Times that the target's host answered that nobody listens there (ICMP port unreachable).
     pub unreachable: u64,
@@ -105,6 +106,8 @@ pub struct Extras {
     /// How often every client gets a new port toward the target, as behind a NAT that forgets: what the
     /// target sends to the old port is lost.
     pub rebind_every: Option<Duration>,
+    /// Clients at one time; none: [`CLIENTS`].
+    pub clients: Option<usize>,
 }
 
 /// What the handle asks of the thread.
@@ -158,7 +161,7 @@ impl Relay {
             board: Mutex::new(RelaySnapshot::default()),
             lateness,
         });
-        let clients = Clients::new(to);
+        let clients = Clients::new(to, extras.clients.unwrap_or(CLIENTS));
         let mut worker = Worker::new(port, clients, up, down, extras.record, shared.clone());
         worker.rebind_every(extras.rebind_every, origin);
         let thread = std::thread::Builder::new()

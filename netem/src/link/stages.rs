@@ -29,6 +29,7 @@ pub(super) struct Stages<T> {
     /// What leaves at a known time, and what was dropped.
     out: BinaryHeap<Reverse<ByTime<T>>>,
     pub(super) in_flight: usize,
+    bytes_in_flight: u64,
     pub(super) counters: LinkCounters,
 }
 
@@ -63,6 +64,7 @@ impl<T> Stages<T> {
             propagation: Propagation::new(seed, id),
             out: BinaryHeap::with_capacity(ROOM.min(limit as usize)),
             in_flight: 0,
+            bytes_in_flight: 0,
             counters: LinkCounters::default(),
         }
     }
@@ -170,6 +172,7 @@ impl<T> Stages<T> {
         match passes {
             Ok(weight) => {
                 self.in_flight = self.in_flight.saturating_add(1);
+                self.bytes_in_flight = self.bytes_in_flight.saturating_add(bytes as u64);
                 let ecn_capable = packet.ecn_capable;
                 self.bottleneck.push(packet, weight, ecn_capable, now);
                 self.advance(timeline, now);
@@ -220,7 +223,8 @@ impl<T> Stages<T> {
         bytes: usize,
     ) -> Result<u64, DropCause> {
         let settings = timeline.at(now);
-        if self.in_flight >= settings.limit as usize {
+        let held = self.bytes_in_flight.saturating_add(bytes as u64);
+        if self.in_flight >= settings.limit.packets as usize || held > settings.limit.bytes {
             return Err(DropCause::Limit);
         }
         let Some(rate) = &settings.rate else {
@@ -253,7 +257,7 @@ impl<T> Stages<T> {
         departure.queued = sent.queued;
         departure.due = timeline.time(sent.at);
         if let Some(cause) = sent.dropped {
-            self.in_flight = self.in_flight.saturating_sub(1);
+            self.forget(departure.bytes);
             self.counters.dropped.count(cause, departure.bytes);
             if !departure.copy {
                 self.report(timeline, departure, cause);
@@ -275,7 +279,7 @@ impl<T> Stages<T> {
     fn report(&mut self, timeline: &Timeline, mut departure: Departure<T>, cause: DropCause) {
         departure.fate = Fate::Dropped(cause);
         let held = self.out.len().saturating_add(self.bottleneck.len());
-        if held.saturating_sub(self.in_flight) < timeline.config.limit as usize {
+        if held.saturating_sub(self.in_flight) < timeline.config.limit.packets as usize {
             self.out.push(Reverse(ByTime(departure)));
         }
     }
@@ -288,7 +292,7 @@ impl<T> Stages<T> {
         }
         let Reverse(ByTime(departure)) = self.out.pop()?;
         if let Fate::Delivered { marked, .. } = departure.fate {
-            self.in_flight = self.in_flight.saturating_sub(1);
+            self.forget(departure.bytes);
             self.counters.delivered.count(departure.bytes);
             if departure.is_corrupted() {
                 self.counters.corrupted.count(departure.bytes);
@@ -298,6 +302,12 @@ impl<T> Stages<T> {
             }
         }
         Some(departure)
+    }
+
+    /// A packet is on the link no more.
+    fn forget(&mut self, bytes: usize) {
+        self.in_flight = self.in_flight.saturating_sub(1);
+        self.bytes_in_flight = self.bytes_in_flight.saturating_sub(bytes as u64);
     }
 
     pub(super) fn next_event(&self, timeline: &Timeline) -> Option<Time> {

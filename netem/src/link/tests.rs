@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use super::*;
-use crate::config::{Delay, Loss, Order, Probability, Shape};
+use crate::config::{Delay, Limit, Loss, Order, Probability, Shape};
 use crate::direction::Direction;
 use crate::packet::{DropCause, Fate};
 
@@ -218,7 +218,10 @@ fn fifo_holds_across_a_reconfiguration() {
 fn refused_settings_leave_the_old_ones_in_force() {
     let mut link = link("delay 5ms", 1, LinkId::UP);
     let bad = LinkConfig {
-        limit: 0,
+        limit: Limit {
+            packets: 0,
+            bytes: 1,
+        },
         ..LinkConfig::default()
     };
     assert!(link.reconfigure(Time::ZERO, bad).is_err());

@@ -9,10 +9,9 @@ use crate::counters::Tally;
 use crate::direction::Direction;
 use crate::packet::DropCause;
 
-/// Beyond this p99 of release lateness the emulation is degraded.
-pub const P99_DEGRADED_US: f64 = 250.0;
-/// Beyond this maximum the emulation is degraded: one tick of the loops.
-pub const MAX_DEGRADED_US: f64 = 1000.0;
+/// Beyond this p99.9 of release lateness the emulation is degraded: more than 0.1 % of its packets left later
+/// than one tick of the loops.
+pub const P999_DEGRADED_US: f64 = 1000.0;
 
 /// Bins of the delay histogram.
 const DELAY_BINS: usize = 40;
@@ -138,8 +137,7 @@ impl Summary {
         late_us.sort_unstable_by(f64::total_cmp);
         self.p99_ms = nearest_rank(&delays_ms, 0.99);
         self.lateness_us = [0.5, 0.99, 1.0].map(|share| nearest_rank(&late_us, share));
-        let [_, p99, max] = self.lateness_us;
-        self.degraded = p99 > P99_DEGRADED_US || max > MAX_DEGRADED_US;
+        self.degraded = nearest_rank(&late_us, 0.999) > P999_DEGRADED_US;
         self.delay_histogram = histogram(&delays_ms);
         by_sending.sort_unstable();
         self.reordered = reordered(by_sending.iter().map(|(_, number)| *number)) / n;

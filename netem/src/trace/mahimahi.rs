@@ -56,6 +56,11 @@ impl Opportunities {
         })
     }
 
+    /// After how long it begins again.
+    pub(crate) fn period(&self) -> Duration {
+        Duration::from_nanos(self.period_ns)
+    }
+
     /// Bits per second on average.
     #[must_use]
     pub fn mean_bit_s(&self) -> f64 {

@@ -1,6 +1,7 @@
 //! The sentences about loss.
 
 use std::sync::Arc;
+use std::time::Duration;
 
 use super::number::{percentage, time, time_from, whole};
 use super::{ParseError, Parser, Word};
@@ -78,7 +79,7 @@ impl<'a> Parser<'a, '_> {
         if word.text != "for" {
             return Err(word.expected("for and how long"));
         }
-        let length = time(self.argument())?;
+        let length = time_from(self.argument(), Duration::from_nanos(1))?;
         let mut every = None;
         if self.takes("every") {
             let word = self.argument();

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use super::SHAPES;
 use crate::config::{
-    Chance, Codel, Correlation, Delay, LIMIT_DEFAULT, LinkConfig, Loss, Order, Outage, Probability,
+    Chance, Codel, Correlation, Delay, Limit, LinkConfig, Loss, Order, Outage, Probability,
     Profile, Queue, Rate, Service, Shape, Slot, SlotGap,
 };
 use crate::distribution::Cdf;
@@ -55,7 +55,7 @@ impl LinkConfig {
             self.rate.as_ref().map(rate),
             queue(&self.queue),
             self.queue.codel.map(codel),
-            (self.limit != LIMIT_DEFAULT).then(|| format!("limit {}", self.limit)),
+            limit(self.limit),
             self.seed.map(|seed| format!("seed {seed}")),
         ]);
         sentences
@@ -223,6 +223,14 @@ fn queue(queue: &Queue) -> Option<String> {
     let limits: Vec<String> = limits.into_iter().flatten().collect();
     let end = if queue.drop_head { " drop-head" } else { "" };
     (!limits.is_empty()).then(|| format!("queue {}{end}", limits.join(" ")))
+}
+
+fn limit(limit: Limit) -> Option<String> {
+    let bytes = match limit.bytes {
+        bytes if bytes == Limit::default().bytes => String::new(),
+        bytes => format!(" {bytes}b"),
+    };
+    (limit != Limit::default()).then(|| format!("limit {}{bytes}", limit.packets))
 }
 
 fn codel(codel: Codel) -> String {

@@ -8,7 +8,7 @@ use super::number::{
 };
 use super::{A_WORD, ParseError, Parser, Reason, SHAPES, Word};
 use crate::config::{
-    Chance, Codel, Correlation, Delay, Framing, LIMIT_MAX, Order, Probability, Queue, Rate,
+    Chance, Codel, Correlation, Delay, Framing, LIMIT_MAX, Limit, Order, Probability, Queue, Rate,
     STEPS_MAX, Service, Shape, Slot, SlotGap, TAU_MIN,
 };
 use crate::direction::Direction;
@@ -87,7 +87,7 @@ impl<'a> Parser<'a, '_> {
                 }
             }
             "codel" => config.queue.codel = Some(self.codel()?),
-            "limit" => config.limit = self.count(LIMIT_MAX, "packets")?,
+            "limit" => config.limit = self.limit()?,
             "trace" => config.replay = Some(self.replay()?),
             "slot" => config.slot = Some(self.slot()?),
             "ecn" => config.ecn = true,
@@ -273,6 +273,16 @@ impl<'a> Parser<'a, '_> {
             self.takes("drop-tail");
         }
         Ok(queue)
+    }
+
+    fn limit(&mut self) -> Result<Limit, ParseError> {
+        let packets = self.count(LIMIT_MAX, "packets")?;
+        let bytes = match self.number().map(|word| (word, queue_limit(word))) {
+            None => Limit::default().bytes,
+            Some((_, Ok(QueueLimit::Bytes(bytes)))) => bytes,
+            Some((word, _)) => return Err(word.expected("a size such as 64mb")),
+        };
+        Ok(Limit { packets, bytes })
     }
 
     fn codel(&mut self) -> Result<Codel, ParseError> {

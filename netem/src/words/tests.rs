@@ -6,9 +6,9 @@ use std::sync::Arc;
 
 use super::*;
 use crate::config::{
-    Chance, Codel, ConfigError, Correlation, Delay, Framing, GilbertElliott, LIMIT_DEFAULT,
-    LIMIT_MAX, Loss, Order, Outage, PacketList, Probability, Queue, RATE_MAX_BIT_S, Rate, Reorder,
-    Service, Slot, SlotGap, TimedBursts,
+    Chance, Codel, ConfigError, Correlation, Delay, Framing, GilbertElliott, LIMIT_MAX,
+    LIMIT_MAX_BYTES, Limit, Loss, Order, Outage, PacketList, Probability, Queue, RATE_MAX_BIT_S,
+    Rate, Reorder, Service, Slot, SlotGap, TimedBursts,
 };
 use crate::distribution::Cdf;
 
@@ -36,7 +36,7 @@ fn the_words_of_tc_are_taken_verbatim() {
     let probability = Probability::from_percent(1.0).unwrap();
     assert_eq!(config.loss, Loss::Independent { probability });
     assert_eq!(config.order, Order::Fifo);
-    assert_eq!(config.limit, LIMIT_DEFAULT);
+    assert_eq!(config.limit, Limit::default());
     assert_eq!(
         parsed("latency 50msec 5msecs distribution normal drop random 1"),
         config
@@ -426,7 +426,7 @@ fn any_settings() -> impl Strategy<Value = LinkConfig> {
         (Just(delay), correlation)
     });
     let reorder = prop::option::of((any_chance(), 1..1_000_000_u32));
-    let outage = (any_time(), 0..1000_u32, prop::option::of(1000..2000_u32));
+    let outage = (any_time(), 1..1000_u32, prop::option::of(1000..2000_u32));
     let outages = prop::collection::vec(
         outage.prop_map(|(at, length, every)| Outage {
             at,
@@ -437,7 +437,9 @@ fn any_settings() -> impl Strategy<Value = LinkConfig> {
     );
     let mtu = prop::option::of(1..=u32::MAX);
     let first = (delay, order, reorder, any_loss(), outages);
-    let second = (any_chance(), any_chance(), mtu, any_rate(), 1..=LIMIT_MAX);
+    let bytes = prop_oneof![Just(Limit::default().bytes), 1..=LIMIT_MAX_BYTES];
+    let limit = (1..=LIMIT_MAX, bytes).prop_map(|(packets, bytes)| Limit { packets, bytes });
+    let second = (any_chance(), any_chance(), mtu, any_rate(), limit);
     let third = (prop::option::of(any_slot()), any::<bool>());
     (first, second, third).prop_map(|(first, second, (slot, ecn))| {
         let ((delay, correlation), order, reorder, loss, outages) = first;

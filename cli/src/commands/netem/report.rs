@@ -4,8 +4,9 @@ use std::fmt;
 use std::path::Path;
 
 use mmt_netem::record::summary::Summary;
-use mmt_netem::record::{self, Heading};
+use mmt_netem::record::{self, End, Entry, Heading};
 use mmt_netem::{Direction, Effect};
+use mmt_shared::time::Time;
 use serde::Serialize;
 
 use super::DEGRADED;
@@ -30,7 +31,7 @@ pub(super) struct RecordReport {
 #[derive(Debug, Serialize)]
 struct DirectionReport {
     words: String,
-    /// What the settings do at the rate of the record; none without packets, or where a file that they
+    /// What the settings do to the packets of the record, by another seed; none without packets, or where a file that they
     /// name cannot be read any more.
     configured: Option<Effect>,
     achieved: Summary,
@@ -57,11 +58,12 @@ impl RecordReport {
             Failure::usage(what).remedy("give a file made with mmt netem --record")
         })?;
         let direction = |words: &str, direction| {
+            let offers = offers(&entries, direction);
             let achieved = Summary::of(&entries, direction);
             let configured = network(words)
                 .ok()
                 .filter(|_| achieved.rate_hz > 0.0)
-                .and_then(|link| link.expected(achieved.rate_hz).ok());
+                .and_then(|link| link.expected_of(&offers).ok());
             DirectionReport {
                 words: words.to_owned(),
                 configured,
@@ -79,6 +81,16 @@ impl RecordReport {
             down,
         })
     }
+}
+
+/// When the packets of a direction were offered, and their lengths.
+fn offers(entries: &[Entry], direction: Direction) -> Vec<(Time, usize)> {
+    let copy = |entry: &Entry| matches!(entry.end, End::Sent { copy: true, .. });
+    let mine = entries.iter().filter(|entry| entry.direction == direction);
+    let mut mine: Vec<&Entry> = mine.filter(|entry| !copy(entry)).collect();
+    mine.sort_by_key(|entry| entry.number);
+    let offer = |entry: &&Entry| (entry.offered, entry.bytes as usize);
+    mine.iter().map(offer).collect()
 }
 
 impl fmt::Display for RecordReport {

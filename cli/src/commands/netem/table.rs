@@ -82,6 +82,12 @@ impl NetemReport {
             "released late        p50 {:.0} us, p99 {:.0} us, max {:.0} us",
             late.p50_us, late.p99_us, late.max_us
         )?;
+        if self.refused_clients {
+            write!(
+                f,
+                "\nmasters were turned away: --clients sets how many there can be"
+            )?;
+        }
         if late.degraded() {
             write!(f, "\n{DEGRADED}")?;
         }

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use mmt_netem::effect::BYTES;
 use mmt_netem::io::record_file::RecordFile;
 use mmt_netem::io::socket::{SocketControl, SocketExtras};
 use mmt_netem::record::Heading;
@@ -139,7 +140,7 @@ pub(crate) fn effect(direction: Direction, link: &LinkConfig) -> Result<String, 
         Direction::Up => UP_HZ,
         Direction::Down => DOWN_HZ,
     };
-    let effect = link.expected(rate).map_err(Failure::usage)?;
+    let effect = link.expected(rate, BYTES).map_err(Failure::usage)?;
     Ok(format!(
         "network {:5} {effect}",
         format!("{}:", direction.name())

@@ -6,7 +6,9 @@
 use std::ops::Range;
 use std::time::Duration;
 
-use mmt_netem::config::{ConfigError, Framing, LIMIT_MAX, Outage, Queue, Rate, Service};
+use mmt_netem::config::{
+    ConfigError, Framing, LIMIT_MAX, LIMIT_MAX_BYTES, Limit, Outage, Queue, Rate, Service,
+};
 use mmt_netem::{Departure, Link, LinkConfig, LinkId, Packet};
 use mmt_shared::time::Time;
 use quinn::udp::EcnCodepoint;
@@ -117,7 +119,10 @@ fn bottleneck(conditions: &Conditions) -> LinkConfig {
             wait: bottleneck.map(|bottleneck| bottleneck.queue),
             ..Queue::default()
         },
-        limit: LIMIT_MAX,
+        limit: Limit {
+            packets: LIMIT_MAX,
+            bytes: LIMIT_MAX_BYTES,
+        },
         ..LinkConfig::default()
     }
 }

@@ -7,8 +7,8 @@ use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr, UdpSocket};
 
 use mmt_shared::time::Time;
 
+use super::CLIENT_IDLE;
 use super::port::{Port, Received};
-use super::{CLIENT_IDLE, CLIENTS_MAX};
 
 /// Who sends to the relay.
 #[derive(Debug)]
@@ -34,15 +34,18 @@ pub(super) struct Clients {
     by_number: BTreeMap<u64, Client>,
     by_addr: BTreeMap<SocketAddr, u64>,
     met: u64,
+    /// How many there can be at one time.
+    most: usize,
 }
 
 impl Clients {
-    pub(super) fn new(to: SocketAddr) -> Self {
+    pub(super) fn new(to: SocketAddr, most: usize) -> Self {
         Self {
             to,
             by_number: BTreeMap::new(),
             by_addr: BTreeMap::new(),
             met: 0,
+            most,
         }
     }
 
@@ -83,7 +86,7 @@ impl Clients {
             client.seen(now);
             return Some(*number);
         }
-        if self.by_number.len() >= CLIENTS_MAX {
+        if self.by_number.len() >= self.most {
             return None;
         }
         let client = Client {
@@ -146,7 +149,7 @@ mod tests {
     use super::*;
 
     fn clients() -> Clients {
-        Clients::new((Ipv4Addr::LOCALHOST, 9).into())
+        Clients::new((Ipv4Addr::LOCALHOST, 9).into(), 64)
     }
 
     fn from(port: u16) -> Received<'static> {
@@ -176,7 +179,7 @@ mod tests {
     #[test]
     fn one_client_too_many_is_turned_away_and_an_old_one_is_not() {
         let mut clients = clients();
-        for port in 0..CLIENTS_MAX as u16 {
+        for port in 0..64 {
             assert!(clients.meet(&from(port + 1), Time::ZERO).is_some());
         }
         assert_eq!(clients.meet(&from(1000), Time::ZERO), None);

@@ -4,6 +4,7 @@ use std::net::{IpAddr, Ipv4Addr, Ipv6Addr};
 use std::time::Instant;
 
 use super::*;
+use crate::config::Limit;
 use crate::io::record_file::RecordFile;
 
 const PATIENCE: Duration = Duration::from_secs(30);
@@ -250,7 +251,10 @@ fn what_cannot_work_is_refused_at_the_start() {
     ));
     assert!(matches!(start(address, address), RelayError::Loop { .. }));
     let bad = LinkConfig {
-        limit: 0,
+        limit: Limit {
+            packets: 0,
+            bytes: 1,
+        },
         ..config()
     };
     let refused = Relay::bind(any, address, config(), bad, 1, Extras::default());
@@ -300,7 +304,10 @@ fn a_running_relay_takes_new_settings() {
     client.send_to(b"lost", relay.local_addr()).unwrap();
     until(&relay, |seen| seen.up.link.dropped.loss.packets == 1);
     let bad = LinkConfig {
-        limit: 0,
+        limit: Limit {
+            packets: 0,
+            bytes: 1,
+        },
         ..LinkConfig::default()
     };
     assert!(relay.reconfigure(bad, LinkConfig::default()).is_err());

@@ -11,6 +11,7 @@ use quinn::udp::EcnCodepoint;
 use quinn::{ClientConfig, Endpoint, EndpointConfig, Runtime, ServerConfig, TokioRuntime};
 
 use super::*;
+use crate::config::Limit;
 use crate::counters::Tally;
 use crate::direction::Direction;
 use crate::io::now;
@@ -195,7 +196,10 @@ fn a_socket_at_work_takes_new_settings_and_keeps_the_times_of_what_is_in_flight(
     socket.try_send(&transmit(b"in flight", None)).unwrap();
     reconfigure("loss 100%").unwrap();
     let refused = LinkConfig {
-        limit: 0,
+        limit: Limit {
+            packets: 0,
+            bytes: 1,
+        },
         ..LinkConfig::default()
     };
     assert!(control.reconfigure(refused).is_err());
@@ -407,7 +411,10 @@ fn received_datagrams_are_counted_one_by_one() {
 #[test]
 fn settings_out_of_range_are_refused() {
     let config = LinkConfig {
-        limit: 0,
+        limit: Limit {
+            packets: 0,
+            bytes: 1,
+        },
         ..LinkConfig::default()
     };
     let inner = Arc::new(Pretended::default());

@@ -47,6 +47,23 @@ fn the_limit_bounds_what_is_in_flight_and_names_what_it_drops() {
 }
 
 #[test]
+fn the_limit_bounds_bytes_too() {
+    let offers = |n: u64, bytes| (0..n).map(move |_| (Time::ZERO, Packet::new(bytes, ())));
+    let dropped = |words: &str, n, bytes| {
+        let mut link = link(words, 1, LinkId::UP);
+        run(&mut link, offers(n, bytes));
+        link.counters().dropped.limit.packets
+    };
+    assert_eq!(dropped("delay 1s limit 100 10kb", 20, 1024), 10);
+    // who gives none has 64 MiB
+    assert_eq!(
+        dropped("delay 1s", 2000, 60_000),
+        2000 - (64 << 20) / 60_000
+    );
+    assert_eq!(dropped("delay 1s limit 10000 1024mb", 2000, 60_000), 0);
+}
+
+#[test]
 fn lateness_of_one_link_does_not_reach_the_next() {
     // two links in a row, polled every 7 ms only: the times are those of exact polling
     let mut near = pushed("delay 10ms rate 8mbit", 1);

@@ -118,7 +118,10 @@ fn correlation_in_time_falls_with_time_and_leaves_the_distribution() {
 fn jitter_that_lives_in_time_keeps_the_order_nearly_for_free() {
     let waiting = |words: &str| {
         let config: crate::LinkConfig = words.parse().unwrap();
-        config.expected(1000.0).unwrap().waiting_ms
+        config
+            .expected(1000.0, crate::effect::BYTES)
+            .unwrap()
+            .waiting_ms
     };
     let by_packet = waiting("delay 50ms 5ms distribution normal");
     let in_time = waiting("delay 50ms 5ms tau 100ms distribution normal");
