@@ -77,8 +77,12 @@ pub fn named(name: &str) -> Option<&'static Preset> {
 
 #[cfg(test)]
 mod tests {
+    use std::time::Duration;
+
+    use mmt_shared::time::Time;
+
     use super::*;
-    use crate::LinkConfig;
+    use crate::{Link, LinkConfig, LinkId, Order, Packet};
 
     #[test]
     fn every_preset_parses_prints_as_written_and_is_named_in_the_message() {
@@ -93,10 +97,115 @@ mod tests {
     }
 
     #[test]
-    fn what_is_said_after_a_preset_goes_before_it() {
+    fn what_follows_a_preset_replaces_its_words() {
         let config: LinkConfig = "preset geo loss 2%".parse().unwrap();
         assert_eq!(config.to_string(), "delay 300ms 5ms tau 1s loss 2%");
         assert!("loss 2% preset geo".parse::<LinkConfig>().is_err());
         assert!("preset mars".parse::<LinkConfig>().is_err());
+    }
+
+    /// Delays of a preset's distribution and process, ms, without order and bottleneck, and its loss.
+    fn met(name: &str, interval: Duration, packets: u32) -> (Vec<f64>, f64) {
+        let config: LinkConfig = named(name).unwrap().words.parse().unwrap();
+        let config = LinkConfig {
+            order: Order::Free,
+            rate: None,
+            ..config
+        };
+        let mut link = Link::try_new(config, 11, LinkId::UP).unwrap();
+        let mut delays = Vec::new();
+        for packet in 0..packets {
+            let now = Time::ZERO + interval * packet;
+            link.offer(now, Packet::new(100, ()));
+            let out = link.poll_delivered(Time::MAX);
+            delays.extend(out.map(|out| out.due.saturating_since(now).as_secs_f64() * 1e3));
+        }
+        let lost = 1.0 - delays.len() as f64 / f64::from(packets);
+        (delays, lost)
+    }
+
+    fn mean_and_sd(values: &[f64]) -> (f64, f64) {
+        let n = values.len() as f64;
+        let mean = values.iter().sum::<f64>() / n;
+        let squares = values.iter().map(|x| (x - mean).powi(2));
+        (mean, (squares.sum::<f64>() / n).sqrt())
+    }
+
+    #[test]
+    fn every_preset_has_the_mean_the_spread_and_the_loss_that_follow_from_its_words_by_hand() {
+        // pieces of a distribution: share, from, to
+        let pieces = |pieces: &[(f64, f64, f64)]| {
+            let mean: f64 = pieces.iter().map(|(p, a, b)| p * (a + b) / 2.0).sum();
+            let square = |(p, a, b): &(f64, f64, f64)| p * (a * a + a * b + b * b) / 3.0;
+            let squares: f64 = pieces.iter().map(square).sum();
+            (mean, (squares - mean * mean).sqrt())
+        };
+        let wifi = [
+            (0.5, 1.0, 3.0),
+            (0.4, 3.0, 20.0),
+            (0.09, 20.0, 250.0),
+            (0.01, 250.0, 300.0),
+        ];
+        let starlink = [
+            (0.25, 10.0, 20.0),
+            (0.25, 20.0, 25.0),
+            (0.25, 25.0, 30.0),
+            (0.25, 30.0, 60.0),
+        ];
+        let root = 3.0_f64.sqrt();
+        for (name, (mean, sd), lost) in [
+            ("lan", (0.2, 0.05 / root), 0.0),
+            ("wifi", pieces(&wifi), 0.001),
+            ("4g", (30.0, 8.0), 0.001),
+            ("5g", (12.0, 3.0), 0.0005),
+            ("5g-up", (18.0, 4.0), 0.0005),
+            ("5g-down", (7.0, 2.0), 0.0005),
+            (
+                "starlink",
+                pieces(&starlink),
+                1.0 - 0.995 * (1.0 - 0.1 / 15.0),
+            ),
+            ("geo", (300.0, 5.0 / root), 0.001),
+            ("transatlantic", (40.0, 1.0 / root), 0.0005),
+            ("paper", (0.0, 0.0), 0.0),
+        ] {
+            // 10.007 s apart, ten times the longest tau, packets are independent and meet no multiple of 15 s
+            let n = 40_000;
+            let (delays, found_lost) = met(name, Duration::from_millis(10_007), n);
+            let (found_mean, found_sd) = mean_and_sd(&delays);
+            let spread = f64::from(n).sqrt();
+            assert!(
+                (found_mean - mean).abs() <= 4.0 * sd / spread,
+                "{name}: mean {found_mean}, not {mean}"
+            );
+            // the heaviest tail here has a kurtosis of 16
+            assert!(
+                (found_sd - sd).abs() <= 8.0 * sd / spread,
+                "{name}: s.d. {found_sd}, not {sd}"
+            );
+            let share = 4.0 * f64::sqrt(lost * (1.0 - lost)) / spread;
+            assert!(
+                (found_lost - lost).abs() <= share,
+                "{name}: loss {found_lost}, not {lost}"
+            );
+        }
+    }
+
+    #[test]
+    fn the_step_from_packet_to_packet_is_that_of_the_process() {
+        // log-normal over a Gaussian of correlation rho: covariance exp(s^2 rho) - 1
+        for (name, mean, sd) in [("4g", 30.0, 8.0), ("5g", 12.0, 3.0), ("5g-down", 7.0, 2.0)] {
+            let s2 = libm::log1p((sd / mean) * (sd / mean));
+            let rho = libm::exp(-1.0 / 50.0);
+            let correlation = libm::expm1(s2 * rho) / libm::expm1(s2);
+            let expected = sd * (2.0 * (1.0 - correlation)).sqrt();
+            let (delays, _) = met(name, Duration::from_millis(1), 200_000);
+            let steps = delays.windows(2).map(|pair| (pair[1] - pair[0]).powi(2));
+            let step = (steps.sum::<f64>() / (delays.len() - 1) as f64).sqrt();
+            assert!(
+                (step / expected - 1.0).abs() < 0.05,
+                "{name}: {step}, not {expected}"
+            );
+        }
     }
 }

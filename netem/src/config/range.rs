@@ -87,8 +87,6 @@ impl LinkConfig {
     fn check_loss(&self) -> Result<(), ConfigError> {
         let outages = self.outages.len() <= STEPS_MAX;
         holds(outages, "the outages", "1000 at most")?;
-        let last = self.outages.iter().all(|outage| !outage.length.is_zero());
-        holds(last, "an outage", "longer than nothing")?;
         match &self.loss {
             Loss::FourState(chain) => holds(
                 chain.is_chain(),
