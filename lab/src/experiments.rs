@@ -10,6 +10,7 @@ mod fig5;
 mod loss;
 mod netem;
 mod physics;
+mod readings;
 mod recovery;
 mod repeats;
 pub mod scenarios;
@@ -20,14 +21,15 @@ mod tupdate;
 
 use crate::experiment::description::Experiment;
 
-/// Every experiment, in the order in which all of them run.
-pub const ALL: [&Experiment; 14] = [
+/// Every experiment, in the order in which they run.
+pub const ALL: [&Experiment; 15] = [
     &physics::PHYSICS,
     &fig5::FIG5,
     &traces::FIG6,
     &traces::FIG7,
     &claims::CLAIMS,
     &ablation::ABLATION,
+    &readings::EXPERIMENT,
     &schemes::SCHEMES,
     &scenarios::EXPERIMENT,
     &tupdate::TUPDATE,

@@ -1,10 +1,14 @@
 //! The paper's experiment as a world: no delay, one sample a packet, and the choices the paper leaves open.
 //!
-//! Literal where the paper is literal: a received pose is set on arrival, which is sound without delay.
+//! Literal where the paper is literal: a received pose is set on arrival, which is sound without delay. The same hand pushes
+//! in both modes. It sees the real object, because the local model is not displayed (IV-A), and draws back as soon as a
+//! push is over, because the paper mentions no rest.
 
 use std::time::Duration;
 
 use mmt_client::device::DeviceProfile;
+use mmt_client::operator::scripted::{Picture, ScriptedConfig};
+use mmt_server::estimator::{EstimatorConfig, ObjectMotion, PaperConfig};
 use mmt_server::playout::PlayoutConfig;
 use mmt_server::slave::SlaveConfig;
 use mmt_server::trigger::{Scheme, TriggerConfig};
@@ -122,6 +126,38 @@ impl Point {
     }
 }
 
+/// A choice of the paper's experiment made otherwise: its name and what it makes of the world.
+pub(crate) type Variant = (&'static str, fn(&mut WorldConfig));
+
+/// The choices that can be read out of the paper's text, each made otherwise. `docs/model.md` has the sentences.
+pub(crate) static READINGS: [Variant; 5] = [
+    ("estimates from the first instant of contact", |world| {
+        paper_estimator(world, |paper| paper.stable_after_s = 0.0);
+    }),
+    ("motion of the tool", |world| {
+        paper_estimator(world, |paper| paper.motion = ObjectMotion::Tool);
+    }),
+    ("timer packets carry no pose", |world| {
+        world.slave.trigger.timer_carries_pose = false;
+    }),
+    ("rest of 0.4 s after a push", |world| {
+        world.operator.hold_s = 0.4;
+    }),
+    ("operator sees the local model", |world| {
+        world.operator.view = Picture::Model;
+    }),
+];
+
+/// Changes the paper's estimator in a world of paper mode.
+pub(crate) fn paper_estimator(world: &mut WorldConfig, change: impl FnOnce(&mut PaperConfig)) {
+    let mut paper = match world.slave.estimator {
+        Some(EstimatorConfig::Paper(paper)) => paper,
+        _ => PaperConfig::default(),
+    };
+    change(&mut paper);
+    world.slave.estimator = Some(EstimatorConfig::Paper(paper));
+}
+
 /// How much steeper PMSE falls from 30 to 10 % than from 10 to 2.5 %: the difference of the exponents d ln PMSE / d ln
 /// Delta; of the PMSE at 2.5, 10 and 30 %.
 pub(crate) fn knee(fine: f64, middle: f64, coarse: f64) -> f64 {
@@ -152,6 +188,11 @@ pub fn paper_world(mode: Mode, scheme: Scheme) -> WorldConfig {
         Mode::Recommended => settings,
     };
     WorldConfig {
+        operator: ScriptedConfig {
+            view: Picture::Delayed,
+            hold_s: 0.0,
+            ..ScriptedConfig::default()
+        },
         slave: SlaveConfig {
             playout: PlayoutConfig {
                 delay_ms: 0.0,

@@ -24,6 +24,45 @@ fn t_975(freedom: usize) -> f64 {
     })
 }
 
+/// How probable a Student's t at least so far from zero is: two-sided, for whole degrees of freedom (Abramowitz and Stegun 1964,
+/// 26.7.3 and 26.7.4).
+fn t_beyond(t: f64, freedom: usize) -> f64 {
+    let angle = libm::atan(t.abs() / (freedom as f64).sqrt());
+    let (sine, cosine) = (libm::sin(angle), libm::cos(angle));
+    let is_odd = freedom % 2 == 1;
+    let mut term = if is_odd { cosine } else { 1.0 };
+    let mut sum = if freedom == 1 { 0.0 } else { term };
+    let first = if is_odd { 3 } else { 2 };
+    for k in (first..freedom.saturating_sub(1)).step_by(2) {
+        term *= cosine * cosine * (k - 1) as f64 / k as f64;
+        sum += term;
+    }
+    let within = if is_odd {
+        std::f64::consts::FRAC_2_PI * (angle + sine * sum)
+    } else {
+        sine * sum
+    };
+    (1.0 - within).clamp(0.0, 1.0)
+}
+
+/// The p-values of a family of tests after Holm's correction (1979), in their order.
+#[must_use]
+pub fn holm(p_values: &[f64]) -> Vec<f64> {
+    let mut order: Vec<usize> = (0..p_values.len()).collect();
+    let p = |k: usize| p_values.get(k).copied().unwrap_or(1.0);
+    order.sort_by(|a, b| p(*a).total_cmp(&p(*b)));
+    let mut corrected = vec![1.0; p_values.len()];
+    let mut least = 0.0_f64;
+    for (rank, place) in order.into_iter().enumerate() {
+        let left = (p_values.len() - rank) as f64;
+        least = least.max((left * p(place)).min(1.0));
+        if let Some(slot) = corrected.get_mut(place) {
+            *slot = least;
+        }
+    }
+    corrected
+}
+
 /// A mean and its 95 % confidence interval.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Interval {
@@ -56,6 +95,27 @@ impl Interval {
             low: mean - half,
             high: mean + half,
         })
+    }
+
+    /// How probable a mean at least so far from `value` is if that were the true one: two-sided, by Student's t. None of fewer
+    /// than two values.
+    #[must_use]
+    pub fn p_against(&self, value: f64) -> Option<f64> {
+        let freedom = self.n.checked_sub(1).filter(|freedom| *freedom > 0)?;
+        let error = (self.high - self.mean) / t_975(freedom);
+        Some(t_beyond((self.mean - value) / error, freedom))
+    }
+
+    /// Of the logarithms of what this is the interval of, if that was found by logarithms.
+    #[must_use]
+    pub fn logarithms(self) -> Self {
+        let [mean, low, high] = [self.mean, self.low, self.high].map(libm::log);
+        Self {
+            mean,
+            low,
+            high,
+            ..self
+        }
     }
 
     /// Of positive values by their logarithms: geometric mean and an interval of ratios; none without any.
@@ -176,6 +236,46 @@ mod tests {
         assert!(t_975(30) > t_975(31) && t_975(31) > t_975(39));
         assert!((t_975(39) - 2.022_691).abs() < 1e-4);
         assert!((t_975(1_000_000) - 1.95996).abs() < 1e-4);
+    }
+
+    /// Points of Student's t that every table has.
+    #[test]
+    fn the_share_beyond_t_is_that_of_the_tables() {
+        for (freedom, t, share) in [
+            (1, 12.706, 0.05),
+            (2, 4.303, 0.05),
+            (3, 3.182, 0.05),
+            (4, 2.776, 0.05),
+            (9, 2.262, 0.05),
+            (10, 3.169, 0.01),
+            (39, 2.023, 0.05),
+            (39, 2.708, 0.01),
+        ] {
+            let found = t_beyond(t, freedom);
+            assert!((found / share - 1.0).abs() < 2e-3, "{freedom} {t}: {found}");
+            assert!((t_beyond(-t, freedom) - found).abs() < 1e-15);
+        }
+        assert_eq!(t_beyond(0.0, 7), 1.0);
+    }
+
+    /// Holm's own example of the order: the least p is multiplied most, and none falls below one before it.
+    #[test]
+    fn holm_multiplies_by_what_is_left_and_never_falls() {
+        let corrected = holm(&[0.01, 0.04, 0.03, 0.005]);
+        let expected = [0.03, 0.06, 0.06, 0.02];
+        for (found, expected) in corrected.iter().zip(expected) {
+            assert!((found - expected).abs() < 1e-12, "{corrected:?}");
+        }
+        assert_eq!(holm(&[0.9, 0.8]), [1.0, 1.0]);
+    }
+
+    #[test]
+    fn a_mean_two_errors_away_is_tested_as_its_interval_says() {
+        let interval = Interval::of([1.0, 2.0, 3.0, 4.0, 5.0]).unwrap();
+        // the end of a 95 % interval is where p is 5 %
+        assert!((interval.p_against(interval.low).unwrap() - 0.05).abs() < 1e-4);
+        assert_eq!(interval.p_against(3.0), Some(1.0));
+        assert_eq!(Interval::of([2.0]).unwrap().p_against(0.0), None);
     }
 
     #[test]

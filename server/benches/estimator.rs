@@ -47,8 +47,8 @@ fn push() -> Vec<Measured> {
 fn estimators(criterion: &mut Criterion) {
     let ticks = push();
     for (name, mode) in [("paper", Mode::Paper), ("recommended", Mode::Recommended)] {
-        let config = EstimatorConfig::of_mode(mode, Coupling::for_stiffness(1000.0));
-        let mut estimator = Estimator::new(&config);
+        let coupling = Coupling::for_stiffness(1000.0);
+        let mut estimator = Estimator::new(&EstimatorConfig::of_mode(mode, coupling), coupling);
         let mut next = ticks.iter().cycle();
         criterion.bench_function(&format!("estimator/{name}"), |bencher| {
             bencher.iter(|| next.next().map(|tick| estimator.step(black_box(tick))));

@@ -75,12 +75,15 @@ impl FromArgMatches for Chosen {
         let Some((name, matches)) = matches.subcommand() else {
             return Err(clap::Error::new(clap::error::ErrorKind::MissingSubcommand));
         };
-        let named = ALL.into_iter().filter(|experiment| experiment.name == name);
+        let wanted = |experiment: &&Experiment| {
+            experiment.name == name || name == "all" && experiment.in_all
+        };
+        let named = ALL.into_iter().filter(wanted);
         let named: Vec<&Experiment> = named.collect();
         let arguments = named.iter().flat_map(|experiment| experiment.arguments);
         Ok(Self {
             given: arguments.filter_map(|of| given(of, matches)).collect(),
-            experiments: if name == "all" { ALL.to_vec() } else { named },
+            experiments: named,
         })
     }
 

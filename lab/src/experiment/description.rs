@@ -19,6 +19,8 @@ pub struct Experiment {
     pub duration: Duration,
     /// Arguments that it alone takes.
     pub arguments: &'static [Argument],
+    /// Whether it is one of those that run when all are asked for.
+    pub in_all: bool,
     /// Runs it and keeps its files.
     pub run: fn(&Runner, &Request) -> Result<Findings, ExperimentError>,
 }
@@ -37,6 +39,7 @@ impl Experiment {
             seeds,
             duration: DURATION,
             arguments: &[],
+            in_all: true,
             run,
         }
     }

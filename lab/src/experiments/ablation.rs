@@ -2,11 +2,11 @@
 //!
 //! Each variant changes one choice of paper mode; everything else stays.
 
-use mmt_server::estimator::{EstimatorConfig, PaperConfig, Rows};
+use mmt_server::estimator::Rows;
 use mmt_shared::model::settings::{ModelSettings, Smoothing};
 
 use crate::experiment::prelude::*;
-use crate::setting::knee;
+use crate::setting::{READINGS, Variant, knee, paper_estimator};
 
 /// The ablation.
 pub(super) const ABLATION: Experiment = Experiment::new(
@@ -21,17 +21,15 @@ const DEADBANDS: [f64; 3] = [0.025, 0.10, 0.30];
 /// The schemes.
 const CURVES: [Curve; 3] = [Curve::Deadband, Curve::Hybrid(50), Curve::Hybrid(150)];
 
-/// One choice made otherwise: its name and what it makes of the world.
-type Variant = (&'static str, fn(&mut WorldConfig));
-
+/// Other choices than [`READINGS`], made otherwise.
 #[rustfmt::skip]
 static VARIANTS: [Variant; 13] = [
     ("as stated", |_| {}),
-    ("window 100 ms", |world| estimator(world, |paper| paper.window_s = 0.1)),
-    ("window 500 ms", |world| estimator(world, |paper| paper.window_s = 0.5)),
-    ("window 1 s", |world| estimator(world, |paper| paper.window_s = 1.0)),
-    ("rows x and y stacked", |world| estimator(world, |paper| paper.rows = Rows::Stacked)),
-    ("timer packets carry the pose", |world| world.slave.trigger.timer_carries_pose = true),
+    ("window 100 ms", |world| paper_estimator(world, |paper| paper.window_s = 0.1)),
+    ("window 500 ms", |world| paper_estimator(world, |paper| paper.window_s = 0.5)),
+    ("window 1 s", |world| paper_estimator(world, |paper| paper.window_s = 1.0)),
+    ("rows x and y stacked", |world| paper_estimator(world, |paper| paper.rows = Rows::Stacked)),
+    ("standstill left out", |world| paper_estimator(world, |paper| paper.leave_out_standstill = true)),
     ("timer in contact only", |world| world.slave.trigger.timer_in_free_space = false),
     ("sticking is no mismatch", |world| world.slave.trigger.judge_sticking = false),
     ("no sensor noise", |world| noise(world, 0.0)),
@@ -40,12 +38,6 @@ static VARIANTS: [Variant; 13] = [
     ("(6) without contact damping", |world| settings(world, |s| s.coupling.damping_ns_per_m = 0.0)),
     ("model of the true side, 36 cm", |world| world.slave.start.side_m = 0.36),
 ];
-
-fn estimator(world: &mut WorldConfig, change: impl FnOnce(&mut PaperConfig)) {
-    let mut paper = PaperConfig::default();
-    change(&mut paper);
-    world.slave.estimator = Some(EstimatorConfig::Paper(paper));
-}
 
 fn settings(world: &mut WorldConfig, change: impl FnOnce(&mut ModelSettings)) {
     if let Some(settings) = &mut world.settings {
@@ -65,7 +57,7 @@ type Group = grid::Group<Case, Measured>;
 
 fn cases() -> Vec<Case> {
     let mut cases = Vec::new();
-    for variant in &VARIANTS {
+    for variant in VARIANTS.iter().chain(&READINGS) {
         for curve in CURVES {
             cases.extend(DEADBANDS.map(|deadband| (variant, curve, deadband)));
         }

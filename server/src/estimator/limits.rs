@@ -36,10 +36,11 @@ fn prior([m, b, c]: [f64; 3]) -> [Check; 3] {
 }
 
 #[rustfmt::skip]
-fn paper(config: &PaperConfig) -> [Check; 3] {
+fn paper(config: &PaperConfig) -> [Check; 4] {
     let kalman = &config.kalman;
     [
         ("estimator: window_s", "s", config.window_s, (0.002, 60.0)),
+        ("estimator: stable_after_s", "s", config.stable_after_s, (0.0, 60.0)),
         ("estimator: position_noise_m", "m", kalman.position_noise_m, (0.0, 0.1)),
         ("estimator: jerk_density", "m^2/s^5", kalman.jerk_density, (1e-9, 1e9)),
     ]

@@ -32,7 +32,7 @@ pub use direction::DirectionConfig;
 pub use gate::GateConfig;
 pub use kalman::KalmanConfig;
 pub use obstacle::OBSTACLE_N;
-pub use paper::PaperConfig;
+pub use paper::{ObjectMotion, PaperConfig};
 pub use recommended::RecommendedConfig;
 pub use recursive::{ChangeTest, RecursiveConfig};
 pub use turning::Seen;
@@ -195,11 +195,12 @@ enum Kind {
 }
 
 impl Estimator {
-    /// An estimator at its prior. Settings from outside pass [`EstimatorConfig::check`] first.
+    /// An estimator at its prior, of an object touched through `coupling`. Settings from outside pass
+    /// [`EstimatorConfig::check`] first.
     #[must_use]
-    pub fn new(config: &EstimatorConfig) -> Self {
+    pub fn new(config: &EstimatorConfig, coupling: Coupling) -> Self {
         Self(match config {
-            EstimatorConfig::Paper(config) => Kind::Paper(PaperEstimator::new(config)),
+            EstimatorConfig::Paper(config) => Kind::Paper(PaperEstimator::new(config, coupling)),
             EstimatorConfig::Recommended(config) => {
                 Kind::Recommended(RecommendedEstimator::new(config))
             }

@@ -52,18 +52,24 @@ impl Surface {
         *self = Self::new(self.coupling);
     }
 
-    /// Takes one tick in contact: tool (m), force on the object (N), inward unit normal n.
+    /// Takes one tick in contact and returns the surface point under the tool, m: tool (m), force on the object (N), inward
+    /// unit normal n.
+    #[must_use]
+    pub(super) fn locate(&mut self, tool: Vec2, force: Vec2, normal: Vec2) -> Vec2 {
+        // (6) with damping, inverted: f = k_p pen_n + k_d (pen_n − pen_{n−1})/T
+        let k_d_per_tick = self.coupling.damping_ns_per_m / TICK_S;
+        let stiffness = self.coupling.stiffness_n_per_m + k_d_per_tick;
+        self.penetration = (force.dot(&normal) + k_d_per_tick * self.penetration) / stiffness;
+        tool - normal * self.penetration
+    }
+
+    /// Takes one tick in contact and returns the motion, as [`Surface::locate`] takes it.
     ///
     /// The motion is known from the third tick on. The force of the row is that of the tick before: tool
     /// and force of one tick give the surface *before* the step in which that force acts, so
     /// `m (v_n − v_{n−1})/T + b v_n + c sign(v_n) = f_n` pairs each motion with the force one tick older.
     pub(super) fn step(&mut self, tool: Vec2, force: Vec2, normal: Vec2) -> Option<SurfaceMotion> {
-        // (6) with damping, inverted: f = k_p pen_n + k_d (pen_n − pen_{n−1})/T
-        let k_d_per_tick = self.coupling.damping_ns_per_m / TICK_S;
-        let stiffness = self.coupling.stiffness_n_per_m + k_d_per_tick;
-        self.penetration = (force.dot(&normal) + k_d_per_tick * self.penetration) / stiffness;
-        let point = tool - normal * self.penetration;
-
+        let point = self.locate(tool, force, normal);
         let velocity = self.point.map(|before| (point - before) / TICK_S);
         let acceleration = velocity
             .zip(self.velocity)

@@ -46,7 +46,7 @@ impl ObjectEstimate {
         estimator.check()?;
         Ok(Self {
             observer: PoseObserver::new(observer, pose, BoxFootprint::square(start.side_m)),
-            estimator: Estimator::new(&estimator),
+            estimator: Estimator::new(&estimator, coupling),
             params: ModelParams::of_square(m, b, c, start.side_m, &coupling)?,
             refused: 0,
             coupling,

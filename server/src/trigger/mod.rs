@@ -41,8 +41,9 @@ pub struct TriggerConfig {
     pub metric: MismatchMetric,
     /// Whether the timer of `hybrid` runs in free space as well; that of `useful` never does.
     pub timer_in_free_space: bool,
-    /// Whether an update that only the timer asked for carries the object's pose. If not, it carries the
-    /// pose and the velocity of the shadow, and renews the parameters alone.
+    /// Whether an update that only the timer asked for carries the object's pose, as every update of section IV-A does
+    /// ("both geometry and impedance"). If not, it carries the pose and the velocity of the shadow, and renews the
+    /// parameters alone.
     pub timer_carries_pose: bool,
     /// Least force that (12) divides by, N.
     pub force_floor_n: f64,
@@ -57,8 +58,8 @@ pub struct TriggerConfig {
 }
 
 impl TriggerConfig {
-    /// The settings of a mode. Paper: hybrid at its best point (10 %, 150 ms), floor F_min = 0.04 N, and
-    /// timer packets of parameters alone. Recommended: `useful` with the same numbers, floor 0.3 N.
+    /// The settings of a mode. Paper: hybrid at its best point (10 %, 150 ms), floor F_min = 0.04 N.
+    /// Recommended: `useful` with the same numbers, floor 0.3 N.
     #[must_use]
     pub fn of_mode(mode: Mode) -> Self {
         let (delta, t_update) = (0.10, Duration::from_millis(150));
@@ -70,7 +71,7 @@ impl TriggerConfig {
             scheme,
             metric: MismatchMetric::Force,
             timer_in_free_space: true,
-            timer_carries_pose: mode == Mode::Recommended,
+            timer_carries_pose: true,
             force_floor_n,
             judge_sticking,
             mismatch_debounce: Duration::from_millis(10),

@@ -5,6 +5,8 @@
 //! logarithmic axes. The ratio is averaged over the rates that both curves reach. Rate and PMSE of a run depend on
 //! one another, so the interval comes from leaving out one seed at a time (jackknife).
 
+use nalgebra::{RowVector3, SMatrix, SVector};
+
 use crate::experiment::grid::Group;
 use crate::setting::{Curve, DEADBANDS, Point, knee};
 use crate::statistics::{Interval, log_ratio, mean};
@@ -14,9 +16,9 @@ use crate::trial::Measured;
 type LogCurve = Vec<(f64, f64)>;
 
 /// All runs, in paper mode.
-pub(super) struct Runs<'a> {
-    pub(super) groups: &'a [Group<Point, Measured>],
-    pub(super) seeds: u64,
+pub(in crate::experiments) struct Runs<'a> {
+    pub(in crate::experiments) groups: &'a [Group<Point, Measured>],
+    pub(in crate::experiments) seeds: u64,
 }
 
 impl Runs<'_> {
@@ -54,6 +56,31 @@ impl Runs<'_> {
             Some(knee(pmse(0.025)?, pmse(0.10)?, pmse(0.30)?))
         });
         Interval::of(knees)
+    }
+
+    /// Exponent of PMSE over Delta between two deadbands.
+    pub(super) fn slope(&self, curve: Curve, [fine, coarse]: [f64; 2]) -> Option<Interval> {
+        let slopes = self.per_seed(|seed| {
+            let pmse = |deadband| self.pmse(curve, deadband, seed);
+            Some(libm::log(pmse(coarse)? / pmse(fine)?) / libm::log(coarse / fine))
+        });
+        Interval::of(slopes)
+    }
+
+    /// The deadband at which the slope of PMSE over Delta changes: of the two lines through all seven deadbands that meet at
+    /// one of them and fit best, on logarithmic axes.
+    pub(super) fn place_of_knee(&self, curve: Curve) -> Option<Interval> {
+        let place = |seed| {
+            let pmse = |deadband: &f64| self.pmse(curve, *deadband, seed).map(libm::log);
+            let logs: Option<Vec<f64>> = DEADBANDS.iter().map(pmse).collect();
+            let logs = logs?;
+            let inner = DEADBANDS.iter().skip(1).take(DEADBANDS.len() - 2);
+            let misfits = inner.map(|knee| Some((*knee, misfit(&logs, *knee)?)));
+            let misfits: Option<Vec<(f64, f64)>> = misfits.collect();
+            let best = misfits?.into_iter().min_by(|a, b| a.1.total_cmp(&b.1));
+            best.map(|(knee, _)| knee)
+        };
+        Interval::of_ratios(self.per_seed(place))
     }
 
     /// Geometric mean of PMSE of one scheme over that of another at equal deadbands.
@@ -116,5 +143,38 @@ impl Runs<'_> {
         let mut points: LogCurve = DEADBANDS.iter().filter_map(point).collect();
         points.sort_by(|a, b| a.0.total_cmp(&b.0));
         points
+    }
+}
+
+/// Sum of squares that two lines leave which meet at a deadband, of ln PMSE at each deadband.
+fn misfit(logs: &[f64], knee: f64) -> Option<f64> {
+    let rows = DEADBANDS.map(|deadband| {
+        let x = libm::log(deadband / knee);
+        RowVector3::new(1.0, x, x.max(0.0))
+    });
+    let design = SMatrix::<f64, { DEADBANDS.len() }, 3>::from_rows(&rows);
+    let values = SVector::<f64, { DEADBANDS.len() }>::from_iterator(logs.iter().copied());
+    let inverse = (design.transpose() * design).try_inverse()?;
+    let lines = inverse * (design.transpose() * values);
+    Some((values - design * lines).norm_squared())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn two_lines_are_found_to_meet_where_they_do() {
+        for knee in [0.05, 0.10, 0.20] {
+            let log = |deadband: f64| {
+                0.1 * libm::log(deadband) + 2.0 * libm::log(deadband / knee).max(0.0)
+            };
+            let logs = DEADBANDS.map(log);
+            let misfits = DEADBANDS.map(|place| misfit(&logs, place));
+            let at = DEADBANDS.iter().position(|deadband| *deadband == knee);
+            assert!(misfits[at.unwrap()].unwrap() < 1e-20, "{misfits:?}");
+            let exact = misfits.iter().flatten().filter(|misfit| **misfit < 1e-20);
+            assert_eq!(exact.count(), 1, "{misfits:?}");
+        }
     }
 }
