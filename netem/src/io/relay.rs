@@ -86,6 +86,10 @@ pub struct RelaySnapshot {
     pub clients_met: u64,
     /// Datagrams from clients beyond the most at one time, or without a socket to be had: never offered.
     pub refused: Tally,
+    /// Datagrams from clients that the kernel dropped because the relay did not read in time: never offered.
+    pub overflows_up: u64,
+    /// The same of datagrams from the target.
+    pub overflows_down: u64,
     /// Times that the target's host answered that nobody listens there (ICMP port unreachable).
     pub unreachable: u64,
     /// Other errors of receiving.

@@ -67,6 +67,8 @@ impl NetemReport {
         writeln!(f, "\nclients met          {:>12}", counters.clients_met)?;
         for (label, count) in [
             ("refused", counters.refused.packets),
+            ("not read in time, up", counters.overflows_up),
+            ("not read in time, down", counters.overflows_down),
             ("target unreachable", counters.unreachable),
             ("receive errors", counters.receive_errors),
             ("new ports (NAT)", counters.rebinds),

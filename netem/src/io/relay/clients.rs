@@ -156,7 +156,8 @@ mod tests {
         Received {
             from: (Ipv4Addr::LOCALHOST, port).into(),
             local_ip: None,
-            ecn: None,
+            class: 0,
+            arrived: Time::ZERO,
             contents: &[],
         }
     }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
 
-use quinn::udp::Transmit;
+use quinn::udp::EcnCodepoint;
 use rustix::event::{PollFd, PollFlags};
 
 use mmt_shared::io::alarm::wait;
@@ -13,7 +13,7 @@ use mmt_shared::io::realtime;
 use mmt_shared::time::Time;
 
 use super::clients::Clients;
-use super::port::{Port, Received, Receiver};
+use super::port::{Port, Received, Receiver, Sending};
 use super::{RelaySnapshot, Shared};
 use crate::counters::Tally;
 use crate::direction::Direction;
@@ -31,9 +31,14 @@ pub(super) struct Worker {
     listen: Port,
     clients: Clients,
     receiver: Receiver,
-    /// The links, whose datagrams know the number of their client.
-    up: Driver<u64>,
-    down: Driver<u64>,
+    /// The links, whose datagrams know their client.
+    up: Driver<Origin>,
+    down: Driver<Origin>,
+    /// The latest arrival that was offered to either: times of offers never go back.
+    offered_up: Time,
+    offered_down: Time,
+    overflows_up: u64,
+    overflows_down: u64,
     record: Option<RecordWriter>,
     refused: Tally,
     unreachable: u64,
@@ -42,6 +47,13 @@ pub(super) struct Worker {
     /// How often to rebind, and when next.
     rebind: Option<(Duration, Time)>,
     shared: Arc<Shared>,
+}
+
+/// Whose datagram it is, and its DSCP in the place that it has in the traffic class.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Origin {
+    number: u64,
+    dscp: u8,
 }
 
 /// The sockets with something to read.
@@ -54,8 +66,8 @@ impl Worker {
     pub(super) fn new(
         listen: Port,
         clients: Clients,
-        up: Driver<u64>,
-        down: Driver<u64>,
+        up: Driver<Origin>,
+        down: Driver<Origin>,
         record: Option<RecordWriter>,
         shared: Arc<Shared>,
     ) -> Self {
@@ -66,6 +78,10 @@ impl Worker {
             up,
             down,
             record,
+            offered_up: Time::ZERO,
+            offered_down: Time::ZERO,
+            overflows_up: 0,
+            overflows_down: 0,
             rebinds: 0,
             rebind: None,
             refused: Tally::default(),
@@ -158,17 +174,23 @@ impl Worker {
             clients,
             receiver,
             up,
+            offered_up,
             refused,
             ..
         } = self;
         let mut take = |received: Received<'_>| match clients.meet(&received, now()) {
-            Some(client) => up.offer(now(), datagram(client, &received)),
+            Some(client) => {
+                *offered_up = received.arrived.max(*offered_up);
+                up.offer(*offered_up, datagram(client, &received));
+            }
             None => refused.count(received.contents.len()),
         };
-        for _ in 0..BATCHES {
-            if let Err(error) = receiver.receive(listen, &mut take) {
-                return self.receive_error(&error);
-            }
+        let mut batches = (0..BATCHES).map(|_| receiver.receive(listen, &mut take));
+        let error = batches.find_map(Result::err);
+        let overflows = self.listen.new_overflows();
+        self.overflows_up = self.overflows_up.saturating_add(overflows);
+        if let Some(error) = error {
+            self.receive_error(&error);
         }
     }
 
@@ -178,10 +200,13 @@ impl Worker {
             return;
         };
         for _ in 0..BATCHES {
-            let down = &mut self.down;
+            let (down, offered) = (&mut self.down, &mut self.offered_down);
             let received = self.receiver.receive(&client.port, |received| {
-                down.offer(now(), datagram(number, &received));
+                *offered = received.arrived.max(*offered);
+                down.offer(*offered, datagram(number, &received));
             });
+            let overflows = client.port.new_overflows();
+            self.overflows_down = self.overflows_down.saturating_add(overflows);
             match received {
                 Ok(()) => client.seen(now()),
                 Err(error) => return self.receive_error(&error),
@@ -212,22 +237,21 @@ impl Worker {
     }
 
     /// Sends to the target from the client's own port, or to the client from the address that it knows.
-    fn send(&mut self, direction: Direction, packet: &Departure<Datagram<u64>>) -> Outcome {
-        let Some(client) = self.clients.get(packet.payload.address) else {
+    fn send(&mut self, direction: Direction, packet: &Departure<Datagram<Origin>>) -> Outcome {
+        let Some(client) = self.clients.get(packet.payload.address.number) else {
             return Outcome::Abandoned;
         };
-        let (port, destination, src_ip) = match direction {
+        let (port, to, from) = match direction {
             Direction::Up => (&client.port, self.clients.target(), None),
             Direction::Down => (&self.listen, client.addr, client.local_ip),
         };
-        let transmit = Transmit {
-            destination,
-            ecn: packet.payload.ecn,
-            contents: &packet.payload.contents,
-            segment_size: None,
-            src_ip,
+        let ecn = packet.payload.ecn.map_or(0, |ecn| ecn as u8);
+        let sending = Sending {
+            to,
+            from,
+            class: packet.payload.address.dscp | ecn,
         };
-        port.send(&transmit, &mut self.unreachable)
+        port.send(sending, &packet.payload.contents, &mut self.unreachable)
     }
 
     fn publish(&self) {
@@ -237,6 +261,8 @@ impl Worker {
             clients: self.clients.len() as u64,
             clients_met: self.clients.met(),
             refused: self.refused,
+            overflows_up: self.overflows_up,
+            overflows_down: self.overflows_down,
             unreachable: self.unreachable,
             receive_errors: self.receive_errors,
             rebinds: self.rebinds,
@@ -247,10 +273,13 @@ impl Worker {
     }
 }
 
-fn datagram(client: u64, received: &Received<'_>) -> Datagram<u64> {
+fn datagram(number: u64, received: &Received<'_>) -> Datagram<Origin> {
     Datagram {
-        address: client,
-        ecn: received.ecn,
+        address: Origin {
+            number,
+            dscp: received.class & !3,
+        },
+        ecn: EcnCodepoint::from_bits(received.class & 3),
         contents: received.contents.to_owned(),
     }
 }
