@@ -189,7 +189,8 @@ fn the_dissector_shows_it(test: &str, client: &Value, capture: &Path, keys: &Pat
     assert_eq!(shown("update"), counted("/received/updates"));
     // before the welcome was read and after the last count there are more
     assert!(shown("heartbeat") >= counted("/sent/heartbeats") + counted("/received/heartbeats"));
-    for (kind, count) in [("hello", 1), ("welcome", 1), ("farewell", 2)] {
+    // the slave's farewell is longer than a packet, and such a message stays unshown (docs/protocol.md, section 9)
+    for (kind, count) in [("hello", 1), ("welcome", 1), ("farewell", 1)] {
         assert_eq!(shown(kind), count, "{kind}");
     }
 }
