@@ -96,7 +96,7 @@ pub struct DelayRow {
 /// Runs an architecture over a network.
 ///
 /// The operator looks at what there is to look at: the delayed picture where there is no model, else what the
-/// configuration says.
+/// configuration asks for.
 ///
 /// # Errors
 /// When a number of the configuration is not accepted.

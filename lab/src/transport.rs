@@ -7,7 +7,7 @@
 
 mod log;
 
-pub use log::{Log, Outcome, Sent};
+pub use log::{FlowOutcome, Log, Sent};
 
 use std::ops::Range;
 use std::time::Duration;

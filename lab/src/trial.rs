@@ -164,7 +164,7 @@ impl Trial {
     /// When a number of the configuration or of the change is not accepted.
     pub fn run(&self) -> Result<Measured, TrialError> {
         let mut world = World::try_new(&self.config)?;
-        let mut run = Run::default();
+        let mut run = Counters::default();
         for _ in 0..self.duration.as_millis() {
             let tick = world.step();
             run.take(&tick, self.traced);
@@ -173,7 +173,7 @@ impl Trial {
         Ok(run.measured(&world))
     }
 
-    fn change_if_due(&self, world: &mut World, run: &mut Run) -> Result<(), TrialError> {
+    fn change_if_due(&self, world: &mut World, run: &mut Counters) -> Result<(), TrialError> {
         let Some(change) = self.change.filter(|_| run.watch.is_none()) else {
             return Ok(());
         };
@@ -192,7 +192,7 @@ impl Trial {
 
 /// What is counted while a trial runs.
 #[derive(Debug, Default)]
-struct Run {
+struct Counters {
     contact_s: f64,
     /// Contact in the current push, s.
     push_contact_s: f64,
@@ -202,7 +202,7 @@ struct Run {
     trace: Vec<TraceRow>,
 }
 
-impl Run {
+impl Counters {
     fn take(&mut self, tick: &WorldTick, traced: bool) {
         let Some(slave) = &tick.slave else {
             return;

@@ -94,18 +94,19 @@ fn drawn(title: &str, rows: &[TraceRow]) -> Figure {
     let contact = rows.iter().find(|row| row.f_s.norm() > 0.1);
     let begin = contact.map_or(0.0, |row| (row.t_s - 0.5).max(0.0));
     let panels = [
-        panel(title, rows, 0.0..=end),
-        panel("the first push", rows, begin..=begin + OPENING_S),
+        panel(title, rows, 0.0..=end, 1.4),
+        panel("the first push", rows, begin..=begin + OPENING_S, 1.08),
     ];
     Figure::of_alike(panels, Legend::UpperRight, 1, (1060, 330))
 }
 
-fn panel(title: &str, rows: &[TraceRow], when: RangeInclusive<f64>) -> Panel {
+/// `height`: how high the axis reaches over the largest force, with room for a legend.
+fn panel(title: &str, rows: &[TraceRow], when: RangeInclusive<f64>, height: f64) -> Panel {
     let shown: Vec<&TraceRow> = rows.iter().filter(|row| when.contains(&row.t_s)).collect();
     let largest = shown
         .iter()
         .map(|row| row.f_s.norm().max(row.f_m.map_or(0.0, |f| f.norm())));
-    let top = largest.fold(1.0, f64::max) * 1.08;
+    let top = largest.fold(1.0, f64::max) * height;
     let curve = |label: &str, colour: Colour, width: u32, of: &dyn Fn(&TraceRow) -> Option<f64>| {
         let line = Series::line(label, colour, envelope(&shown, of));
         line.stroked(Stroke::Solid, width)

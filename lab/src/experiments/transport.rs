@@ -7,7 +7,7 @@ mod tables;
 use crate::digest::of_runs;
 use crate::experiment::prelude::*;
 use crate::io::virtual_time;
-use grid::Run;
+use grid::FlowRun;
 
 /// Stock quinn against ours: 864 runs, a second of which may be an outage.
 pub(super) const TRANSPORT: Experiment = Experiment {
@@ -31,7 +31,7 @@ fn run(runner: &Runner, request: &Request) -> Result<Findings, ExperimentError> 
     })?;
     let of_group = groups.iter().map(|group| (&group.case, group.runs.iter()));
     let runs = of_group.flat_map(|(case, runs)| runs.map(move |outcome| (case, outcome)));
-    let runs: Vec<Run> = runs.collect();
+    let runs: Vec<FlowRun> = runs.collect();
     runner.keep_table("transport.csv", &tables::all(&runs))?;
     runner.keep_figure("transport.svg", &figure::figure(&runs))?;
     Ok(Findings {

@@ -314,7 +314,7 @@ const REACH: i32 = 13;
 fn halves(stroke: Stroke) -> [[(i32, i32); 2]; 2] {
     match stroke {
         Stroke::Solid => [[(-REACH, 0), (0, 0)], [(0, 0), (REACH, 0)]],
-        Stroke::Dashed => [[(-REACH, 0), (8 - REACH, 0)], [(REACH - 8, 0), (REACH, 0)]],
+        Stroke::Dashed => [[(-REACH, 0), (5 - REACH, 0)], [(REACH - 5, 0), (REACH, 0)]],
         Stroke::Events => [[(0, -7), (0, 0)], [(0, 0), (0, 7)]],
     }
 }

@@ -7,7 +7,7 @@
 
 use mmt_shared::model::geometry::Vec2;
 
-use super::surface::{Law, Motion, Surface};
+use super::surface::{Friction, Law, PushMotion};
 use crate::statistics::median;
 
 /// k: force errors well below it count by their square, well above by their size, N.
@@ -29,15 +29,15 @@ type Mat4 = nalgebra::Matrix4<f64>;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Observation {
     /// How the block moved.
-    pub(super) motion: Motion,
+    pub(super) motion: PushMotion,
     /// Steady force on the block in its own frame halfway, N.
     pub(super) force: Vec2,
 }
 
 /// The friction that explains `pushes` best under a law; `start` is the prior and `from` where to begin.
-pub(super) fn fit(law: Law, start: &Surface, from: &Surface, pushes: &[Observation]) -> Surface {
+pub(super) fn fit(law: Law, start: &Friction, from: &Friction, pushes: &[Observation]) -> Friction {
     match law {
-        Law::Decoupled => Surface {
+        Law::Decoupled => Friction {
             friction_n: median(pushes.iter().map(|push| push.force.norm()))
                 .unwrap_or(start.friction_n),
             ..*start
@@ -50,11 +50,11 @@ pub(super) fn fit(law: Law, start: &Surface, from: &Surface, pushes: &[Observati
 
 struct Search<'a> {
     law: Law,
-    start: &'a Surface,
+    start: &'a Friction,
     pushes: &'a [Observation],
 }
 
-fn to_vector(surface: &Surface) -> Vec4 {
+fn to_vector(surface: &Friction) -> Vec4 {
     Vec4::new(
         libm::log(surface.friction_n.max(1e-6)),
         libm::log(surface.arm_m.max(1e-6)),
@@ -63,8 +63,8 @@ fn to_vector(surface: &Surface) -> Vec4 {
     )
 }
 
-fn to_surface(q: &Vec4) -> Surface {
-    Surface {
+fn to_surface(q: &Vec4) -> Friction {
+    Friction {
         friction_n: libm::exp(q.x),
         arm_m: libm::exp(q.y),
         centre_m: Vec2::new(q.z, q.w),
@@ -72,7 +72,7 @@ fn to_surface(q: &Vec4) -> Surface {
 }
 
 impl Search<'_> {
-    fn run(&self, from: &Surface) -> Surface {
+    fn run(&self, from: &Friction) -> Friction {
         let mut q = to_vector(from);
         let mut cost = self.cost(&q);
         let mut lift = 1e-3;
@@ -146,12 +146,12 @@ mod tests {
     use super::*;
     use mmt_shared::rng::Substream;
 
-    const START: Surface = Surface {
+    const START: Friction = Friction {
         friction_n: 1.0,
         arm_m: 0.05,
         centre_m: Vec2::new(0.0, 0.0),
     };
-    const TRUTH: Surface = Surface {
+    const TRUTH: Friction = Friction {
         friction_n: 4.2,
         arm_m: 0.062,
         centre_m: Vec2::new(0.004, -0.003),
@@ -160,7 +160,7 @@ mod tests {
     fn pushes(law: Law, count: usize, noise_n: f64) -> Vec<Observation> {
         let mut random = Substream::new(5, "test/fit", 0);
         let mut push = || {
-            let motion = Motion {
+            let motion = PushMotion {
                 displacement: Vec2::new(random.normal(), random.normal()) * 0.008,
                 turn: 0.1 * random.normal(),
                 touched: Vec2::new(-0.05, random.uniform_in(-0.05, 0.09)),
@@ -175,7 +175,7 @@ mod tests {
         (0..count).map(|_| push()).collect()
     }
 
-    fn distance(a: &Surface, b: &Surface) -> f64 {
+    fn distance(a: &Friction, b: &Friction) -> f64 {
         (a.friction_n / b.friction_n - 1.0).abs()
             + (a.arm_m / b.arm_m - 1.0).abs()
             + (a.centre_m - b.centre_m).norm() / 0.05

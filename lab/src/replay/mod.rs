@@ -14,7 +14,7 @@ mod trigger;
 pub use config::ReplayConfig;
 pub use heldout::HeldOut;
 pub use report::{LawOnPush, LawReport, PushReport, Rates, ReplayReport, Spread};
-pub use surface::{Law, Motion, Surface};
+pub use surface::{Friction, Law, PushMotion};
 pub use trigger::Packets;
 
 use mmt_shared::model::geometry::{Vec2, rotate};
@@ -23,7 +23,7 @@ use mmt_shared::recording::{Push, Recording};
 use crate::statistics::quantile;
 use fit::{Observation, fit};
 use heldout::Split;
-use trigger::{Contact, Traffic};
+use trigger::{Contact, TriggerTraffic};
 
 /// Replays a recording under every law: friction fitted to the pushes so far, the next push's force
 /// predicted from its motion before its own force is used, the trigger run on measured against predicted
@@ -81,12 +81,12 @@ fn replay_push(
     learners: &mut [Learner],
     observed: &mut Vec<Observation>,
 ) -> PushReport {
-    let motion = Motion::of(push);
+    let motion = PushMotion::of(push);
     let measured = steady_force(config, push);
     let contact_s = contact_time_s(config, push);
     let laws = learners
         .iter_mut()
-        .map(|learner| learner.meet(push, &motion, measured, contact_s))
+        .map(|learner| learner.predict(push, &motion, measured, contact_s))
         .collect();
     if let Some(force) = measured {
         let force = rotate(-motion.halfway, force);
@@ -149,8 +149,8 @@ fn contact_time_s(config: &ReplayConfig, push: &Push) -> f64 {
 struct Learner {
     law: Law,
     config: ReplayConfig,
-    at_slave: Surface,
-    at_master: Surface,
+    at_slave: Friction,
+    at_master: Friction,
     packets: Packets,
     samples: u64,
     error_sum: f64,
@@ -170,10 +170,10 @@ impl Learner {
     }
 
     /// Predicts a push and runs the trigger on it; learns nothing from its force.
-    fn meet(
+    fn predict(
         &mut self,
         push: &Push,
-        motion: &Motion,
+        motion: &PushMotion,
         measured: Option<Vec2>,
         contact_s: f64,
     ) -> LawOnPush {
@@ -194,7 +194,7 @@ impl Learner {
         }
     }
 
-    fn count(&mut self, traffic: &Traffic) {
+    fn count(&mut self, traffic: &TriggerTraffic) {
         self.packets.add(&traffic.packets);
         self.samples += traffic.samples;
         self.error_sum += traffic.error_sum;

@@ -61,7 +61,7 @@ impl Law {
     /// Force on the block in its own frame (N) that this law expects for a motion under the friction
     /// `surface`; zero for no motion.
     #[must_use]
-    pub fn force(self, surface: &Surface, motion: &Motion) -> Vec2 {
+    pub fn force(self, surface: &Friction, motion: &PushMotion) -> Vec2 {
         match self {
             Self::Decoupled => unit(motion.displacement) * surface.friction_n,
             Self::LimitSurfaceTwist => from_twist(surface, motion),
@@ -73,7 +73,7 @@ impl Law {
 
 /// What a law's friction looks like: its size, how hard it is to turn, and about which point.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Surface {
+pub struct Friction {
     /// Friction c when the block slides without turning, N.
     pub friction_n: f64,
     /// e/c: friction torque over friction, m; positive.
@@ -82,7 +82,7 @@ pub struct Surface {
     pub centre_m: Vec2,
 }
 
-impl Surface {
+impl Friction {
     /// Friction torque e when the block turns about its centre of friction, N m.
     #[must_use]
     pub fn torque_nm(&self) -> f64 {
@@ -92,7 +92,7 @@ impl Surface {
 
 /// What is known of a push's motion, without any of its forces. Block's frame, halfway through the turn.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Motion {
+pub struct PushMotion {
     /// Displacement of the reference point, m (of the screw motion: constant in the block's frame).
     pub displacement: Vec2,
     /// Turning, rad, counter-clockwise.
@@ -103,7 +103,7 @@ pub struct Motion {
     pub halfway: f64,
 }
 
-impl Motion {
+impl PushMotion {
     /// The motion of a recorded push, from the poses before and after and the finger's last position.
     #[must_use]
     pub fn of(push: &Push) -> Self {
@@ -139,7 +139,7 @@ fn unit(v: Vec2) -> Vec2 {
 }
 
 /// f = c v / sqrt(|v|² + (e/c)² w²), v at the centre of friction.
-fn from_twist(surface: &Surface, motion: &Motion) -> Vec2 {
+fn from_twist(surface: &Friction, motion: &PushMotion) -> Vec2 {
     let v = motion.displacement + spin(motion.turn, surface.centre_m);
     let w = surface.arm_m * motion.turn;
     let length = (v.norm_squared() + w * w).sqrt();
@@ -151,7 +151,7 @@ fn from_twist(surface: &Surface, motion: &Motion) -> Vec2 {
 
 /// The ellipsoid cut by "moment = lever arm × force": |f|² + (p·f)²/(e/c)² = c² with p = (−r_y, r_x); the
 /// force on that ellipse that does most work on v_p.
-fn at_point(surface: &Surface, motion: &Motion) -> Vec2 {
+fn at_point(surface: &Friction, motion: &PushMotion) -> Vec2 {
     let v = motion.at_touch();
     let p = spin(1.0, motion.touched - surface.centre_m);
     let arm2 = surface.arm_m * surface.arm_m;
@@ -165,7 +165,7 @@ fn at_point(surface: &Surface, motion: &Motion) -> Vec2 {
 }
 
 /// Coulomb friction c/3 at three supports; the block turns about the touched point with least resistance.
-fn on_three_points(surface: &Surface, motion: &Motion) -> Vec2 {
+fn on_three_points(surface: &Friction, motion: &PushMotion) -> Vec2 {
     let v = motion.at_touch();
     if v.norm() < 1e-12 {
         return Vec2::zeros();
@@ -210,14 +210,14 @@ fn root_of_increasing(f: impl Fn(f64) -> f64, scale: f64) -> f64 {
 mod tests {
     use super::*;
 
-    const SURFACE: Surface = Surface {
+    const SURFACE: Friction = Friction {
         friction_n: 4.2,
         arm_m: 0.05,
         centre_m: Vec2::new(0.004, -0.002),
     };
 
-    fn motion(x: f64, y: f64, turn: f64, touched: Vec2) -> Motion {
-        Motion {
+    fn motion(x: f64, y: f64, turn: f64, touched: Vec2) -> PushMotion {
+        PushMotion {
             displacement: Vec2::new(x, y),
             turn,
             touched,

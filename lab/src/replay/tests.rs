@@ -5,7 +5,7 @@ use mmt_shared::model::geometry::Pose;
 use mmt_shared::recording::{FingerSample, ForceSample};
 use mmt_shared::rng::Substream;
 
-const TRUTH: Surface = Surface {
+const TRUTH: Friction = Friction {
     friction_n: 4.2,
     arm_m: 0.055,
     centre_m: Vec2::new(0.003, 0.002),
@@ -33,7 +33,7 @@ fn push(law: Law, random: &mut Substream) -> Push {
         force: Vec::new(),
         finger: vec![finger(0.0), finger(5.0)],
     };
-    let motion = Motion::of(&push);
+    let motion = PushMotion::of(&push);
     let steady = rotate(motion.halfway, law.force(&TRUTH, &motion));
     push.force = (0..500)
         .map(|k: u32| ForceSample {

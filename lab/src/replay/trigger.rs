@@ -37,7 +37,7 @@ impl Packets {
 
 /// What one push cost and how far the master's force was from the measured one.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Traffic {
+pub(super) struct TriggerTraffic {
     pub(super) packets: Packets,
     /// Contact samples.
     pub(super) samples: u64,
@@ -70,8 +70,8 @@ pub(super) fn run(
     samples: &[ForceSample],
     by_master: Vec2,
     by_slave: Vec2,
-) -> Traffic {
-    let mut traffic = Traffic::default();
+) -> TriggerTraffic {
+    let mut traffic = TriggerTraffic::default();
     let mut contact = Contact::default();
     let mut held = by_master;
     let mut quiet_since_s: Option<f64> = None;

@@ -54,15 +54,15 @@ fn rows_are_the_product_of_the_axes_in_their_order_with_seeds_innermost() {
     let plan = plan(GRID);
     assert_eq!(plan.rows(), 12);
     let rows: Vec<Row> = (1..=12).filter_map(|n| plan.row(n)).collect();
-    let told: Vec<String> = rows
+    let written: Vec<String> = rows
         .iter()
         .map(|row| format!("{} {} {}", row.number, row.values.join("|"), row.seed))
         .collect();
-    assert_eq!(told[0], "1 deadband 5%|none|none 5");
-    assert_eq!(told[1], "2 deadband 5%|none|none 6");
-    assert_eq!(told[2], "3 deadband 5%|delay 50ms|delay 20ms loss 1% 5");
-    assert_eq!(told[6], "7 hybrid 10% 150ms|none|none 5");
-    assert_eq!(told[11], "12 hybrid 10% 150ms|delay 1ms|none 6");
+    assert_eq!(written[0], "1 deadband 5%|none|none 5");
+    assert_eq!(written[1], "2 deadband 5%|none|none 6");
+    assert_eq!(written[2], "3 deadband 5%|delay 50ms|delay 20ms loss 1% 5");
+    assert_eq!(written[6], "7 hybrid 10% 150ms|none|none 5");
+    assert_eq!(written[11], "12 hybrid 10% 150ms|delay 1ms|none 6");
     assert!(plan.row(0).is_none() && plan.row(13).is_none());
     assert!(plan.keys().eq(["slave.trigger.scheme", "up", "down"]));
 }
@@ -112,7 +112,7 @@ fn a_case_of_a_choice_replaces_another_case() {
 }
 
 #[test]
-fn a_wrong_key_or_value_is_told_with_its_line_and_a_caret() {
+fn a_wrong_key_or_value_is_reported_with_its_line_and_a_caret() {
     let base = |text: &str| format!("{HEAD}[base]\n{text}\n");
     let mistyped = base("slave.enviroment.mass_kg = 1.0");
     refuses(
@@ -159,7 +159,7 @@ fn a_wrong_key_or_value_is_told_with_its_line_and_a_caret() {
 }
 
 #[test]
-fn a_wrong_axis_is_told_with_axis_key_and_value() {
+fn a_wrong_axis_is_reported_with_axis_key_and_value() {
     let axis =
         |key: &str, values: &str| format!("{HEAD}[[axis]]\nkey = \"{key}\"\nvalues = {values}\n");
     refuses(
@@ -252,7 +252,7 @@ fn a_change_is_tried_before_anything_runs() {
 }
 
 #[test]
-fn the_key_of_a_row_tells_its_configuration_and_not_its_words() {
+fn the_key_of_a_row_is_of_its_configuration_and_not_its_words() {
     let key = |text: &str, row| plan(text).row(row).unwrap().key();
     assert_eq!(
         key(GRID, 1),

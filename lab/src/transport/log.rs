@@ -49,7 +49,7 @@ pub struct Log {
 
 /// What a run measured.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Outcome {
+pub struct FlowOutcome {
     /// Messages sent while the path was up.
     pub possible: u64,
     /// Those of them that came.
@@ -117,7 +117,7 @@ impl Log {
 
     /// What the run measured.
     #[must_use]
-    pub fn outcome(&self, up: Sent, down: Sent) -> Outcome {
+    pub fn outcome(&self, up: Sent, down: Sent) -> FlowOutcome {
         let outage = self.case.outage(self.start);
         let into_outage = |number: &u32| outage.contains(&self.sent_at(*number));
         let possible = (0..self.sent).filter(|number| !into_outage(number)).count();
@@ -128,7 +128,7 @@ impl Log {
             .count();
         let mut added: Vec<Duration> = self.arrivals.iter().map(|a| a.added).collect();
         added.sort_unstable();
-        Outcome {
+        FlowOutcome {
             possible: possible as u64,
             delivered: (self.arrivals.len() - stale) as u64,
             added_p50_ms: nearest_rank(&added, 50).map(millis),
@@ -175,7 +175,7 @@ impl Log {
     }
 }
 
-impl Outcome {
+impl FlowOutcome {
     /// Share of the messages sent while the path was up that came.
     #[must_use]
     pub fn share(&self) -> Option<f64> {

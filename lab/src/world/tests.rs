@@ -111,11 +111,11 @@ fn without_updates_the_force_error_is_clearly_larger() {
     let mut silent = over(WAN, 2);
     silent.slave.trigger.scheme = "timer 60s".parse().unwrap();
     silent.slave.trigger.mismatch_debounce = Duration::from_secs(60);
-    let (silent, told) = (run(&silent, 20), run(&over(WAN, 2), 20));
-    let news = told.outcome().updates.total();
-    assert!(news > 20, "{news} updates");
-    let (silent, told) = (relative_error(&silent), relative_error(&told));
-    assert!(silent > 1.5 * told, "{silent} without, {told} with");
+    let (silent, informed) = (run(&silent, 20), run(&over(WAN, 2), 20));
+    let updates = informed.outcome().updates.total();
+    assert!(updates > 20, "{updates} updates");
+    let (silent, informed) = (relative_error(&silent), relative_error(&informed));
+    assert!(silent > 1.5 * informed, "{silent} without, {informed} with");
 }
 
 #[test]
@@ -261,7 +261,7 @@ fn loss_on_the_way_up_changes_no_draw_on_the_way_down() {
     assert_eq!((clean.2, faulty.2 > 100), (0, true), "loss up is on");
     assert_eq!(
         clean.0, clean.1,
-        "down loses the packets that its own seed says"
+        "down loses the packets that its own seed draws"
     );
     assert_eq!(faulty.0, faulty.1, "whatever happens on the way up");
 }

@@ -1,11 +1,11 @@
 //! The figure: what the protocol adds to the path's delay, over loss, for each path and both stacks.
 
 use super::grid::{
-    JITTERS_MS, Kind, LOSSES_PERCENT, NARROW, OUTAGE, PLAIN, ROUND_TRIPS_MS, Run, kind, largest,
-    outcomes,
+    FlowRun, JITTERS_MS, Kind, LOSSES_PERCENT, NARROW, OUTAGE, PLAIN, ROUND_TRIPS_MS, kind,
+    largest, outcomes,
 };
 use crate::experiment::prelude::*;
-use crate::transport::{Flow, Outcome, Stack};
+use crate::transport::{Flow, FlowOutcome, Stack};
 
 /// Where no loss and no delay are drawn on axes that have no zero.
 const NO_LOSS_PERCENT: f64 = 0.01;
@@ -18,7 +18,7 @@ struct Row {
     kind: Kind,
     /// What it shows of each run, ms.
     what: &'static str,
-    value: fn(&Outcome) -> Option<f64>,
+    value: fn(&FlowOutcome) -> Option<f64>,
     /// The least that is shown, ms.
     foot: f64,
 }
@@ -49,7 +49,7 @@ const ROWS: [Row; 3] = [
 ];
 
 /// Round trips side by side, kinds of path below each other, at 1000 messages a second.
-pub(super) fn figure(runs: &[Run]) -> Figure {
+pub(super) fn figure(runs: &[FlowRun]) -> Figure {
     let mut panels = Vec::new();
     for row in &ROWS {
         for round_trip_ms in ROUND_TRIPS_MS {
@@ -73,7 +73,7 @@ pub(super) fn figure(runs: &[Run]) -> Figure {
 }
 
 /// The worst seed of each condition, over the loss.
-fn curves(runs: &[Run], row: &Row, round_trip: Duration) -> Vec<Series> {
+fn curves(runs: &[FlowRun], row: &Row, round_trip: Duration) -> Vec<Series> {
     let mut curves = Vec::new();
     for (stack, colour, stroke) in [
         (Stack::Stock, Colour::VERMILION, Stroke::Dashed),

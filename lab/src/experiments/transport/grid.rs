@@ -4,10 +4,10 @@ use std::time::Duration;
 
 use mmt_netem::Probability;
 
-use crate::transport::{Bottleneck, Case, Conditions, Flow, Outcome, Stack};
+use crate::transport::{Bottleneck, Case, Conditions, Flow, FlowOutcome, Stack};
 
 /// A case and what it measured.
-pub(super) type Run<'a> = (&'a Case, &'a Outcome);
+pub(super) type FlowRun<'a> = (&'a Case, &'a FlowOutcome);
 
 /// Shortest round trips, ms.
 pub(super) const ROUND_TRIPS_MS: [u64; 3] = [20, 100, 200];
@@ -75,17 +75,20 @@ pub(super) fn kind(conditions: &Conditions) -> Kind {
 
 /// What the runs of a stack measured on some paths with some messages.
 pub(super) fn outcomes<'a>(
-    runs: &[Run<'a>],
+    runs: &[FlowRun<'a>],
     stack: Stack,
     wanted: impl Fn(&Case) -> bool,
-) -> Vec<&'a Outcome> {
+) -> Vec<&'a FlowOutcome> {
     let runs = runs.iter();
     let runs = runs.filter(|(case, _)| case.stack == stack && wanted(case));
     runs.map(|(_, outcome)| *outcome).collect()
 }
 
 /// The largest of what was measured.
-pub(super) fn largest(outcomes: &[&Outcome], of: fn(&Outcome) -> Option<f64>) -> Option<f64> {
+pub(super) fn largest(
+    outcomes: &[&FlowOutcome],
+    of: fn(&FlowOutcome) -> Option<f64>,
+) -> Option<f64> {
     outcomes
         .iter()
         .filter_map(|outcome| of(outcome))

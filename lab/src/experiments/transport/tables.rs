@@ -2,9 +2,9 @@
 
 use mmt_netem::Probability;
 
-use super::grid::{Kind, NARROW, OUTAGE, PLAIN, Run, kind, largest, outcomes};
+use super::grid::{FlowRun, Kind, NARROW, OUTAGE, PLAIN, kind, largest, outcomes};
 use crate::experiment::prelude::*;
-use crate::transport::{Case, Flow, Outcome, Stack};
+use crate::transport::{Case, Flow, FlowOutcome, Stack};
 
 /// The round trip of the examples, and the shortest one of the promise about bottlenecks.
 const LONG: Duration = Duration::from_millis(100);
@@ -15,7 +15,7 @@ fn millis(duration: Duration) -> u64 {
 
 /// Every run.
 #[rustfmt::skip]
-pub(super) fn all(runs: &[Run]) -> Table {
+pub(super) fn all(runs: &[FlowRun]) -> Table {
     Table::of(
         "Delay added by the protocol",
         runs,
@@ -51,7 +51,7 @@ pub(super) fn all(runs: &[Run]) -> Table {
 struct Promise {
     what: &'static str,
     holds_for: fn(&Case) -> bool,
-    value: fn(&Outcome) -> Option<f64>,
+    value: fn(&FlowOutcome) -> Option<f64>,
     limit_ms: f64,
 }
 
@@ -79,18 +79,18 @@ static PROMISES: [Promise; 3] = [
 
 impl Promise {
     /// How often it is kept.
-    fn kept(&self, outcomes: &[&Outcome]) -> u64 {
+    fn kept(&self, outcomes: &[&FlowOutcome]) -> u64 {
         let values = outcomes.iter().filter_map(|outcome| (self.value)(outcome));
         values.filter(|value| *value <= self.limit_ms).count() as u64
     }
 }
 
 /// A promise with what stock quinn and ours came to where it holds.
-type Kept<'a> = (&'static Promise, [Vec<&'a Outcome>; 2]);
+type Kept<'a> = (&'static Promise, [Vec<&'a FlowOutcome>; 2]);
 
 /// What the transport promises and how far it is kept.
 #[rustfmt::skip]
-pub(super) fn promises(runs: &[Run]) -> Table {
+pub(super) fn promises(runs: &[FlowRun]) -> Table {
     let rows = PROMISES.iter().map(|promise| {
         (promise, Stack::ALL.map(|stack| outcomes(runs, stack, promise.holds_for)))
     });
@@ -111,7 +111,7 @@ pub(super) fn promises(runs: &[Run]) -> Table {
 }
 
 /// Messages over a path of this name by a stack.
-type Group<'a> = grid::Group<(Flow, &'static str, Stack), &'a Outcome>;
+type Group<'a> = grid::Group<(Flow, &'static str, Stack), &'a FlowOutcome>;
 
 /// The worst of each measure.
 #[rustfmt::skip]
@@ -130,7 +130,7 @@ fn columns<'a>() -> [Column<'a, Group<'a>>; 9] {
 }
 
 /// A sample of each kind of path.
-pub(super) fn examples(runs: &[Run]) -> Table {
+pub(super) fn examples(runs: &[FlowRun]) -> Table {
     let mut rows = Vec::new();
     for (name, loss, jitter_ms, of_kind) in [
         ("clean", 0.0, 0, PLAIN),
@@ -159,7 +159,7 @@ pub(super) fn examples(runs: &[Run]) -> Table {
 }
 
 /// The worst of each kind of path.
-pub(super) fn worst(runs: &[Run]) -> Table {
+pub(super) fn worst(runs: &[FlowRun]) -> Table {
     let kinds: [(&str, Kind); 4] = [
         ("loss and jitter", PLAIN),
         ("and 1 s outage", OUTAGE),

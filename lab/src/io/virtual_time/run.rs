@@ -19,7 +19,7 @@ use super::ends::{Ends, MemorySocket, ends};
 use super::executor::{Executor, lock};
 use super::path::{Datagram, OneWay};
 use crate::io::failure::Failure;
-use crate::transport::{Case, HEARTBEAT, HEARTBEAT_BYTES, Log, Outcome, Sent};
+use crate::transport::{Case, FlowOutcome, HEARTBEAT, HEARTBEAT_BYTES, Log, Sent};
 
 /// Is called for each packet that came: when, and what the path itself took for it.
 type Arrived<'a> = &'a mut dyn FnMut(Time, Duration) -> Result<(), Failure>;
@@ -35,7 +35,7 @@ const START_GRID: Duration = Duration::from_secs(1);
 ///
 /// # Errors
 /// The link's settings are out of range, or quinn refuses to connect or to send.
-pub fn run(case: &Case) -> Result<Outcome, Failure> {
+pub fn run(case: &Case) -> Result<FlowOutcome, Failure> {
     Setup::new(case)?.measure(case)
 }
 
@@ -111,7 +111,7 @@ impl Setup {
         }
     }
 
-    fn measure(&self, case: &Case) -> Result<Outcome, Failure> {
+    fn measure(&self, case: &Case) -> Result<FlowOutcome, Failure> {
         let pair = self.shake_hands()?;
         let start = next_on_grid(self.executor.time());
         let (now, outage) = (self.executor.time(), case.outage(start));

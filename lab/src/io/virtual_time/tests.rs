@@ -6,7 +6,7 @@ use std::time::Duration;
 use mmt_netem::Probability;
 
 use super::*;
-use crate::transport::{Bottleneck, Case, Conditions, Flow, Outcome, Stack};
+use crate::transport::{Bottleneck, Case, Conditions, Flow, FlowOutcome, Stack};
 
 const MS: Duration = Duration::from_millis(1);
 
@@ -53,7 +53,7 @@ fn outage(stack: Stack, flow: Flow) -> Case {
     })
 }
 
-fn measured(case: Case) -> Outcome {
+fn measured(case: Case) -> FlowOutcome {
     run(&case).unwrap()
 }
 

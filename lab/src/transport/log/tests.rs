@@ -26,7 +26,7 @@ fn case() -> Case {
 }
 
 /// Messages by number with the delay that each met beyond the path's 10 ms.
-fn outcome(added_ms: &[(u32, u32)]) -> Outcome {
+fn outcome(added_ms: &[(u32, u32)]) -> FlowOutcome {
     let mut log = Log::new(&case(), START);
     let messages: Vec<Vec<u8>> = (0..8).map(|_| log.send()).collect();
     for (number, added) in added_ms {

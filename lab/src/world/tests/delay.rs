@@ -284,7 +284,7 @@ proptest! {
         config.operator.hand.tremor_m = shake_m;
         let mut draw = Substream::new(seed, "test/object", 0);
         let mut world = World::try_new(&config).unwrap();
-        let mut told = 0;
+        let mut applied = 0;
         for tick in 0..10_000 {
             if tick % 500 == 499 {
                 let environment = world.environment_mut();
@@ -292,10 +292,10 @@ proptest! {
                 environment.set_friction(draw.uniform_in(0.05, 0.8)).unwrap();
             }
             world.step();
-            told = world.master().applied();
+            applied = world.master().applied();
         }
         let outcome = world.outcome();
-        prop_assert!(told > 0, "nothing was told");
+        prop_assert!(applied > 0, "no update was applied");
         prop_assert!(outcome.energy_injected_j < 1e-9, "{} J", outcome.energy_injected_j);
         prop_assert!(outcome.observer_min_j >= -1e-3, "{} J", outcome.observer_min_j);
     }

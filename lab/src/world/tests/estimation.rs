@@ -235,7 +235,7 @@ fn pushes_at_10_mm_per_s_show_c() {
 }
 
 #[test]
-fn a_box_that_turns_more_easily_than_a_square_is_told_to_the_model() {
+fn a_box_that_turns_more_easily_than_a_square_is_so_in_the_model() {
     let mut pmse = vec![];
     for seed in SEEDS {
         let mut config = experiment(seed);

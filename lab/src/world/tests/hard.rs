@@ -1,4 +1,4 @@
-//! The hard cases of delay, each a scenario with a law; `docs/limits.md` says what is not made good.
+//! The hard cases of delay, each a scenario with a law; `docs/limits.md` lists what is not made good.
 
 use super::*;
 use mmt_client::operator::scripted::Phase;

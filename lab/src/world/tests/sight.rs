@@ -119,9 +119,9 @@ fn without_delay_most_of_the_force_error_is_the_first_touch() {
     for seed in FIVE {
         let config = over("", seed);
         let shares = Shares::of(&config);
-        let mut told = config;
-        told.slave.start.side_m = 0.36;
-        let of_known = Shares::of(&told);
+        let mut informed = config;
+        informed.slave.start.side_m = 0.36;
+        let of_known = Shares::of(&informed);
         println!("seed {seed}: unknown {shares:.4?}, known {of_known:.4?}");
         assert!(shares.air + shares.first > 0.5 * shares.sum(), "{shares:?}");
         assert!(of_known.air < 0.5 * shares.air, "{of_known:?}");
