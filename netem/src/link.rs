@@ -16,6 +16,7 @@ pub use crate::direction::{Direction, LinkId};
 use crate::packet::{Departure, Packet};
 
 mod bottleneck;
+mod by_time;
 mod codel;
 mod correlated;
 mod loss_model;

@@ -1,6 +1,8 @@
 //! The line printed at the start tells the truth.
 
+use super::offers::PACKETS_MAX;
 use super::*;
+use crate::record::summary::runs;
 
 fn at_1_khz(words: &str) -> Effect {
     words

@@ -1,12 +1,13 @@
 //! The packets on a link, and the stages that they pass.
 
-use std::cmp::{Ordering, Reverse};
+use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 use std::time::Duration;
 
 use mmt_shared::time::Time;
 
 use super::bottleneck::{Bottleneck, ROOM, Sent};
+use super::by_time::ByTime;
 use super::correlated::ByPacket;
 use super::loss_model::LossModel;
 use super::propagation::{Propagation, Way};
@@ -328,34 +329,4 @@ impl<T> Stages<T> {
 /// Whether a packet is no larger than the MTU.
 fn fits(settings: &LinkConfig, bytes: usize) -> bool {
     settings.mtu.is_none_or(|mtu| bytes <= mtu as usize)
-}
-
-/// A departure ordered by its time, then by number of offer, a copy last.
-#[derive(Clone, Debug)]
-struct ByTime<T>(Departure<T>);
-
-impl<T> ByTime<T> {
-    fn key(&self) -> (Time, u64, bool) {
-        (self.0.due, self.0.number, self.0.copy)
-    }
-}
-
-impl<T> PartialEq for ByTime<T> {
-    fn eq(&self, other: &Self) -> bool {
-        self.key() == other.key()
-    }
-}
-
-impl<T> Eq for ByTime<T> {}
-
-impl<T> PartialOrd for ByTime<T> {
-    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        Some(self.cmp(other))
-    }
-}
-
-impl<T> Ord for ByTime<T> {
-    fn cmp(&self, other: &Self) -> Ordering {
-        self.key().cmp(&other.key())
-    }
 }

@@ -1,0 +1,37 @@
+//! The order in which packets leave a link.
+
+use std::cmp::Ordering;
+
+use mmt_shared::time::Time;
+
+use crate::packet::Departure;
+
+/// A departure ordered by its time, then by number of offer, a copy last.
+#[derive(Clone, Debug)]
+pub(super) struct ByTime<T>(pub(super) Departure<T>);
+
+impl<T> ByTime<T> {
+    fn key(&self) -> (Time, u64, bool) {
+        (self.0.due, self.0.number, self.0.copy)
+    }
+}
+
+impl<T> PartialEq for ByTime<T> {
+    fn eq(&self, other: &Self) -> bool {
+        self.key() == other.key()
+    }
+}
+
+impl<T> Eq for ByTime<T> {}
+
+impl<T> PartialOrd for ByTime<T> {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl<T> Ord for ByTime<T> {
+    fn cmp(&self, other: &Self) -> Ordering {
+        self.key().cmp(&other.key())
+    }
+}
