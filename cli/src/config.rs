@@ -1,10 +1,11 @@
-//! The configuration file of a slave: TOML, unknown keys are errors with line and caret.
+//! The files of a slave, configuration and scene: TOML, unknown keys are errors with line and caret.
 //!
 //! What the file leaves out is the mode's, and the mode is the command line's before the file's.
 
 use std::path::Path;
 
 use mmt_lab::overlay::laid_over;
+use mmt_server::environment::SceneConfig;
 use mmt_server::slave::SlaveConfig;
 use mmt_shared::model::settings::Mode;
 
@@ -22,14 +23,33 @@ pub(crate) fn slave_config(
     let Some(path) = path else {
         return Ok(SlaveConfig::of_mode(mode.unwrap_or(Mode::Recommended)));
     };
-    let text = read_text(path, "the configuration")?;
-    parse(&text, mode).map_err(|error| {
-        let what = format!(
-            "the configuration {}: {}",
-            path.display(),
-            error.to_string().trim_end()
-        );
-        Failure::usage(what).remedy("correct that line; docs/commands.md lists every key")
+    read(path, "the configuration", "docs/commands.md", |text| {
+        parse(text, mode)
+    })
+}
+
+/// The scene of a file.
+///
+/// # Errors
+/// The file cannot be read, is no TOML, or is no scene.
+pub(crate) fn scene(path: &Path) -> Result<SceneConfig, Failure> {
+    read(path, "the scene", "docs/scenes.md", |text| {
+        toml::from_str(text)
+    })
+}
+
+/// Reads a file that `page` describes.
+fn read<T>(
+    path: &Path,
+    what: &str,
+    page: &str,
+    parse: impl Fn(&str) -> Result<T, toml::de::Error>,
+) -> Result<T, Failure> {
+    let text = read_text(path, what)?;
+    parse(&text).map_err(|error| {
+        let (path, error) = (path.display(), error.to_string());
+        let what = format!("{what} {path}: {}", error.trim_end());
+        Failure::usage(what).remedy(format!("correct that line; {page} lists every key"))
     })
 }
 
@@ -88,6 +108,19 @@ mod tests {
         }
         let error = parse("[environment.shape.disc]\nradius_m = 0.1\n", None).unwrap_err();
         assert!(error.to_string().contains("radius_m"), "{error}");
+    }
+
+    #[test]
+    fn a_scene_that_is_wrong_is_named_with_line_and_caret() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("scene.toml");
+        std::fs::write(&path, "[[bodies]]\nmas_kg = 1.0\n").unwrap();
+        let text = scene(&path).unwrap_err().to_string();
+        for part in ["the scene", "scene.toml", "line 2", "^^^^^^", "scenes.md"] {
+            assert!(text.contains(part), "{text}");
+        }
+        let config = parse("[scene]\n[[scene.bodies]]\nmass_kg = 2.0\n", None).unwrap();
+        assert_eq!(config.scene.bodies[0].mass_kg, 2.0);
     }
 
     #[test]

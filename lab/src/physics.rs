@@ -91,7 +91,7 @@ pub struct TracePoint {
 }
 
 /// Why there are no reference motions of a body.
-#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum PhysicsError {
     /// The body's numbers are not accepted.
     #[error(transparent)]

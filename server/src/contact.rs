@@ -22,8 +22,10 @@ pub struct Contact {
     pub vision: Option<VisionSample>,
     /// Contact force as it is, N: for reports.
     pub true_force: Vec2,
-    /// The object's pose when the tool met it, before it moved on: for reports.
+    /// The object's pose when the tool met it, before it moved on: for reports, and for the first look at another body.
     pub truth: Pose,
+    /// Number of the body that is touched, or was last.
+    pub body: usize,
 }
 
 /// The object, its ground and the slave's sensors.
@@ -31,6 +33,7 @@ pub struct ContactStage {
     environment: Environment,
     sensing: Sensing,
     detector: ContactDetector,
+    body: usize,
 }
 
 impl ContactStage {
@@ -41,6 +44,7 @@ impl ContactStage {
             environment,
             sensing,
             detector,
+            body: 0,
         }
     }
 
@@ -57,16 +61,20 @@ impl ContactStage {
 
     /// One tick with the tool at `tool` (m), moving at `velocity` (m/s).
     pub fn step(&mut self, now: Time, tool: Vec2, velocity: Vec2) -> Contact {
-        let truth = self.environment.pose();
-        let true_force = self.environment.step(tool, velocity).force;
-        let sensed = self.sensing.sense(now, tool, true_force, &truth);
+        let met = self.environment.step(tool, velocity);
+        if met.body != self.body {
+            self.body = met.body;
+            self.sensing.drop_images();
+        }
+        let sensed = self.sensing.sense(now, tool, met.force, &met.pose);
         Contact {
             tool: sensed.tool,
             force: sensed.force,
             in_contact: self.detector.step(sensed.force.norm()),
             vision: sensed.vision,
-            true_force,
-            truth,
+            true_force: met.force,
+            truth: met.pose,
+            body: met.body,
         }
     }
 }

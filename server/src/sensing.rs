@@ -174,6 +174,12 @@ impl Sensing {
         self.dropped
     }
 
+    /// Drops the images that are on their way: they show another body than the one that is touched now.
+    pub fn drop_images(&mut self) {
+        self.dropped += self.on_their_way.len() as u64;
+        self.on_their_way.clear();
+    }
+
     fn image_due(&mut self, now: Time, object: &Pose) -> Option<VisionSample> {
         if self.period_ns > 0 && now >= *self.next_image.get_or_insert(now) {
             self.take_image(now, object);

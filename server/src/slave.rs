@@ -93,10 +93,11 @@ impl Slave {
         settings: ModelSettings,
     ) -> Result<Self, SlaveError> {
         let coupling = settings.coupling;
-        let environment = Environment::try_new(EnvironmentConfig {
+        let environment = EnvironmentConfig {
             coupling,
             ..config.environment
-        })?;
+        };
+        let environment = Environment::of_scene(environment, &config.scene)?;
         let pose = environment.pose();
         let object = ObjectEstimate::try_new(config, coupling, pose)?;
         let footprint = BoxFootprint::square(config.start.side_m);
@@ -259,6 +260,10 @@ impl Slave {
         let contact = self.contact.step(now, played.hip, played.velocity);
         self.tool.measured(contact.force);
         let held_back = self.tool.is_held_back();
+        if self.object.follow_body(&contact) {
+            // the master has the body that was touched before
+            self.trigger.repeat(Cause::SlaveOnlyContact);
+        }
         self.object.step(now, &contact, held_back);
         self.follow_master(played.stamp);
         self.reference.take_echo(played.force);

@@ -98,6 +98,9 @@ pub(crate) struct DemoArguments {
     /// Whose force the hand feels
     #[arg(long, value_name = "NAME", default_value = "mmt", value_parser = values::architecture())]
     pub(crate) architecture: Architecture,
+    /// Bodies and walls, TOML [default: one cube]
+    #[arg(long, value_name = "FILE")]
+    pub(crate) scene: Option<PathBuf>,
     /// When updates are sent [default: the mode's]
     #[arg(long, value_name = "WORDS", value_parser = values::scheme)]
     pub(crate) scheme: Option<Scheme>,
@@ -141,6 +144,9 @@ pub(crate) struct SlaveArguments {
     /// Configuration of the slave, TOML
     #[arg(long, value_name = "FILE")]
     pub(crate) config: Option<PathBuf>,
+    /// Bodies and walls, TOML [default: the configuration's, else one cube]
+    #[arg(long, value_name = "FILE")]
+    pub(crate) scene: Option<PathBuf>,
     /// Emulated network on what the slave sends
     #[arg(long, value_name = "WORDS", default_value = "none", value_parser = values::netem)]
     pub(crate) netem: LinkConfig,

@@ -23,6 +23,7 @@ use super::netem::wrap::{Emulation, effect};
 use super::viewer::Viewer;
 use super::{master, slave};
 use crate::args::DemoArguments;
+use crate::config::scene;
 use crate::failure::Failure;
 use crate::log::Messages;
 use crate::output::{note, print, print_json};
@@ -39,7 +40,7 @@ const FAREWELL: Duration = Duration::from_secs(3);
 /// # Errors
 /// A host could not start, or the session broke.
 pub(crate) fn run(arguments: &DemoArguments, messages: &Messages) -> Result<(), Failure> {
-    let config = slave_config(arguments);
+    let config = slave_config(arguments)?;
     let caption = caption(arguments, &config);
     let (up, down) = (up(arguments), down(arguments));
     note(effect(Direction::Up, up)?);
@@ -103,9 +104,12 @@ fn architecture(arguments: &DemoArguments) -> Architecture {
     arguments.architecture
 }
 
-fn slave_config(arguments: &DemoArguments) -> SlaveConfig {
+fn slave_config(arguments: &DemoArguments) -> Result<SlaveConfig, Failure> {
     let mut config = SlaveConfig::of_mode(arguments.mode);
     config.seed = arguments.seed;
+    if let Some(path) = &arguments.scene {
+        config.scene = scene(path)?;
+    }
     // where the tool may be felt the play-out finds out by itself how long it has to wait
     if !architecture(arguments).feels_tool() {
         let jitter = up(arguments).jitter_span();
@@ -116,7 +120,7 @@ fn slave_config(arguments: &DemoArguments) -> SlaveConfig {
     }
     config.repeats_ms = arguments.repeats.unwrap_or(config.repeats_ms);
     config.stretch_max = arguments.stretch_max.unwrap_or(config.stretch_max);
-    config
+    Ok(config)
 }
 
 fn caption(arguments: &DemoArguments, config: &SlaveConfig) -> Caption {
@@ -140,7 +144,8 @@ fn caption(arguments: &DemoArguments, config: &SlaveConfig) -> Caption {
         command: "demo",
         duration_s: Some(arguments.duration.as_secs_f64()),
         setting: format!("{mode}, {scheme}; {network}; seed {seed}"),
-        truth: Some([m, environment.damping_ns_per_m, c]),
+        // of several bodies the one that is touched counts
+        truth: (config.scene.bodies.is_empty()).then_some([m, environment.damping_ns_per_m, c]),
     }
 }
 

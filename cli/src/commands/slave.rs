@@ -20,7 +20,7 @@ use super::host::{Host, spawn};
 use super::netem::wrap::{Emulation, effect};
 use super::viewer::Viewer;
 use crate::args::SlaveArguments;
-use crate::config::slave_config;
+use crate::config::{scene, slave_config};
 use crate::failure::{Exit, Failure};
 use crate::log::Messages;
 use crate::output::{note, print, print_json};
@@ -114,6 +114,9 @@ pub(super) fn start(
 fn options(arguments: &SlaveArguments) -> Result<SlaveOptions, Failure> {
     let mode = arguments.mode;
     let mut config: SlaveConfig = slave_config(arguments.config.as_deref(), mode)?;
+    if let Some(path) = &arguments.scene {
+        config.scene = scene(path)?;
+    }
     if let Some(scheme) = arguments.scheme {
         config.trigger.scheme = scheme;
     }

@@ -75,10 +75,11 @@ impl BilateralSlave {
     ) -> Result<Self, SlaveError> {
         let mut playout = PlayoutBuffer::try_new(config.playout)?;
         playout.start_at(hip);
-        let environment = Environment::try_new(EnvironmentConfig {
+        let environment = EnvironmentConfig {
             coupling,
             ..config.environment
-        })?;
+        };
+        let environment = Environment::of_scene(environment, &config.scene)?;
         let sensing = Sensing::try_new(config.sensing, config.seed)?;
         let detector = ContactDetector::new(config.trigger.contact);
         let speed_max_m_per_s = config.playout.speed_max_m_per_s;

@@ -268,6 +268,7 @@ fn loss_on_the_way_up_changes_no_draw_on_the_way_down() {
 
 mod delay;
 mod hard;
+mod scenes;
 mod sight;
 
 #[test]

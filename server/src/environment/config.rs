@@ -1,13 +1,13 @@
 //! What an environment is made of, with the default scenario, and the checks on it.
 
 use mmt_shared::model::contact::Coupling;
-use mmt_shared::model::geometry::{Pose, Vec2};
+use mmt_shared::model::geometry::{Face, Pose, Vec2};
 use mmt_shared::model::params::{GRAVITY, ModelParams, ParamsError, WORKSPACE_M};
 use mmt_shared::range::{OutOfRange, in_range};
 use serde::{Deserialize, Serialize};
 
 use super::bounded::Bounded;
-use super::outline::{Outline, OutlineError, Shape};
+use super::outline::{Outline, OutlineError, Shape, convex, simple};
 use super::terrain::{GroundPatch, PATCHES_MAX, Ripple, Terrain};
 use super::wall::Wall;
 
@@ -24,7 +24,7 @@ const STIFFNESS_N_PER_M: (f64, f64) = (1.0, 30_000.0);
 /// Accepted contact damping `k_d`, N s/m.
 const CONTACT_DAMPING_NS_PER_M: (f64, f64) = (0.0, 300.0);
 /// Accepted initial angle, rad, of body and wall.
-const ANGLE_RAD: (f64, f64) = (-1000.0, 1000.0);
+pub(super) const ANGLE_RAD: (f64, f64) = (-1000.0, 1000.0);
 /// Accepted ratio of static to sliding friction: wood on wood is near 1.5.
 const STATIC_RATIO: (f64, f64) = (1.0, 5.0);
 /// Accepted share of the ripple: at 1 there are places without friction.
@@ -33,8 +33,6 @@ const RIPPLE_SHARE: (f64, f64) = (0.0, 1.0);
 const RIPPLE_PERIOD_M: (f64, f64) = (0.01, 10.0);
 /// Accepted coordinates of the corners of a ground patch, m.
 const GROUND_M: (f64, f64) = (-1000.0, 1000.0);
-/// Accepted distance of the wall from the origin, m.
-const WALL_M: (f64, f64) = (-2.0 * WORKSPACE_M, 2.0 * WORKSPACE_M);
 
 /// A body on a plane. The default is the default scenario of the model study: a cube on plain ground.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -94,7 +92,7 @@ impl Default for EnvironmentConfig {
 }
 
 /// Why an environment cannot be made of these numbers.
-#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum EnvironmentError {
     /// A number lies outside its accepted range or is not a number.
     #[error("environment: {0}")]
@@ -113,6 +111,12 @@ pub enum EnvironmentError {
         /// y of what it was, m.
         y: f64,
     },
+    /// A body of the scene is wrong; the first has number 1.
+    #[error("scene: body {0}: {1}")]
+    Body(usize, Box<EnvironmentError>),
+    /// Two bodies of the scene are in each other at the start.
+    #[error("scene: bodies {0} and {1} overlap")]
+    Overlap(usize, usize),
 }
 
 impl EnvironmentConfig {
@@ -132,7 +136,8 @@ impl EnvironmentConfig {
                 in_range("disc diameter", "m", *diameter_m, SIDE_M)?;
                 Ok(Outline::Circle(diameter_m / 2.0))
             }
-            Shape::Polygon { vertices_m } => Ok(Outline::polygon(vertices_m)?),
+            Shape::Polygon { vertices_m } => Ok(Outline::polygon(vertices_m, convex)?),
+            Shape::Compound { vertices_m } => Ok(Outline::polygon(vertices_m, simple)?),
         }
     }
 
@@ -189,7 +194,17 @@ impl EnvironmentConfig {
         in_range("position y", "m", self.pose.position.y, place)?;
         in_range("angle", "rad", self.pose.angle, ANGLE_RAD)?;
         let (x, y) = (self.centre_of_mass_m.x, self.centre_of_mass_m.y);
-        if !outline.holds(self.centre_of_mass_m) {
+        let held = match self.shape {
+            // the centroid of a body with notches may lie in one
+            Shape::Compound { .. } => {
+                let bounds = outline.bounding_box();
+                let within =
+                    |face: Face| face.outward().dot(&self.centre_of_mass_m) <= bounds.offset(face);
+                Face::ALL.into_iter().all(within)
+            }
+            _ => outline.holds(self.centre_of_mass_m),
+        };
+        if !held {
             return Err(EnvironmentError::CentreOfMass { x, y });
         }
         self.check_ground()
@@ -208,22 +223,6 @@ impl EnvironmentConfig {
             in_range("patch to x", "m", to.x, (from.x, GROUND_M.1))?;
             in_range("patch to y", "m", to.y, (from.y, GROUND_M.1))?;
         }
-        if let Some(wall) = &self.wall {
-            in_range("wall angle", "rad", wall.angle_rad, ANGLE_RAD)?;
-            in_range("wall distance", "m", wall.distance_m, WALL_M)?;
-        }
         Ok(())
-    }
-
-    /// Checks that the body starts in front of the wall.
-    pub(super) fn check_start(&self, outline: &Outline) -> Result<(), EnvironmentError> {
-        let Some(wall) = &self.wall else {
-            return Ok(());
-        };
-        let distance = wall.distance_m;
-        let least = distance - wall.clearance(outline, &self.pose);
-        // a body may start flush: room for rounding
-        let room = (least - 1e-9, WALL_M.1);
-        Ok(in_range("wall distance", "m", distance, room)?)
     }
 }

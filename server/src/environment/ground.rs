@@ -2,9 +2,8 @@
 //!
 //! Solves, for the velocity u = (v, omega) of the centre of mass in the body frame with M = diag(m, m, I),
 //! `min ½ |u − u*|²_M + T [ ½ uᵀ D u + Σ_i (w_i c/64) sqrt(|v + omega × r_i|² + eps²) ]`
-//! within the limits that a wall sets to u, and decides first whether ground and wall hold the body. It is
-//! the minimiser of a convex function whose least dissipation is at rest, which the wall always allows, so
-//! it never adds energy and never reverses a velocity within a step. A body at rest needs `static_ratio`
+//! and decides first whether the ground holds the body. It is the minimiser of a convex function whose least
+//! dissipation is at rest, so it never adds energy and never reverses a velocity within a step. A body at rest needs `static_ratio`
 //! times the friction of a sliding one to break away; the fall to sliding friction takes place at once.
 //! It must never let a held body creep: eps smooths sliding only, the stick test has eps = 0.
 
@@ -13,7 +12,6 @@ use mmt_shared::time::TICK_S;
 use nalgebra::{Matrix3, Vector3};
 
 use super::patch::{HELD, Patch, Sums};
-use super::wall::Limits;
 
 /// Smoothing speed eps of sliding friction, m/s: a model study's choice, a thousandth of the slowest push.
 const EPS_M_PER_S: f64 = 1e-4;
@@ -75,39 +73,29 @@ struct Minimum {
     u: Vector3<f64>,
     /// A bound on the weighted mean of `q_i` at u.
     at_most: f64,
-    /// Impulse of the walls that the body touches already.
-    reaction: Vector3<f64>,
 }
 
 impl Patch {
     /// The velocity (m/s, m/s, rad/s; body frame) after one period T under ground friction, from the
-    /// velocity `free` that the body would have without it, within a wall's limits. `before` is the
-    /// velocity that it had: where the search starts, since a sliding body changes little in 1 ms. All
+    /// velocity `free` that the body would have without it. `before` is the velocity that it had: where the search starts, since a sliding body changes little in 1 ms. All
     /// numbers must be finite.
     pub(super) fn step(
         &self,
         load: &Load,
-        limits: &Limits,
         before: Vector3<f64>,
         free: Vector3<f64>,
     ) -> Vector3<f64> {
         let resting = load.static_ratio > 1.0 && before == Vector3::zeros();
-        if resting && self.slide(&load.at_rest(), limits, before, free) == Vector3::zeros() {
+        if resting && self.slide(&load.at_rest(), before, free) == Vector3::zeros() {
             return Vector3::zeros();
         }
-        self.slide(load, limits, before, free)
+        self.slide(load, before, free)
     }
 
-    fn slide(
-        &self,
-        load: &Load,
-        limits: &Limits,
-        before: Vector3<f64>,
-        free: Vector3<f64>,
-    ) -> Vector3<f64> {
+    fn slide(&self, load: &Load, before: Vector3<f64>, free: Vector3<f64>) -> Vector3<f64> {
         let masses = load.masses();
         if load.c * self.hold.force <= 0.0 {
-            return without_friction(load, limits, free);
+            return without_friction(load, free);
         }
         let wrench = free.component_mul(&masses) / TICK_S;
         if self.surely_held(load, &wrench) {
@@ -115,16 +103,15 @@ impl Patch {
         }
         let mut eps = EPS_M_PER_S;
         let slid = before.xy().norm_squared() > 100.0 * eps * eps;
-        let mut u = limits.shortened(if slid { before } else { free });
+        let mut u = if slid { before } else { free };
         for _ in 0..EPS_LEVELS {
-            let minimum = self.minimise(load, limits, free, u, eps);
+            let minimum = self.minimise(load, free, u, eps);
             u = minimum.u;
             // Slides, exactly: the wrench does more work along u than friction can take.
             if wrench.dot(&u) > load.c * minimum.at_most {
                 return u;
             }
-            let pressed = wrench + minimum.reaction / TICK_S;
-            if self.held_by_slack(load, &pressed, &u, eps) {
+            if self.held_by_slack(load, &wrench, &u, eps) {
                 return Vector3::zeros();
             }
             eps /= 10.0;
@@ -133,15 +120,8 @@ impl Patch {
         Vector3::zeros()
     }
 
-    /// Safeguarded Newton from `start`, which must be within the limits.
-    fn minimise(
-        &self,
-        load: &Load,
-        limits: &Limits,
-        free: Vector3<f64>,
-        start: Vector3<f64>,
-        eps: f64,
-    ) -> Minimum {
+    /// Safeguarded Newton from `start`.
+    fn minimise(&self, load: &Load, free: Vector3<f64>, start: Vector3<f64>, eps: f64) -> Minimum {
         let (masses, dampings) = (load.masses(), load.dampings() * TICK_S);
         let friction = load.c * TICK_S;
         let inert = Matrix3::from_diagonal(&masses) + dampings;
@@ -153,7 +133,6 @@ impl Patch {
         };
         let mut u = start;
         let mut sums = self.sums(&u, eps);
-        let mut reaction = Vector3::zeros();
         for _ in 0..NEWTON_STEPS_MAX {
             let gradient =
                 (u - free).component_mul(&masses) + dampings * u + sums.gradient * friction;
@@ -161,15 +140,13 @@ impl Patch {
             let Some(factor) = hessian.cholesky() else {
                 break;
             };
-            let newton;
-            (newton, reaction) = limits.descend(&factor, &gradient, &u);
+            let newton = -factor.solve(&gradient);
             let stretch = newton.xy().norm() + newton.z.abs() * self.reach;
             if stretch < LAST_STEP * eps {
                 // q_i changes by no more than its point's velocity
                 return Minimum {
                     u: u + newton,
                     at_most: sums.potential + stretch * self.hold.force,
-                    reaction,
                 };
             }
             let (value, slope) = (cost(&u, &sums), gradient.dot(&newton));
@@ -189,7 +166,6 @@ impl Patch {
         Minimum {
             u,
             at_most: sums.potential,
-            reaction,
         }
     }
 
@@ -235,12 +211,13 @@ impl Patch {
 }
 
 /// The same step where nothing but damping resists.
-fn without_friction(load: &Load, limits: &Limits, free: Vector3<f64>) -> Vector3<f64> {
+fn without_friction(load: &Load, free: Vector3<f64>) -> Vector3<f64> {
     let masses = load.masses();
     let inert = Matrix3::from_diagonal(&masses) + load.dampings() * TICK_S;
-    let gradient = -free.component_mul(&masses);
-    let step = |factor| limits.descend(&factor, &gradient, &Vector3::zeros()).0;
-    inert.cholesky().map_or_else(Vector3::zeros, step)
+    let momentum = free.component_mul(&masses);
+    inert
+        .cholesky()
+        .map_or_else(Vector3::zeros, |factor| factor.solve(&momentum))
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! The outline of a body seen from above: what of it touches the ground, the tool and the wall.
 //!
 //! Everything is in the object's frame, whose origin is the centroid of the area. It must never hold an
-//! outline that is not convex.
+//! outline that crosses itself.
 
 use mmt_shared::model::geometry::{BoxFootprint, Face, Vec2, cross};
 use mmt_shared::model::params::FACE_OFFSET_M;
@@ -44,6 +44,11 @@ pub enum Shape {
         /// 3 to 16 corners in order, m.
         vertices_m: Bounded<Vec2, VERTICES_MAX>,
     },
+    /// A polygon that may have notches: a compound of convex parts. Its vertices are given likewise.
+    Compound {
+        /// 3 to 16 corners in order, m.
+        vertices_m: Bounded<Vec2, VERTICES_MAX>,
+    },
 }
 
 /// Why vertices are no outline.
@@ -63,6 +68,9 @@ pub enum OutlineError {
         /// Its length, m.
         length: f64,
     },
+    /// Two edges meet elsewhere than at a common corner.
+    #[error("polygon crosses itself")]
+    Crossing,
     /// The outline turns back or runs straight on at a vertex, or goes round more than once.
     #[error("polygon is not convex at vertex {0}")]
     NotConvex(usize),
@@ -78,7 +86,7 @@ pub enum OutlineError {
     },
 }
 
-/// A convex outline about its centroid.
+/// An outline about its centroid.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[allow(
     clippy::large_enum_variant,
@@ -99,8 +107,12 @@ impl Outline {
         Self::Corners(Bounded::try_new(&corners).unwrap_or_default())
     }
 
-    /// The convex polygon with these corners, turned counter-clockwise and moved to its centroid.
-    pub(super) fn polygon(vertices: &Bounded<Vec2, VERTICES_MAX>) -> Result<Self, OutlineError> {
+    /// The polygon with these corners, turned counter-clockwise and moved to its centroid; `check` is [`convex`] or
+    /// [`simple`].
+    pub(super) fn polygon(
+        vertices: &Bounded<Vec2, VERTICES_MAX>,
+        check: fn(&[Vec2]) -> Result<(), OutlineError>,
+    ) -> Result<Self, OutlineError> {
         let mut corners = *vertices;
         let given = corners.as_slice();
         if given.len() < 3 {
@@ -113,7 +125,7 @@ impl Outline {
         if doubled_area(given) < 0.0 {
             corners.as_mut_slice().reverse();
         }
-        convex(corners.as_slice())?;
+        check(corners.as_slice())?;
         let centroid = centroid(corners.as_slice());
         for corner in corners.as_mut_slice() {
             *corner -= centroid;
@@ -168,7 +180,7 @@ impl Outline {
         }
     }
 
-    /// Whether a point lies inside or on the outline.
+    /// Whether a point lies inside or on a convex outline.
     pub(super) fn holds(&self, point: Vec2) -> bool {
         match self {
             Self::Circle(radius) => point.norm() <= *radius,
@@ -196,7 +208,8 @@ pub(super) fn centroid(corners: &[Vec2]) -> Vec2 {
     sum / (3.0 * doubled_area(corners))
 }
 
-fn convex(corners: &[Vec2]) -> Result<(), OutlineError> {
+/// Checks that an outline is convex.
+pub(super) fn convex(corners: &[Vec2]) -> Result<(), OutlineError> {
     let mut turned = 0.0;
     let following = edges(corners).cycle().skip(1);
     for (index, ((p, q), (_, r))) in edges(corners).zip(following).enumerate() {
@@ -214,6 +227,24 @@ fn convex(corners: &[Vec2]) -> Result<(), OutlineError> {
     // a star turns left everywhere and goes round twice
     if turned > 1.5 * std::f64::consts::TAU {
         return Err(OutlineError::NotConvex(0));
+    }
+    Ok(())
+}
+
+/// Checks that an outline has no edge that is too short or meets another one.
+pub(super) fn simple(corners: &[Vec2]) -> Result<(), OutlineError> {
+    for (index, (p, q)) in edges(corners).enumerate() {
+        let length = (q - p).norm();
+        if length < EDGE_MIN_M {
+            return Err(OutlineError::ShortEdge { index, length });
+        }
+        let apart = |(r, s): (Vec2, Vec2)| {
+            let split = |p, q, r, s| cross(q - p, r - p) * cross(q - p, s - p) > 0.0;
+            p == r || p == s || q == r || q == s || split(p, q, r, s) || split(r, s, p, q)
+        };
+        if !edges(corners).all(apart) {
+            return Err(OutlineError::Crossing);
+        }
     }
     Ok(())
 }

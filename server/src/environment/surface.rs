@@ -1,6 +1,6 @@
 //! The tool on the real surface: a god-object proxy for the box, for discs and for convex polygons.
 //!
-//! The box is followed by the proxy that the local model has too. It must never let the proxy change
+//! parry's nearest point serves bodies with notches; it forgets by which face the tool came. The box is followed by the proxy that the local model has too. It must never let the proxy change
 //! edge while the HIP stays behind the edge that it entered by, nor stop it on a round surface.
 
 use mmt_shared::model::contact::{GodObject, Touch};
@@ -8,12 +8,12 @@ use mmt_shared::model::geometry::{BoxFootprint, Face, Pose, Vec2, cross, rotate}
 
 use super::bounded::Bounded;
 use super::outline::{VERTICES_MAX, edges};
+use super::solid::Skin;
 
 /// The surface with the memory of where the tool entered.
-#[derive(Clone, Copy, Debug)]
 #[allow(
     clippy::large_enum_variant,
-    reason = "there is one, and it never moves"
+    reason = "a body has one, and it never moves"
 )]
 pub(super) enum Surface {
     /// A square or a brick.
@@ -22,6 +22,8 @@ pub(super) enum Surface {
     Disc(Disc),
     /// A convex polygon.
     Polygon(Polygon),
+    /// A polygon with notches: the proxy is parry's nearest point of the surface.
+    Notched(Skin),
 }
 
 /// A round surface: the proxy slides freely to the point nearest to the HIP.
@@ -78,6 +80,12 @@ impl Surface {
             Self::Box(footprint, proxy) => proxy.follow(footprint, pose, tool),
             Self::Disc(disc) => disc.follow(pose, local(pose)),
             Self::Polygon(polygon) => polygon.follow(pose, local(pose)),
+            Self::Notched(skin) => {
+                let tool = local(pose);
+                let out = skin.way_out(tool)? - tool;
+                let penetration = out.norm();
+                (penetration > 0.0).then(|| touch(pose, out / penetration, tool, penetration))
+            }
         }
     }
 }

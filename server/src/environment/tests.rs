@@ -1,9 +1,12 @@
 //! Laws of the environment.
 
 use super::*;
+use mmt_shared::model::geometry::rotate;
+use mmt_shared::time::TICK_S;
 
 mod bodies;
 mod ground;
+mod scenes;
 
 fn default() -> Environment {
     Environment::try_new(EnvironmentConfig::default()).unwrap()

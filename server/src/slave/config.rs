@@ -6,7 +6,7 @@ use mmt_shared::model::settings::Mode;
 use mmt_shared::range::OutOfRange;
 use serde::{Deserialize, Serialize};
 
-use crate::environment::{EnvironmentConfig, EnvironmentError};
+use crate::environment::{EnvironmentConfig, EnvironmentError, SceneConfig};
 use crate::estimator::EstimatorConfig;
 use crate::playout::PlayoutConfig;
 use crate::repeats::Repeats;
@@ -51,6 +51,8 @@ pub struct SlaveConfig {
     pub mode: Mode,
     /// The real object and its ground.
     pub environment: EnvironmentConfig,
+    /// Bodies and walls, where there is more than one body.
+    pub scene: SceneConfig,
     /// Noise, vision.
     pub sensing: SensingConfig,
     /// Buffer for the master's samples.
@@ -84,6 +86,7 @@ impl SlaveConfig {
             seed: 1,
             mode,
             environment: EnvironmentConfig::default(),
+            scene: SceneConfig::default(),
             sensing: SensingConfig::default(),
             playout: PlayoutConfig::default(),
             tool_force_max_n: TOOL_FORCE_MAX_N,

@@ -1,4 +1,8 @@
 //! Pose and parameters of the object, as the slave finds them.
+//!
+//! The object is the body that the tool touches, or touched last. What was found of each body is remembered.
+
+use std::collections::BTreeMap;
 
 use mmt_shared::model::contact::Coupling;
 use mmt_shared::model::geometry::{BoxFootprint, Pose};
@@ -20,6 +24,24 @@ pub(super) struct ObjectEstimate {
     /// Estimates whose numbers were not accepted as parameters.
     pub(super) refused: u64,
     coupling: Coupling,
+    observer_config: ObserverConfig,
+    estimator_config: EstimatorConfig,
+    /// Number of the body.
+    body: usize,
+    /// What was found of other bodies, by their numbers.
+    found: BTreeMap<usize, Found>,
+    /// What is taken for true of a body that has never been touched.
+    start: Found,
+}
+
+/// What is remembered of a body.
+#[derive(Clone, Copy, Debug)]
+struct Found {
+    /// What the model got.
+    params: ModelParams,
+    /// The estimator's m, b and c.
+    mbc: [f64; 3],
+    footprint: BoxFootprint,
 }
 
 impl ObjectEstimate {
@@ -38,19 +60,55 @@ impl ObjectEstimate {
             learn: config.mode == Mode::Recommended,
         };
         let start = config.start;
-        let [m, b, c] = [start.mass_kg, start.damping_ns_per_m, start.friction_n];
+        let mbc = [start.mass_kg, start.damping_ns_per_m, start.friction_n];
+        let [m, b, c] = mbc;
         let estimator = config
             .estimator
             .unwrap_or_else(|| EstimatorConfig::of_mode(config.mode, coupling))
-            .starting_at([m, b, c]);
+            .starting_at(mbc);
         estimator.check()?;
-        Ok(Self {
-            observer: PoseObserver::new(observer, pose, BoxFootprint::square(start.side_m)),
-            estimator: Estimator::new(&estimator, coupling),
+        let start = Found {
             params: ModelParams::of_square(m, b, c, start.side_m, &coupling)?,
+            mbc,
+            footprint: BoxFootprint::square(start.side_m),
+        };
+        Ok(Self {
+            observer: PoseObserver::new(observer, pose, start.footprint),
+            estimator: Estimator::new(&estimator, coupling),
+            params: start.params,
             refused: 0,
             coupling,
+            observer_config: observer,
+            estimator_config: estimator,
+            body: 0,
+            found: BTreeMap::new(),
+            start,
         })
+    }
+
+    /// Goes over to the body that is touched now, at the pose that vision has averaged before. Returns whether that is
+    /// another one than before.
+    pub(super) fn follow_body(&mut self, contact: &Contact) -> bool {
+        if contact.body == self.body {
+            return false;
+        }
+        let Estimate { m, b, c, .. } = *self.estimator.estimate();
+        let found = Found {
+            params: self.params,
+            mbc: [m, b, c],
+            footprint: self.observer.footprint(),
+        };
+        self.found.insert(self.body, found);
+        self.body = contact.body;
+        let Found {
+            params,
+            mbc,
+            footprint,
+        } = self.found.get(&self.body).copied().unwrap_or(self.start);
+        self.params = params;
+        self.estimator = Estimator::new(&self.estimator_config.starting_at(mbc), self.coupling);
+        self.observer = PoseObserver::new(self.observer_config, contact.truth, footprint);
+        true
     }
 
     /// One tick. `held_back` says whether the limit of the tool's force keeps the tool from the HIP.

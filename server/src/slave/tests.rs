@@ -1,5 +1,6 @@
 //! The promises of `slave`.
 
+use crate::environment::BodyConfig;
 use mmt_shared::model::sample::HipCounts;
 use mmt_shared::model::settings::Mode;
 use mmt_shared::time::TICK;
@@ -40,4 +41,132 @@ fn an_object_beyond_the_workspace_is_at_its_edge_and_counted_and_updates_go_on()
     assert!(clamped >= at_the_edge as u64, "{clamped}");
     let numbers = updates.iter().map(|update| update.sequence);
     assert!(numbers.eq(1..=updates.len() as u32), "none is left out");
+}
+
+/// A slave that is driven along a straight path, 0.15 m/s.
+struct Driven {
+    slave: Slave,
+    now: Time,
+    hip: Vec2,
+    updates: Vec<Update>,
+    peak_n: f64,
+}
+
+impl Driven {
+    fn new(mode: Mode, bodies: Vec<BodyConfig>) -> Self {
+        let mut config = SlaveConfig::of_mode(mode);
+        config.scene.bodies = bodies;
+        let coupling = Coupling::for_stiffness(1000.0);
+        let mut slave = Slave::try_new(&config, coupling).unwrap();
+        let hip = Vec2::new(-0.3, 0.0);
+        slave.start_at(hip);
+        Self {
+            slave,
+            now: Time::ZERO,
+            hip,
+            updates: Vec::new(),
+            peak_n: 0.0,
+        }
+    }
+
+    fn go(&mut self, to: (f64, f64)) {
+        let way = Vec2::new(to.0, to.1) - self.hip;
+        let ticks = (way.norm() / 0.15e-3).ceil().max(1.0);
+        for _ in 0..ticks as u32 {
+            self.now += TICK;
+            self.hip += way / ticks;
+            let newest = self.updates.last().map_or(0, |update| update.sequence);
+            let sample = HipSample {
+                stamp: self.now,
+                hip: HipCounts::nearest(self.hip),
+                ..HipSample::default()
+            };
+            self.slave.handle_sample(self.now, &sample, newest);
+            let Some(tick) = self.slave.tick(self.now) else {
+                continue;
+            };
+            assert!(tick.truth.is_finite() && tick.f_shadow.norm().is_finite());
+            self.peak_n = self.peak_n.max(tick.true_force.norm());
+            self.updates.extend(tick.update);
+        }
+    }
+}
+
+fn cube(y: f64, mass_kg: f64, fixed: bool) -> BodyConfig {
+    BodyConfig {
+        pose: Pose::new(0.0, y, 0.0),
+        mass_kg,
+        fixed,
+        ..BodyConfig::default()
+    }
+}
+
+/// Pushes the cube at y = 0, then the one at y = 1, then the first again; both give way to the east.
+fn pushed_in_turn(mode: Mode, second: BodyConfig) -> (Driven, [usize; 3]) {
+    let mut driven = Driven::new(mode, vec![cube(0.0, 0.7, false), second]);
+    driven.go((0.1, 0.0));
+    let first = driven.updates.len();
+    for to in [(-0.6, 0.0), (-0.6, 1.0), (0.0, 1.0)] {
+        driven.go(to);
+    }
+    let second = driven.updates.len();
+    for to in [(-0.6, 1.0), (-0.6, 0.0), (0.15, 0.0)] {
+        driven.go(to);
+    }
+    let third = driven.updates.len();
+    (driven, [first, second, third])
+}
+
+#[test]
+fn the_model_goes_over_to_the_body_that_is_touched_and_comes_back() {
+    for mode in [Mode::Paper, Mode::Recommended] {
+        let (driven, [first, second, third]) = pushed_in_turn(mode, cube(1.0, 2.0, false));
+        let y = |k: usize| driven.updates[k].state.pose().position.y;
+        assert!(y(first - 1).abs() < 0.05, "{mode:?}: {}", y(first - 1));
+        assert!(
+            (y(second - 1) - 1.0).abs() < 0.05,
+            "{mode:?}: {}",
+            y(second - 1)
+        );
+        assert!(y(third - 1).abs() < 0.05, "{mode:?}: {}", y(third - 1));
+        // what the master has is where the slave takes the object to be, and it is felt
+        let model = driven.slave.shadow().ahead();
+        let (seen, shown) = (driven.slave.observer().pose(), model.state().pose);
+        assert!(
+            (seen.position - shown.position).norm() < 0.03,
+            "{mode:?}: {seen:?} {shown:?}"
+        );
+        assert!(model.rendered().in_contact(), "{mode:?}");
+    }
+}
+
+#[test]
+fn what_was_found_of_a_body_is_remembered() {
+    let (driven, [first, second, third]) = pushed_in_turn(Mode::Recommended, cube(1.0, 2.0, false));
+    let c = |k: usize| driven.updates[k].state.params().c();
+    let (one, other) = (c(first - 1), c(second - 1));
+    assert!(other > 1.7 * one, "{one} and {other} N");
+    let back = (second..third).find(|k| driven.updates[*k].state.pose().position.y < 0.5);
+    let again = c(back.unwrap());
+    assert!((again / one - 1.0).abs() < 0.2, "{again} N after {one} N");
+}
+
+#[test]
+fn a_fixed_body_is_pushed_with_no_more_than_the_tools_limit_and_stays() {
+    for mode in [Mode::Paper, Mode::Recommended] {
+        let (driven, _) = pushed_in_turn(mode, cube(1.0, 0.7, true));
+        assert!(
+            driven.peak_n > 5.0 && driven.peak_n < 25.0,
+            "{}",
+            driven.peak_n
+        );
+        let fixed = driven.slave.environment().pose_of(1).unwrap();
+        assert_eq!(fixed, Pose::new(0.0, 1.0, 0.0));
+        assert!(
+            driven
+                .updates
+                .iter()
+                .all(|update| update.state.params().c().is_finite())
+        );
+    }
 }

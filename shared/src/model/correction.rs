@@ -42,6 +42,8 @@ pub const IN_FREE_SPACE: BleedRates = BleedRates {
 /// A box that is brought up to the HIP stops this far from it, m: five times the amplitude of a hand's
 /// tremor, so that a hand at rest is not touched again and again.
 pub const ROOM_M: f64 = 5e-4;
+/// A pose that is farther away than this, m, is that of another body. No correction of one body is as large.
+pub const OTHER_BODY_M: f64 = 0.3;
 /// Most energy that the tank holds, J: the coupling at 1000 N/m stores this at a depth of 14 mm, deeper
 /// than any push at 8 N. What is dissipated beyond it is gone.
 pub const TANK_MAX_J: f64 = 0.1;
@@ -125,7 +127,8 @@ impl Correction {
     }
 
     /// Bleeds one tick's worth of what remains into `pose`. `touch` is what the HIP touches now,
-    /// `in_contact` how fast that may be done while it touches anything.
+    /// `in_contact` how fast that may be done while it touches anything. While it touches nothing the model goes over
+    /// to another body at once: on its way there the box might have to pass the HIP.
     pub fn bleed(
         &mut self,
         pose: &mut Pose,
@@ -138,6 +141,10 @@ impl Correction {
         } else {
             IN_FREE_SPACE
         };
+        if touch.is_none() && self.remaining.shift.norm() > OTHER_BODY_M {
+            self.snap(pose);
+            return;
+        }
         let share = TICK_S / rates.tau_s;
         let most = rates.turn_rad_per_s * TICK_S;
         let turn = (self.remaining.turn * share).clamp(-most, most);

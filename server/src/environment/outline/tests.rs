@@ -5,7 +5,7 @@ use mmt_shared::model::params::{friction_torque_of_square, inertia_of_square};
 
 fn polygon(vertices: &[(f64, f64)]) -> Result<Outline, OutlineError> {
     let vertices: Vec<_> = vertices.iter().map(|(x, y)| Vec2::new(*x, *y)).collect();
-    Outline::polygon(&Bounded::try_new(&vertices).unwrap())
+    Outline::polygon(&Bounded::try_new(&vertices).unwrap(), convex)
 }
 
 fn corners(outline: &Outline) -> &[Vec2] {

@@ -117,11 +117,11 @@ fn a_wall_stops_a_push_of_8_n_within_a_millimetre() {
             let mut deepest = 0.0_f64;
             for _ in 0..3_000 {
                 environment.step_with_wrench(into * 8.0, 0.05);
-                let clearance = wall.clearance(&environment.outline, &environment.pose());
+                let clearance = wall.clearance(&environment.touched.outline, &environment.pose());
                 deepest = deepest.max(-clearance);
             }
             assert!(deepest < 1e-5, "{shape:?}: {deepest} m deep");
-            let clearance = wall.clearance(&environment.outline, &environment.pose());
+            let clearance = wall.clearance(&environment.touched.outline, &environment.pose());
             assert!(
                 clearance < 1e-3,
                 "{shape:?}: never came to the wall, {clearance} m"
@@ -184,7 +184,7 @@ fn a_flying_body_ends_flush_or_stopped_at_the_wall() {
         let next = environment.kinetic_energy();
         assert!(next <= energy * (1.0 + 1e-12), "{next} after {energy}");
         energy = next;
-        assert!(wall.clearance(&environment.outline, &environment.pose()) > -1e-6);
+        assert!(wall.clearance(&environment.touched.outline, &environment.pose()) > -1e-6);
     }
     assert!(environment.pose().angle.abs() > 0.31 || environment.pose().angle.abs() < 0.29);
 }
@@ -208,7 +208,7 @@ fn a_tool_pushes_a_body_against_a_wall_and_no_further() {
             let tool = Vec2::new(-west + gone, 0.02);
             force = environment.step(tool, Vec2::zeros()).force.norm();
         }
-        let clearance = wall.clearance(&environment.outline, &environment.pose());
+        let clearance = wall.clearance(&environment.touched.outline, &environment.pose());
         assert!(clearance > -1e-5, "{shape:?}: {clearance}");
         assert!(force < 9.0, "{shape:?}: {force}");
     }
@@ -347,7 +347,8 @@ fn no_body_goes_through_a_wall_or_gains_energy_from_it_however_it_comes() {
                 "{round}: {energy} {next}"
             );
             energy = next;
-            nearest = nearest.min(wall.clearance(&environment.outline, &environment.pose()));
+            nearest =
+                nearest.min(wall.clearance(&environment.touched.outline, &environment.pose()));
         }
         deepest = deepest.max(-nearest);
         assert!(nearest > -1e-5, "{round}, {shape:?}: {nearest} m");
