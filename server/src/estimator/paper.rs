@@ -39,7 +39,7 @@ pub struct PaperConfig {
     /// Which motion is taken for the object's.
     pub motion: ObjectMotion,
     /// How long contact must have lasted before a tick counts, s; 0 to 60 s. The paper estimates "after a stable contact"
-    /// (II-A). Default 0.1: the spring of (6) and the default mass have swung out by then.
+    /// (II-A) and gives no time. Default 0.02: twice as long as contact of one side alone must last to count.
     pub stable_after_s: f64,
     /// Whether ticks in which the object stands still are left out. (1) does not hold there, but the paper does not
     /// leave them out. Default no.
@@ -55,7 +55,7 @@ impl Default for PaperConfig {
             window_s: 0.200,
             rows: Rows::default(),
             motion: ObjectMotion::default(),
-            stable_after_s: 0.1,
+            stable_after_s: 0.02,
             leave_out_standstill: false,
             prior: [0.4, 0.0, 1.0],
         }
