@@ -8,7 +8,6 @@ use std::time::Duration;
 
 use mmt_client::device::DeviceProfile;
 use mmt_client::operator::scripted::{Picture, ScriptedConfig};
-use mmt_server::estimator::{EstimatorConfig, ObjectMotion, PaperConfig};
 use mmt_server::playout::PlayoutConfig;
 use mmt_server::slave::SlaveConfig;
 use mmt_server::trigger::{Scheme, TriggerConfig};
@@ -80,12 +79,14 @@ pub const FIG5_CURVES: [(Mode, Curve); 7] = [
 ];
 
 /// The two modes with the schemes that they default to.
+#[cfg(feature = "io")]
 pub(crate) const MODES: [(Mode, Curve); 2] = [
     (Mode::Paper, Curve::Hybrid(150)),
     (Mode::Recommended, Curve::Useful(150)),
 ];
 
 /// The paper's experiment in both modes, each with the scheme that it defaults to.
+#[cfg(feature = "io")]
 pub(crate) fn paper_worlds(deadband: f64) -> Vec<WorldConfig> {
     MODES
         .map(|(mode, curve)| paper_world(mode, curve.at(deadband)))
@@ -126,40 +127,9 @@ impl Point {
     }
 }
 
-/// A choice of the paper's experiment made otherwise: its name and what it makes of the world.
-pub(crate) type Variant = (&'static str, fn(&mut WorldConfig));
-
-/// The choices that can be read out of the paper's text, each made otherwise. `docs/model.md` has the sentences.
-pub(crate) static READINGS: [Variant; 5] = [
-    ("estimates from the first instant of contact", |world| {
-        paper_estimator(world, |paper| paper.stable_after_s = 0.0);
-    }),
-    ("motion of the tool", |world| {
-        paper_estimator(world, |paper| paper.motion = ObjectMotion::Tool);
-    }),
-    ("timer packets carry no pose", |world| {
-        world.slave.trigger.timer_carries_pose = false;
-    }),
-    ("rest of 0.4 s after a push", |world| {
-        world.operator.hold_s = 0.4;
-    }),
-    ("operator sees the local model", |world| {
-        world.operator.view = Picture::Model;
-    }),
-];
-
-/// Changes the paper's estimator in a world of paper mode.
-pub(crate) fn paper_estimator(world: &mut WorldConfig, change: impl FnOnce(&mut PaperConfig)) {
-    let mut paper = match world.slave.estimator {
-        Some(EstimatorConfig::Paper(paper)) => paper,
-        _ => PaperConfig::default(),
-    };
-    change(&mut paper);
-    world.slave.estimator = Some(EstimatorConfig::Paper(paper));
-}
-
 /// How much steeper PMSE falls from 30 to 10 % than from 10 to 2.5 %: the difference of the exponents d ln PMSE / d ln
 /// Delta; of the PMSE at 2.5, 10 and 30 %.
+#[cfg(feature = "io")]
 pub(crate) fn knee(fine: f64, middle: f64, coarse: f64) -> f64 {
     let [fine, middle, coarse] = [fine, middle, coarse].map(libm::log);
     (coarse - middle) / libm::log(3.0) - (middle - fine) / libm::log(4.0)

@@ -5,8 +5,9 @@
 use mmt_server::estimator::Rows;
 use mmt_shared::model::settings::{ModelSettings, Smoothing};
 
+use super::readings::{READINGS, Variant, paper_estimator};
 use crate::experiment::prelude::*;
-use crate::setting::{READINGS, Variant, knee, paper_estimator};
+use crate::setting::knee;
 
 /// The ablation.
 pub(super) const ABLATION: Experiment = Experiment::new(

@@ -3,9 +3,44 @@
 //! The text leaves choices open, or a reader may take it otherwise. Every combination of them runs the whole of section
 //! IV-B. A claim that holds in all of them does not hang on how the paper is read.
 
+use mmt_client::operator::scripted::Picture;
+use mmt_server::estimator::{EstimatorConfig, ObjectMotion, PaperConfig};
+
 use super::claims::{Claim, Runs, Verdict, claims, points, verdicts};
 use crate::experiment::prelude::*;
-use crate::setting::{Point, READINGS};
+use crate::setting::Point;
+
+/// A choice of the paper's experiment made otherwise: its name and what it makes of the world.
+pub(super) type Variant = (&'static str, fn(&mut WorldConfig));
+
+/// The choices that can be read out of the paper's text, each made otherwise. `docs/model.md` has the sentences.
+pub(super) static READINGS: [Variant; 5] = [
+    ("estimates from the first instant of contact", |world| {
+        paper_estimator(world, |paper| paper.stable_after_s = 0.0);
+    }),
+    ("motion of the tool", |world| {
+        paper_estimator(world, |paper| paper.motion = ObjectMotion::Tool);
+    }),
+    ("timer packets carry no pose", |world| {
+        world.slave.trigger.timer_carries_pose = false;
+    }),
+    ("rest of 0.4 s after a push", |world| {
+        world.operator.hold_s = 0.4;
+    }),
+    ("operator sees the local model", |world| {
+        world.operator.view = Picture::Model;
+    }),
+];
+
+/// Changes the paper's estimator in a world of paper mode.
+pub(super) fn paper_estimator(world: &mut WorldConfig, change: impl FnOnce(&mut PaperConfig)) {
+    let mut paper = match world.slave.estimator {
+        Some(EstimatorConfig::Paper(paper)) => paper,
+        _ => PaperConfig::default(),
+    };
+    change(&mut paper);
+    world.slave.estimator = Some(EstimatorConfig::Paper(paper));
+}
 
 /// The readings: two hours of one core, and so no part of `all`.
 pub(super) const EXPERIMENT: Experiment = Experiment {

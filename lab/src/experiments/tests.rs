@@ -5,12 +5,13 @@ use std::time::Duration;
 
 use mmt_shared::model::settings::Mode;
 
+use super::readings::READINGS;
 use super::*;
 use crate::experiment::description::Request;
 use crate::experiment::findings::{Extent, Findings};
 use crate::experiment::grid::Run;
 use crate::io::{Folder, Runner};
-use crate::setting::{Curve, Point, READINGS, paper_world};
+use crate::setting::{Curve, Point, paper_world};
 use crate::table::{Cell, Column};
 use crate::trial::{Measured, Trial};
 

@@ -79,6 +79,7 @@ impl WorldConfig {
     }
 
     /// This configuration with these greatest stretches of master and slave.
+    #[cfg(feature = "io")]
     pub(crate) fn stretched(mut self, master: StretchMax, slave: StretchMax) -> Self {
         self.stretch_max = master;
         self.slave.stretch_max = slave;
