@@ -2,7 +2,7 @@
 //! real sockets with real clocks.
 //!
 //! A live run is compared with the median over seeds of virtual time, and repeated if it does not agree. A host that is
-//! too busy for 1 kHz shows it by its own loops. Such a run says nothing about the two, so the test fails if each is such.
+//! too busy for 1 kHz shows it by its own loops. Such a run cannot be compared. The test fails if each run is such.
 
 #![allow(
     clippy::disallowed_methods,

@@ -241,7 +241,7 @@ mod tests {
                 (xy - expected).abs() < 0.02,
                 "lag {lag} tau: {xy}, not {expected}"
             );
-            // the step says more where the correlation is near one: known to 4 / sqrt(2 n)
+            // near a correlation of one the step is the finer measure: known to 4 / sqrt(2 n)
             let step = (xx + yy - 2.0 * xy) / (2.0 - 2.0 * expected);
             assert!((step - 1.0).abs() < 0.025, "lag {lag} tau: step {step}");
         }

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use super::bounded::Bounded;
 use super::outline::{Outline, OutlineError, Shape, convex, simple};
 use super::terrain::{GroundPatch, PATCHES_MAX, Ripple, Terrain};
-use super::wall::Wall;
+use super::wall::{ANGLE_RAD, Wall};
 
 /// Accepted side l, m: the accepted face offsets of the local model, doubled.
 const SIDE_M: (f64, f64) = (0.02, 2.0);
@@ -23,8 +23,6 @@ const GRAVITY_M_PER_S2: (f64, f64) = (0.0, 25.0);
 const STIFFNESS_N_PER_M: (f64, f64) = (1.0, 30_000.0);
 /// Accepted contact damping `k_d`, N s/m.
 const CONTACT_DAMPING_NS_PER_M: (f64, f64) = (0.0, 300.0);
-/// Accepted initial angle, rad, of body and wall.
-pub(super) const ANGLE_RAD: (f64, f64) = (-1000.0, 1000.0);
 /// Accepted ratio of static to sliding friction: wood on wood is near 1.5.
 const STATIC_RATIO: (f64, f64) = (1.0, 5.0);
 /// Accepted share of the ripple: at 1 there are places without friction.

@@ -132,7 +132,7 @@ impl SceneConfig {
         for wall in walls() {
             for object in objects().filter(|object| !object.fixed) {
                 let started = wall.check_start(&object.outline, &object.pose());
-                started.map_err(|error| self.named(object.number, error))?;
+                started.map_err(|error| self.named(object.number, error.into()))?;
             }
             world.insert_wall(wall, self.contact_friction);
         }

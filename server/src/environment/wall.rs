@@ -2,12 +2,13 @@
 
 use mmt_shared::model::geometry::{Pose, Vec2, rotate};
 use mmt_shared::model::params::WORKSPACE_M;
-use mmt_shared::range::in_range;
+use mmt_shared::range::{OutOfRange, in_range};
 use serde::{Deserialize, Serialize};
 
-use super::config::{ANGLE_RAD, EnvironmentError};
 use super::outline::Outline;
 
+/// Accepted angle of a wall, rad, and of a body at the start.
+pub(super) const ANGLE_RAD: (f64, f64) = (-1000.0, 1000.0);
 /// Accepted distance of the wall from the origin, m.
 const WALL_M: (f64, f64) = (-2.0 * WORKSPACE_M, 2.0 * WORKSPACE_M);
 
@@ -42,16 +43,12 @@ impl Wall {
     }
 
     /// Checks the wall, and that a body starts in front of it.
-    pub(super) fn check_start(
-        &self,
-        outline: &Outline,
-        pose: &Pose,
-    ) -> Result<(), EnvironmentError> {
+    pub(super) fn check_start(&self, outline: &Outline, pose: &Pose) -> Result<(), OutOfRange> {
         in_range("wall angle", "rad", self.angle_rad, ANGLE_RAD)?;
         in_range("wall distance", "m", self.distance_m, WALL_M)?;
         let least = self.distance_m - self.clearance(outline, pose);
         // a body may start flush: room for rounding
         let room = (least - 1e-9, WALL_M.1);
-        Ok(in_range("wall distance", "m", self.distance_m, room)?)
+        in_range("wall distance", "m", self.distance_m, room)
     }
 }

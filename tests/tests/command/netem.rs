@@ -95,14 +95,14 @@ fn a_demo_at_work_takes_new_networks_from_stdin() {
     // it takes them as soon as it runs, whether or not the session has begun
     writeln!(orders, "sideways\nrebind\nup loss every 4").unwrap();
     let output = child.wait_with_output().unwrap();
-    let told = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert!(told.contains("no command \"sideways\""), "{told}");
-    assert!(told.contains("only the relay"), "{told}");
-    assert!(told.contains("loss 25.000 %"), "{told}");
+    let stderr = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(stderr.contains("no command \"sideways\""), "{stderr}");
+    assert!(stderr.contains("only the relay"), "{stderr}");
+    assert!(stderr.contains("loss 25.000 %"), "{stderr}");
     let report = document(&output);
     assert!(
         report["drops"]["master_netem_loss"].as_u64().unwrap() > 10,
-        "{told}"
+        "{stderr}"
     );
     assert_eq!(report["drops"]["slave_netem_loss"], 0);
     drop(orders);

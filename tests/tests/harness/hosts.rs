@@ -15,7 +15,7 @@ const RELAY_TO_SLAVE: &str = "10.91.1.1";
 const RELAY_TO_MASTER: &str = "10.91.2.1";
 const MASTER: &str = "10.91.2.2";
 /// For what needs no more than a start or an end.
-const SOON: Duration = Duration::from_secs(10);
+const SOON: Duration = Duration::from_secs(60);
 
 /// Why there are no hosts, or why a session on them came to nothing.
 #[derive(Debug, thiserror::Error)]

@@ -1,7 +1,7 @@
 //! Whether a claim holds here, from the interval of what it speaks of.
 //!
-//! A claim is tested against the bound that it expects, two-sided, with Holm's correction over all claims: 16 tests at 5 %
-//! would find one that is not there. A ratio that no test tells from one may still be shown to be one, to 5 %.
+//! A claim is tested against the bound that it expects, two-sided, with Holm's correction over all claims: of many tests
+//! at 5 % one finds what is not there. A ratio whose test finds nothing may still be shown to be one within 5 %.
 
 use std::fmt;
 
@@ -47,7 +47,7 @@ pub(in crate::experiments) enum Verdict {
     Holds,
     /// It is a ratio, and one to within 5 % (two one-sided tests).
     Tie,
-    /// The runs do not tell.
+    /// The runs leave it open.
     Undecided,
     /// It lies elsewhere, and that is no chance.
     Fails,
@@ -83,7 +83,7 @@ impl Bound {
         }
     }
 
-    /// How probable it is to measure this if the truth stood at the bound; none if one run tells nothing of chance.
+    /// How probable it is to measure this if the truth stood at the bound; none of a single run.
     fn p_value(self, measured: &Interval) -> Option<f64> {
         let p = |bound| measured.p_against(bound);
         match self {
