@@ -14,6 +14,7 @@ mod table;
 
 use serde::Serialize;
 
+use crate::channel::peer::Loss;
 use crate::metrics::ForceSummary;
 use crate::wire::Ending;
 
@@ -174,8 +175,9 @@ impl<C> RunReport<C> {
         }
     }
 
-    /// The path, as the master saw it.
-    fn seen_by_master(self, own: SessionStats) -> Self {
+    /// The path, as the master saw it; of the slave what is known.
+    fn seen_by_master(self, own: SessionStats, slave: Option<&SessionStats>) -> Self {
+        let (loss_up, loss_down) = losses(&own, slave);
         Self {
             messages: UpDown {
                 up: own.sent,
@@ -187,8 +189,10 @@ impl<C> RunReport<C> {
             },
             link: LinkReport {
                 rtt_ms: own.rtt_ms,
-                loss_up: own.loss_sent,
-                loss_down: own.loss_received,
+                loss_up,
+                loss_down,
+                unsent_up: own.unsent,
+                unsent_down: slave.and_then(|slave| slave.unsent),
                 ..self.link
             },
             drops: Some(own.drops),
@@ -196,8 +200,9 @@ impl<C> RunReport<C> {
         }
     }
 
-    /// The path, as the slave saw it.
-    fn seen_by_slave(self, own: SessionStats) -> Self {
+    /// The path, as the slave saw it; of the master what is known.
+    fn seen_by_slave(self, own: SessionStats, master: Option<&SessionStats>) -> Self {
+        let (loss_down, loss_up) = losses(&own, master);
         Self {
             messages: UpDown {
                 up: own.received,
@@ -209,8 +214,10 @@ impl<C> RunReport<C> {
             },
             link: LinkReport {
                 rtt_ms: own.rtt_ms,
-                loss_up: own.loss_received,
-                loss_down: own.loss_sent,
+                loss_up,
+                loss_down,
+                unsent_up: master.and_then(|master| master.unsent),
+                unsent_down: own.unsent,
                 ..self.link
             },
             drops: Some(own.drops),
@@ -222,20 +229,22 @@ impl<C> RunReport<C> {
 impl<C> From<MasterSession<C>> for RunReport<C> {
     fn from(session: MasterSession<C>) -> Self {
         let own = session.own.session.clone();
+        let other = session.other.as_ref().map(|slave| slave.session.clone());
         let slave = session.other.unwrap_or_default();
         Self::of_halves("master", session.configuration, session.own, slave)
             .ended(session.seed, session.duration_s, session.ending)
-            .seen_by_master(own)
+            .seen_by_master(own, other.as_ref())
     }
 }
 
 impl<C> From<SlaveSession<C>> for RunReport<C> {
     fn from(session: SlaveSession<C>) -> Self {
         let own = session.own.session.clone();
+        let other = session.other.as_ref().map(|master| master.session.clone());
         let master = session.other.unwrap_or_default();
         Self::of_halves("slave", session.configuration, master, session.own)
             .ended(session.seed, session.duration_s, session.ending)
-            .seen_by_slave(own)
+            .seen_by_slave(own, other.as_ref())
     }
 }
 
@@ -243,6 +252,7 @@ impl<M, S> RunReport<Both<M, S>> {
     /// The report of a demo, both ends of which live in one process. Each direction is counted where it is sent; what
     /// both ends measured is the master's.
     pub fn of_both(master: MasterSession<M>, slave: Option<SlaveSession<S>>) -> Self {
+        let answered = master.other.is_some() || slave.as_ref().is_some_and(|s| s.other.is_some());
         let (half, slave) = slave.map(|slave| (slave.own, slave.configuration)).unzip();
         let half = half.or(master.other);
         let (up, down) = (
@@ -264,15 +274,32 @@ impl<M, S> RunReport<Both<M, S>> {
             names.map(move |(name, n)| (format!("{side}_{name}"), n))
         };
         let drops = of_side("master", up.drops.clone());
-        let mut report = report.seen_by_master(up);
+        let mut report = report.seen_by_master(up, down.as_ref().filter(|_| answered));
         let mut drops: Counts = drops.collect();
         if let Some(down) = down {
+            report.link.unsent_down = down.unsent;
             drops.extend(of_side("slave", down.drops));
             (report.messages.down, report.wire.down) = (down.sent, down.wire_sent);
         }
         report.drops = Some(drops);
         report
     }
+}
+
+/// Shares that the path lost of what this end sent and of what it received, without what either host dropped. Without
+/// the farewell of the other end nobody knows what became of the last datagrams: none.
+fn losses(own: &SessionStats, other: Option<&SessionStats>) -> (Number, Number) {
+    let Some(other) = other else {
+        return (Number::ABSENT, Number::ABSENT);
+    };
+    let on_the_path = |counted: Loss, from: &SessionStats, to: &SessionStats| {
+        let path = counted.on_the_path(from.unsent.unwrap_or(0), to.unread.unwrap_or(0));
+        Number::from(path.share())
+    };
+    (
+        on_the_path(own.outgoing, own, other),
+        on_the_path(own.incoming, other, own),
+    )
 }
 
 /// One of something per direction.
@@ -311,10 +338,14 @@ pub struct ForceReport {
 pub struct LinkReport {
     /// Round-trip time.
     pub rtt_ms: DelayReport,
-    /// Share of the master's datagrams that never arrived, 0 to 1.
+    /// Share of the master's datagrams that the path lost, 0 to 1; absent if the session ended without a farewell.
     pub loss_up: Number,
-    /// Share of the slave's datagrams that never arrived, 0 to 1.
+    /// Share of the slave's datagrams that the path lost, 0 to 1; as above.
     pub loss_down: Number,
+    /// Datagrams that the master itself overtook or could not send: no loss of the path.
+    pub unsent_up: Option<u64>,
+    /// Datagrams that the slave itself overtook or could not send.
+    pub unsent_down: Option<u64>,
     /// Delay of the slave's play-out, over its ticks.
     pub playout_delay_ms: DelayReport,
 }

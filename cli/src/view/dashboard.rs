@@ -13,7 +13,7 @@ use super::{Caption, History, Snapshot};
 /// Messages shown at the bottom.
 pub(super) const MESSAGES_MAX: usize = 3;
 /// Height of a panel of numbers, lines.
-const PANEL_HEIGHT: u16 = 9;
+const PANEL_HEIGHT: u16 = 10;
 /// Widths of the panels; the last one takes what is left.
 const UPDATES_WIDTH: u16 = 25;
 const MODEL_WIDTH: u16 = 32;
@@ -125,7 +125,7 @@ fn render_panels(frame: &mut Frame<'_>, area: Rect, caption: &Caption, history: 
         Constraint::Min(0),
     ])
     .areas(area);
-    let [link, loops] = Layout::vertical([Constraint::Length(5), Constraint::Fill(1)]).areas(right);
+    let [link, loops] = Layout::vertical([Constraint::Length(6), Constraint::Fill(1)]).areas(right);
     for (panel, area) in [
         (update_panel(history), updates),
         (model_panel(caption, &history.newest()), model),

@@ -27,9 +27,12 @@ pub(crate) fn line(history: &History) -> String {
         " /s",
     );
     add("rtt", now.rtt_ms(), 0, " ms");
-    let (up, down) = now.loss();
-    add("loss up", up.map(|share| share * 100.0), 1, " %");
-    add("loss down", down.map(|share| share * 100.0), 1, " %");
+    for (way, missing) in ["up", "down"].into_iter().zip(now.missing()) {
+        let percent = missing.share.map(|share| share * 100.0);
+        add(&format!("{} {way}", missing.name()), percent, 1, " %");
+        let unsent = missing.unsent.filter(|n| *n > 0).map(|n| n as f64);
+        add(&format!("unsent {way}"), unsent, 0, "");
+    }
     add(
         "mass",
         now.slave.map(|slave| mass(slave.estimate)),

@@ -10,6 +10,7 @@ mod screen;
 
 use mmt_client::io::MasterLive;
 use mmt_server::io::SlaveLive;
+use mmt_shared::channel::peer::Loss;
 
 pub(crate) use history::History;
 pub(crate) use lines::line;
@@ -35,6 +36,25 @@ pub(crate) struct Snapshot {
     pub(crate) slave: Option<SlaveLive>,
     /// The master.
     pub(crate) master: Option<MasterLive>,
+}
+
+/// What of a direction's datagrams does not arrive.
+struct Missing {
+    /// Share, 0 to 1: of what the sender sent where its own count is known, else of what it numbered.
+    share: Option<f64>,
+    /// Datagrams that the sender itself overtook or could not send, where this process knows it.
+    unsent: Option<u64>,
+}
+
+impl Missing {
+    /// The share's name: a loss of the path only where the sender's own part is known.
+    fn name(&self) -> &'static str {
+        if self.unsent.is_some() {
+            "loss"
+        } else {
+            "missing"
+        }
+    }
 }
 
 impl Snapshot {
@@ -67,10 +87,17 @@ impl Snapshot {
         self.master.and_then(|master| master.rtt_ms).or(slave)
     }
 
-    /// Loss up and down, 0 to 1.
-    fn loss(&self) -> (Option<f64>, Option<f64>) {
-        let (up, down) = self.master.map_or((None, None), |master| master.loss);
-        (up.or(self.slave.and_then(|slave| slave.loss_up)), down)
+    /// What does not arrive, up and down.
+    fn missing(&self) -> [Missing; 2] {
+        let (master, slave) = (self.master, self.slave);
+        let up = (master.map(|m| m.up)).or_else(|| slave.map(|s| s.up));
+        let unsent = [master.map(|m| m.unsent), slave.map(|s| s.unsent)];
+        let down = master.map(|m| m.down.on_the_path(unsent[1].unwrap_or(0), 0));
+        let of = |(counted, unsent): (Option<Loss>, Option<u64>)| Missing {
+            share: counted.and_then(|counted| counted.share()),
+            unsent,
+        };
+        [(up, unsent[0]), (down, unsent[1])].map(of)
     }
 }
 

@@ -4,7 +4,7 @@ use mmt_shared::model::update::Cause;
 use ratatui::text::Line;
 use ratatui::widgets::{Block, Paragraph};
 
-use super::{Caption, History, Snapshot};
+use super::{Caption, History, Missing, Snapshot};
 
 fn panel(title: impl Into<String>, lines: Vec<String>) -> Paragraph<'static> {
     let lines: Vec<Line<'_>> = lines.into_iter().map(Line::from).collect();
@@ -64,17 +64,19 @@ pub(super) fn model_panel(caption: &Caption, now: &Snapshot) -> Paragraph<'stati
     panel("model", lines)
 }
 
-/// Round trip, loss, state.
+/// Round trip, loss, what was not sent, state.
 pub(super) fn link_panel(now: &Snapshot) -> Paragraph<'static> {
-    let (up, down) = now.loss();
-    let percent = |share: Option<f64>| shown(share.map(|share| share * 100.0), 1, " %");
+    let [up, down] = now.missing();
+    let percent = |way: &Missing| shown(way.share.map(|share| share * 100.0), 1, " %");
+    let unsent = |way: &Missing| shown(way.unsent.map(|n| n as f64), 0, "");
     let state = now.master.map_or("-", |master| master.link.name());
     panel(
         format!("link: {state}"),
         vec![
             format!("round trip {}", shown(now.rtt_ms(), 1, " ms")),
-            format!("loss up {}", percent(up)),
-            format!("loss down {}", percent(down)),
+            format!("{} up {}", up.name(), percent(&up)),
+            format!("{} down {}", down.name(), percent(&down)),
+            format!("unsent up {} down {}", unsent(&up), unsent(&down)),
         ],
     )
 }

@@ -19,6 +19,8 @@ fn snapshot(elapsed_s: f64) -> Snapshot {
         updates: [7, 11, 0, 1, 2, 0],
         estimate: [0.701, 2.95, 2.06],
         in_contact: true,
+        // a stall of its host: the path lost 9 of the 1000 that it did send
+        unsent: 100,
         ..SlaveLive::default()
     };
     let master = MasterLive {
@@ -38,7 +40,15 @@ fn snapshot(elapsed_s: f64) -> Snapshot {
         }),
         scene_age_s: Some(0.21),
         rtt_ms: Some(101.5),
-        loss: (Some(0.011), Some(0.009)),
+        up: Loss {
+            expected: 1000,
+            received: 989,
+        },
+        down: Loss {
+            expected: 1100,
+            received: 991,
+        },
+        unsent: 12,
         lateness_p99_us: 63.0,
         skipped: 4,
         ..MasterLive::default()
@@ -110,6 +120,7 @@ fn the_dashboard_shows_every_label_and_number_on_a_small_terminal() {
         "101.5 ms",
         "loss up 1.1 %",
         "loss down 0.9 %",
+        "unsent up 12 down 100",
         "lateness p99 63 us",
         "skipped 4",
         "a message",
@@ -146,6 +157,31 @@ fn the_plain_line_has_the_same_numbers_and_leaves_out_what_is_not_known() {
     }
     let text = line(&History::default());
     assert!(!text.contains("f_s") && !text.contains("link"), "{text}");
+}
+
+#[test]
+fn what_a_sender_left_unsent_is_no_loss_of_the_path_and_without_its_count_nothing_is_called_loss() {
+    let mut history = History::default();
+    history.push(snapshot(1.0));
+    let text = line(&history);
+    for part in [
+        "loss up 1.1 %",
+        "unsent up 12",
+        "loss down 0.9 %",
+        "unsent down 100",
+    ] {
+        assert!(text.contains(part), "{part}: {text}");
+    }
+    let mut alone = History::default();
+    alone.push(Snapshot {
+        slave: None,
+        ..snapshot(1.0)
+    });
+    let text = line(&alone);
+    assert!(
+        text.contains("missing down 9.9 %") && !text.contains("loss down"),
+        "{text}"
+    );
 }
 
 #[test]

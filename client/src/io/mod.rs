@@ -22,6 +22,7 @@ use std::time::Duration;
 
 use mmt_netem::LinkConfig;
 use mmt_netem::io::socket::SocketExtras;
+use mmt_shared::channel::peer::Loss;
 use mmt_shared::io::input_log::RecordWanted;
 use mmt_shared::io::transport::Transport;
 use mmt_shared::io::truth::TruthReceiver;
@@ -148,8 +149,12 @@ pub struct MasterLive {
     pub link: LinkState,
     /// Median round trip, ms.
     pub rtt_ms: Option<f64>,
-    /// Loss up and down, 0 to 1.
-    pub loss: (Option<f64>, Option<f64>),
+    /// What of the datagrams that the master sent reached the slave's host.
+    pub up: Loss,
+    /// What of the slave's datagrams reached this host; what the slave did not send is in what is missing.
+    pub down: Loss,
+    /// Datagrams that the master itself overtook or could not send.
+    pub unsent: u64,
     /// Late wake-ups of the haptic loop so far: p99, µs.
     pub lateness_p99_us: f64,
     /// Ticks skipped.

@@ -24,7 +24,7 @@ pub(super) fn half(
     }
     half.pose = (&haptic.pose).into();
     half.session.timing = (&haptic.timing).into();
-    half.session.add_drops(task.drops());
+    task.add_to(&mut half.session);
     let (meter, before) = (&connected.meter, SocketCounters::default());
     meter.add_to(&mut half.session, &before, connected.address, duration_s);
     half

@@ -202,8 +202,12 @@ impl Session<'_> {
             self.shown = snapshot.link;
             tracing::info!(link = snapshot.link.name(), "the link");
         }
+        let unsent = self.task.unsent();
         self.live.send_replace(MasterLive {
             ended: ended.or(snapshot.ended),
+            up: snapshot.up.on_the_path(unsent, 0),
+            down: snapshot.down.on_the_path(0, self.task.unread()),
+            unsent,
             ..snapshot
         });
     }

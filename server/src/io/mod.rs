@@ -20,6 +20,7 @@ use std::net::SocketAddr;
 
 use mmt_netem::LinkConfig;
 use mmt_netem::io::socket::SocketExtras;
+use mmt_shared::channel::peer::Loss;
 use mmt_shared::io::identity::Identity;
 use mmt_shared::io::input_log::RecordWanted;
 use mmt_shared::io::transport::Transport;
@@ -88,8 +89,10 @@ pub struct SlaveLive {
     pub in_contact: bool,
     /// Median round trip, ms.
     pub rtt_ms: Option<f64>,
-    /// Loss up, 0 to 1.
-    pub loss_up: Option<f64>,
+    /// What of the master's datagrams reached this host; what the master did not send is in what is missing.
+    pub up: Loss,
+    /// Datagrams that the slave itself overtook or could not send.
+    pub unsent: u64,
 }
 
 /// The configuration as the report shows it.

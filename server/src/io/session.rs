@@ -244,7 +244,11 @@ impl Session<'_> {
     fn beat(&mut self, live: &watch::Sender<SlaveLive>) -> Option<End> {
         let now = self.context.clock.now();
         let snapshot = *self.task.handle().snapshot();
-        live.send_replace(snapshot.live);
+        live.send_replace(SlaveLive {
+            up: snapshot.live.up.on_the_path(0, self.task.unread()),
+            unsent: self.task.unsent(),
+            ..snapshot.live
+        });
         let silent = |heard| now.saturating_since(heard) > SILENCE_MAX;
         if snapshot.numbers_spent {
             Some(End::Numbers(NumbersSpent))
@@ -260,7 +264,7 @@ impl Session<'_> {
         let mut half = finished.end.half(duration_s);
         let (session, peer) = (&mut half.session, self.connection.remote_address());
         session.timing = (&finished.ticker).into();
-        session.add_drops(self.task.drops());
+        self.task.add_to(session);
         session.add_drops(self.context.refusals());
         let meter = &self.context.meter;
         meter.add_to(session, &self.socket_before, peer, duration_s);

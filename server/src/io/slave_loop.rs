@@ -147,7 +147,7 @@ impl SlaveLoop {
             connected: true,
             elapsed_s: now.saturating_since(channel.began()).as_secs_f64(),
             rtt_ms: median.map(|rtt| rtt.as_secs_f64() * 1e3),
-            loss_up: channel.peer().incoming().share(),
+            up: channel.peer().incoming(),
             ..SlaveLive::default()
         };
         for (slot, (_, count)) in live.updates.iter_mut().zip(end.counts().updates.by_cause()) {

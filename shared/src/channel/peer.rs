@@ -8,6 +8,8 @@ mod window;
 
 use std::time::Duration;
 
+use serde::{Deserialize, Serialize};
+
 pub use round_trip::RoundTrip;
 pub use window::{Freshness, SequenceWindow, WINDOW};
 
@@ -38,7 +40,8 @@ pub enum Arrival {
 }
 
 /// What has been counted in one direction.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default)]
 pub struct Loss {
     /// Datagrams that were numbered up to the newest one known.
     pub expected: u32,
@@ -50,6 +53,19 @@ impl Loss {
     /// How many did not arrive, or not yet.
     pub fn lost(&self) -> u32 {
         self.expected.saturating_sub(self.received)
+    }
+
+    /// What the path did: without the datagrams that their sender left unsent, and with those that reached the host and
+    /// that nobody there read.
+    #[must_use]
+    pub fn on_the_path(self, unsent: u64, unread: u64) -> Self {
+        let count = |n: u64| u32::try_from(n).unwrap_or(u32::MAX);
+        let received = self.received.saturating_add(count(unread));
+        let expected = self.expected.saturating_sub(count(unsent));
+        Self {
+            expected: expected.max(received),
+            received,
+        }
     }
 
     /// Share that did not arrive, 0 to 1; none before the first.

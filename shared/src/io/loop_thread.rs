@@ -179,9 +179,14 @@ impl<S: Send, T> LoopHandle<S, T> {
         self.stop.store(true, Ordering::Release);
     }
 
-    /// Datagrams that found no room in a ring, before the loop or before the network task.
-    pub fn dropped(&self) -> u64 {
-        self.arrivals_dropped + self.departures_dropped.load(Ordering::Relaxed)
+    /// Datagrams that arrived and found no room before the loop.
+    pub fn arrivals_dropped(&self) -> u64 {
+        self.arrivals_dropped
+    }
+
+    /// Datagrams that were to leave and found no room before the network task.
+    pub fn departures_dropped(&self) -> u64 {
+        self.departures_dropped.load(Ordering::Relaxed)
     }
 }
 
@@ -239,7 +244,7 @@ mod tests {
         for n in 0..ARRIVALS_MAX as u64 + 3 {
             handle.deliver(AT(n), &n.to_le_bytes());
         }
-        assert_eq!(handle.dropped(), 3);
+        assert_eq!(handle.arrivals_dropped() + handle.departures_dropped(), 3);
         for n in 0..ARRIVALS_MAX as u64 {
             let frame = side.next_arrival().unwrap();
             assert_eq!((frame.at, frame.bytes()), (AT(n), &n.to_le_bytes()[..]));
@@ -251,7 +256,10 @@ mod tests {
             left -= 1;
             (left > 0).then_some(2)
         });
-        assert_eq!(handle.dropped(), 3 + 1);
+        assert_eq!(
+            handle.arrivals_dropped() + handle.departures_dropped(),
+            3 + 1
+        );
         handle.wakeup.wait().await.unwrap();
         assert_eq!(handle.next_departure().unwrap().bytes(), b"up");
     }

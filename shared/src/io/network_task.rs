@@ -13,6 +13,7 @@ use tokio::time::{Interval, MissedTickBehavior, interval, timeout};
 use super::clock::Clock;
 use super::loop_thread::LoopHandle;
 use super::transport::{Connection, ConnectionError, SendDatagramError};
+use crate::report::SessionStats;
 
 /// Between two beats, at which a caller reads the loop's snapshot: 25 a second.
 pub const BEAT: Duration = Duration::from_millis(40);
@@ -88,24 +89,40 @@ impl<S: Send, T> NetworkTask<S, T> {
         }
     }
 
-    /// Datagrams dropped between the loop and the network so far, by name.
-    pub fn drops(&self) -> [(&'static str, u64); 6] {
-        let (counts, passed) = (&self.counts, self.connection.datagrams());
-        [
-            // displaced by newer ones, or still held
-            (
-                "datagrams_displaced",
-                counts.given.saturating_sub(passed.sent),
-            ),
-            ("datagrams_ring_full", self.handle.dropped()),
-            (
-                "datagrams_unread",
-                passed.received.saturating_sub(counts.read),
-            ),
-            ("send_disconnected", counts.send_disconnected),
-            ("send_too_large", counts.send_too_large),
-            ("send_unsupported", counts.send_unsupported),
-        ]
+    /// Adds what was dropped between the loop and the network so far, by name and by who did not pass it on.
+    pub fn add_to(&self, stats: &mut SessionStats) {
+        stats.unsent = Some(self.unsent());
+        stats.unread = Some(self.unread());
+        let rings = self.handle.arrivals_dropped() + self.handle.departures_dropped();
+        stats.add_drops([
+            ("datagrams_displaced", self.displaced()),
+            ("datagrams_ring_full", rings),
+            ("datagrams_unread", self.left_unread()),
+            ("send_disconnected", self.counts.send_disconnected),
+            ("send_too_large", self.counts.send_too_large),
+            ("send_unsupported", self.counts.send_unsupported),
+        ]);
+    }
+
+    /// Datagrams that this end made and did not send while the connection was up.
+    pub fn unsent(&self) -> u64 {
+        let refused = self.counts.send_too_large + self.counts.send_unsupported;
+        self.displaced() + refused + self.handle.departures_dropped()
+    }
+
+    /// Datagrams that arrived and never reached the loop.
+    pub fn unread(&self) -> u64 {
+        self.left_unread() + self.handle.arrivals_dropped()
+    }
+
+    /// Datagrams that QUIC dropped for newer ones, or still holds.
+    fn displaced(&self) -> u64 {
+        (self.counts.given).saturating_sub(self.connection.datagrams().sent)
+    }
+
+    /// Datagrams that QUIC received and nobody read.
+    fn left_unread(&self) -> u64 {
+        (self.connection.datagrams().received).saturating_sub(self.counts.read)
     }
 
     /// The loop's handle.

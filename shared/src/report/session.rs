@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::number::{Counts, Number, named};
 use crate::channel::datagram_channel::DatagramChannel;
+use crate::channel::peer::Loss;
 use crate::stats::histogram::{Histogram, Quantiles};
 use crate::stats::session::KindCounts;
 use crate::wire::{Architecture, Side};
@@ -26,10 +27,15 @@ pub struct SessionStats {
     pub wire_received: WireReport,
     /// Round-trip time.
     pub rtt_ms: DelayReport,
-    /// Share of this end's datagrams that never arrived, by the other's echoes, 0 to 1.
-    pub loss_sent: Number,
-    /// Share of the other's datagrams that never arrived, 0 to 1.
-    pub loss_received: Number,
+    /// What became of this end's datagrams, by the other's echoes.
+    pub outgoing: Loss,
+    /// What became of the other's datagrams.
+    pub incoming: Loss,
+    /// Datagrams that this end overtook or could not send while the connection was up: they are in `outgoing`, and the
+    /// path did not lose them.
+    pub unsent: Option<u64>,
+    /// Datagrams that reached this end's host and not its loop: they are in `incoming`.
+    pub unread: Option<u64>,
     /// The emulated network on what this end sends.
     pub emulation: EmulationReport,
     /// The 1 kHz loop.
@@ -52,8 +58,8 @@ impl SessionStats {
             sent,
             received,
             rtt_ms: peer.round_trip().histogram().into(),
-            loss_sent: peer.outgoing().share().into(),
-            loss_received: peer.incoming().share().into(),
+            outgoing: peer.outgoing(),
+            incoming: peer.incoming(),
             drops: named([
                 ("datagrams_duplicate", counts.datagrams_duplicate),
                 ("datagrams_malformed", counts.datagrams_malformed),
@@ -199,8 +205,7 @@ pub struct EmulationReport {
     pub released: Option<u64>,
     /// How long after their times they left, µs.
     pub late_us: LateReport,
-    /// Whether the host was too slow for the run to be about this network: p99 above 250 µs, or anything
-    /// above 1 ms.
+    /// Whether the host was too slow for the run to be about this network: p99.9 above 1 ms.
     pub degraded: Option<bool>,
 }
 

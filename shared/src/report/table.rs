@@ -192,6 +192,7 @@ impl<C> RunReport<C> {
         vec![
             row("round trip", [p("p50", rtt.p50), p("p99", rtt.p99)]),
             row("loss", [after("up", share(link.loss_up)), after("down", share(link.loss_down))]),
+            row("unsent", [after("up", count(link.unsent_up, "")), after("down", count(link.unsent_down, ""))]),
             row("play-out delay", [p("p50", playout.p50), p("p99", playout.p99)]),
             row("messages up", kinds(&messages.up)),
             row("messages down", kinds(&messages.down)),

@@ -1,6 +1,7 @@
 //! The document's keys, its nulls, and the table.
 
 use super::*;
+use crate::channel::datagram_channel::DatagramChannel;
 use crate::metrics::{
     AgeOfInformation, ContactBreaks, ForceMetrics, ForcePeak, PoseError, UpdateCounts,
 };
@@ -9,7 +10,7 @@ use crate::model::update::Cause;
 use crate::stats::histogram::Histogram;
 use crate::stats::session::KindCounts;
 use crate::time::Time;
-use crate::wire::Architecture;
+use crate::wire::{Architecture, DATAGRAM_MAX, Message, Side};
 use serde_json::{Value, json};
 
 fn empty() -> RunReport<Value> {
@@ -89,6 +90,7 @@ fn full() -> RunReport<Value> {
     delays.record(std::time::Duration::from_millis(16));
     report.link.playout_delay_ms = DelayReport::from(&delays);
     (report.link.loss_up, report.link.loss_down) = (0.01.into(), 0.012.into());
+    (report.link.unsent_up, report.link.unsent_down) = (Some(0), Some(17));
     report.emulation.up = EmulationReport {
         released: Some(2100),
         late_us: LateReport {
@@ -163,7 +165,7 @@ const REQUIRED: &str = "version command seed duration_s ending configuration dro
     pose.position_rms_m pose.position_max_m pose.angle_rms_rad pose.angle_max_rad \
     tool.held_s tool.force_peak_n \
     passivity.energy_injected_j passivity.observer_min_j \
-    link.rtt_ms.p50 link.rtt_ms.p99 link.loss_up link.loss_down \
+    link.rtt_ms.p50 link.rtt_ms.p99 link.loss_up link.loss_down link.unsent_up link.unsent_down \
     emulation.up.released emulation.up.late_us.p50 emulation.up.late_us.p99 \
     emulation.up.late_us.max emulation.up.degraded \
     emulation.down.released emulation.down.late_us.p50 emulation.down.late_us.p99 \
@@ -418,6 +420,69 @@ fn the_longest_half_fits_into_a_farewell_and_is_read_back_the_same() {
     );
 }
 
+/// The stats of an end that has sent 686 datagrams when the path dies: the other has answered 500, and all of them came.
+fn of_a_path_that_died() -> SessionStats {
+    let ends = [Side::Master, Side::Slave].map(|side| DatagramChannel::new(side, Time::ZERO));
+    let [mut up, mut down] = ends;
+    let mut buffer = [0; DATAGRAM_MAX];
+    for n in 0..686 {
+        let now = Time::from_millis(n);
+        let length = up.encode(now, Message::Heartbeat, &mut buffer);
+        let length = length.unwrap().unwrap();
+        if n < 500 {
+            down.handle(now, &buffer[..length]).unwrap();
+            let length = down.encode(now, Message::Heartbeat, &mut buffer);
+            up.handle(now, &buffer[..length.unwrap().unwrap()]).unwrap();
+        }
+    }
+    SessionStats::new(Side::Master, &up, 0, 0.7)
+}
+
+#[test]
+fn of_a_session_that_died_nobody_knows_the_loss() {
+    let (mut master, mut slave) = halves();
+    (master.own.session, slave.own.session) = (of_a_path_that_died(), of_a_path_that_died());
+    let living = RunReport::from(master.clone()).link;
+    assert_eq!(
+        (living.loss_up.get(), living.loss_down.get()),
+        (Some(0.0), Some(0.0)),
+        "the farewell came, so the path lived to the end"
+    );
+    (master.other, slave.other) = (None, None);
+    let both = RunReport::of_both(master.clone(), Some(slave.clone())).link;
+    for link in [
+        RunReport::from(master).link,
+        RunReport::from(slave).link,
+        both,
+    ] {
+        assert_eq!((link.loss_up, link.loss_down), Default::default());
+    }
+}
+
+#[test]
+fn what_a_host_dropped_is_not_lost_on_the_path() {
+    let (mut master, _) = halves();
+    let own = &mut master.own.session;
+    // the master stood still and overtook 90 of its 1000 datagrams, the path lost 10, the slave left 5 unread
+    own.outgoing = Loss {
+        expected: 1000,
+        received: 895,
+    };
+    own.unsent = Some(90);
+    own.incoming = Loss {
+        expected: 500,
+        received: 480,
+    };
+    own.unread = Some(0);
+    let mut other = master.other.take().unwrap();
+    (other.session.unsent, other.session.unread) = (Some(20), Some(5));
+    master.other = Some(other);
+    let link = RunReport::from(master).link;
+    assert_eq!((link.unsent_up, link.unsent_down), (Some(90), Some(20)));
+    assert_eq!(link.loss_up.get(), Some(10.0 / 910.0));
+    assert_eq!(link.loss_down.get(), Some(0.0));
+}
+
 #[test]
 fn the_table_shows_what_is_known_and_leaves_out_what_is_not() {
     let version = env!("CARGO_PKG_VERSION");
@@ -445,6 +510,7 @@ fn the_table_of_a_full_report_is_aligned_and_stays_within_100_columns() {
         "  round trip as felt        14.9 ms",
         "  mass m                    0.707 kg           truth 0.700 kg     error 1.0 %",
         "  loss                      up 1.0 %           down 1.2 %",
+        "  unsent                    up 0               down 17",
         "  datagrams up              2100               105.0 /s           336000 B           157.9 kbit/s",
     ] {
         assert!(shown.lines().any(|line| line == row), "{row}\n{shown}");
