@@ -40,7 +40,13 @@ impl Haptic {
         let coupling = device.coupling();
         let params = ModelParams::of_square(0.7, 3.0, 2.06, 0.36, &coupling).unwrap();
         let footprint = BoxFootprint::square(0.36);
-        let state = ModelState::try_new(params, footprint, Pose::default(), Twist::default());
+        let state = ModelState::try_new(
+            params,
+            footprint,
+            Pose::default(),
+            Twist::default(),
+            &coupling,
+        );
         let welcome = Welcome {
             settings: mode.model_settings(coupling),
             state: state.unwrap(),
@@ -77,7 +83,8 @@ impl Haptic {
             pose,
             twist,
         } = *self.end.master().model().state();
-        ModelState::try_new(params, footprint, pose, twist).unwrap()
+        let coupling = &self.end.master().model().settings().coupling;
+        ModelState::try_new(params, footprint, pose, twist, coupling).unwrap()
     }
 
     fn tick(&mut self, out: &mut [u8]) -> Option<usize> {

@@ -111,6 +111,7 @@ impl MasterEnd {
         session.add_drops([
             ("bad_readings", master.bad_readings()),
             ("forces_not_finite", master.limiter().rejected()),
+            ("model_not_finite", master.model().not_finite()),
         ]);
         MasterHalf {
             session,

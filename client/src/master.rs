@@ -170,6 +170,9 @@ impl Master {
         }
         let hip = self.hip.metres();
         let rendered = self.model.step(stamp, hip);
+        if self.model.not_finite() > 0 {
+            self.limiter.release();
+        }
         let felt = match &mut self.tdpa {
             Some(tdpa) => tdpa.step(hip),
             None => rendered.force,
@@ -222,7 +225,8 @@ mod tests {
         let (footprint, pose) = (BoxFootprint::square(0.4), Pose::default());
         Welcome {
             settings: Mode::Recommended.model_settings(coupling),
-            state: ModelState::try_new(params, footprint, pose, Twist::default()).unwrap(),
+            state: ModelState::try_new(params, footprint, pose, Twist::default(), &coupling)
+                .unwrap(),
             scheme: Label::clipped("timer 150ms"),
             program: Label::clipped("test"),
         }

@@ -101,7 +101,8 @@ impl Slave {
         let pose = environment.pose();
         let object = ObjectEstimate::try_new(config, coupling, pose)?;
         let footprint = BoxFootprint::square(config.start.side_m);
-        let start = ModelState::try_new(object.params, footprint, pose, Twist::default())?;
+        let start =
+            ModelState::try_new(object.params, footprint, pose, Twist::default(), &coupling)?;
         let sensing = Sensing::try_new(config.sensing, config.seed)?;
         let detector = ContactDetector::new(config.trigger.contact);
         let noise_n = config.sensing.force_noise_n;

@@ -57,7 +57,8 @@ fn update() -> Option<Update> {
         cause: Cause::Deadband,
         answers: Time::from_millis(30_000),
         slave_in_contact: true,
-        state: ModelState::try_new(params, BoxFootprint::square(0.36), pose, twist).ok()?,
+        state: ModelState::try_new(params, BoxFootprint::square(0.36), pose, twist, &COUPLING)
+            .ok()?,
     })
 }
 

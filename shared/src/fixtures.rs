@@ -20,7 +20,14 @@ pub const COUPLING: Coupling = Coupling {
 pub fn square_at_rest(m: f64, b: f64, c: f64, side_m: f64) -> ModelState {
     let params = ModelParams::of_square(m, b, c, side_m, &COUPLING).unwrap();
     let footprint = BoxFootprint::square(side_m);
-    ModelState::try_new(params, footprint, Pose::default(), Twist::default()).unwrap()
+    ModelState::try_new(
+        params,
+        footprint,
+        Pose::default(),
+        Twist::default(),
+        &COUPLING,
+    )
+    .unwrap()
 }
 
 /// An update that answers the sample of so many milliseconds, while the slave's tool touches the object.

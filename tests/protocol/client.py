@@ -105,7 +105,9 @@ def accepted(state, coupling):
     k_p, k_d = coupling
     step = 0.001
     bound = 2.5 * k_p * step**2 + 2 * (state["b"] + 2.5 * k_d) * step
-    return state["m"] >= bound and all(
+    lever = max(state[face] for face in ("east", "north", "west", "south"))
+    least = lever**2 * (k_p * step**2 + 2 * k_d * step)
+    return state["m"] >= bound and state["inertia"] >= least and all(
         least <= state[name] <= most for name, (least, most) in RANGES.items())
 
 

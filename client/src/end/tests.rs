@@ -17,7 +17,14 @@ const AT: fn(u64) -> Time = Time::from_millis;
 fn state(mass_kg: f64, coupling: &Coupling) -> ModelState {
     let params = ModelParams::of_square(mass_kg, 3.0, 2.06, 0.4, coupling).unwrap();
     let footprint = BoxFootprint::square(0.4);
-    ModelState::try_new(params, footprint, Pose::default(), Twist::default()).unwrap()
+    ModelState::try_new(
+        params,
+        footprint,
+        Pose::default(),
+        Twist::default(),
+        coupling,
+    )
+    .unwrap()
 }
 
 fn end(config: CommandConfig, architecture: Architecture) -> MasterEnd {

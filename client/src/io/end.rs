@@ -17,6 +17,8 @@ pub enum SessionEnd {
     SlaveEnded(Ending),
     /// Nothing arrived from the slave for so long that the hand was released.
     LinkSilent,
+    /// A number of the local model was none, and the hand was released.
+    ModelBroken,
     /// The connection broke or was closed.
     ConnectionLost,
     /// The slave sent on the stream what it must not send there, or closed it.
@@ -30,7 +32,9 @@ impl SessionEnd {
             Self::DurationOver | Self::OperatorFinished => Ending::Finished,
             Self::Stopped => Ending::Interrupted,
             Self::SlaveEnded(ending) => ending,
-            Self::LinkSilent | Self::ConnectionLost | Self::StreamBroken => Ending::Failed,
+            Self::LinkSilent | Self::ModelBroken | Self::ConnectionLost | Self::StreamBroken => {
+                Ending::Failed
+            }
         }
     }
 }
@@ -47,6 +51,10 @@ impl fmt::Display for SessionEnd {
             Self::LinkSilent => {
                 "nothing came from the slave for 1 s and the hand was released: see whether the \
                  slave and the network are alive, and start again"
+            }
+            Self::ModelBroken => {
+                "a number of the local model was not finite and the hand was released: this is a \
+                 defect of mmt; please report it with the report of this session"
             }
             Self::ConnectionLost => {
                 "the connection to the slave was lost: see whether it still runs, and start again"

@@ -155,6 +155,9 @@ impl HapticLoop {
         if done.link == LinkState::Released && !self.releasing {
             self.why.get_or_insert(SessionEnd::LinkSilent);
         }
+        if self.end.master().model().not_finite() > 0 {
+            self.why.get_or_insert(SessionEnd::ModelBroken);
+        }
         let sent = now();
         self.transmit(side, sent);
         if let Some(record) = &mut self.record {

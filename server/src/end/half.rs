@@ -39,7 +39,7 @@ impl SlaveEnd {
     }
 }
 
-fn drops(slave: &Slave) -> [(&'static str, u64); 8] {
+fn drops(slave: &Slave) -> [(&'static str, u64); 9] {
     let playout = slave.playout().counts();
     [
         ("samples_late", playout.late),
@@ -50,6 +50,7 @@ fn drops(slave: &Slave) -> [(&'static str, u64); 8] {
         ("states_clamped", slave.clamped_states()),
         ("wrenches_refused", slave.environment().refused()),
         ("forces_not_finite", slave.force().rejected()),
+        ("model_not_finite", slave.shadow().ahead().not_finite()),
     ]
 }
 

@@ -16,7 +16,13 @@ fn update(sequence: u32, cause: Cause) -> Update {
     let coupling = Coupling::for_stiffness(1000.0);
     let params = ModelParams::of_square(0.7, 3.0, 2.06, 0.4, &coupling).unwrap();
     let footprint = BoxFootprint::square(0.4);
-    let state = ModelState::try_new(params, footprint, Pose::default(), Twist::default());
+    let state = ModelState::try_new(
+        params,
+        footprint,
+        Pose::default(),
+        Twist::default(),
+        &coupling,
+    );
     Update {
         sequence,
         cause,

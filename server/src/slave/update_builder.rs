@@ -62,11 +62,12 @@ impl UpdateBuilder {
                 (observer.footprint(), pose, observer.twist())
             }
         };
-        let state = match ModelState::try_new(object.params, footprint, pose, twist) {
+        let coupling = &model.settings().coupling;
+        let state = match ModelState::try_new(object.params, footprint, pose, twist, coupling) {
             Ok(state) => state,
             Err(_) => {
                 self.clamped += 1;
-                ModelState::nearest(object.params, footprint, pose, twist).ok()?
+                ModelState::nearest(object.params, footprint, pose, twist, coupling).ok()?
             }
         };
         self.sequence = self.sequence.saturating_add(1);

@@ -12,6 +12,11 @@ use crate::time::TICK_S;
 /// Regularisation of the limit surface, m/s: below it friction acts like viscous drag. The stick test
 /// itself is exact.
 const EPS: f64 = 1e-9;
+/// Less Coulomb friction than this, N, is none: what divides by it stays far from the ends of f64.
+const FRICTION_LEAST_N: f64 = 1e-9;
+/// Explicit friction that changes a velocity (m/s) or a turning rate (rad/s) by more than this in a tick does not reverse
+/// it: so much would throw the body to and fro. Bodies under their own weight stay far below.
+const EXPLICIT_MOST: (f64, f64) = (0.1, 1.0);
 /// Newton iterations on one scalar; three are typical, the bracket makes every one safe.
 const ITERATIONS: u32 = 30;
 
@@ -65,18 +70,30 @@ fn sign_step(twist: &Twist, params: &ModelParams, force: Vec2, moment: f64) -> T
     } else {
         Vec2::zeros()
     };
+    let c = explicit(params.c(), params.m(), speed, EXPLICIT_MOST.0);
     // (5), which is (1) solved for the acceleration
-    let a = (force - v * params.b() - direction * params.c()) / params.m();
+    let a = (force - v * params.b() - direction * c) / params.m();
     // (11), which is (7) solved likewise; signum of a float is ±1 at zero, the equation's is 0
     let sign = if twist.angular == 0.0 {
         0.0
     } else {
         twist.angular.signum()
     };
-    let alpha = (moment - params.e() * sign) / params.inertia();
+    let rate = twist.angular.abs();
+    let e = explicit(params.e(), params.inertia(), rate, EXPLICIT_MOST.1);
+    let alpha = (moment - e * sign) / params.inertia();
     Twist {
         linear: v + a * TICK_S,
         angular: twist.angular + alpha * TICK_S,
+    }
+}
+
+/// Friction (N or N m) on a body of this inertia (kg or kg m²) at this speed, as far as an explicit step can have it.
+fn explicit(friction: f64, inertia: f64, speed: f64, most: f64) -> f64 {
+    if friction * TICK_S <= most * inertia {
+        friction
+    } else {
+        friction.min(speed * inertia / TICK_S)
     }
 }
 
@@ -99,7 +116,7 @@ fn limit_surface_step(twist: &Twist, params: &ModelParams, force: Vec2, moment: 
         angular: twist.angular + moment * (TICK_S / inertia),
     };
     let damped_mass = m + TICK_S * b;
-    if c <= 0.0 {
+    if c < FRICTION_LEAST_N {
         return Twist {
             linear: free.linear * (m / damped_mass),
             angular: free.angular,

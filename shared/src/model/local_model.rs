@@ -8,37 +8,20 @@
 mod body;
 mod replay;
 
-use crate::model::contact::Touch;
 use crate::model::correction::{Correction, IN_CONTACT, IN_CONTACT_REPLAYED, Tank};
 use crate::model::dynamics::Motion;
-use crate::model::geometry::{Vec2, rotate};
+use crate::model::geometry::{Twist, Vec2, rotate};
 use crate::model::history::{HISTORY_TICKS, History, Moment};
 use crate::model::params::{ModelParams, ModelState};
 use crate::model::settings::{ModelSettings, PoseCorrection, Smoothing};
 use crate::model::update::{Cause, Update};
 use crate::time::{TICK, TICK_S, Time};
 
-pub use body::BodyState;
+pub use body::{BodyState, Rendered};
 
 use body::Body;
 pub use replay::REPLAYED_PER_TICK;
 use replay::Replay;
-
-/// What the local model did with one HIP sample.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Rendered {
-    /// f_m, N, world: on the object; the hand gets −f_m.
-    pub force: Vec2,
-    /// What the HIP touches.
-    pub touch: Option<Touch>,
-}
-
-impl Rendered {
-    /// Whether the HIP touches the model.
-    pub fn in_contact(&self) -> bool {
-        self.touch.is_some()
-    }
-}
 
 /// The box that is rendered.
 #[derive(Clone, Debug)]
@@ -57,6 +40,8 @@ pub struct LocalModel {
     rendered: Rendered,
     /// Sum of what updates added to the model's energy beyond what the tank paid, J.
     injected_j: f64,
+    /// Times that a number of the box was none.
+    not_finite: u64,
 }
 
 impl LocalModel {
@@ -72,6 +57,7 @@ impl LocalModel {
             previous: None,
             rendered: Rendered::default(),
             injected_j: 0.0,
+            not_finite: 0,
         }
     }
 
@@ -106,6 +92,11 @@ impl LocalModel {
         self.injected_j
     }
 
+    /// Times that a number of the box was none, so that it went back to where it last was good.
+    pub fn not_finite(&self) -> u64 {
+        self.not_finite
+    }
+
     /// Whether a received pose has been replayed up to the newest sample.
     pub fn is_replayed(&self) -> bool {
         self.replay.is_live()
@@ -117,6 +108,7 @@ impl LocalModel {
             self.replay.wait(update);
             return;
         }
+        let good = self.body;
         let before = self.energy_now();
         self.take_params(&update.state.params());
         match self.settings.correction {
@@ -125,6 +117,7 @@ impl LocalModel {
             PoseCorrection::Replay => self.restart(update),
         }
         self.account(before, before, self.energy_now());
+        self.stay_finite(good);
     }
 
     /// Becomes what `other` is, but for the history, which stays: both took the same samples.
@@ -219,6 +212,7 @@ impl LocalModel {
     pub fn step(&mut self, stamp: Time, hip: Vec2) -> Rendered {
         let hip_velocity = self.hip_velocity(stamp, hip);
         self.previous = Some((stamp, hip));
+        let good = self.body;
         self.smooth(hip);
         self.correct(hip);
         self.remember(stamp, hip, hip_velocity);
@@ -226,7 +220,23 @@ impl LocalModel {
         self.correction.tank.fill(dissipated_w * TICK_S);
         self.rendered = rendered;
         self.go_on_replaying();
-        rendered
+        self.stay_finite(good);
+        self.rendered
+    }
+
+    /// A number that is none never stays: the box is what it was when it last was `good`, at rest and felt no more.
+    fn stay_finite(&mut self, good: Body) {
+        let force = self.rendered.force;
+        if self.body.is_finite() && force.x.is_finite() && force.y.is_finite() {
+            return;
+        }
+        self.body = good;
+        self.body.state.twist = Twist::default();
+        self.target = good.state.params;
+        self.correction = Correction::default();
+        self.replay.stop();
+        self.rendered = Rendered::default();
+        self.not_finite = self.not_finite.saturating_add(1);
     }
 
     /// Smoothing in time. What heavier parameters add to a moving box is paid from the tank, or the box

@@ -6,9 +6,13 @@
 use serde::Serialize;
 
 use crate::model::contact::Coupling;
-use crate::model::geometry::{BoxFootprint, Face, Pose, Twist};
+use crate::model::geometry::{BoxFootprint, Face};
 use crate::range::{self, OutOfRange};
 use crate::time::TICK_S;
+
+mod state;
+
+pub use state::ModelState;
 
 /// Acceleration of gravity g, m/s².
 pub const GRAVITY: f64 = 9.81;
@@ -53,12 +57,16 @@ pub enum ParamsError {
     OutOfRange(#[from] OutOfRange),
     /// The discrete local model would be near its stability bound.
     #[error(
-        "mass {mass} kg is below {least} kg, the least that is stable with margin at this stiffness and damping"
+        "{name} {value} {unit} is below {least} {unit}, the least that is stable with margin at this stiffness, damping and size"
     )]
     Unstable {
-        /// The mass, kg.
-        mass: f64,
-        /// The least accepted mass for these b, k_p, k_d, kg.
+        /// Which number: the mass or the inertia.
+        name: &'static str,
+        /// Its unit.
+        unit: &'static str,
+        /// What it was.
+        value: f64,
+        /// The least that is accepted with the other numbers.
         least: f64,
     },
 }
@@ -109,7 +117,12 @@ impl ModelParams {
         in_range("friction torque", "N m", e, FRICTION_TORQUE_NM)?;
         let least = least_stable_mass(b, coupling);
         if m < least {
-            return Err(ParamsError::Unstable { mass: m, least });
+            return Err(ParamsError::Unstable {
+                name: "mass",
+                unit: "kg",
+                value: m,
+                least,
+            });
         }
         Ok(Self {
             m,
@@ -171,6 +184,16 @@ impl ModelParams {
         self.e
     }
 
+    /// These parameters with at least the inertia that is stable at the footprint's longest lever: what a body computes
+    /// with while its parameters and its faces come from different updates.
+    pub(crate) fn steadied(&self, footprint: &BoxFootprint, coupling: &Coupling) -> Self {
+        let least = least_stable_inertia(footprint, coupling);
+        Self {
+            inertia: self.inertia.max(least),
+            ..*self
+        }
+    }
+
     /// These parameters moved towards `target`: each number becomes `own·keep + target·(1 − keep)`.
     ///
     /// The accepted set is convex (the stability bound is linear in m and b), so the blend of two
@@ -198,6 +221,21 @@ pub fn least_stable_mass(b: f64, coupling: &Coupling) -> f64 {
     STABILITY_MARGIN * bound / 4.0
 }
 
+/// Least inertia (kg m²) accepted with a footprint under a coupling: `I ≥ s² (k_p T² + 2 k_d T)`, s the longest lever arm
+/// of a force on a face.
+///
+/// With [`least_stable_mass`] it keeps `(1/m + s²/I)(k_p T² + 2 k_d T) + 2 b T/m` at 2 or below, half of what is proven
+/// stable. Squares of an accepted mass have more inertia than that.
+pub fn least_stable_inertia(footprint: &BoxFootprint, coupling: &Coupling) -> f64 {
+    let lever = Face::ALL
+        .into_iter()
+        .map(|face| footprint.offset(face))
+        .fold(0.0, f64::max);
+    let k_p = coupling.stiffness_n_per_m;
+    let k_d = coupling.damping_ns_per_m;
+    lever * lever * (k_p * TICK_S * TICK_S + 2.0 * k_d * TICK_S)
+}
+
 /// Inertia about z of a square of mass m (kg) and side l (m), kg m².
 pub fn inertia_of_square(m: f64, side: f64) -> f64 {
     // (8)
@@ -208,109 +246,6 @@ pub fn inertia_of_square(m: f64, side: f64) -> f64 {
 pub fn friction_torque_of_square(c: f64, side: f64) -> f64 {
     // (9) in closed form: e = c l (sqrt 2 + asinh 1) / 6
     c * side * (std::f64::consts::SQRT_2 + libm::asinh(1.0)) / 6.0
-}
-
-/// All that the master needs to render the object: parameters, footprint, pose and velocity, every number checked.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ModelState {
-    params: ModelParams,
-    footprint: BoxFootprint,
-    pose: Pose,
-    twist: Twist,
-}
-
-/// What [`ModelState::try_new`] accepts: least and greatest value.
-const COORDINATE_M: (f64, f64) = (-WORKSPACE_M, WORKSPACE_M);
-const TURN_RAD: (f64, f64) = (-ANGLE_RAD, ANGLE_RAD);
-const VELOCITY_M_PER_S: (f64, f64) = (-SPEED_M_PER_S, SPEED_M_PER_S);
-const RATE_RAD_PER_S: (f64, f64) = (-TURN_RATE_RAD_PER_S, TURN_RATE_RAD_PER_S);
-
-impl ModelState {
-    /// A state whose every number has been checked.
-    ///
-    /// # Errors
-    /// Names the first number that is not finite or outside its range.
-    pub fn try_new(
-        params: ModelParams,
-        footprint: BoxFootprint,
-        pose: Pose,
-        twist: Twist,
-    ) -> Result<Self, ParamsError> {
-        for face in Face::ALL {
-            in_range("face offset", "m", footprint.offset(face), FACE_OFFSET_M)?;
-        }
-        in_range("position x", "m", pose.position.x, COORDINATE_M)?;
-        in_range("position y", "m", pose.position.y, COORDINATE_M)?;
-        in_range("angle", "rad", pose.angle, TURN_RAD)?;
-        in_range("velocity x", "m/s", twist.linear.x, VELOCITY_M_PER_S)?;
-        in_range("velocity y", "m/s", twist.linear.y, VELOCITY_M_PER_S)?;
-        in_range("turning rate", "rad/s", twist.angular, RATE_RAD_PER_S)?;
-        Ok(Self {
-            params,
-            footprint,
-            pose,
-            twist,
-        })
-    }
-
-    /// The state nearest to these numbers that [`ModelState::try_new`] accepts: an object that has left the workspace
-    /// is at its edge.
-    ///
-    /// # Errors
-    /// Names the first number that is not a number.
-    pub fn nearest(
-        params: ModelParams,
-        footprint: BoxFootprint,
-        pose: Pose,
-        twist: Twist,
-    ) -> Result<Self, ParamsError> {
-        let within = |value: f64, (least, most): (f64, f64)| value.clamp(least, most);
-        let BoxFootprint {
-            east,
-            north,
-            west,
-            south,
-        } = footprint;
-        let [east, north, west, south] =
-            [east, north, west, south].map(|offset| within(offset, FACE_OFFSET_M));
-        let footprint = BoxFootprint {
-            east,
-            north,
-            west,
-            south,
-        };
-        let pose = Pose::new(
-            within(pose.position.x, COORDINATE_M),
-            within(pose.position.y, COORDINATE_M),
-            within(pose.angle, TURN_RAD),
-        );
-        let twist = Twist::new(
-            within(twist.linear.x, VELOCITY_M_PER_S),
-            within(twist.linear.y, VELOCITY_M_PER_S),
-            within(twist.angular, RATE_RAD_PER_S),
-        );
-        Self::try_new(params, footprint, pose, twist)
-    }
-
-    /// The impedance.
-    pub const fn params(&self) -> ModelParams {
-        self.params
-    }
-
-    /// One distance from the reference point to each face.
-    pub const fn footprint(&self) -> BoxFootprint {
-        self.footprint
-    }
-
-    /// `world_from_object`.
-    pub const fn pose(&self) -> Pose {
-        self.pose
-    }
-
-    /// Velocity of the reference point and turning rate.
-    pub const fn twist(&self) -> Twist {
-        self.twist
-    }
 }
 
 #[cfg(test)]

@@ -51,7 +51,7 @@ impl RawState {
     /// The state, if its numbers are those of a model under `coupling`.
     ///
     /// # Errors
-    /// Names the first number that is out of its range or below the stability bound.
+    /// Names the first number that is out of its range or below its stability bound.
     pub fn accept(&self, coupling: &Coupling) -> Result<ModelState, ParamsError> {
         let [m, b, c, inertia, e] = self.params;
         let [east, north, west, south] = self.footprint;
@@ -67,6 +67,7 @@ impl RawState {
             },
             Pose::new(x, y, angle),
             Twist::new(v_x, v_y, omega),
+            coupling,
         )
     }
 }

@@ -26,6 +26,7 @@ fn state() -> ModelState {
         BoxFootprint::square(0.36),
         Pose::new(0.1, -0.2, 0.3),
         Twist::new(0.15, 0.0, -0.5),
+        &COUPLING,
     )
     .unwrap()
 }
@@ -623,7 +624,7 @@ fn any_finite() -> impl Strategy<Value = f64> {
 }
 
 fn any_state() -> impl Strategy<Value = ModelState> {
-    let params = (0.2..50.0, 0.0..50.0, 0.0..200.0, 1e-5..34.0, 0.0..200.0);
+    let params = (0.2..50.0, 0.0..50.0, 0.0..200.0, 0.03..34.0, 0.0..200.0);
     let offsets = prop::array::uniform4(0.01..1.0);
     let motion = prop::array::uniform6(-4.9..4.9);
     (params, offsets, motion).prop_map(|((m, b, c, i, e), [east, north, west, south], p)| {
@@ -638,6 +639,7 @@ fn any_state() -> impl Strategy<Value = ModelState> {
             footprint,
             Pose::new(p[0], p[1], p[2]),
             Twist::new(p[3], p[4], p[5]),
+            &COUPLING,
         )
         .unwrap()
     })

@@ -74,7 +74,7 @@ pub(super) struct Session {
 pub(super) fn state(coupling: &Coupling) -> ModelState {
     let params = ModelParams::of_square(0.7, 3.0, 2.0, 0.4, coupling).unwrap();
     let (footprint, pose) = (BoxFootprint::square(0.4), Pose::default());
-    ModelState::try_new(params, footprint, pose, Twist::default()).unwrap()
+    ModelState::try_new(params, footprint, pose, Twist::default(), coupling).unwrap()
 }
 
 pub(super) fn welcome_for(coupling: Coupling) -> Welcome {

@@ -37,6 +37,18 @@ fn pressing(duration: Option<Duration>) -> Ticked {
     along("0,-0.21,0\n0.1,-0.198,0\n1000,-0.198,0\n", duration, None)
 }
 
+/// A loop of a model that breaks when it is touched.
+fn breaking() -> Ticked {
+    let mut ticked = pressing(None);
+    let limiter = ForceLimiter::try_new(DeviceProfile::default().limits()).unwrap();
+    let mut welcome = welcome_for(COUPLING);
+    // no slave can bring a master to this: its welcome would be refused
+    welcome.settings.coupling.stiffness_n_per_m = f64::INFINITY;
+    let master = Master::new(&welcome, limiter);
+    ticked.haptic.end = MasterEnd::new(Time::ZERO, master, CommandConfig::default());
+    ticked
+}
+
 /// A loop whose hand follows a path, with the truth at hand or without.
 fn along(path: &str, duration: Option<Duration>, truth: Option<TruthReceiver>) -> Ticked {
     let limiter = ForceLimiter::try_new(DeviceProfile::default().limits()).unwrap();
@@ -192,4 +204,24 @@ async fn the_network_is_woken_once_for_a_commands_samples() {
     woken.unwrap().unwrap();
     assert!(ticked.handle.next_departure().is_some());
     assert_eq!(ticked.handle.next_departure(), None);
+}
+
+#[tokio::test]
+async fn a_model_that_breaks_releases_the_hand_fails_the_session_and_is_counted() {
+    let mut ticked = breaking();
+    ticked.run_out();
+    assert_eq!(ticked.haptic.why, Some(SessionEnd::ModelBroken));
+    assert_eq!(SessionEnd::ModelBroken.ending(), Ending::Failed);
+    let half = ticked.haptic.end().half(1.0);
+    assert_ne!(half.session.drops.get("model_not_finite"), Some(&0));
+    assert!(
+        ticked
+            .haptic
+            .end()
+            .master()
+            .model()
+            .state()
+            .pose
+            .is_finite()
+    );
 }

@@ -3,13 +3,28 @@
 //! The box that is felt and the box that is replayed are both this type, so that a replay does to the one
 //! what the ticks did to the other. It must never change its parameters for more energy than was paid.
 
-use super::Rendered;
 use crate::model::contact::{Coupling, GodObject, Touch, contact_force};
 use crate::model::correction::{Correction, ROOM_M, Tank};
 use crate::model::dynamics::Motion;
 use crate::model::geometry::{BoxFootprint, Face, Pose, Twist, Vec2, rotate};
 use crate::model::params::{ModelParams, ModelState};
 use crate::model::settings::ModelSettings;
+
+/// What the local model did with one HIP sample.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Rendered {
+    /// f_m, N, world: on the object; the hand gets −f_m.
+    pub force: Vec2,
+    /// What the HIP touches.
+    pub touch: Option<Touch>,
+}
+
+impl Rendered {
+    /// Whether the HIP touches the model.
+    pub fn in_contact(&self) -> bool {
+        self.touch.is_some()
+    }
+}
 
 /// What a box is now. It began as an accepted [`ModelState`] and has moved since, wherever the hand took it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -48,6 +63,11 @@ impl Body {
             state: state.into(),
             god: GodObject::default(),
         }
+    }
+
+    /// Whether every number that moves is one.
+    pub(super) fn is_finite(&self) -> bool {
+        self.state.pose.is_finite() && self.state.twist.is_finite()
     }
 
     /// What the HIP touches with the box as it is; changes nothing.
@@ -125,9 +145,10 @@ impl Body {
             pose: state.pose,
             twist: state.twist,
         };
-        let after = before.step(settings.friction, &state.params, force, lever);
+        let params = state.params.steadied(&state.footprint, &settings.coupling);
+        let after = before.step(settings.friction, &params, force, lever);
         (state.pose, state.twist) = (after.pose, after.twist);
-        let dissipated_w = after.dissipation(settings.friction, &state.params);
+        let dissipated_w = after.dissipation(settings.friction, &params);
         (Rendered { force, touch }, dissipated_w)
     }
 }

@@ -55,6 +55,11 @@ impl Replay {
         matches!(self.progress, Progress::Live(_))
     }
 
+    /// Gives up what it replays.
+    pub(super) fn stop(&mut self) {
+        (self.progress, self.waiting) = (Progress::Idle, None);
+    }
+
     /// Puts an update off until the replay has caught up; a newer one takes the place of an older one.
     pub(super) fn wait(&mut self, update: &Update) {
         self.waiting = Some(*update);

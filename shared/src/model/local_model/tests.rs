@@ -7,6 +7,7 @@ use crate::model::geometry::{BoxFootprint, Pose};
 use crate::model::settings::Mode;
 
 mod energy;
+mod hostile;
 mod replay;
 
 fn state(m: f64, b: f64, c: f64) -> ModelState {
@@ -23,7 +24,14 @@ fn model(mode: Mode, correction: PoseCorrection) -> LocalModel {
 
 fn accepted(state: impl Into<BodyState>) -> ModelState {
     let state = state.into();
-    ModelState::try_new(state.params, state.footprint, state.pose, state.twist).unwrap()
+    ModelState::try_new(
+        state.params,
+        state.footprint,
+        state.pose,
+        state.twist,
+        &COUPLING,
+    )
+    .unwrap()
 }
 
 fn update(cause: Cause, answers_ms: u64, state: impl Into<BodyState>) -> Update {

@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::fixtures::COUPLING;
+use crate::model::geometry::{Pose, Twist};
 
 #[test]
 fn inertia_8_and_torque_9_have_their_closed_forms() {
@@ -70,15 +71,22 @@ fn a_mass_near_the_stability_bound_is_refused_and_blends_of_accepted_sets_are_ac
 #[test]
 fn the_nearest_state_is_the_same_within_the_ranges_and_on_their_edge_beyond() {
     let params = ModelParams::of_square(0.7, 3.0, 2.06, 0.36, &COUPLING).unwrap();
-    let nearest =
-        |pose, twist| ModelState::nearest(params, BoxFootprint::square(0.36), pose, twist).unwrap();
+    let nearest = |pose, twist| {
+        ModelState::nearest(params, BoxFootprint::square(0.36), pose, twist, &COUPLING).unwrap()
+    };
     let (pose, twist) = (Pose::new(4.99, -4.99, 6282.0), Twist::new(9.0, -9.0, 99.0));
-    let inside = ModelState::try_new(params, BoxFootprint::square(0.36), pose, twist);
+    let inside = ModelState::try_new(params, BoxFootprint::square(0.36), pose, twist, &COUPLING);
     assert_eq!(Ok(nearest(pose, twist)), inside);
     let state = nearest(Pose::new(7.0, -7.0, 1e4), Twist::new(-99.0, 99.0, -1e3));
     assert_eq!(state.pose(), Pose::new(5.0, -5.0, 6283.0));
     assert_eq!(state.twist(), Twist::new(-10.0, 10.0, -100.0));
     let nowhere = Pose::new(f64::NAN, 0.0, 0.0);
-    let none = ModelState::nearest(params, BoxFootprint::square(0.36), nowhere, twist);
+    let none = ModelState::nearest(
+        params,
+        BoxFootprint::square(0.36),
+        nowhere,
+        twist,
+        &COUPLING,
+    );
     assert!(none.is_err());
 }

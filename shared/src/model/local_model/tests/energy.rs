@@ -60,7 +60,7 @@ fn jump(draw: &mut Substream, model: &LocalModel, now: u64, size: f64) -> Update
         ..update(
             Cause::Deadband,
             answers,
-            ModelState::try_new(params, footprint, pose, twist).unwrap(),
+            ModelState::try_new(params, footprint, pose, twist, &COUPLING).unwrap(),
         )
     }
 }
