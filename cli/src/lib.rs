@@ -17,16 +17,21 @@ mod input;
 mod log;
 mod output;
 mod progress;
+mod stderr;
 mod stop;
 mod view;
 
 use std::process::ExitCode;
+use std::time::Duration;
 
 use clap::Parser;
 
 use args::{Arguments, Command};
 use failure::Failure;
 use log::Messages;
+
+/// How long the end of the process waits for its last messages to be read.
+const LAST_WORDS: Duration = Duration::from_secs(1);
 
 /// Runs the command line of this process.
 pub fn run() -> ExitCode {
@@ -35,13 +40,15 @@ pub fn run() -> ExitCode {
         Ok(arguments) => arguments,
         Err(error) => return answer(&error),
     };
-    match execute(arguments.command) {
+    let code = match execute(arguments.command) {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
             output::note(&failure);
             ExitCode::from(failure.exit().code())
         }
-    }
+    };
+    stderr::settle(LAST_WORDS);
+    code
 }
 
 fn execute(command: Command) -> Result<(), Failure> {

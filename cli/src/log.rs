@@ -1,9 +1,16 @@
 //! Log messages: to stderr, or into a short list while the screen belongs to the live view.
+//!
+//! A message is one line, [cleaned](clean) of whatever a peer wrote into it. Nobody waits for it to be read, and one cause
+//! cannot fill the log.
 
-use std::collections::VecDeque;
+use std::collections::{HashMap, VecDeque};
 use std::io::{self, Write};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
 
+use mmt_shared::clean::clean;
+use tracing::Metadata;
+use tracing::callsite::Identifier;
 use tracing_subscriber::EnvFilter;
 use tracing_subscriber::fmt::MakeWriter;
 
@@ -16,10 +23,46 @@ pub(crate) const VARIABLE: &str = "MMT_LOG";
 const DEFAULT: &str = "warn,mmt_cli=info,mmt_client=info,mmt_server=info,mmt_netem=info";
 /// Messages kept while the live view is shown; older ones are dropped.
 const KEPT_MAX: usize = 100;
+/// Messages of one cause, a line of the program, that are shown in a window of time: a stranger's thousand attempts are
+/// ten lines a second and a number.
+const SHOWN_MAX: u32 = 10;
+/// That window.
+const WINDOW: Duration = Duration::from_secs(1);
 
 /// Where messages go. Copies share the place.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Messages(Arc<Mutex<Option<VecDeque<String>>>>);
+pub(crate) struct Messages(Arc<Mutex<State>>);
+
+#[derive(Debug, Default)]
+struct State {
+    /// While the live view is shown.
+    kept: Option<VecDeque<String>>,
+    causes: HashMap<Identifier, Cause>,
+}
+
+/// What a cause has said of late.
+#[derive(Clone, Copy, Debug)]
+struct Cause {
+    /// When its window began.
+    since: Instant,
+    shown: u32,
+    hidden: u64,
+}
+
+impl Cause {
+    /// Whether one more may be shown at `now`, and how many were not before it.
+    fn admit(&mut self, now: Instant) -> Option<u64> {
+        if now.saturating_duration_since(self.since) >= WINDOW {
+            (self.since, self.shown) = (now, 0);
+        }
+        if self.shown == SHOWN_MAX {
+            self.hidden += 1;
+            return None;
+        }
+        self.shown += 1;
+        Some(std::mem::take(&mut self.hidden))
+    }
+}
 
 impl Messages {
     /// Starts logging for this process.
@@ -44,36 +87,52 @@ impl Messages {
 
     /// From now on messages are kept instead of written.
     pub(crate) fn keep(&self) {
-        self.lock().get_or_insert_default();
+        self.lock().kept.get_or_insert_default();
     }
 
     /// Writes what was kept, and from now on everything at once.
     pub(crate) fn release(&self) {
-        let kept = self.lock().take();
+        let kept = self.lock().kept.take();
         kept.into_iter().flatten().for_each(note);
     }
 
     /// The newest messages that were kept, oldest first.
     pub(crate) fn newest(&self, count: usize) -> Vec<String> {
-        let kept = self.lock();
-        let kept = kept.iter().flatten();
+        let state = self.lock();
+        let kept = state.kept.iter().flatten();
         let all: Vec<String> = kept.cloned().collect();
         all.into_iter().rev().take(count).rev().collect()
     }
 
-    fn take(&self, message: String) {
-        if let Some(kept) = self.lock().as_mut() {
+    fn take(&self, cause: Option<Identifier>, text: &str) {
+        let mut state = self.lock();
+        let hidden = cause.map_or(Some(0), |cause| {
+            let now = Instant::now();
+            let new = Cause {
+                since: now,
+                shown: 0,
+                hidden: 0,
+            };
+            state.causes.entry(cause).or_insert(new).admit(now)
+        });
+        let message = match hidden {
+            None => return,
+            Some(0) => clean(text),
+            Some(hidden) => format!("{} ({hidden} more like this were not shown)", clean(text)),
+        };
+        if let Some(kept) = state.kept.as_mut() {
             if kept.len() == KEPT_MAX {
                 kept.pop_front();
             }
             kept.push_back(message);
             return;
         }
+        drop(state);
         note(message);
     }
 
     /// What a panicking thread left behind is whole messages, good to go on with.
-    fn lock(&self) -> MutexGuard<'_, Option<VecDeque<String>>> {
+    fn lock(&self) -> MutexGuard<'_, State> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
@@ -89,6 +148,7 @@ fn filter(words: &str) -> Result<EnvFilter, Failure> {
 #[derive(Debug)]
 pub(crate) struct Message {
     to: Messages,
+    cause: Option<Identifier>,
     bytes: Vec<u8>,
 }
 
@@ -106,7 +166,7 @@ impl Write for Message {
 impl Drop for Message {
     fn drop(&mut self) {
         let text = String::from_utf8_lossy(&self.bytes);
-        self.to.take(text.trim_end().to_owned());
+        self.to.take(self.cause.take(), text.trim_end());
     }
 }
 
@@ -116,8 +176,15 @@ impl<'a> MakeWriter<'a> for Messages {
     fn make_writer(&'a self) -> Message {
         Message {
             to: self.clone(),
+            cause: None,
             bytes: Vec::new(),
         }
+    }
+
+    fn make_writer_for(&'a self, of: &Metadata<'_>) -> Message {
+        let mut message = self.make_writer();
+        message.cause = Some(of.callsite());
+        message
     }
 }
 
@@ -144,6 +211,38 @@ mod tests {
         assert_eq!(messages.newest(1000).len(), KEPT_MAX);
         messages.release();
         assert!(messages.newest(1).is_empty());
+    }
+
+    #[test]
+    fn a_message_is_one_line_that_steers_no_terminal() {
+        let messages = Messages::default();
+        messages.keep();
+        let mut message = messages.make_writer();
+        writeln!(
+            message,
+            "closed by peer: \x1b[2Jbye\r\n INFO 10.0.0.7 operates"
+        )
+        .unwrap();
+        drop(message);
+        assert_eq!(
+            messages.newest(9),
+            ["closed by peer: ?[2Jbye?? INFO 10.0.0.7 operates"]
+        );
+    }
+
+    #[test]
+    fn one_cause_is_shown_ten_times_a_second_and_what_was_not_shown_is_counted() {
+        let start = Instant::now();
+        let mut cause = Cause {
+            since: start,
+            shown: 0,
+            hidden: 0,
+        };
+        let just_before = start + WINDOW - Duration::from_nanos(1);
+        let shown = (0..1000).filter(|_| cause.admit(just_before).is_some());
+        assert_eq!(shown.count(), 10);
+        assert_eq!(cause.admit(start + WINDOW), Some(990));
+        assert_eq!(cause.admit(start + WINDOW), Some(0));
     }
 
     #[test]

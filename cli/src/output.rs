@@ -2,21 +2,23 @@
 
 use std::fmt::Display;
 use std::io::{self, ErrorKind, Write};
+use std::time::Duration;
 
 use serde::Serialize;
 
 use crate::failure::Failure;
+pub(crate) use crate::stderr::note;
+use crate::stderr::settle;
 
-/// Writes a message and a line end to stderr; it is dropped if nobody can read it.
-pub(crate) fn note(message: impl Display) {
-    let _ = writeln!(io::stderr().lock(), "{message}");
-}
+/// How long data waits for the messages before it, so that they come in their order on a terminal.
+const IN_ORDER: Duration = Duration::from_millis(100);
 
 /// Writes data and a line end to stdout at once.
 ///
 /// # Errors
 /// stdout cannot be written to, for another reason than that its reader has gone.
 pub(crate) fn print(data: impl Display) -> Result<(), Failure> {
+    settle(IN_ORDER);
     print_to(&mut io::stdout().lock(), data)
 }
 

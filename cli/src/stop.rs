@@ -1,4 +1,4 @@
-//! How a run is asked to end: Ctrl-C, SIGTERM or a key. The second time ends the process at once.
+//! How a run is asked to end: Ctrl-C, SIGTERM, SIGHUP or a key. The second time ends the process at once.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -25,7 +25,7 @@ impl Stop {
         }
     }
 
-    /// A wish that SIGINT and SIGTERM wake from now on.
+    /// A wish that SIGINT, SIGTERM and SIGHUP wake from now on; SIGHUP only where it is not ignored (`nohup`).
     ///
     /// # Errors
     /// The system gives no thread or no signals.
@@ -37,17 +37,27 @@ impl Stop {
             .build()
             .map_err(no_signals)?;
         // Registered before the thread starts: from here on no signal is missed.
-        let (mut interrupt, mut terminate) = {
+        let (mut interrupt, mut terminate, mut hang_up) = {
             let _inside = runtime.enter();
             let register = |kind| signal(kind).map_err(no_signals);
             (
                 register(SignalKind::interrupt())?,
                 register(SignalKind::terminate())?,
+                (!ignores_hang_up())
+                    .then(|| register(SignalKind::hangup()))
+                    .transpose()?,
             )
         };
         let wait = async move {
             loop {
+                let hung_up = async {
+                    match &mut hang_up {
+                        Some(hang_up) => hang_up.recv().await,
+                        None => std::future::pending().await,
+                    }
+                };
                 tokio::select! {
+                    _ = hung_up => on_signal.ask(),
                     _ = interrupt.recv() => on_signal.ask(),
                     _ = terminate.recv() => on_signal.ask(),
                 }
@@ -70,8 +80,8 @@ impl Stop {
             restore_terminal();
             std::process::exit(INTERRUPTED_TWICE);
         }
-        tracing::info!("ending; once more to quit at once");
         self.wanted.send_replace(true);
+        tracing::info!("ending; once more to quit at once");
     }
 
     /// Ends the run without counting as asked by a person.
@@ -88,6 +98,14 @@ impl Stop {
     pub(crate) fn receiver(&self) -> watch::Receiver<bool> {
         self.wanted.subscribe()
     }
+}
+
+/// Whether this process was started with SIGHUP, number 1, ignored.
+fn ignores_hang_up() -> bool {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let ignored = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
+    let mask = ignored.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok());
+    mask.is_some_and(|mask| mask & 1 == 1)
 }
 
 fn no_signals(error: std::io::Error) -> Failure {

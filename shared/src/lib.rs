@@ -5,6 +5,7 @@
 //! behind the feature of that name.
 
 pub mod channel;
+pub mod clean;
 #[cfg(any(test, feature = "fixtures"))]
 pub mod fixtures;
 #[cfg(feature = "io")]

@@ -14,6 +14,7 @@ use mmt_client::operator::trace::Trace;
 use mmt_netem::Direction;
 use mmt_netem::io::socket::SocketExtras;
 use mmt_netem::trace::mmt::path_text;
+use mmt_shared::clean::clean;
 use mmt_shared::io::connect::ConnectError;
 use mmt_shared::model::geometry::Vec2;
 use mmt_shared::pairing::Pairing;
@@ -229,7 +230,8 @@ fn host_failure(error: &MasterHostError) -> Failure {
         | E::Welcome { .. } => Exit::Refused,
         _ => Exit::Failed,
     };
-    Failure::new(exit, error)
+    // what the slave wrote may stand in it
+    Failure::new(exit, clean(&error.to_string()))
 }
 
 #[cfg(test)]

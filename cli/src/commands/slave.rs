@@ -9,6 +9,7 @@ use mmt_server::io::{
     SlaveConfiguration, SlaveHost, SlaveHostError, SlaveLive, SlaveOptions, SlaveReport,
 };
 use mmt_server::slave::SlaveConfig;
+use mmt_shared::clean::clean;
 use mmt_shared::io::identity_file::{default_directory, load_or_create};
 use mmt_shared::pairing::{Host as HostName, Pairing};
 use mmt_shared::report::RunReport;
@@ -169,7 +170,8 @@ fn host_failure(error: &SlaveHostError) -> Failure {
         }
         SlaveHostError::Insecure(_) => Failure::usage(error),
         SlaveHostError::Netem(_) => Failure::usage(error).remedy("change --netem"),
-        _ => Failure::failed(error),
+        // what a master wrote may stand in it
+        _ => Failure::failed(clean(&error.to_string())),
     }
 }
 

@@ -1,17 +1,20 @@
 //! The terminal while the dashboard is on it. Whatever happens, it is given back as it was.
 
-use std::io::{self, IsTerminal, Stderr};
+use std::fs::File;
+use std::io::{self, ErrorKind, IsTerminal, Stderr};
+use std::os::fd::{AsFd, OwnedFd};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use crossterm::cursor::Show;
-use crossterm::event::{self, Event, KeyCode, KeyEvent, KeyEventKind, KeyModifiers};
 use crossterm::execute;
 use crossterm::terminal::{
     EnterAlternateScreen, LeaveAlternateScreen, disable_raw_mode, enable_raw_mode,
 };
 use ratatui::Terminal;
 use ratatui::backend::CrosstermBackend;
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
+use rustix::io::Errno;
 
 use super::{Caption, History, dashboard};
 use crate::log::Messages;
@@ -31,6 +34,7 @@ pub(crate) fn restore_terminal() {
 /// The terminal, taken. Dropping it gives it back.
 pub(crate) struct Screen {
     terminal: Terminal<CrosstermBackend<Stderr>>,
+    keys: Keys,
     messages: Messages,
 }
 
@@ -63,6 +67,7 @@ impl Screen {
         execute!(io::stderr(), EnterAlternateScreen)?;
         Ok(Self {
             terminal: Terminal::new(CrosstermBackend::new(io::stderr()))?,
+            keys: Keys::of_terminal()?,
             messages: messages.clone(),
         })
     }
@@ -82,15 +87,9 @@ impl Screen {
     /// Waits for a key, no longer than `patience`; whether it was one that ends the run.
     ///
     /// # Errors
-    /// The terminal cannot be read from.
+    /// The terminal cannot be read from, or is gone.
     pub(crate) fn wants_end(&mut self, patience: Duration) -> io::Result<bool> {
-        if !event::poll(patience)? {
-            return Ok(false);
-        }
-        match event::read()? {
-            Event::Key(key) => Ok(ends(&key)),
-            _ => Ok(false),
-        }
+        self.keys.want_end(patience)
     }
 }
 
@@ -101,24 +100,78 @@ impl Drop for Screen {
     }
 }
 
-/// q, Esc or Ctrl-C: in raw mode the terminal makes no signal of the latter.
-fn ends(key: &KeyEvent) -> bool {
-    let control_c = key.modifiers.contains(KeyModifiers::CONTROL) && key.code == KeyCode::Char('c');
-    let quit = matches!(key.code, KeyCode::Char('q' | 'Q') | KeyCode::Esc);
-    key.kind == KeyEventKind::Press && (quit || control_c)
+/// What is typed on the terminal. Read here and not by crossterm, whose reader spins for ever once the terminal is gone.
+struct Keys(OwnedFd);
+
+impl Keys {
+    /// Those of stdin if it is a terminal, else those of the terminal that the process belongs to.
+    fn of_terminal() -> io::Result<Self> {
+        let stdin = io::stdin();
+        Ok(Self(if stdin.is_terminal() {
+            stdin.as_fd().try_clone_to_owned()?
+        } else {
+            File::open("/dev/tty")?.into()
+        }))
+    }
+
+    fn want_end(&self, patience: Duration) -> io::Result<bool> {
+        let patience = Timespec::try_from(patience).unwrap_or_default();
+        let mut polled = [PollFd::new(&self.0, PollFlags::IN)];
+        match poll(&mut polled, Some(&patience)) {
+            Ok(0) | Err(Errno::INTR) => return Ok(false),
+            Ok(_) => {}
+            Err(error) => return Err(error.into()),
+        }
+        let [polled] = polled;
+        let mut typed = [0; 64];
+        let gone = PollFlags::HUP | PollFlags::ERR | PollFlags::NVAL;
+        let count = if polled.revents().intersects(gone) {
+            0
+        } else {
+            rustix::io::read(&self.0, &mut typed)?
+        };
+        if count == 0 {
+            return Err(io::Error::new(
+                ErrorKind::BrokenPipe,
+                "the terminal is gone",
+            ));
+        }
+        Ok(typed.get(..count).is_some_and(ends))
+    }
+}
+
+/// q, Esc or Ctrl-C: in raw mode the terminal makes no signal of the latter. Other keys that begin with Esc go on.
+fn ends(typed: &[u8]) -> bool {
+    typed == b"\x1b"
+        || (!typed.starts_with(b"\x1b") && typed.iter().any(|key| b"qQ\x03".contains(key)))
 }
 
 #[cfg(test)]
 mod tests {
+    use std::io::Write;
+
     use super::*;
 
     #[test]
     fn q_escape_and_control_c_end_and_other_keys_do_not() {
-        let key = |code, modifiers| ends(&KeyEvent::new(code, modifiers));
-        assert!(key(KeyCode::Char('q'), KeyModifiers::NONE));
-        assert!(key(KeyCode::Esc, KeyModifiers::NONE));
-        assert!(key(KeyCode::Char('c'), KeyModifiers::CONTROL));
-        assert!(!key(KeyCode::Char('c'), KeyModifiers::NONE));
-        assert!(!key(KeyCode::Enter, KeyModifiers::NONE));
+        for typed in [&b"q"[..], b"Q", b"\x1b", b"\x03", b"xq"] {
+            assert!(ends(typed), "{typed:?}");
+        }
+        for typed in [&b"c"[..], b"\r", b"\x1b[A", b"\x1b[15~", b"\x1bOq"] {
+            assert!(!ends(typed), "{typed:?}");
+        }
+    }
+
+    #[test]
+    fn a_terminal_that_vanishes_ends_the_view() {
+        let (reader, mut writer) = io::pipe().unwrap();
+        let keys = Keys(reader.into());
+        assert!(!keys.want_end(Duration::ZERO).unwrap(), "nothing is typed");
+        writer.write_all(b"x").unwrap();
+        assert!(!keys.want_end(Duration::ZERO).unwrap());
+        writer.write_all(b"q").unwrap();
+        assert!(keys.want_end(Duration::ZERO).unwrap());
+        drop(writer);
+        assert!(keys.want_end(Duration::ZERO).is_err());
     }
 }

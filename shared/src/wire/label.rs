@@ -5,11 +5,13 @@ use std::fmt;
 use serde::de::{self, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
+use crate::clean::clean;
+
 /// The longest label, bytes of UTF-8.
 pub const LABEL_MAX: usize = 64;
 
-/// A text of at most [`LABEL_MAX`] bytes without control characters, so that a peer's name can neither
-/// fill a log nor steer a terminal.
+/// A text of at most [`LABEL_MAX`] bytes without control characters, [cleaned](clean) where it is shown, so that a peer's
+/// name can neither fill a log nor steer a terminal.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub struct Label {
     length: usize,
@@ -56,13 +58,13 @@ impl Label {
 
 impl fmt::Debug for Label {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        fmt::Debug::fmt(self.as_str(), f)
+        fmt::Debug::fmt(&clean(self.as_str()), f)
     }
 }
 
 impl fmt::Display for Label {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        fmt::Display::fmt(self.as_str(), f)
+        fmt::Display::fmt(&clean(self.as_str()), f)
     }
 }
 
@@ -109,5 +111,8 @@ mod tests {
         assert_eq!(Label::clipped("a\x1b[2Jb\n").as_str(), "a?[2Jb?");
         assert_eq!(Label::exact("a\x1b[2J"), None);
         assert_eq!(Label::exact("a\u{9b}2J"), None);
+        // on the wire it is a text like any other
+        let turned = Label::exact("a\u{202e}b").unwrap();
+        assert_eq!(format!("{turned} {turned:?}"), "a?b \"a?b\"");
     }
 }
