@@ -17,6 +17,7 @@ use mmt_shared::time::Time;
 use mmt_shared::wire::{Architecture, Command, Message, RawState, Side};
 
 use crate::commands::{CommandConfig, CommandPacker};
+use crate::failsafe::LinkState;
 use crate::master::{Master, MasterTick};
 use crate::operator::scripted::View;
 
@@ -33,6 +34,8 @@ pub struct MasterCounts {
     pub newest_applied: u32,
     /// Updates whose numbers were not accepted.
     pub updates_rejected: u64,
+    /// Updates that came while the link was stale.
+    pub updates_frozen: u64,
     /// Updates that a newer one overtook before a tick could apply them.
     pub updates_superseded: u64,
 }
@@ -93,7 +96,9 @@ impl MasterEnd {
             stale: self.window.stale(),
             rejected: self.counts.updates_rejected,
             superseded: self.counts.updates_superseded,
-            frozen: u64::from(self.master.frozen()) + u64::from(self.update.is_some()),
+            frozen: self.counts.updates_frozen
+                + u64::from(self.master.frozen())
+                + u64::from(self.update.is_some()),
         }
     }
 
@@ -145,15 +150,21 @@ impl MasterEnd {
             return;
         };
         match received.message {
-            Message::Update(update) => self.handle_update(&update),
+            Message::Update(update) => self.handle_update(at, &update),
             Message::Scene(scene) if received.is_newest => self.scene = Some(scene),
             Message::Tool(tool) if received.is_newest => self.master.handle_tool_state(at, &tool),
             Message::Scene(_) | Message::Tool(_) | Message::Command(_) | Message::Heartbeat => {}
         }
     }
 
-    fn handle_update(&mut self, update: &Update<RawState>) {
+    /// What the slave finds while the HIP does not reach it is about a tool that stands: it is neither applied nor
+    /// acknowledged.
+    fn handle_update(&mut self, at: Time, update: &Update<RawState>) {
         if self.window.judge(update.sequence) != Freshness::Fresh {
+            return;
+        }
+        if LinkState::of_silence(self.channel.silence(at)) >= LinkState::Stale {
+            self.counts.updates_frozen += 1;
             return;
         }
         let coupling = &self.master.model().settings().coupling;

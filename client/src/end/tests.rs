@@ -197,3 +197,84 @@ fn a_heartbeat_goes_out_when_nothing_else_did() {
     let unsent = end.commands.drops().map(|(_, samples)| samples);
     assert_eq!(unsent, [119, 0, 1]);
 }
+
+/// A session over a path of 20 ms each way whose way up, or down, carries nothing from `lost_from` ms on; the slave sends
+/// an update every 20 ms. Gives the link at each tick, by its milliseconds, the updates applied by then and the loss up.
+fn outage(up: bool, lost_from: u64) -> Vec<(LinkState, u32, f64)> {
+    let mut end = end(CommandConfig::default(), Architecture::Mmt);
+    let mut slave = DatagramChannel::new(Side::Slave, Time::ZERO);
+    let (mut ups, mut downs) = (Vec::new(), Vec::new());
+    let mut sequence = 0;
+    let mut seen = Vec::new();
+    for ms in 1..=lost_from + 1500 {
+        let passes = |is_up: bool| is_up != up || ms < lost_from;
+        let mut out = [0; DATAGRAM_MAX];
+        ups.retain(|(at, bytes): &(u64, Vec<u8>)| {
+            let arrives = *at == ms;
+            if arrives {
+                slave.handle(AT(ms), bytes);
+            }
+            !arrives
+        });
+        if ms % 20 == 0 {
+            sequence += 1;
+            let sent = datagram(
+                &mut slave,
+                AT(ms),
+                Message::Update((&update(sequence, 0.7)).into()),
+            );
+            downs.extend(passes(false).then_some((ms + 20, sent)));
+        }
+        downs.retain(|(at, bytes): &(u64, Vec<u8>)| {
+            let arrives = *at == ms;
+            if arrives {
+                end.handle_datagram(AT(ms), bytes);
+            }
+            !arrives
+        });
+        let tick = end.tick(AT(ms), Vec2::new(-0.3, 0.0));
+        while let Some(length) = end.poll_transmit(AT(ms), &mut out).unwrap() {
+            ups.extend(passes(true).then(|| (ms + 20, out[..length].to_vec())));
+        }
+        let loss = end.channel().peer().outgoing_at(AT(ms)).share();
+        seen.push((tick.link, end.master().applied(), loss.unwrap_or(0.0)));
+    }
+    seen
+}
+
+#[test]
+fn a_link_that_is_silent_one_way_is_late_stale_and_released_in_time_whichever_way_it_is() {
+    for up in [true, false] {
+        let seen = outage(up, 1000);
+        let first = |state| seen.iter().position(|(link, ..)| *link >= state).unwrap() as u64;
+        // the last that came through arrives 20 ms after the outage begins, an answer after 40 ms
+        let begins = if up { 1040 } else { 1020 };
+        for (state, after) in [
+            (LinkState::Late, 120),
+            (LinkState::Stale, 250),
+            (LinkState::Released, 1000),
+        ] {
+            let at = first(state);
+            let (soonest, latest) = (begins + after - 40, begins + after + 20);
+            assert!(
+                (soonest..=latest).contains(&at),
+                "up {up}: {state:?} at {at} ms"
+            );
+        }
+    }
+}
+
+#[test]
+fn while_the_way_up_is_lost_nothing_is_applied_and_the_loss_that_is_shown_rises() {
+    let seen = outage(true, 1000);
+    let stale = seen
+        .iter()
+        .position(|(link, ..)| *link >= LinkState::Stale)
+        .unwrap();
+    let (_, applied, loss) = seen[stale];
+    assert!(applied > 40, "until then updates were applied: {applied}");
+    let (_, at_the_end, worst) = seen[seen.len() - 1];
+    assert_eq!(at_the_end, applied);
+    assert!(seen[999].2 < 0.01, "no loss before: {}", seen[999].2);
+    assert!(loss > 0.05 && worst > 2.0 * loss, "{loss} then {worst}");
+}

@@ -248,7 +248,7 @@ impl HapticLoop {
             scene: self.end.scene().copied(),
             scene_age_s: self.end.scene().map(age),
             rtt_ms: rtt.map(|rtt| rtt.as_secs_f64() * 1e3),
-            up: peer.outgoing(),
+            up: peer.outgoing_at(now),
             down: peer.incoming(),
             unsent: 0,
             lateness_p99_us: self.timing.lateness.p99.as_secs_f64() * 1e6,

@@ -114,9 +114,11 @@ impl DatagramChannel {
         self.last_sent + HEARTBEAT
     }
 
-    /// Time since a datagram of the other side last arrived, or since the beginning.
+    /// For how long one of the two ways has been silent: since a datagram of the other side last arrived (or since the
+    /// beginning), or, beyond what the path takes, since one was sent that has no answer. The longer of the two.
     pub fn silence(&self, now: Time) -> Duration {
-        now.saturating_since(self.last_arrival())
+        let since_arrival = now.saturating_since(self.last_arrival());
+        since_arrival.max(self.peer.unanswered(now))
     }
 
     /// When a datagram of the other side last arrived, or the beginning.

@@ -3,6 +3,7 @@
 //! Used by both sides on every datagram that decodes. Pure and of fixed size: time comes as an argument.
 //! Loss is counted by the application's own numbers; what the transport declares lost is not loss.
 
+mod departures;
 mod round_trip;
 mod window;
 
@@ -15,11 +16,18 @@ pub use window::{Freshness, SequenceWindow, WINDOW};
 
 use crate::time::{Time, duration_nanos};
 use crate::wire::{Echo, Envelope};
+use departures::Departures;
 use window::Window;
 
 /// The last number that a datagram or an update may have. Numbers never wrap: at 2 kHz they last for
 /// 24 days, and a session that has used them up must end.
 pub const NUMBER_LAST: u32 = u32::MAX;
+
+/// What a round trip may take before one has been measured: the longest that the history can replay.
+const PATH_UNKNOWN: Duration = Duration::from_secs(4);
+/// An answer may be later than the path's least by this, two heartbeats and some jitter, before what it would answer
+/// counts as missing.
+const ANSWER_LATE: Duration = Duration::from_millis(120);
 
 /// All numbers of a session have been used: it must end, and a new one begin.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
@@ -87,6 +95,9 @@ struct Newest {
 #[derive(Clone, Debug, Default)]
 pub struct Peer {
     sent: u32,
+    departures: Departures,
+    /// Number of the newest datagram that the other side has answered.
+    answered: u32,
     window: Window,
     newest: Option<Newest>,
     last_arrival: Option<Time>,
@@ -103,6 +114,7 @@ impl Peer {
     /// After [`NUMBER_LAST`] datagrams there is no number left.
     pub fn stamp(&mut self, now: Time) -> Result<Envelope, NumbersSpent> {
         self.sent = self.sent.checked_add(1).ok_or(NumbersSpent)?;
+        self.departures.note(self.sent, now);
         Ok(Envelope {
             number: self.sent,
             sent: now,
@@ -156,6 +168,7 @@ impl Peer {
             return;
         };
         self.round_trip.note(now, Duration::from_nanos(round_trip));
+        self.answered = self.answered.max(echo.number);
         if arrival == Arrival::Newest {
             self.their_report = Loss {
                 expected: echo.number,
@@ -190,6 +203,33 @@ impl Peer {
     /// Loss from this side to the other, by the other's report.
     pub fn outgoing(&self) -> Loss {
         self.their_report
+    }
+
+    /// The same as it looks at `now`: what should have been answered by now and was not is missing.
+    pub fn outgoing_at(&self, now: Time) -> Loss {
+        let wait = self.path(now) + ANSWER_LATE;
+        let due = now
+            .as_nanos()
+            .checked_sub(duration_nanos(wait))
+            .map_or(0, |then| self.departures.newest_by(Time::from_nanos(then)));
+        Loss {
+            expected: self.their_report.expected.max(due),
+            ..self.their_report
+        }
+    }
+
+    /// How long what this side sends has been without an answer, beyond what the path takes: the age of the oldest datagram
+    /// after the newest that was answered. It grows when the way there is lost although datagrams still come.
+    pub fn unanswered(&self, now: Time) -> Duration {
+        let since = self.departures.first_after(self.answered);
+        since.map_or(Duration::ZERO, |since| {
+            now.saturating_since(since).saturating_sub(self.path(now))
+        })
+    }
+
+    /// The least round trip of late.
+    fn path(&self, now: Time) -> Duration {
+        self.round_trip.least(now).unwrap_or(PATH_UNKNOWN)
     }
 
     /// The round trip without the time that the other side held the answer.
