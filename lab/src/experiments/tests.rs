@@ -232,7 +232,7 @@ fn congestion_that_is_answered_leaves_the_queue_short() {
 }
 
 #[test]
-fn netem_does_what_its_presets_are_configured_to_do() {
+fn netem_does_what_follows_from_the_words_of_its_presets_by_formula() {
     let done = Done::of(&netem::NETEM, 10_000);
     // the others wait in long bursts, of which ten seconds hold too few
     for preset in [
@@ -245,10 +245,14 @@ fn netem_does_what_its_presets_are_configured_to_do() {
         "transatlantic",
     ] {
         let of = |key| done.number("netem.csv", &[("preset", preset)], key);
-        let (configured, achieved) = (of("mean_ms"), of("mean_ms_achieved"));
+        let (formula, free) = (of("mean_ms"), of("mean_ms_free"));
+        assert!((free / formula - 1.0).abs() < 0.05, "{preset}: {free} ms");
+        assert!(of("mean_ms_achieved") >= 0.99 * free, "order only adds");
+        let step = |key| done.number("netem-steps.csv", &[("preset", preset)], key);
+        let (formula, achieved) = (step("step_rms_ms"), step("step_rms_ms_achieved"));
         assert!(
-            (achieved / configured - 1.0).abs() < 0.15,
-            "{preset}: {achieved} ms"
+            (achieved / formula - 1.0).abs() < 0.05,
+            "{preset}: steps of {achieved} ms, not {formula}"
         );
         assert!((9000.0..=10_000.0).contains(&of("packets")));
     }
