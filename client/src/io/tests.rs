@@ -424,6 +424,21 @@ async fn a_trace_ends_the_session_when_it_is_over() {
 }
 
 #[tokio::test]
+async fn the_error_behind_a_path_that_is_too_narrow_names_the_mtu() {
+    let fake = Fake::new();
+    let mut options = scripted(&fake);
+    options.netem = "mtu 900".parse().unwrap();
+    let timeouts = Timeouts {
+        connect: Duration::from_millis(300),
+        ..TIMEOUTS
+    };
+    let error = start(options, timeouts).error().await.to_string();
+    for part in ["UDP packets of 1200 bytes", "an MTU of 1228"] {
+        assert!(error.contains(part), "{error}");
+    }
+}
+
+#[tokio::test]
 async fn the_emulated_link_loses_what_it_is_told_to_and_says_so() {
     let fake = Fake::new();
     let mut options = scripted(&fake);

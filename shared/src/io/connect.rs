@@ -20,13 +20,24 @@ const SERVER_NAME: &str = "mmt";
 /// TLS alert `no_application_protocol` (RFC 7301, section 3.2).
 const ALERT_NO_PROTOCOL: u8 = 120;
 
+/// The first packets of a QUIC connection are as long as this and must not be split, bytes of UDP payload (RFC 9000,
+/// section 14): a smaller path lets none of them through.
+const MTU_MIN: usize = 1200;
+
+/// IP and UDP headers of a packet to an address, bytes.
+fn header_bytes(address: &SocketAddr) -> usize {
+    if address.is_ipv4() { 28 } else { 48 }
+}
+
 /// Why a master got no connection.
 #[derive(Debug, thiserror::Error)]
 pub enum ConnectError {
     /// Nothing there.
     #[error(
         "nothing answered at {address} for {limit:?}: is the slave running there, is the port right, \
-         does a firewall let UDP through?"
+         does a firewall let UDP through, does the path carry UDP packets of {MTU_MIN} bytes (an MTU of {} \
+         at the least)?",
+        MTU_MIN + header_bytes(.address)
     )]
     NoAnswer {
         /// Where.
