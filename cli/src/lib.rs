@@ -57,7 +57,7 @@ fn execute(command: Command) -> Result<(), Failure> {
         Command::Demo(arguments) => commands::demo::run(&arguments, &messages),
         Command::Slave(arguments) => commands::slave::run(arguments, &messages),
         Command::Master(arguments) => commands::master::run(arguments, &messages),
-        Command::Netem(arguments) => commands::netem::run(&arguments),
+        Command::Netem(arguments) => commands::netem::run(&arguments, &messages),
         Command::Replay(arguments) => commands::replay::run(&arguments),
         Command::Reproduce(arguments) => commands::reproduce::run(&arguments),
         Command::Sweep(arguments) => commands::sweep::run(&arguments),

@@ -104,6 +104,11 @@ impl Messages {
         all.into_iter().rev().take(count).rev().collect()
     }
 
+    /// Takes what belongs to no line of the log: writes it, or keeps it.
+    pub(crate) fn show(&self, text: &str) {
+        self.take(None, text);
+    }
+
     fn take(&self, cause: Option<Identifier>, text: &str) {
         let mut state = self.lock();
         let hidden = cause.map_or(Some(0), |cause| {

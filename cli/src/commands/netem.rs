@@ -16,15 +16,18 @@ use serde::Serialize;
 
 use crate::args::{NetemArguments, NetemCommand};
 use crate::failure::{Exit, Failure};
+use crate::log::Messages;
 use crate::output::{note, print, print_json};
 use crate::stop::Stop;
 
 pub(super) mod control;
+mod gauge;
 mod report;
 mod table;
 pub(super) mod wrap;
 
 use control::Command;
+use gauge::{Caption, Gauge};
 
 /// How often the state of the relay is checked.
 const CHECK_EVERY: Duration = Duration::from_millis(50);
@@ -64,7 +67,7 @@ struct NetemConfiguration {
 /// # Errors
 /// The slave's name is unknown, the address cannot be had, the record cannot be written, the relay
 /// breaks; of a report, its file is none.
-pub(crate) fn run(arguments: &NetemArguments) -> Result<(), Failure> {
+pub(crate) fn run(arguments: &NetemArguments, messages: &Messages) -> Result<(), Failure> {
     if let Some(NetemCommand::Report(arguments)) = &arguments.command {
         return report::run(arguments);
     }
@@ -87,9 +90,21 @@ pub(crate) fn run(arguments: &NetemArguments) -> Result<(), Failure> {
     let local = relay.local_addr();
     print(local)?;
     let began = Instant::now();
-    let effects = announce(arguments, to);
+    // the keys are the commands' where there are commands
+    let live = !arguments.json && !arguments.control;
+    let gauge = live.then(|| Gauge::take(caption(arguments, local, to), messages));
+    let effects = announce(arguments, to, messages);
     let commands = arguments.control.then(lines_of_stdin);
-    wait(&relay, &stop, arguments, commands.as_ref());
+    wait(
+        &relay,
+        &stop,
+        arguments,
+        commands.as_ref(),
+        Show {
+            gauge: gauge.flatten(),
+            messages,
+        },
+    );
     let duration_s = began.elapsed().as_secs_f64();
     let ending = if stop.asked() {
         "interrupted"
@@ -132,14 +147,16 @@ pub(crate) fn run(arguments: &NetemArguments) -> Result<(), Failure> {
 fn announce(
     arguments: &NetemArguments,
     to: SocketAddr,
+    messages: &Messages,
 ) -> JoinHandle<Result<(Effect, Effect), ConfigError>> {
     let (up, down) = (arguments.up.clone(), arguments.down.clone());
     let (rate, bytes) = (arguments.rate, arguments.bytes);
+    let messages = messages.clone();
     std::thread::spawn(move || {
         let effect_up = up.expected(rate, bytes)?;
-        note(format_args!("up   (to {to}): {effect_up}"));
+        messages.show(&format!("up   (to {to}): {effect_up}"));
         let effect_down = down.expected(rate, bytes)?;
-        note(format_args!("down (to masters): {effect_down}"));
+        messages.show(&format!("down (to masters): {effect_down}"));
         Ok((effect_up, effect_down))
     })
 }
@@ -176,6 +193,7 @@ fn wait(
     stop: &Stop,
     arguments: &NetemArguments,
     commands: Option<&Receiver<String>>,
+    mut show: Show<'_>,
 ) {
     let (began, duration) = (Instant::now(), arguments.duration);
     let mut links = (arguments.up.clone(), arguments.down.clone());
@@ -190,12 +208,44 @@ fn wait(
         if !refused && relay.snapshot().refused.packets > 0 {
             refused = true;
             let most = arguments.clients;
-            note(format_args!(
+            show.messages.show(&format!(
                 "a master was turned away: there are {most} already (--clients), or no socket is to be had"
             ));
         }
         let left = duration.map(|duration| duration.saturating_sub(began.elapsed()));
-        std::thread::sleep(left.map_or(CHECK_EVERY, |left| left.min(CHECK_EVERY)));
+        let patience = left.map_or(CHECK_EVERY, |left| left.min(CHECK_EVERY));
+        if show.look(relay, patience) {
+            stop.ask();
+        }
+    }
+}
+
+/// Where a run shows what it does: the gauge, if there is a terminal for it, and messages.
+struct Show<'a> {
+    gauge: Option<Gauge>,
+    messages: &'a Messages,
+}
+
+impl Show<'_> {
+    /// Shows what the relay does for as long as `patience`; whether somebody wants the end.
+    fn look(&mut self, relay: &RelayHandle, patience: Duration) -> bool {
+        let Some(gauge) = &mut self.gauge else {
+            std::thread::sleep(patience);
+            return false;
+        };
+        gauge.look(relay, patience).unwrap_or_else(|error| {
+            self.gauge = None;
+            tracing::warn!("the live view ends: {error}");
+            false
+        })
+    }
+}
+
+fn caption(arguments: &NetemArguments, local: SocketAddr, to: SocketAddr) -> Caption {
+    let (up, down) = (&arguments.up, &arguments.down);
+    Caption {
+        path: format!("{local} to {to}, up: {up}, down: {down}"),
+        duration: arguments.duration,
     }
 }
 

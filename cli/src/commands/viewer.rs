@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 use crate::log::Messages;
 use crate::output::note;
 use crate::stop::Stop;
-use crate::view::{Caption, History, Screen, Snapshot, line};
+use crate::view::{Caption, History, Screen, Snapshot, line, render};
 
 /// Time between two frames: 20 a second are as much as an eye can use.
 const LOOK: Duration = Duration::from_millis(50);
@@ -52,7 +52,8 @@ impl Viewer {
             self.line();
             return;
         };
-        let drawn = screen.draw(&self.caption, &self.history);
+        let (caption, history) = (&self.caption, &self.history);
+        let drawn = screen.draw(|frame, messages| render(frame, caption, history, messages));
         match drawn.and_then(|()| screen.wants_end(LOOK)) {
             Ok(true) => self.stop.ask(),
             Ok(false) => {}

@@ -8,10 +8,9 @@ use ratatui::widgets::{Block, Paragraph, Sparkline};
 
 use super::panels::{link_panel, loop_panel, model_panel, update_panel};
 use super::scene::render_scene;
+use super::screen::MESSAGES_MAX;
 use super::{Caption, History, Snapshot};
 
-/// Messages shown at the bottom.
-pub(super) const MESSAGES_MAX: usize = 3;
 /// Height of a panel of numbers, lines.
 const PANEL_HEIGHT: u16 = 10;
 /// Widths of the panels; the last one takes what is left.
@@ -37,7 +36,7 @@ const CHARTS: [(&str, Reading, Color); 3] = [
 ];
 
 /// Draws everything.
-pub(super) fn render(
+pub(crate) fn render(
     frame: &mut Frame<'_>,
     caption: &Caption,
     history: &History,

@@ -12,6 +12,7 @@ use mmt_client::io::MasterLive;
 use mmt_server::io::SlaveLive;
 use mmt_shared::channel::peer::Loss;
 
+pub(crate) use dashboard::render;
 pub(crate) use history::History;
 pub(crate) use lines::line;
 pub(crate) use screen::{Screen, restore_terminal};

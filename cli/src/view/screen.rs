@@ -11,13 +11,15 @@ use crossterm::execute;
 use crossterm::terminal::{
     EnterAlternateScreen, LeaveAlternateScreen, disable_raw_mode, enable_raw_mode,
 };
-use ratatui::Terminal;
 use ratatui::backend::CrosstermBackend;
+use ratatui::{Frame, Terminal};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::io::Errno;
 
-use super::{Caption, History, dashboard};
 use crate::log::Messages;
+
+/// Messages shown at the bottom.
+pub(super) const MESSAGES_MAX: usize = 3;
 
 /// Whether this process has changed the terminal.
 static TAKEN: AtomicBool = AtomicBool::new(false);
@@ -72,16 +74,17 @@ impl Screen {
         })
     }
 
-    /// Draws what is seen now.
+    /// Draws what `render` makes of the frame and of the newest messages.
     ///
     /// # Errors
     /// The terminal cannot be written to.
-    pub(crate) fn draw(&mut self, caption: &Caption, history: &History) -> io::Result<()> {
-        let messages = self.messages.newest(dashboard::MESSAGES_MAX);
-        let draw = |frame: &mut ratatui::Frame<'_>| {
-            dashboard::render(frame, caption, history, &messages);
-        };
-        self.terminal.draw(draw).map(|_| ())
+    pub(crate) fn draw(
+        &mut self,
+        render: impl FnOnce(&mut Frame<'_>, &[String]),
+    ) -> io::Result<()> {
+        let messages = self.messages.newest(MESSAGES_MAX);
+        let drawn = self.terminal.draw(|frame| render(frame, &messages));
+        drawn.map(|_| ())
     }
 
     /// Waits for a key, no longer than `patience`; whether it was one that ends the run.

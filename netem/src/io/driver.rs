@@ -85,6 +85,8 @@ pub(super) struct Driver<A> {
     id: LinkId,
     record: Option<RecordWriter>,
     lateness: Arc<Recorder>,
+    /// From offer to sending, if anybody wants to know.
+    delays: Option<Arc<Recorder>>,
     /// What became of what the link delivered; `link` and `in_flight` are not kept here.
     counters: DirectionCounters,
 }
@@ -109,8 +111,15 @@ impl<A: Clone> Driver<A> {
             id,
             record,
             lateness,
+            delays: None,
             counters: DirectionCounters::default(),
         })
+    }
+
+    /// The same with a record of how long what is sent took.
+    pub(super) fn timed(mut self, delays: Arc<Recorder>) -> Self {
+        self.delays = Some(delays);
+        self
     }
 
     /// Puts a datagram on the link.
@@ -149,6 +158,9 @@ impl<A: Clone> Driver<A> {
         moment: Time,
     ) {
         self.lateness.record(departure.due, moment);
+        if let Some(delays) = self.delays.as_ref().filter(|_| outcome == Outcome::Sent) {
+            delays.record(departure.offered_at, moment);
+        }
         let counter = match outcome {
             Outcome::Sent => &mut self.counters.sent,
             Outcome::Blocked => &mut self.counters.blocked,

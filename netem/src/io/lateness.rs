@@ -4,7 +4,7 @@ use std::sync::Mutex;
 use std::time::Duration;
 
 use mmt_shared::report::{EmulationReport, LateReport};
-use mmt_shared::stats::histogram::Histogram;
+use mmt_shared::stats::histogram::{Histogram, Quantiles};
 use mmt_shared::time::Time;
 use serde::Serialize;
 
@@ -60,6 +60,11 @@ impl Recorder {
     /// Records that a packet due at `due` left at `now`.
     pub(crate) fn record(&self, due: Time, now: Time) {
         lock(&self.0).record(now.saturating_since(due));
+    }
+
+    /// What was recorded since the last call.
+    pub(crate) fn take(&self) -> Quantiles {
+        std::mem::take(&mut *lock(&self.0)).quantiles()
     }
 
     pub(crate) fn summary(&self) -> Lateness {

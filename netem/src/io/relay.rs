@@ -12,6 +12,7 @@ use std::thread::JoinHandle;
 use std::time::Duration;
 
 use mmt_shared::io::alarm::Alarm;
+use mmt_shared::stats::histogram::Quantiles;
 use serde::Serialize;
 
 use super::driver::{DirectionCounters, Driver};
@@ -140,11 +141,14 @@ impl Relay {
         extras: Extras,
     ) -> Result<RelayHandle, RelayError> {
         let (origin, lateness) = (now(), Arc::new(Recorder::default()));
+        let delays = [(); 2].map(|()| Arc::new(Recorder::default()));
         let driver = |config, id| {
             let (record, lateness) = (extras.record.clone(), Arc::clone(&lateness));
             Driver::try_new(config, seed, id, origin, record, lateness)
         };
-        let (up, down) = (driver(up, LinkId::UP)?, driver(down, LinkId::DOWN)?);
+        let [of_up, of_down] = &delays;
+        let up = driver(up, LinkId::UP)?.timed(Arc::clone(of_up));
+        let down = driver(down, LinkId::DOWN)?.timed(Arc::clone(of_down));
         if to.port() == 0 || to.ip().is_unspecified() {
             return Err(RelayError::Target { to });
         }
@@ -164,6 +168,7 @@ impl Relay {
             commands: Mutex::new(Commands::default()),
             board: Mutex::new(RelaySnapshot::default()),
             lateness,
+            delays,
         });
         let clients = Clients::new(to, extras.clients.unwrap_or(CLIENTS));
         let mut worker = Worker::new(port, clients, up, down, extras.record, shared.clone());
@@ -203,6 +208,8 @@ struct Shared {
     /// The counts as of the thread's last round, without the lateness.
     board: Mutex<RelaySnapshot>,
     lateness: Arc<Recorder>,
+    /// Delays up and down since somebody last asked.
+    delays: [Arc<Recorder>; 2],
 }
 
 impl RelayHandle {
@@ -219,6 +226,13 @@ impl RelayHandle {
             lateness: self.shared.lateness.summary(),
             ..*lock(&self.shared.board)
         }
+    }
+
+    /// Delays, up and down, of what was sent on since the last call: from its arrival here to its departure.
+    #[must_use]
+    pub fn take_delays(&self) -> [Quantiles; 2] {
+        let [up, down] = &self.shared.delays;
+        [up.take(), down.take()]
     }
 
     /// New settings for both directions from now on ([`crate::Link::reconfigure`]).

@@ -8,10 +8,10 @@ use mmt_netem::io::driver::DirectionCounters;
 use super::{DEGRADED, NetemReport};
 
 /// What a row counts in a direction.
-type Count = fn(&DirectionCounters) -> Tally;
+pub(super) type Count = fn(&DirectionCounters) -> Tally;
 
 /// The rows; those below the first two are left out while they are zero.
-const ROWS: [(&str, Count); 14] = [
+pub(super) const ROWS: [(&str, Count); 14] = [
     ("offered", |direction| direction.link.offered),
     ("sent on", |direction| direction.sent),
     ("lost on the link", |direction| direction.link.dropped.loss),
@@ -30,7 +30,7 @@ const ROWS: [(&str, Count); 14] = [
     ("client forgotten", |direction| direction.abandoned),
 ];
 /// Rows that are always there.
-const ALWAYS: usize = 2;
+pub(super) const ALWAYS: usize = 2;
 
 impl fmt::Display for NetemReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

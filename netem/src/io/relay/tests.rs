@@ -72,6 +72,14 @@ fn forwards_both_ways(listen: IpAddr, target: IpAddr) {
     assert!(start.elapsed() >= Duration::from_millis(5));
 
     until(&relay, |seen| seen.down.sent.packets == 1);
+    let [up, down] = relay.take_delays();
+    assert_eq!((up.count, down.count), (1, 1));
+    assert!(up.max >= Duration::from_millis(20) && down.max >= Duration::from_millis(5));
+    assert_eq!(
+        relay.take_delays().map(|delays| delays.count),
+        [0, 0],
+        "taken"
+    );
     let end = relay.stop().unwrap();
     let tally = |packets, bytes| Tally { packets, bytes };
     assert_eq!(end.up.sent, tally(1, 2));
