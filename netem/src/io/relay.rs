@@ -170,7 +170,8 @@ impl Relay {
             lateness,
             delays,
         });
-        let clients = Clients::new(to, extras.clients.unwrap_or(CLIENTS));
+        let clients = Clients::try_new(to, extras.clients.unwrap_or(CLIENTS));
+        let clients = clients.map_err(RelayError::Thread)?;
         let mut worker = Worker::new(port, clients, up, down, extras.record, shared.clone());
         worker.rebind_every(extras.rebind_every, origin);
         let thread = std::thread::Builder::new()

@@ -4,11 +4,20 @@
 use std::collections::BTreeMap;
 use std::io;
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr, UdpSocket};
+use std::os::fd::{AsFd, OwnedFd};
 
 use mmt_shared::time::Time;
+use rustix::buffer::spare_capacity;
+use rustix::event::{PollFd, PollFlags, Timespec, epoll};
+use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
 
 use super::CLIENT_IDLE;
 use super::port::{Port, Received};
+
+/// Clients whose sockets are read before the times are looked at again.
+const READY_MAX: usize = 64;
+/// Descriptors besides one for each client: the program's own.
+const OTHER_DESCRIPTORS: u64 = 64;
 
 /// Who sends to the relay.
 #[derive(Debug)]
@@ -36,17 +45,50 @@ pub(super) struct Clients {
     met: u64,
     /// How many there can be at one time.
     most: usize,
+    /// All their sockets, so that a wait is one for all of them.
+    sockets: OwnedFd,
 }
 
 impl Clients {
-    pub(super) fn new(to: SocketAddr, most: usize) -> Self {
-        Self {
+    /// Room for `most` clients of the target `to`.
+    ///
+    /// # Errors
+    /// The process is out of descriptors.
+    pub(super) fn try_new(to: SocketAddr, most: usize) -> io::Result<Self> {
+        make_room(most as u64 + OTHER_DESCRIPTORS);
+        Ok(Self {
             to,
             by_number: BTreeMap::new(),
             by_addr: BTreeMap::new(),
             met: 0,
             most,
-        }
+            sockets: epoll::create(epoll::CreateFlags::CLOEXEC)?,
+        })
+    }
+
+    /// Ready when a client's socket has something to read.
+    pub(super) fn as_poll_fd(&self) -> PollFd<'_> {
+        PollFd::from_borrowed_fd(self.sockets.as_fd(), PollFlags::IN)
+    }
+
+    /// The clients whose sockets have something to read, or an error; of many some, the next time others.
+    ///
+    /// # Errors
+    /// Those of epoll.
+    pub(super) fn ready(&self) -> io::Result<Vec<u64>> {
+        let mut events = Vec::with_capacity(READY_MAX);
+        let at_once = Timespec::default();
+        epoll::wait(&self.sockets, spare_capacity(&mut events), Some(&at_once))?;
+        let number = |event: &epoll::Event| event.data.u64();
+        Ok(events.iter().map(number).collect())
+    }
+
+    /// A socket toward the target whose datagrams are for client `number`.
+    fn port_for(&self, number: u64) -> io::Result<Port> {
+        let port = port_toward(self.to)?;
+        let (data, flags) = (epoll::EventData::new_u64(number), epoll::EventFlags::IN);
+        epoll::add(&self.sockets, &port, data, flags)?;
+        Ok(port)
     }
 
     /// Where all clients' packets go.
@@ -60,12 +102,6 @@ impl Clients {
 
     pub(super) fn get_mut(&mut self, number: u64) -> Option<&mut Client> {
         self.by_number.get_mut(&number)
-    }
-
-    pub(super) fn iter(&self) -> impl Iterator<Item = (u64, &Client)> {
-        self.by_number
-            .iter()
-            .map(|(number, client)| (*number, client))
     }
 
     pub(super) fn len(&self) -> usize {
@@ -89,13 +125,13 @@ impl Clients {
         if self.by_number.len() >= self.most {
             return None;
         }
+        let number = self.met;
         let client = Client {
             addr: datagram.from,
             local_ip: datagram.local_ip,
-            port: port_toward(self.to).ok()?,
+            port: self.port_for(number).ok()?,
             last_seen: now,
         };
-        let number = self.met;
         self.met = number.saturating_add(1);
         self.by_addr.insert(client.addr, number);
         self.by_number.insert(number, client);
@@ -105,10 +141,12 @@ impl Clients {
     /// Gives every client a new port toward the target; one that can get none keeps the old one. Returns
     /// how many got one.
     pub(super) fn rebind(&mut self) -> u64 {
-        let to = self.to;
         let mut rebound = 0;
-        for client in self.by_number.values_mut() {
-            if let Ok(port) = port_toward(to) {
+        let numbers: Vec<u64> = self.by_number.keys().copied().collect();
+        for number in numbers {
+            if let Ok(port) = self.port_for(number)
+                && let Some(client) = self.by_number.get_mut(&number)
+            {
                 client.port = port;
                 rebound += 1;
             }
@@ -131,6 +169,20 @@ impl Clients {
     }
 }
 
+/// Raises this process's limit of descriptors to `wanted` where it is lower, as far as the system allows: a client that
+/// gets no socket is turned away and counted.
+fn make_room(wanted: u64) {
+    let now = getrlimit(Resource::Nofile);
+    if now.current.is_some_and(|current| current < wanted) {
+        let current = now.maximum.map_or(wanted, |most| most.min(wanted));
+        let raised = Rlimit {
+            current: Some(current),
+            ..now
+        };
+        let _ = setrlimit(Resource::Nofile, raised);
+    }
+}
+
 /// A socket connected to `to`: the kernel keeps strangers' datagrams out of it.
 fn port_toward(to: SocketAddr) -> io::Result<Port> {
     let any: IpAddr = match to {
@@ -149,7 +201,7 @@ mod tests {
     use super::*;
 
     fn clients() -> Clients {
-        Clients::new((Ipv4Addr::LOCALHOST, 9).into(), 64)
+        Clients::try_new((Ipv4Addr::LOCALHOST, 9).into(), 64).unwrap()
     }
 
     fn from(port: u16) -> Received<'static> {

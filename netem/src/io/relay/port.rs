@@ -6,7 +6,7 @@
 use std::cell::Cell;
 use std::io::{self, IoSlice, IoSliceMut};
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr, UdpSocket};
-use std::os::fd::{AsFd, AsRawFd};
+use std::os::fd::{AsFd, AsRawFd, BorrowedFd};
 use std::time::{Duration, SystemTime};
 
 use mmt_shared::time::Time;
@@ -37,6 +37,16 @@ pub(super) struct Port {
     /// Datagrams that the kernel has dropped so far, as it counts them, and how many of them are reported.
     overflows: Cell<u32>,
     reported: Cell<u32>,
+    /// Whom the socket is connected to, if to anybody.
+    peer: Option<SocketAddr>,
+    /// The traffic class that the socket gives what it sends to its peer; none before the first.
+    class: Cell<Option<u8>>,
+}
+
+impl AsFd for Port {
+    fn as_fd(&self) -> BorrowedFd<'_> {
+        self.socket.as_fd()
+    }
 }
 
 /// Where a datagram goes, from which address, and in which traffic class.
@@ -58,6 +68,8 @@ impl Port {
         setsockopt(&socket, sockopt::ReceiveTimestampns, &true)?;
         setsockopt(&socket, sockopt::RxqOvfl, &1)?;
         Ok(Self {
+            peer: socket.peer_addr().ok(),
+            class: Cell::new(None),
             socket,
             overflows: Cell::new(0),
             reported: Cell::new(0),
@@ -90,6 +102,9 @@ impl Port {
     }
 
     fn try_send(&self, sending: Sending, contents: &[u8]) -> io::Result<()> {
+        if self.peer == Some(sending.to) && sending.from.is_none() {
+            return self.send_to_peer(sending.class, contents);
+        }
         let (class_v4, class_v6) = (sending.class, i32::from(sending.class));
         let class = if is_v4(sending.to.ip()) {
             ControlMessage::Ipv4Tos(&class_v4)
@@ -118,6 +133,22 @@ impl Port {
             Some(&to),
         )?;
         Ok(())
+    }
+}
+
+impl Port {
+    /// Without an address and a class of its own a packet needs no look at the routes.
+    fn send_to_peer(&self, class: u8, contents: &[u8]) -> io::Result<()> {
+        if self.class.get() != Some(class) {
+            let of_all = i32::from(class);
+            if self.peer.is_some_and(|peer| is_v4(peer.ip())) {
+                setsockopt(&self.socket, sockopt::Ipv4Tos, &of_all)?;
+            } else {
+                setsockopt(&self.socket, sockopt::Ipv6TClass, &of_all)?;
+            }
+            self.class.set(Some(class));
+        }
+        self.socket.send(contents).map(|_| ())
     }
 }
 

@@ -374,3 +374,35 @@ fn every_packet_is_on_record_in_both_forms() {
         assert!((0..100).all(entry), "{name}");
     }
 }
+
+#[test]
+fn a_thousand_clients_have_a_port_each_and_are_answered_each() {
+    const CLIENTS: usize = 1000;
+    let server = socket(LOCAL);
+    let none = || LinkConfig::default();
+    let extras = Extras {
+        clients: Some(CLIENTS),
+        ..Extras::default()
+    };
+    let to = server.local_addr().unwrap();
+    let relay = Relay::bind((LOCAL, 0).into(), to, none(), none(), 1, extras).unwrap();
+    let mut ports = std::collections::BTreeSet::new();
+    for client in 0..CLIENTS {
+        // an address each, and a socket only while it is needed
+        let [.., high, low] = client.to_be_bytes();
+        let client = socket(Ipv4Addr::new(127, 1, high, low).into());
+        client.send_to(&[high, low], relay.local_addr()).unwrap();
+        let (contents, from) = receive(&server);
+        assert_eq!(contents, [high, low]);
+        ports.insert(from);
+        server.send_to(&contents, from).unwrap();
+        assert_eq!(receive(&client).0, [high, low]);
+    }
+    assert_eq!(ports.len(), CLIENTS);
+    let stranger = socket(Ipv4Addr::new(127, 2, 0, 1).into());
+    stranger
+        .send_to(b"one too many", relay.local_addr())
+        .unwrap();
+    let end = until(&relay, |seen| seen.refused.packets == 1);
+    assert_eq!((end.clients, end.clients_met), (1000, 1000));
+}

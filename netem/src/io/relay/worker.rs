@@ -6,7 +6,7 @@ use std::sync::atomic::Ordering;
 use std::time::Duration;
 
 use quinn::udp::EcnCodepoint;
-use rustix::event::{PollFd, PollFlags};
+use rustix::event::PollFlags;
 
 use mmt_shared::io::alarm::wait;
 use mmt_shared::io::realtime;
@@ -44,6 +44,8 @@ pub(super) struct Worker {
     unreachable: u64,
     receive_errors: u64,
     rebinds: u64,
+    /// No client is idle for too long before this; none: there was no client.
+    expiry: Option<Time>,
     /// How often to rebind, and when next.
     rebind: Option<(Duration, Time)>,
     shared: Arc<Shared>,
@@ -83,6 +85,7 @@ impl Worker {
             overflows_up: 0,
             overflows_down: 0,
             rebinds: 0,
+            expiry: None,
             rebind: None,
             refused: Tally::default(),
             unreachable: 0,
@@ -124,7 +127,7 @@ impl Worker {
         while !self.shared.stopping.load(Ordering::Acquire) {
             self.release_due();
             self.apply_commands();
-            self.clients.expire(now());
+            self.expire();
             self.publish();
             let ready = self.wait()?;
             if ready.listen {
@@ -142,29 +145,35 @@ impl Worker {
         let until = [
             self.up.poll_timeout(),
             self.down.poll_timeout(),
-            self.clients.next_expiry(),
+            self.expiry,
             self.rebind.map(|(_, next)| next),
         ];
-        let mut fds = vec![self.shared.alarm.as_poll_fd(), self.listen.as_poll_fd()];
-        fds.extend(
-            self.clients
-                .iter()
-                .map(|(_, client)| client.port.as_poll_fd()),
-        );
+        let mut fds = [
+            self.shared.alarm.as_poll_fd(),
+            self.listen.as_poll_fd(),
+            self.clients.as_poll_fd(),
+        ];
         wait(&mut fds, until.into_iter().flatten().min())?;
-        self.shared.alarm.silence();
-
         // an error is a reason to read, too: reading returns and clears it
-        let readable = |fd: &PollFd<'_>| fd.revents() != PollFlags::empty();
-        let numbers = self.clients.iter().map(|(number, _)| number);
-        Ok(Ready {
-            listen: fds.get(1).is_some_and(readable),
-            clients: numbers
-                .zip(fds.iter().skip(2))
-                .filter(|(_, fd)| readable(fd))
-                .map(|(number, _)| number)
-                .collect(),
-        })
+        let [alarm, listen, clients] = fds.map(|fd| fd.revents() != PollFlags::empty());
+        if alarm {
+            self.shared.alarm.silence();
+        }
+        let clients = if clients {
+            self.clients.ready()?
+        } else {
+            Vec::new()
+        };
+        Ok(Ready { listen, clients })
+    }
+
+    /// Forgets who was idle for too long, once somebody may have been.
+    fn expire(&mut self) {
+        let now = now();
+        if self.expiry.is_none_or(|at| at <= now) {
+            self.clients.expire(now);
+            self.expiry = self.clients.next_expiry();
+        }
     }
 
     /// Takes what clients sent and puts it on the link up.
