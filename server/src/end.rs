@@ -47,6 +47,8 @@ pub struct SlaveCounts {
     pub updates_superseded: u64,
     /// HIP samples received, repeated ones included.
     pub samples: u64,
+    /// Commands that acknowledge an update that never left.
+    pub acknowledgements_implausible: u64,
     /// Updates that could not be sent: they break a rule of the wire, or the datagram numbers are used up.
     pub updates_unsent: u64,
 }
@@ -67,6 +69,8 @@ pub struct SlaveEnd {
     channel: DatagramChannel,
     config: SlaveEndConfig,
     newest_acknowledged: u32,
+    /// Sequence of the newest update that left.
+    newest_sent: u32,
     /// To be sent.
     update: Option<Update>,
     repeating: Option<Repeating>,
@@ -87,6 +91,7 @@ impl SlaveEnd {
             channel: DatagramChannel::with_rate_control(Side::Slave, now, config.stretch_max),
             config,
             newest_acknowledged: 0,
+            newest_sent: 0,
             update: None,
             repeating: None,
             tool: None,
@@ -152,8 +157,9 @@ impl SlaveEnd {
         let Message::Command(command) = received.message else {
             return;
         };
-        self.newest_acknowledged = self.newest_acknowledged.max(command.newest_update);
-        self.handle_samples(at, &command);
+        let newest_update = self.acknowledged(&command);
+        self.newest_acknowledged = self.newest_acknowledged.max(newest_update);
+        self.handle_samples(at, &command, newest_update);
         self.slave.stretch(self.channel.stretch());
         let counts = received.is_newest && self.config.architecture.feels_tool();
         if let Some(port) = command.port.filter(|_| counts) {
@@ -161,17 +167,22 @@ impl SlaveEnd {
         }
     }
 
+    /// The newest update that a command acknowledges; none (0) if none of that number has left.
+    fn acknowledged(&mut self, command: &Command) -> u32 {
+        if command.newest_update <= self.newest_sent {
+            return command.newest_update;
+        }
+        self.counts.acknowledgements_implausible += 1;
+        0
+    }
+
     /// A command's samples, oldest first, each with the newest update that the master had by then as far as the
     /// command says: none (0) of a sample that is repeated from an earlier command.
-    fn handle_samples(&mut self, at: Time, command: &Command) {
+    fn handle_samples(&mut self, at: Time, command: &Command, newest_update: u32) {
         let new = usize::from(self.config.samples_per_command).max(1);
         let repeated = command.samples.len().saturating_sub(new);
         for (n, sample) in command.samples.as_slice().iter().enumerate() {
-            let newest_update = if n < repeated {
-                0
-            } else {
-                command.newest_update
-            };
+            let newest_update = if n < repeated { 0 } else { newest_update };
             self.slave.handle_sample(at, sample, newest_update);
             self.counts.samples += 1;
         }
@@ -245,6 +256,7 @@ impl SlaveEnd {
             .encode(now, Message::Update(update.into()), out);
         if let Ok(Some(_)) = sent {
             self.counts.updates.sent(update.cause);
+            self.newest_sent = self.newest_sent.max(update.sequence);
         } else {
             self.counts.updates_unsent += 1;
         }

@@ -23,6 +23,10 @@ impl SlaveEnd {
         session.add_drops([
             ("updates_superseded", counts.updates_superseded),
             ("updates_unsent", counts.updates_unsent + waiting),
+            (
+                "acknowledgements_implausible",
+                counts.acknowledgements_implausible,
+            ),
         ]);
         session.add_drops(drops(slave));
         SlaveHalf {

@@ -260,3 +260,19 @@ fn each_update_that_a_tick_made_is_sent_superseded_or_unsent() {
     );
     assert_eq!(half.updates.sent, Some(made - superseded - unsent));
 }
+
+#[test]
+fn an_acknowledgement_of_what_never_left_silences_nothing_and_is_counted() {
+    let mut end = end("10ms 30ms", Architecture::Mmt, 0);
+    let mut master = DatagramChannel::new(Side::Master, Time::ZERO);
+    let sent = updates(&mut end, |ms, end| match ms {
+        5 => end.update = Some(update(1, Cause::Timer)),
+        8 => {
+            let command = command(&mut master, 8, 1..=10, u32::MAX, None);
+            end.handle_datagram(AT(8), &command);
+        }
+        _ => {}
+    });
+    assert_eq!(sent, [(5, 1), (15, 1), (35, 1)]);
+    assert_eq!(end.counts().acknowledgements_implausible, 1);
+}
