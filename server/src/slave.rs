@@ -16,7 +16,7 @@ use mmt_shared::time::Time;
 use crate::contact::{Contact, ContactStage};
 use crate::environment::{Environment, EnvironmentConfig};
 use crate::estimator::Estimate;
-use crate::playout::{Played, PlayoutBuffer};
+use crate::playout::{Played, PlayoutBuffer, PlayoutConfig};
 use crate::pose_observer::PoseObserver;
 use crate::sensing::Sensing;
 use crate::shadow::Shadow;
@@ -106,12 +106,17 @@ impl Slave {
         let sensing = Sensing::try_new(config.sensing, config.seed)?;
         let detector = ContactDetector::new(config.trigger.contact);
         let noise_n = config.sensing.force_noise_n;
-        let port = ToolPort::new(noise_n, config.playout.speed_max_m_per_s);
         let limit = ToolForce::try_new(config.tool_force_max_n, coupling)?;
+        let speed_max_m_per_s = (config.playout.speed_max_m_per_s).min(limit.approach_speed()?);
+        let playout = PlayoutConfig {
+            speed_max_m_per_s,
+            ..config.playout
+        };
+        let port = ToolPort::new(noise_n, speed_max_m_per_s);
         let timer_carries_pose = config.trigger.timer_carries_pose;
         Ok(Self {
             settings,
-            playout: PlayoutBuffer::try_new(config.playout)?,
+            playout: PlayoutBuffer::try_new(playout)?,
             tool: ToolDrive::new(port, limit),
             contact: ContactStage::new(environment, sensing, detector),
             object,

@@ -7,10 +7,16 @@
 use mmt_shared::model::contact::Coupling;
 use mmt_shared::model::geometry::Vec2;
 use mmt_shared::range::{OutOfRange, in_range};
+use mmt_shared::time::TICK_S;
 
 /// Default of the limit, N. The hand presses with 8 N at the most (`device`'s profiles), so a tool that does what is felt
 /// stays below it; and it is the bound that outages are held to (15 N after 60 ms, `lab/src/world/tests/hard.rs`).
 pub const TOOL_FORCE_MAX_N: f64 = 15.0;
+/// What is too slow, in messages.
+const APPROACH_NAME: &str =
+    "tool: speed of approach, limit of the force / (contact damping + 2 stiffness T)";
+/// Accepted speed at which the tool may touch, m/s: a slower tool follows no hand.
+const APPROACH_M_PER_S: (f64, f64) = (0.1, f64::MAX);
 /// Accepted limits, N: from twice the force that counts as noise up to what no tabletop arm exerts.
 const LIMIT_N: (f64, f64) = (0.1, 1000.0);
 
@@ -39,6 +45,21 @@ impl ToolForce {
             held_ticks: 0,
             peak_n: 0.0,
         })
+    }
+
+    /// The speed at which a touch that nobody foresaw costs the limit at most, m/s: f_max / (k_d + 2 k_p T). The tool is
+    /// inside of the object for a tick before its force is measured, and for another before it stops.
+    ///
+    /// # Errors
+    /// When that is below 0.1 m/s: the coupling is too stiff or too damped for the limit.
+    pub fn approach_speed(&self) -> Result<f64, OutOfRange> {
+        let Coupling {
+            stiffness_n_per_m: k_p,
+            damping_ns_per_m: k_d,
+        } = self.coupling;
+        let speed = self.max_n / (k_d + 2.0 * k_p * TICK_S);
+        in_range(APPROACH_NAME, "m/s", speed, APPROACH_M_PER_S)?;
+        Ok(speed)
     }
 
     /// Ticks in which the limit shortened the tool's way.
@@ -96,8 +117,8 @@ impl ToolForce {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use mmt_shared::model::settings::{CONTACT_DAMPING_NS_PER_M, STIFFNESS_N_PER_M};
     use mmt_shared::rng::Substream;
-    use mmt_shared::time::TICK_S;
 
     const SOFT: Coupling = Coupling {
         stiffness_n_per_m: 1000.0,
@@ -112,6 +133,8 @@ mod tests {
         x: f64,
         force: Vec2,
         noise: Option<Substream>,
+        /// The longest way of a tick, m.
+        quick: f64,
     }
 
     impl Press {
@@ -121,12 +144,13 @@ mod tests {
                 x: -0.01,
                 force: Vec2::zeros(),
                 noise: noise.map(|seed| Substream::new(seed, "test/noise", 0)),
+                quick: QUICK,
             }
         }
 
         /// One tick towards `aim`; the true force.
         fn tick(&mut self, aim: f64) -> f64 {
-            let wanted = Vec2::new((aim - self.x).clamp(-QUICK, QUICK), 0.0);
+            let wanted = Vec2::new((aim - self.x).clamp(-self.quick, self.quick), 0.0);
             let way = self.limit.allowed(wanted, TICK_S, self.force);
             self.x += way.x;
             let velocity = way / TICK_S;
@@ -179,6 +203,55 @@ mod tests {
             assert_eq!(limit.allowed(way, TICK_S, Vec2::zeros()), way);
             assert!((coupling.force(QUICK, QUICK / TICK_S) - most_n).abs() < 1e-9);
         }
+    }
+
+    /// Largest force of a tool that goes at `speed` (m/s) against a wall, over where a tick finds it before the wall.
+    fn first_touch(coupling: Coupling, speed: f64) -> f64 {
+        let most = (0..20).map(|part| {
+            let mut press = Press::new(15.0, coupling, None);
+            let way = speed * TICK_S;
+            press.quick = way;
+            press.x = -way * (3.0 + f64::from(part) / 20.0);
+            (0..50).map(|_| press.tick(1.0)).fold(0.0, f64::max)
+        });
+        most.fold(0.0, f64::max)
+    }
+
+    #[test]
+    fn a_first_touch_costs_no_more_than_the_limit_for_every_accepted_coupling() {
+        let range = |(least, most): (f64, f64)| {
+            (0..=20).map(move |n| least + (most - least) * f64::from(n) / 20.0)
+        };
+        let (mut worst, mut unbound) = (0.0_f64, 0.0_f64);
+        for k_p in range(STIFFNESS_N_PER_M) {
+            for k_d in range(CONTACT_DAMPING_NS_PER_M) {
+                let coupling = Coupling {
+                    stiffness_n_per_m: k_p,
+                    damping_ns_per_m: k_d,
+                };
+                let limit = ToolForce::try_new(15.0, coupling).unwrap();
+                let speed = limit.approach_speed().unwrap().min(0.6);
+                worst = worst.max(first_touch(coupling, speed));
+                unbound = unbound.max(first_touch(coupling, 0.6));
+            }
+        }
+        assert!(unbound > 46.0, "the effect exists: {unbound} N");
+        assert!(worst <= 15.0 + 1e-9, "{worst} N");
+    }
+
+    #[test]
+    fn a_coupling_that_leaves_less_than_a_tenth_of_a_metre_a_second_is_refused() {
+        let damped = |k_d| Coupling {
+            stiffness_n_per_m: 10_000.0,
+            damping_ns_per_m: k_d,
+        };
+        let speed = |max_n, k_d| {
+            ToolForce::try_new(max_n, damped(k_d))
+                .unwrap()
+                .approach_speed()
+        };
+        assert!((speed(12.0, 100.0).unwrap() - 0.1).abs() < 1e-12);
+        assert!(speed(11.9, 100.0).is_err() && speed(1.0, 0.0).is_err());
     }
 
     #[test]
