@@ -14,7 +14,6 @@ mod table;
 
 use serde::Serialize;
 
-use crate::channel::peer::Loss;
 use crate::metrics::ForceSummary;
 use crate::wire::Ending;
 
@@ -177,7 +176,7 @@ impl<C> RunReport<C> {
 
     /// The path, as the master saw it; of the slave what is known.
     fn seen_by_master(self, own: SessionStats, slave: Option<&SessionStats>) -> Self {
-        let (loss_up, loss_down) = losses(&own, slave);
+        let (loss_up, loss_down) = own.losses(slave);
         Self {
             messages: UpDown {
                 up: own.sent,
@@ -202,7 +201,7 @@ impl<C> RunReport<C> {
 
     /// The path, as the slave saw it; of the master what is known.
     fn seen_by_slave(self, own: SessionStats, master: Option<&SessionStats>) -> Self {
-        let (loss_down, loss_up) = losses(&own, master);
+        let (loss_down, loss_up) = own.losses(master);
         Self {
             messages: UpDown {
                 up: own.received,
@@ -284,22 +283,6 @@ impl<M, S> RunReport<Both<M, S>> {
         report.drops = Some(drops);
         report
     }
-}
-
-/// Shares that the path lost of what this end sent and of what it received, without what either host dropped. Without
-/// the farewell of the other end nobody knows what became of the last datagrams: none.
-fn losses(own: &SessionStats, other: Option<&SessionStats>) -> (Number, Number) {
-    let Some(other) = other else {
-        return (Number::ABSENT, Number::ABSENT);
-    };
-    let on_the_path = |counted: Loss, from: &SessionStats, to: &SessionStats| {
-        let path = counted.on_the_path(from.unsent.unwrap_or(0), to.unread.unwrap_or(0));
-        Number::from(path.share())
-    };
-    (
-        on_the_path(own.outgoing, own, other),
-        on_the_path(own.incoming, other, own),
-    )
 }
 
 /// One of something per direction.

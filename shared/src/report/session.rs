@@ -71,6 +71,22 @@ impl SessionStats {
         }
     }
 
+    /// Shares that the path lost of what this end sent and of what it received, without what either host dropped. Without
+    /// the farewell of the other end nobody knows what became of the last datagrams: none.
+    pub(super) fn losses(&self, other: Option<&Self>) -> (Number, Number) {
+        let Some(other) = other else {
+            return (Number::ABSENT, Number::ABSENT);
+        };
+        let on_the_path = |counted: Loss, from: &Self, to: &Self| {
+            let path = counted.on_the_path(from.unsent.unwrap_or(0), to.unread.unwrap_or(0));
+            Number::from(path.share())
+        };
+        (
+            on_the_path(self.outgoing, self, other),
+            on_the_path(self.incoming, other, self),
+        )
+    }
+
     /// Adds drops by name.
     pub fn add_drops<'a>(&mut self, drops: impl IntoIterator<Item = (&'a str, u64)>) {
         self.drops.extend(named(drops));

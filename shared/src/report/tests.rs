@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::channel::datagram_channel::DatagramChannel;
+use crate::channel::peer::Loss;
 use crate::metrics::{
     AgeOfInformation, ContactBreaks, ForceMetrics, ForcePeak, PoseError, UpdateCounts,
 };
