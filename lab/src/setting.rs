@@ -9,6 +9,7 @@ use std::time::Duration;
 use mmt_client::device::DeviceProfile;
 use mmt_client::operator::scripted::{Picture, ScriptedConfig};
 use mmt_server::playout::PlayoutConfig;
+use mmt_server::sensing::VisionConfig;
 use mmt_server::slave::SlaveConfig;
 use mmt_server::trigger::{Scheme, TriggerConfig};
 use mmt_shared::model::settings::{Mode, ModelSettings, PoseCorrection};
@@ -67,15 +68,47 @@ impl Curve {
     }
 }
 
-/// The curves of fig. 5: the paper's three in both modes, and the recommended scheme.
-pub const FIG5_CURVES: [(Mode, Curve); 7] = [
-    (Mode::Paper, Curve::Deadband),
-    (Mode::Paper, Curve::Hybrid(50)),
-    (Mode::Paper, Curve::Hybrid(150)),
-    (Mode::Recommended, Curve::Deadband),
-    (Mode::Recommended, Curve::Hybrid(50)),
-    (Mode::Recommended, Curve::Hybrid(150)),
-    (Mode::Recommended, Curve::Useful(150)),
+/// What the slave finds the object by while it is pushed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Senses {
+    /// Force and position of the tool, as in the paper.
+    Touch,
+    /// Images as well.
+    Vision,
+}
+
+impl Senses {
+    /// For files: `touch` or `vision`.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Touch => "touch",
+            Self::Vision => "vision",
+        }
+    }
+
+    fn vision(self) -> VisionConfig {
+        match self {
+            Self::Touch => VisionConfig::off(),
+            Self::Vision => VisionConfig::default(),
+        }
+    }
+}
+
+/// The curves of fig. 5: the paper's three in both modes and the recommended scheme; and with equal senses, paper mode
+/// with vision and the recommended scheme without.
+pub const FIG5_CURVES: [(Mode, Senses, Curve); 11] = [
+    (Mode::Paper, Senses::Touch, Curve::Deadband),
+    (Mode::Paper, Senses::Touch, Curve::Hybrid(50)),
+    (Mode::Paper, Senses::Touch, Curve::Hybrid(150)),
+    (Mode::Paper, Senses::Vision, Curve::Deadband),
+    (Mode::Paper, Senses::Vision, Curve::Hybrid(50)),
+    (Mode::Paper, Senses::Vision, Curve::Hybrid(150)),
+    (Mode::Recommended, Senses::Touch, Curve::Useful(150)),
+    (Mode::Recommended, Senses::Vision, Curve::Deadband),
+    (Mode::Recommended, Senses::Vision, Curve::Hybrid(50)),
+    (Mode::Recommended, Senses::Vision, Curve::Hybrid(150)),
+    (Mode::Recommended, Senses::Vision, Curve::Useful(150)),
 ];
 
 /// The two modes with the schemes that they default to.
@@ -98,6 +131,8 @@ pub(crate) fn paper_worlds(deadband: f64) -> Vec<WorldConfig> {
 pub struct Point {
     /// The mode.
     pub mode: Mode,
+    /// The senses.
+    pub senses: Senses,
     /// The scheme.
     pub curve: Curve,
     /// Delta, as a share.
@@ -106,10 +141,11 @@ pub struct Point {
 
 impl Point {
     /// Every deadband of some curves, curve by curve.
-    pub fn of(curves: impl IntoIterator<Item = (Mode, Curve)>) -> Vec<Self> {
-        let points = |(mode, curve)| {
+    pub fn of(curves: impl IntoIterator<Item = (Mode, Senses, Curve)>) -> Vec<Self> {
+        let points = |(mode, senses, curve)| {
             DEADBANDS.map(|deadband| Self {
                 mode,
+                senses,
                 curve,
                 deadband,
             })
@@ -120,10 +156,9 @@ impl Point {
     /// The run of the paper's experiment at this point.
     #[must_use]
     pub fn trial(&self, duration: Duration) -> Trial {
-        Trial::new(
-            paper_world(self.mode, self.curve.at(self.deadband)),
-            duration,
-        )
+        let mut world = paper_world(self.mode, self.curve.at(self.deadband));
+        world.slave.sensing.vision = self.senses.vision();
+        Trial::new(world, duration)
     }
 }
 

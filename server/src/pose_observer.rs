@@ -6,9 +6,11 @@
 //! the centre to each face. Pure; it must never use the true pose.
 
 mod angle_filter;
+mod centre;
 mod contact_frame;
 mod face_map;
 mod past;
+mod penetration;
 mod tangent_tracker;
 mod tracker;
 mod turning;
@@ -26,6 +28,7 @@ use mmt_shared::time::{TICK_S, Time};
 use angle_filter::AngleFilter;
 use face_map::FaceMap;
 use past::{Past, PastPoses};
+use penetration::Penetration;
 use tracker::{BoxTracker, Tracker};
 use turning::Push;
 
@@ -60,7 +63,7 @@ pub struct ObserverConfig {
     pub vision_noise_m: f64,
     /// Vision noise of the angle, rad r.m.s.
     pub vision_noise_rad: f64,
-    /// Recommended mode: vision is used all the time and face offsets are learned. Otherwise vision
+    /// Whether it takes images, learns the face offsets and reckons with how the box turns and slides. Otherwise vision
     /// gives the first pose only, as in the paper.
     pub learn: bool,
 }
@@ -73,8 +76,7 @@ pub struct PoseObserver {
     faces: FaceMap,
     angle: AngleFilter,
     contact: Option<ContactFrame>,
-    /// Depth of the tool behind the surface, m.
-    penetration: f64,
+    penetration: Penetration,
     tracker: Tracker,
     /// Variance of the centre along the face (or, without touch, of both coordinates), m².
     slide_var: f64,
@@ -94,7 +96,7 @@ impl PoseObserver {
             faces: FaceMap::new(footprint),
             angle: AngleFilter::new(config.vision_noise_rad.powi(2)),
             contact: None,
-            penetration: 0.0,
+            penetration: Penetration::new(config.coupling),
             tracker: Tracker::Box(BoxTracker::default()),
             slide_var: config.vision_noise_m.powi(2),
             past: PastPoses::default(),
@@ -173,6 +175,7 @@ impl PoseObserver {
         } else {
             self.let_go(params);
         }
+        self.penetration.remember(tool);
         self.past.push(Past {
             time: now,
             pose: self.motion.pose,
@@ -190,13 +193,20 @@ impl PoseObserver {
         let unknown = self.turn(force, params);
         self.follow_angle(face, force, size, unknown);
         let inward = -rotate(self.motion.pose.angle, face.outward());
-        self.follow_penetration(force.dot(&inward));
-        let surface = tool - inward * self.penetration;
+        self.penetration.follow(force.dot(&inward));
+        let surface = tool - inward * self.penetration.depth;
         if self.tracker.is_settling() {
             self.motion.pose.position += self.motion.twist.linear * TICK_S;
             let offset = inward.dot(&(self.motion.pose.position - surface));
             self.faces.set_accepted(face, offset);
         } else {
+            if self.contact.is_none() && self.config.learn {
+                // a body that stood still stands where it was last seen, so its face is where it is felt
+                let offset = inward.dot(&(self.motion.pose.position - surface));
+                self.faces
+                    .learn(&mut self.tracker, face, offset, self.slide_var);
+            }
+            self.slide_along(inward, params);
             self.follow_plane(face, inward, surface);
         }
         if let Tracker::Tangent(tangent) = &mut self.tracker {
@@ -213,7 +223,7 @@ impl PoseObserver {
     /// The first tick of a contact. Returns the face that is touched: of a box the one that the force is normal to; of a
     /// tangent the one that is nearest to the tool, because the master pushes that one.
     fn begin_contact(&mut self, tool: Vec2, force: Vec2) -> Face {
-        self.penetration = force.norm() / self.config.coupling.stiffness_n_per_m;
+        self.penetration.begin(tool, force);
         if let Tracker::Tangent(_) = self.tracker {
             self.begin_tangent();
             let tool_in_object = self.motion.pose.point_to_object(tool);
@@ -228,19 +238,6 @@ impl PoseObserver {
             }
         }
         best.0
-    }
-
-    /// Moves the centre so that the face lies where the tool touches it.
-    fn follow_plane(&mut self, face: Face, inward: Vec2, surface: Vec2) {
-        let Motion { pose, twist } = &mut self.motion;
-        let before = pose.position;
-        let gap = inward.dot(&(surface - before)) + self.faces.footprint.offset(face);
-        pose.position += inward * gap;
-        if self.contact.is_some() {
-            let velocity = (pose.position - before) / TICK_S;
-            // 20 ms, as long as the parameters' smoothing
-            twist.linear += (velocity - twist.linear) * (TICK_S / 0.020);
-        }
     }
 
     /// The normal of a new contact with a body that is no box may be any.
@@ -274,15 +271,6 @@ impl PoseObserver {
         };
         twist.angular = omega;
         rest
-    }
-
-    /// Inverts the force law: k_d d(pen)/dt + k_p pen = f, implicit.
-    fn follow_penetration(&mut self, force: f64) {
-        let Coupling {
-            stiffness_n_per_m: k_p,
-            damping_ns_per_m: k_d,
-        } = self.config.coupling;
-        self.penetration = (k_d * self.penetration + force * TICK_S) / (k_d + k_p * TICK_S);
     }
 
     /// theta by the direction of the force.

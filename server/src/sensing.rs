@@ -42,7 +42,7 @@ pub struct SensingConfig {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct VisionConfig {
-    /// Images per second; 0 turns vision off. Default 30.
+    /// Images per second; 0 turns vision off. Default 30; paper mode's 0, for the paper has none.
     pub rate_hz: f64,
     /// Noise of the position, m r.m.s. per axis. Default 1 mm.
     pub position_noise_m: f64,
@@ -69,6 +69,17 @@ impl Default for VisionConfig {
             position_noise_m: 1e-3,
             angle_noise_rad: 5e-3,
             latency_ms: 30.0,
+        }
+    }
+}
+
+impl VisionConfig {
+    /// No images. The pose at the start is known all the same.
+    #[must_use]
+    pub fn off() -> Self {
+        Self {
+            rate_hz: 0.0,
+            ..Self::default()
         }
     }
 }
@@ -230,10 +241,7 @@ impl SensingConfig {
         Self {
             position_noise_m: 0.0,
             force_noise_n: 0.0,
-            vision: VisionConfig {
-                rate_hz: 0.0,
-                ..VisionConfig::default()
-            },
+            vision: VisionConfig::off(),
         }
     }
 

@@ -95,7 +95,7 @@ fn run(runner: &Runner, request: &Request) -> Result<Findings, ExperimentError> 
 
 /// The three schemes of the paper at each of its deadbands.
 pub(super) fn points() -> Vec<Point> {
-    Point::of(SCHEMES.map(|curve| (Mode::Paper, curve)))
+    Point::of(SCHEMES.map(|curve| (Mode::Paper, Senses::Touch, curve)))
 }
 
 /// The verdict on each claim that is tested; none on what is kept or only measured.

@@ -26,6 +26,8 @@ pub(super) const FIG5: Experiment = Experiment {
 };
 
 type Group = grid::Group<Point, Measured>;
+/// A curve of the figure.
+type Of = (Mode, Senses, Curve);
 
 /// Keeps `fig5.csv` and `fig5.svg`; with `samples`, every run's forces as well.
 fn run(runner: &Runner, request: &Request) -> Result<Findings, ExperimentError> {
@@ -50,11 +52,12 @@ fn run(runner: &Runner, request: &Request) -> Result<Findings, ExperimentError> 
     })
 }
 
-/// `samples/<mode>-<scheme>-<t_update_ms>-<deadband>-<seed>.csv`.
+/// `samples/<mode>-<sensing>-<scheme>-<t_update_ms>-<deadband>-<seed>.csv`.
 fn samples_name(point: &Point, seed: u64) -> String {
-    let (mode, scheme) = (mode_name(point.mode), point.curve.at(point.deadband).name());
+    let (mode, senses) = (mode_name(point.mode), point.senses.name());
+    let scheme = point.curve.at(point.deadband).name();
     let (t_update_ms, deadband) = (point.curve.t_update_ms(), point.deadband);
-    format!("samples/{mode}-{scheme}-{t_update_ms}-{deadband}-{seed}.csv")
+    format!("samples/{mode}-{senses}-{scheme}-{t_update_ms}-{deadband}-{seed}.csv")
 }
 
 /// f_s and f_m of every sample and whether an update was sent; a lost sample's f_m is absent.
@@ -78,6 +81,7 @@ fn samples(trace: &[TraceRow]) -> Table {
 pub(super) fn columns<'a>() -> Vec<Column<'a, Run<'a, Point, Measured>>> {
     vec![
         column("mode", "", 0, |run| mode_name(run.case.mode)),
+        column("sensing", "", 0, |run| run.case.senses.name()),
         column("scheme", "", 0, |run| run.case.curve.at(run.case.deadband).name()),
         column("t_update_ms", "ms", 0, |run| run.case.curve.t_update_ms()),
         column("deadband", "", 3, |run| run.case.deadband),
@@ -114,6 +118,7 @@ fn summary(groups: &[Group]) -> Table {
         groups,
         &[
             column("mode", "", 0, |group| mode_name(group.case.mode)),
+            column("sensing", "", 0, |group| group.case.senses.name()),
             column("scheme", "", 0, |group| group.case.curve.label()),
             column("deadband", "", 3, |group| group.case.deadband),
             column("n", "", 0, |group| rate(group).map(|rate| rate.n as u64)),
@@ -128,24 +133,25 @@ fn summary(groups: &[Group]) -> Table {
     )
 }
 
-/// Left the paper's axes and curves, right both modes on logarithmic axes.
+/// Left the paper's axes and curves, right both modes with equal senses on logarithmic axes.
 fn figure(groups: &[Group]) -> Figure {
-    let series = |mode: Mode, notes: bool| {
-        let wanted = FIG5_CURVES.into_iter().filter(move |(of, _)| *of == mode);
-        wanted.map(move |(mode, curve)| drawn(groups, mode, curve, notes))
+    let as_printed = |of: &Of| (of.0, of.1) == (Mode::Paper, Senses::Touch);
+    let series = |notes: bool, wanted: fn(&Of) -> bool| {
+        let wanted = FIG5_CURVES.into_iter().filter(wanted);
+        wanted.map(move |of| drawn(groups, of, notes))
     };
     let rate = "packet rate, 1/s";
     let of_paper = Panel::new(
         "The paper's schemes",
         Axis::linear(rate),
         Axis::linear("PMSE"),
-        series(Mode::Paper, true),
+        series(true, as_printed),
     );
     let of_both = Panel::new(
-        "Both modes",
+        "Both modes, by touch and with vision",
         Axis::log(rate),
         Axis::log("PMSE"),
-        series(Mode::Paper, false).chain(series(Mode::Recommended, false)),
+        series(false, |_| true),
     );
     Figure {
         panels: vec![
@@ -157,16 +163,22 @@ fn figure(groups: &[Group]) -> Figure {
     }
 }
 
-fn drawn(groups: &[Group], mode: Mode, curve: Curve, notes: bool) -> Series {
-    let (colour, mark) = match curve {
-        Curve::Deadband => (Colour::BLUE, Mark::Circle),
-        Curve::Hybrid(50) => (Colour::VERMILION, Mark::Square),
-        Curve::Hybrid(_) => (Colour::GREEN, Mark::Triangle),
-        Curve::Useful(_) => (Colour::BLACK, Mark::Cross),
+/// A curve in the figure: colour by scheme and mode, stroke by senses.
+fn drawn(groups: &[Group], of: Of, notes: bool) -> Series {
+    let (mode, senses, curve) = of;
+    let (of_paper, of_recommended, mark) = match curve {
+        Curve::Deadband => (Colour::BLUE, Colour::SKY, Mark::Circle),
+        Curve::Hybrid(50) => (Colour::VERMILION, Colour::ORANGE, Mark::Square),
+        Curve::Hybrid(_) => (Colour::GREEN, Colour::PURPLE, Mark::Triangle),
+        Curve::Useful(_) => (Colour::BLACK, Colour::BLACK, Mark::Cross),
+    };
+    let colour = match mode {
+        Mode::Paper => of_paper,
+        Mode::Recommended => of_recommended,
     };
     let of_curve = groups
         .iter()
-        .filter(|group| (group.case.mode, group.case.curve) == (mode, curve));
+        .filter(|group| (group.case.mode, group.case.senses, group.case.curve) == of);
     let dots = of_curve.filter_map(|group| {
         let deadband = group.case.deadband;
         let noted = notes && curve == Curve::Deadband && NOTED.contains(&deadband);
@@ -175,14 +187,15 @@ fn drawn(groups: &[Group], mode: Mode, curve: Curve, notes: bool) -> Series {
             ..Dot::of_intervals(rate(group)?, pmse(group)?)
         })
     });
-    let stroke = match mode {
-        Mode::Paper => Stroke::Solid,
-        Mode::Recommended => Stroke::Dashed,
+    let stroke = match senses {
+        Senses::Touch => Stroke::Solid,
+        Senses::Vision => Stroke::Dashed,
     };
     let label = if notes {
         curve.label()
     } else {
-        format!("{}, {}", mode_name(mode), curve.label())
+        let (mode, senses) = (mode_name(mode), senses.name());
+        format!("{mode}, {}, {senses}", curve.label())
     };
     Series::line(&label, colour, dots.collect())
         .marked(mark)

@@ -11,7 +11,7 @@ use crate::experiment::description::Request;
 use crate::experiment::findings::{Extent, Findings};
 use crate::experiment::grid::Run;
 use crate::io::{Folder, Runner};
-use crate::setting::{Curve, Point, paper_world};
+use crate::setting::{Curve, Point, Senses, paper_world};
 use crate::table::{Cell, Column};
 use crate::trial::{Measured, Trial};
 
@@ -111,9 +111,18 @@ fn every_choice_of_a_reading_changes_the_world() {
 #[test]
 fn fig5_sends_less_and_errs_more_with_a_wider_deadband() {
     let done = Done::of(&fig5::FIG5, 6000);
-    for mode in ["paper", "recommended"] {
+    for (mode, sensing) in [
+        ("paper", "touch"),
+        ("paper", "vision"),
+        ("recommended", "vision"),
+    ] {
         let at = |delta: &str, key: &str| {
-            let wanted = [("mode", mode), ("scheme", "deadband"), ("deadband", delta)];
+            let wanted = [
+                ("mode", mode),
+                ("sensing", sensing),
+                ("scheme", "deadband"),
+                ("deadband", delta),
+            ];
             done.number("fig5.csv", &wanted, key)
         };
         let (fine, coarse) = ("0.025", "0.3");
@@ -326,6 +335,7 @@ fn recomputed(run: &Run<Point, Measured>) -> BTreeMap<&'static str, Cell> {
     let contact_s = run.measured.contact_s;
     BTreeMap::from([
         ("mode", Cell::from("paper")),
+        ("sensing", "touch".into()),
         ("scheme", "hybrid".into()),
         ("t_update_ms", 150_u64.into()),
         ("deadband", 0.15.into()),
@@ -365,6 +375,7 @@ fn wrong<'a>(
 fn columns_show_what_the_samples_say_and_two_that_are_swapped_are_seen() {
     let point = Point {
         mode: Mode::Paper,
+        senses: Senses::Touch,
         curve: Curve::Hybrid(150),
         deadband: 0.15,
     };

@@ -13,13 +13,15 @@ use super::tracker::Tracker;
 const MARGIN_M: (f64, f64) = (1e-3, 8e-3);
 /// The next contact with a body that is no box is expected this much nearer than any so far, m.
 const GUESS_MARGIN_M: f64 = 0.01;
+/// Variance of the offset of a face that nothing is known of, m².
+const UNKNOWN_M2: f64 = 0.1 * 0.1;
 
 /// Footprint and what is known of it.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct FaceMap {
     pub(super) footprint: BoxFootprint,
-    /// Images that each face has been learned from.
-    images: PerFace<u32>,
+    /// Variance of each face's offset, m²; none of a face that nothing is known of.
+    variances: PerFace<Option<f64>>,
     /// How far behind the tool the next retracted face will lie, m.
     margin: f64,
 }
@@ -28,7 +30,7 @@ impl FaceMap {
     pub(super) fn new(footprint: BoxFootprint) -> Self {
         Self {
             footprint,
-            images: PerFace::default(),
+            variances: PerFace::default(),
             margin: MARGIN_M.0,
         }
     }
@@ -40,7 +42,7 @@ impl FaceMap {
 
     /// Whether the face has been learned.
     pub(super) fn is_known(&self, face: Face) -> bool {
-        self.images.get(face) > 0
+        self.variances.get(face).is_some()
     }
 
     /// Sets an offset (m), or the least one that is accepted.
@@ -48,11 +50,11 @@ impl FaceMap {
         self.footprint.set_offset(face, offset.max(FACE_OFFSET_M.0));
     }
 
-    /// Learns an offset (m) from an image.
-    pub(super) fn learn(&mut self, tracker: &mut Tracker, face: Face, offset: f64) {
+    /// Learns an offset (m) that is known to `variance` (m²): from an image, or from touch where the centre is known.
+    pub(super) fn learn(&mut self, tracker: &mut Tracker, face: Face, offset: f64, variance: f64) {
         let known = self.footprint.offset(face);
         match tracker {
-            Tracker::Box(_) => self.learn_box(face, known, offset),
+            Tracker::Box(_) => self.learn_box(face, known, offset, variance),
             Tracker::Tangent(tangent) if tangent.is_settling() => {}
             Tracker::Tangent(tangent) => {
                 let mean = known + (offset - known) * tangent.offset_weight();
@@ -61,19 +63,21 @@ impl FaceMap {
         }
     }
 
-    /// Running mean of a face's offset. As long as one face only has been learned, its offset is the best guess for the
-    /// others (a square is assumed).
-    fn learn_box(&mut self, face: Face, known: f64, offset: f64) {
-        let images = self.images.get_mut(face);
-        *images = images.saturating_add(1);
-        let mean = known + (offset - known) / f64::from(*images);
-        self.footprint.set_offset(face, mean);
+    /// Kalman filter of a constant. As long as one face only has been learned, its offset is the best guess for the others
+    /// (a square is assumed).
+    fn learn_box(&mut self, face: Face, known: f64, offset: f64, variance: f64) {
+        let before = self.variances.get(face).unwrap_or(UNKNOWN_M2);
+        let total = before + variance;
+        let gain = if total > 0.0 { before / total } else { 0.0 };
+        *self.variances.get_mut(face) = Some(before * (1.0 - gain));
+        let mean = known + (offset - known) * gain;
+        self.set_accepted(face, mean);
         let others = Face::ALL.into_iter().filter(|other| *other != face);
         if others.clone().any(|other| self.is_known(other)) {
             return;
         }
         for other in others {
-            self.footprint.set_offset(other, mean);
+            self.set_accepted(other, mean);
         }
     }
 

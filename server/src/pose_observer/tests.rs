@@ -58,6 +58,63 @@ fn touch_and_vision_teach_the_offset_of_a_face_and_the_others_guess_by_it() {
     assert!((observer.twist().linear.x - 0.1).abs() < 0.01);
 }
 
+/// Lets the tool run into a box at rest at 0.1 m/s; returns the offset of the face after the first tick of contact.
+fn offset_at_first_touch() -> f64 {
+    let mut observer = observer(true);
+    let Coupling {
+        stiffness_n_per_m,
+        damping_ns_per_m,
+    } = COUPLING;
+    for n in 0..20 {
+        // 0.05 mm into the face in tick 10
+        let depth = 1e-4 * (f64::from(n) - 9.5);
+        let tool = Vec2::new(-HALF + depth, 0.0);
+        let touching = depth > 0.0;
+        let force = if touching {
+            stiffness_n_per_m * depth + damping_ns_per_m * 0.1
+        } else {
+            0.0
+        };
+        let now = Time::ZERO + TICK * n;
+        observer.step(now, tool, Vec2::new(force, 0.0), touching, &params());
+        if touching {
+            break;
+        }
+    }
+    observer.footprint().west
+}
+
+#[test]
+fn the_first_touch_of_a_box_at_rest_teaches_the_offset_of_its_face() {
+    let offset = offset_at_first_touch();
+    assert!((offset - HALF).abs() < 2e-4, "{offset} m");
+}
+
+/// How far from the true centre a box is taken to be that is pushed off its middle, turns and is never seen, m.
+fn off_after_turning(learn: bool) -> f64 {
+    let mut observer = observer(learn);
+    observer.faces = FaceMap::new(BoxFootprint::square(2.0 * HALF));
+    let mut truth = Motion::default();
+    for n in 1..=3000 {
+        let contact = Vec2::new(-HALF, 0.015);
+        let inward = rotate(truth.pose.angle, Vec2::new(1.0, 0.0));
+        let (force, lever) = (inward * 2.6, rotate(truth.pose.angle, contact));
+        let surface = truth.pose.point_to_world(contact);
+        let tool = surface + force / COUPLING.stiffness_n_per_m;
+        observer.step(Time::ZERO + TICK * n, tool, force, true, &params());
+        truth = truth.step(FrictionLaw::LimitSurface, &params(), force, lever);
+    }
+    assert!(truth.pose.angle.abs() > 0.4, "{truth:?}");
+    (observer.pose().position - truth.pose.position).norm()
+}
+
+#[test]
+fn a_box_that_turns_slides_along_its_face_and_is_followed_unseen() {
+    let (stiff, sliding) = (off_after_turning(false), off_after_turning(true));
+    assert!(stiff > 3e-3, "{stiff} m");
+    assert!(sliding < 0.2 * stiff, "{sliding} m of {stiff} m");
+}
+
 #[test]
 fn the_paper_keeps_its_side_and_finds_the_plane_of_the_face() {
     let mut observer = observer(false);

@@ -33,7 +33,8 @@ impl PoseObserver {
                 self.motion.pose.position += along * gain;
                 let known = self.faces.footprint.offset(is.face);
                 let seen = was.inward.dot(&(vision.pose.position - was.surface));
-                self.faces.learn(&mut self.tracker, was.face, seen);
+                self.faces
+                    .learn(&mut self.tracker, was.face, seen, variance);
                 // the face stays where it is touched: that the centre lies elsewhere is no motion
                 let shift = self.faces.footprint.offset(is.face) - known;
                 self.motion.pose.position += is.inward * shift;

@@ -10,7 +10,7 @@ use crate::environment::{EnvironmentConfig, EnvironmentError, SceneConfig};
 use crate::estimator::EstimatorConfig;
 use crate::playout::PlayoutConfig;
 use crate::repeats::Repeats;
-use crate::sensing::{SensingConfig, SensingError};
+use crate::sensing::{SensingConfig, SensingError, VisionConfig};
 use crate::shadow::TriggerReference;
 use crate::tool::force::TOOL_FORCE_MAX_N;
 use crate::trigger::TriggerConfig;
@@ -75,19 +75,26 @@ pub struct SlaveConfig {
 
 impl SlaveConfig {
     /// The default of a mode: the default scenario, with the mode's update scheme. Only recommended mode sends
-    /// updates again and answers congestion.
+    /// updates again, answers congestion and sees the object while it is pushed.
     #[must_use]
     pub fn of_mode(mode: Mode) -> Self {
-        let (repeats_ms, stretch_max) = match mode {
-            Mode::Paper => (Repeats::NONE, StretchMax::OFF),
-            Mode::Recommended => (Repeats::recommended(), StretchMax::RECOMMENDED),
+        let (repeats_ms, stretch_max, vision) = match mode {
+            Mode::Paper => (Repeats::NONE, StretchMax::OFF, VisionConfig::off()),
+            Mode::Recommended => (
+                Repeats::recommended(),
+                StretchMax::RECOMMENDED,
+                VisionConfig::default(),
+            ),
         };
         Self {
             seed: 1,
             mode,
             environment: EnvironmentConfig::default(),
             scene: SceneConfig::default(),
-            sensing: SensingConfig::default(),
+            sensing: SensingConfig {
+                vision,
+                ..SensingConfig::default()
+            },
             playout: PlayoutConfig::default(),
             tool_force_max_n: TOOL_FORCE_MAX_N,
             estimator: None,

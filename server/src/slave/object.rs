@@ -57,7 +57,7 @@ impl ObjectEstimate {
             force_noise_n: sensing.force_noise_n,
             vision_noise_m: sensing.vision.position_noise_m,
             vision_noise_rad: sensing.vision.angle_noise_rad,
-            learn: config.mode == Mode::Recommended,
+            learn: config.mode == Mode::Recommended || sensing.vision.rate_hz > 0.0,
         };
         let start = config.start;
         let mbc = [start.mass_kg, start.damping_ns_per_m, start.friction_n];

@@ -47,7 +47,7 @@ fn fig5_is_the_same_bytes_again_and_its_samples_say_what_its_rows_say() {
         assert_eq!(first[name], second[name], "{name}");
     }
     let csv = String::from_utf8(first["fig5.csv"].clone()).unwrap();
-    assert_eq!(csv.lines().count(), 1 + 7 * 7);
+    assert_eq!(csv.lines().count(), 1 + 11 * 7);
     let contract = "mode,scheme,t_update_ms,deadband,seed,duration_s,packet_rate_hz,contact_packet_rate_hz,pmse,\
                     pmse_x,pmse_y,pmse_magnitude,relative_error,jnd7_share";
     assert!(csv.starts_with(contract), "{csv}");
@@ -64,10 +64,10 @@ fn fig5_is_the_same_bytes_again_and_its_samples_say_what_its_rows_say() {
         .unwrap();
     let said = String::from_utf8_lossy(&recomputed.stdout).into_owned();
     assert!(recomputed.status.success(), "{recomputed:?}");
-    assert!(said.starts_with("49 rows, largest difference"), "{said}");
+    assert!(said.starts_with("77 rows, largest difference"), "{said}");
 
     // and the check can fail
-    let sample = once.join("samples/paper-deadband-0-0.1-1.csv");
+    let sample = once.join("samples/paper-touch-deadband-0-0.1-1.csv");
     let text = fs::read_to_string(&sample).unwrap();
     let wrong: Vec<String> = text
         .lines()
