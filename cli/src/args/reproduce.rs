@@ -80,7 +80,9 @@ impl FromArgMatches for Chosen {
         };
         let named = ALL.into_iter().filter(wanted);
         let named: Vec<&Experiment> = named.collect();
-        let arguments = named.iter().flat_map(|experiment| experiment.arguments);
+        // `all` takes none of them
+        let arguments = named.iter().filter(|experiment| experiment.name == name);
+        let arguments = arguments.flat_map(|experiment| experiment.arguments);
         Ok(Self {
             given: arguments.filter_map(|of| given(of, matches)).collect(),
             experiments: named,

@@ -1,6 +1,7 @@
 //! What the command line takes, and how it answers what it does not take.
 
 use clap::CommandFactory;
+use mmt_lab::experiments::ALL;
 
 use super::*;
 
@@ -150,5 +151,25 @@ fn every_help_has_examples() {
     for command in Arguments::command().get_subcommands() {
         let help = command.clone().render_long_help().to_string();
         assert!(help.contains("Examples:"), "{}", command.get_name());
+    }
+}
+
+#[test]
+fn every_experiment_can_be_asked_for_and_all_of_them() {
+    for name in ALL
+        .map(|experiment| experiment.name)
+        .into_iter()
+        .chain(["all"])
+    {
+        let Ok(Command::Reproduce(reproduce)) = parse(&["reproduce", name]) else {
+            panic!("{name}");
+        };
+        let asked = reproduce.chosen.experiments;
+        assert!(
+            asked
+                .iter()
+                .all(|experiment| name == "all" || experiment.name == name)
+        );
+        assert!(!asked.is_empty());
     }
 }
