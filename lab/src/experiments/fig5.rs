@@ -159,7 +159,7 @@ fn figure(groups: &[Group]) -> Figure {
             of_both.with_legend(Legend::UpperLeft),
         ],
         columns: 2,
-        panel_size: (560, 440),
+        panel_size: (680, 440),
     }
 }
 

@@ -1,7 +1,7 @@
 //! What a hostile peer or a careless host does to the command: text for the terminal, a log that nobody reads.
 
 use std::io::Write;
-use std::process::Stdio;
+use std::process::{Command, Stdio};
 
 use mmt_shared::io::congestion::RateCap;
 use mmt_shared::io::connect::connect;
@@ -60,7 +60,12 @@ fn a_slave_whose_log_nobody_reads_ends_on_sigterm_and_on_sighup_with_its_report(
         // what a pipe holds by default: from here on every write to it waits
         let (_unread, mut full) = std::io::pipe().unwrap();
         full.write_all(&[b'.'; 65_536]).unwrap();
-        let mut command = mmt(&home, &[&SLAVE[..], &["identity"]].concat());
+        let slave = mmt(&home, &[&SLAVE[..], &["identity"]].concat());
+        // whoever runs this test may ignore SIGHUP, and a child inherits that
+        let mut command = Command::new("env");
+        command.arg("--default-signal=HUP").arg(slave.get_program());
+        command.args(slave.get_args()).current_dir(home.path());
+        command.stdin(Stdio::null()).stdout(Stdio::piped());
         let mut child = command.stderr(Stdio::from(full)).spawn().unwrap();
         // the process alone holds the other end now
         drop(command);
