@@ -78,6 +78,15 @@ pub enum Senses {
 }
 
 impl Senses {
+    /// Those of a mode.
+    #[must_use]
+    pub fn of_mode(mode: Mode) -> Self {
+        match mode {
+            Mode::Paper => Self::Touch,
+            Mode::Recommended => Self::Vision,
+        }
+    }
+
     /// For files: `touch` or `vision`.
     #[must_use]
     pub fn name(self) -> &'static str {

@@ -68,7 +68,9 @@ def main():
     worst, rows = 0.0, 0
     with open(folder / "fig5.csv", newline="") as file:
         for row in csv.DictReader(file):
-            name = "{mode}-{sensing}-{scheme}-{t_update_ms}-{deadband}-{seed}.csv".format(**row)
+            name = "{mode}{{}}-{scheme}-{t_update_ms}-{deadband}-{seed}.csv".format(**row)
+            own = {"paper": "touch", "recommended": "vision"}[row["mode"]]
+            name = name.format("" if row["sensing"] == own else "-" + row["sensing"])
             forces, updates, count = samples(folder / "samples" / name)
             found = metrics(forces)
             found["packet_rate_hz"] = updates / (count * 1e-3)

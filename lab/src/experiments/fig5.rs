@@ -52,12 +52,17 @@ fn run(runner: &Runner, request: &Request) -> Result<Findings, ExperimentError> 
     })
 }
 
-/// `samples/<mode>-<sensing>-<scheme>-<t_update_ms>-<deadband>-<seed>.csv`.
+/// `samples/<mode>-<scheme>-<t_update_ms>-<deadband>-<seed>.csv`, and `<mode>-<sensing>` where the senses are not the mode's.
 fn samples_name(point: &Point, seed: u64) -> String {
     let (mode, senses) = (mode_name(point.mode), point.senses.name());
+    let senses = if point.senses == Senses::of_mode(point.mode) {
+        String::new()
+    } else {
+        format!("-{senses}")
+    };
     let scheme = point.curve.at(point.deadband).name();
     let (t_update_ms, deadband) = (point.curve.t_update_ms(), point.deadband);
-    format!("samples/{mode}-{senses}-{scheme}-{t_update_ms}-{deadband}-{seed}.csv")
+    format!("samples/{mode}{senses}-{scheme}-{t_update_ms}-{deadband}-{seed}.csv")
 }
 
 /// f_s and f_m of every sample and whether an update was sent; a lost sample's f_m is absent.
@@ -81,7 +86,6 @@ fn samples(trace: &[TraceRow]) -> Table {
 pub(super) fn columns<'a>() -> Vec<Column<'a, Run<'a, Point, Measured>>> {
     vec![
         column("mode", "", 0, |run| mode_name(run.case.mode)),
-        column("sensing", "", 0, |run| run.case.senses.name()),
         column("scheme", "", 0, |run| run.case.curve.at(run.case.deadband).name()),
         column("t_update_ms", "ms", 0, |run| run.case.curve.t_update_ms()),
         column("deadband", "", 3, |run| run.case.deadband),
@@ -97,6 +101,7 @@ pub(super) fn columns<'a>() -> Vec<Column<'a, Run<'a, Point, Measured>>> {
         column("jnd7_share", "", 3, |run| run.measured.force.jnd7_share),
         column("packets", "", 0, |run| run.measured.updates.total()),
         column("contact_s", "s", 1, |run| run.measured.contact_s),
+        column("sensing", "", 0, |run| run.case.senses.name()),
     ]
 }
 

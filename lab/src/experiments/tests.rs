@@ -335,7 +335,6 @@ fn recomputed(run: &Run<Point, Measured>) -> BTreeMap<&'static str, Cell> {
     let contact_s = run.measured.contact_s;
     BTreeMap::from([
         ("mode", Cell::from("paper")),
-        ("sensing", "touch".into()),
         ("scheme", "hybrid".into()),
         ("t_update_ms", 150_u64.into()),
         ("deadband", 0.15.into()),
@@ -354,6 +353,7 @@ fn recomputed(run: &Run<Point, Measured>) -> BTreeMap<&'static str, Cell> {
         ("jnd7_share", (sum(outside) / touching.len() as f64).into()),
         ("packets", packets.into()),
         ("contact_s", contact_s.into()),
+        ("sensing", "touch".into()),
     ])
 }
 

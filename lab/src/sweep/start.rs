@@ -49,6 +49,9 @@ pub(super) fn beginning(start: Start, given: &Spanned<DeTable>) -> WorldConfig {
         .used_with(hints.stiffness_n_per_m, None)
         .unwrap_or(device);
     let coupling = device.coupling();
+    if let Some(settings) = &mut world.settings {
+        settings.coupling = coupling;
+    }
     if hints.settings.is_some() && world.settings.is_none() {
         world.settings = Some(mode.model_settings(coupling));
     }

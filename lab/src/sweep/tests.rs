@@ -96,6 +96,14 @@ fn what_a_start_leaves_to_the_mode_is_the_modes_where_a_key_reaches_into_it() {
     assert_eq!(settings.coupling.stiffness_n_per_m, 500.0);
 }
 
+#[test]
+fn a_device_of_another_stiffness_reaches_the_model_of_the_paper_s_experiment() {
+    let stiff = "[[axis]]\nkey = \"stiffness_n_per_m\"\nvalues = [300.0]\n";
+    let points = points(&format!("{HEAD}start = \"paper-experiment\"\n{stiff}"));
+    let settings = points[0].settings.unwrap();
+    assert_eq!(settings.coupling.stiffness_n_per_m, 300.0);
+}
+
 fn paper_scheme() -> Scheme {
     mmt_server::trigger::TriggerConfig::of_mode(Mode::Paper).scheme
 }

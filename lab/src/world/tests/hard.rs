@@ -273,8 +273,9 @@ fn after_an_outage_of_60_ms_the_speed_limit_keeps_the_force_on_the_object_low() 
     };
     for one_way_ms in [50, 500] {
         let (limited, free) = (peak(one_way_ms, 0.6), peak(one_way_ms, 10.0));
-        assert!(free > 30.0, "the effect exists: {free} N");
-        assert!(limited <= 15.0, "{limited} N");
+        assert!(limited < free, "the effect exists: {free} N");
+        // what a touch that nobody foresaw may cost, at whatever speed a configuration allows
+        assert!(free <= 15.0, "{free} N");
     }
 }
 
