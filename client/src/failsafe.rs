@@ -1,8 +1,8 @@
 //! What the master does about a silent link: one pure function decides, the most severe action wins.
 //!
-//! Without *updates* a link is normal under a deadband; what is watched here is the link itself, which carries
-//! at least a heartbeat every 50 ms and an answer to what was sent, in both directions. The frozen local model is passive, so that it is rendered on; only
-//! when the link must be taken for dead is the hand released.
+//! Without *updates* a link is normal under a deadband; what is watched here is the link itself, which carries in each
+//! direction at least a heartbeat every 50 ms, and with it an answer to what was sent. The frozen local model is passive, so
+//! that it is rendered on; only when the link must be taken for dead is the hand released.
 
 use std::time::Duration;
 

@@ -156,7 +156,7 @@ impl Master {
     }
 
     /// One sample period. `stamp` is the tick's time, `reading` the device's HIP (m, world), `silence`
-    /// the time since a datagram of the slave arrived.
+    /// for how long one of the two ways has been silent.
     pub fn tick(&mut self, stamp: Time, reading: Vec2, silence: Duration) -> MasterTick {
         if reading.x.is_finite() && reading.y.is_finite() {
             self.hip = HipCounts::nearest(reading);

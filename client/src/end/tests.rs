@@ -1,5 +1,7 @@
 //! What the master's end accepts, acknowledges and sends, datagram by datagram.
 
+use std::ops::Range;
+
 use super::*;
 use crate::limiter::{ForceLimiter, Limits};
 use mmt_shared::model::contact::Coupling;
@@ -198,16 +200,20 @@ fn a_heartbeat_goes_out_when_nothing_else_did() {
     assert_eq!(unsent, [119, 0, 1]);
 }
 
-/// A session over a path of 20 ms each way whose way up, or down, carries nothing from `lost_from` ms on; the slave sends
-/// an update every 20 ms. Gives the link at each tick, by its milliseconds, the updates applied by then and the loss up.
-fn outage(up: bool, lost_from: u64) -> Vec<(LinkState, u32, f64)> {
+/// A session of so many ms over a path that takes `way(is_up, ms)` ms for what is sent then, or loses it; the slave sends
+/// an update every 20 ms, and the master's host stands still for a while. Gives the link at each tick, the updates applied
+/// by then and the loss up.
+fn session(
+    until: u64,
+    stands_still: Range<u64>,
+    way: impl Fn(bool, u64) -> Option<u64>,
+) -> Vec<(LinkState, u32, f64)> {
     let mut end = end(CommandConfig::default(), Architecture::Mmt);
     let mut slave = DatagramChannel::new(Side::Slave, Time::ZERO);
     let (mut ups, mut downs) = (Vec::new(), Vec::new());
     let mut sequence = 0;
     let mut seen = Vec::new();
-    for ms in 1..=lost_from + 1500 {
-        let passes = |is_up: bool| is_up != up || ms < lost_from;
+    for ms in 1..=until {
         let mut out = [0; DATAGRAM_MAX];
         ups.retain(|(at, bytes): &(u64, Vec<u8>)| {
             let arrives = *at == ms;
@@ -223,10 +229,13 @@ fn outage(up: bool, lost_from: u64) -> Vec<(LinkState, u32, f64)> {
                 AT(ms),
                 Message::Update((&update(sequence, 0.7)).into()),
             );
-            downs.extend(passes(false).then_some((ms + 20, sent)));
+            downs.extend(way(false, ms).map(|takes| (ms + takes, sent)));
+        }
+        if stands_still.contains(&ms) {
+            continue;
         }
         downs.retain(|(at, bytes): &(u64, Vec<u8>)| {
-            let arrives = *at == ms;
+            let arrives = *at <= ms;
             if arrives {
                 end.handle_datagram(AT(ms), bytes);
             }
@@ -234,12 +243,36 @@ fn outage(up: bool, lost_from: u64) -> Vec<(LinkState, u32, f64)> {
         });
         let tick = end.tick(AT(ms), Vec2::new(-0.3, 0.0));
         while let Some(length) = end.poll_transmit(AT(ms), &mut out).unwrap() {
-            ups.extend(passes(true).then(|| (ms + 20, out[..length].to_vec())));
+            ups.extend(way(true, ms).map(|takes| (ms + takes, out[..length].to_vec())));
         }
         let loss = end.channel().peer().outgoing_at(AT(ms)).share();
         seen.push((tick.link, end.master().applied(), loss.unwrap_or(0.0)));
     }
     seen
+}
+
+/// Over a path of 20 ms each way whose way up, or down, carries nothing from `lost_from` ms on.
+fn outage(up: bool, lost_from: u64) -> Vec<(LinkState, u32, f64)> {
+    session(lost_from + 1500, 0..0, |is_up, ms| {
+        (is_up != up || ms < lost_from).then_some(20)
+    })
+}
+
+#[test]
+fn a_path_that_becomes_slower_by_two_seconds_is_not_silent() {
+    let slower = |_, ms: u64| Some(20 + ms.saturating_sub(1000).min(3000) / 3);
+    let seen = session(8000, 0..0, slower);
+    let worst = seen.iter().map(|(link, ..)| *link).max().unwrap();
+    assert!(worst < LinkState::Stale, "{worst:?}");
+    let (_, applied, loss) = seen[seen.len() - 1];
+    assert!(applied > 300, "{applied} updates of 400");
+    assert!(seen.iter().all(|(.., loss)| *loss < 0.01), "{loss}");
+}
+
+#[test]
+fn a_host_that_stands_still_for_two_seconds_finds_its_link_as_it_was() {
+    let seen = session(6000, 1000..3000, |_, _| Some(20));
+    assert!(seen.iter().all(|(link, ..)| *link == LinkState::Fresh));
 }
 
 #[test]

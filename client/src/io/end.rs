@@ -15,7 +15,7 @@ pub enum SessionEnd {
     Stopped,
     /// The slave sent its farewell first.
     SlaveEnded(Ending),
-    /// Nothing arrived from the slave for so long that the hand was released.
+    /// One of the two ways was silent for so long that the hand was released.
     LinkSilent,
     /// A number of the local model was none, and the hand was released.
     ModelBroken,
@@ -49,8 +49,8 @@ impl fmt::Display for SessionEnd {
             Self::SlaveEnded(Ending::Interrupted) => "the slave was asked to end",
             Self::SlaveEnded(Ending::Failed) => "the slave failed: see its own log",
             Self::LinkSilent => {
-                "nothing came from the slave for 1 s and the hand was released: see whether the \
-                 slave and the network are alive, and start again"
+                "for 1 s nothing came from the slave, or nothing that was sent was answered, and the hand \
+                 was released: see whether the slave and the network are alive, and start again"
             }
             Self::ModelBroken => {
                 "a number of the local model was not finite and the hand was released: this is a \

@@ -115,7 +115,7 @@ impl DatagramChannel {
     }
 
     /// For how long one of the two ways has been silent: since a datagram of the other side last arrived (or since the
-    /// beginning), or, beyond what the path takes, since one was sent that has no answer. The longer of the two.
+    /// beginning), or since a new answer was due. The longer of the two.
     pub fn silence(&self, now: Time) -> Duration {
         let since_arrival = now.saturating_since(self.last_arrival());
         since_arrival.max(self.peer.unanswered(now))

@@ -98,6 +98,8 @@ pub struct Peer {
     departures: Departures,
     /// Number of the newest datagram that the other side has answered.
     answered: u32,
+    /// When that answer came.
+    answered_at: Option<Time>,
     window: Window,
     newest: Option<Newest>,
     last_arrival: Option<Time>,
@@ -165,7 +167,9 @@ impl Peer {
             return;
         }
         // a clock that runs faster makes the holding longer than the whole way, and an answer all the same
-        self.answered = self.answered.max(echo.number);
+        if echo.number > self.answered {
+            (self.answered, self.answered_at) = (echo.number, Some(now));
+        }
         let away = now.as_nanos().checked_sub(echo.sent.as_nanos());
         let Some(round_trip) = away.and_then(|away| away.checked_sub(echo.held_ns)) else {
             self.echoes_implausible += 1;
@@ -208,8 +212,11 @@ impl Peer {
         self.their_report
     }
 
-    /// The same as it looks at `now`: what should have been answered by now and was not is missing.
+    /// The same as it looks at `now`: while answers stay away, what should have been answered by now is missing.
     pub fn outgoing_at(&self, now: Time) -> Loss {
+        if self.unanswered(now) < ANSWER_LATE {
+            return self.their_report;
+        }
         let wait = self.path(now) + ANSWER_LATE;
         let due = now
             .as_nanos()
@@ -221,12 +228,13 @@ impl Peer {
         }
     }
 
-    /// How long what this side sends has been without an answer, beyond what the path takes: the age of the oldest datagram
-    /// after the newest that was answered. It grows when the way there is lost although datagrams still come.
+    /// How long an answer has been due and no new one has come. It grows when the way there is lost although datagrams still
+    /// come. Answers that come later and later are answers: a path that becomes slower is not silent.
     pub fn unanswered(&self, now: Time) -> Duration {
-        let since = self.departures.first_after(self.answered);
-        since.map_or(Duration::ZERO, |since| {
-            now.saturating_since(since).saturating_sub(self.path(now))
+        let sent = self.departures.first_after(self.answered);
+        sent.map_or(Duration::ZERO, |sent| {
+            let newest = self.answered_at.unwrap_or_default();
+            now.saturating_since(newest.max(sent + self.path(now)))
         })
     }
 
