@@ -40,7 +40,7 @@ struct State {
     causes: HashMap<Identifier, Cause>,
 }
 
-/// What a cause has said of late.
+/// What a cause has reported of late.
 #[derive(Clone, Copy, Debug)]
 struct Cause {
     /// When its window began.

@@ -16,9 +16,10 @@ use mmt_client::master::Master;
 use mmt_client::operator::Operator;
 use mmt_client::operator::scripted::{Scripted, ScriptedConfig};
 use mmt_shared::channel::datagram_channel::DatagramChannel;
-use mmt_shared::model::geometry::{BoxFootprint, Pose, Twist, Vec2};
+use mmt_shared::fixtures::square_at_rest;
+use mmt_shared::model::geometry::Vec2;
 use mmt_shared::model::local_model::BodyState;
-use mmt_shared::model::params::{ModelParams, ModelState};
+use mmt_shared::model::params::ModelState;
 use mmt_shared::model::settings::Mode;
 use mmt_shared::model::update::{Cause, Update};
 use mmt_shared::time::{TICK, Time};
@@ -38,18 +39,9 @@ impl Haptic {
     fn new(mode: Mode) -> Self {
         let device = DeviceProfile::default();
         let coupling = device.coupling();
-        let params = ModelParams::of_square(0.7, 3.0, 2.06, 0.36, &coupling).unwrap();
-        let footprint = BoxFootprint::square(0.36);
-        let state = ModelState::try_new(
-            params,
-            footprint,
-            Pose::default(),
-            Twist::default(),
-            &coupling,
-        );
         let welcome = Welcome {
             settings: mode.model_settings(coupling),
-            state: state.unwrap(),
+            state: square_at_rest(0.7, 3.0, 2.06, 0.36),
             scheme: Label::clipped("any"),
             program: Label::clipped("bench"),
         };

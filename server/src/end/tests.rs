@@ -2,9 +2,8 @@
 
 use super::*;
 use crate::slave::SlaveConfig;
+use mmt_shared::fixtures::square_at_rest;
 use mmt_shared::model::contact::Coupling;
-use mmt_shared::model::geometry::{BoxFootprint, Pose, Twist};
-use mmt_shared::model::params::{ModelParams, ModelState};
 use mmt_shared::model::sample::HipSample;
 use mmt_shared::model::tool::HandPort;
 use mmt_shared::model::update::Cause;
@@ -13,22 +12,12 @@ use mmt_shared::wire::{DATAGRAM_MAX, SampleBlock};
 const AT: fn(u64) -> Time = Time::from_millis;
 
 fn update(sequence: u32, cause: Cause) -> Update {
-    let coupling = Coupling::for_stiffness(1000.0);
-    let params = ModelParams::of_square(0.7, 3.0, 2.06, 0.4, &coupling).unwrap();
-    let footprint = BoxFootprint::square(0.4);
-    let state = ModelState::try_new(
-        params,
-        footprint,
-        Pose::default(),
-        Twist::default(),
-        &coupling,
-    );
     Update {
         sequence,
         cause,
         answers: AT(1),
         slave_in_contact: true,
-        state: state.unwrap(),
+        state: square_at_rest(0.7, 3.0, 2.06, 0.4),
     }
 }
 

@@ -62,9 +62,12 @@ fn fig5_is_the_same_bytes_again_and_its_samples_say_what_its_rows_say() {
         .arg(&once)
         .output()
         .unwrap();
-    let said = String::from_utf8_lossy(&recomputed.stdout).into_owned();
+    let printed = String::from_utf8_lossy(&recomputed.stdout).into_owned();
     assert!(recomputed.status.success(), "{recomputed:?}");
-    assert!(said.starts_with("77 rows, largest difference"), "{said}");
+    assert!(
+        printed.starts_with("77 rows, largest difference"),
+        "{printed}"
+    );
 
     // and the check can fail
     let sample = once.join("samples/paper-deadband-0-0.1-1.csv");
@@ -116,10 +119,10 @@ fn physics_takes_any_body_and_refuses_what_is_none() {
 
     let refused = mmt(&["physics", "--mass", "-2"], place.path());
     assert_eq!(refused.status.code(), Some(2));
-    let said = String::from_utf8_lossy(&refused.stderr).into_owned();
+    let printed = String::from_utf8_lossy(&refused.stderr).into_owned();
     assert!(
-        said.contains("mass") && said.contains("what to do"),
-        "{said}"
+        printed.contains("mass") && printed.contains("what to do"),
+        "{printed}"
     );
 }
 
@@ -130,6 +133,6 @@ fn a_folder_that_cannot_be_made_is_named() {
     fs::write(&file, "").unwrap();
     let refused = mmt(&["fig6", "--duration", "1s"], &file.join("figures"));
     assert_eq!(refused.status.code(), Some(2));
-    let said = String::from_utf8_lossy(&refused.stderr).into_owned();
-    assert!(said.contains("--out"), "{said}");
+    let printed = String::from_utf8_lossy(&refused.stderr).into_owned();
+    assert!(printed.contains("--out"), "{printed}");
 }
