@@ -57,6 +57,9 @@ pub struct Touch {
     pub penetration: f64,
 }
 
+/// No hand presses deeper than this, m: 50 N at 1000 N/m. What lies deeper after a jump was not pressed.
+pub const DEEPEST_M: f64 = 0.05;
+
 /// The god-object proxy: remembers the face that the HIP entered by.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct GodObject {
@@ -97,6 +100,16 @@ impl GodObject {
         }
         self.touched
             .map(|face| touch(footprint, pose, face, hip_in_object))
+    }
+
+    /// The box was set to another pose. What was touched by the old one stays touched if the HIP is inside the new
+    /// one and at most [`DEEPEST_M`] behind that face; else the memory begins anew.
+    pub fn after_jump(&mut self, footprint: &BoxFootprint, pose: &Pose, hip: Vec2) {
+        let is_inside = footprint.nearest(pose.point_to_object(hip)).1 <= 0.0;
+        let touch = self.touch_at(footprint, pose, hip);
+        if touch.is_some_and(|touch| !is_inside || touch.penetration > DEEPEST_M) {
+            *self = Self::default();
+        }
     }
 
     /// What the HIP touches, if it keeps its face, with the box at another pose. Changes nothing.
@@ -186,6 +199,24 @@ mod tests {
         let touch = follow(&[(-0.3, 0.15), (-0.19, 0.15), (-0.10, 0.19)]).unwrap();
         assert_eq!(touch.face, Face::West);
         assert!((touch.penetration - 0.10).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_box_that_jumped_is_touched_by_its_old_face_only_where_that_is_pressed() {
+        let footprint = BoxFootprint::square(0.4);
+        let touched = |pose: Pose| {
+            let mut god = GodObject::default();
+            for x in [-0.3, -0.197] {
+                god.follow(&footprint, &Pose::default(), Vec2::new(x, 0.0));
+            }
+            let hip = Vec2::new(-0.197, 0.0);
+            god.after_jump(&footprint, &pose, hip);
+            god.follow(&footprint, &pose, hip).map(|touch| touch.face)
+        };
+        assert_eq!(touched(Pose::new(-0.01, 0.0, 0.1)), Some(Face::West));
+        // in front of the opposite face, and just inside of it
+        assert_eq!(touched(Pose::new(-0.4, 0.0, 0.0)), None);
+        assert_eq!(touched(Pose::new(-0.396, 0.0, 0.0)), Some(Face::East));
     }
 
     #[test]

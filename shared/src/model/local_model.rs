@@ -157,6 +157,10 @@ impl LocalModel {
             }
         }
         self.correction.remaining = Default::default();
+        if let Some((_, hip)) = self.previous {
+            let state = &self.body.state;
+            self.body.god.after_jump(&state.footprint, &state.pose, hip);
+        }
     }
 
     /// Compares at the stamp that the update answers; the ticks bleed the difference in.
@@ -267,6 +271,8 @@ impl LocalModel {
             correction.bleed(pose, touch.as_ref(), &settings.coupling, rates);
             if touch.is_none() {
                 body.keep_off(hip, gap, correction);
+                body.god
+                    .after_jump(&body.state.footprint, &body.state.pose, hip);
             }
         });
     }

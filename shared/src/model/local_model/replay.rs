@@ -5,7 +5,7 @@
 //! then on it takes each new sample as well. What it is away from the box that is felt is what remains to
 //! be corrected. It must never touch the box that is felt, and never take longer in a tick than its share.
 
-use super::body::Body;
+use super::body::{Body, BodyState};
 use crate::model::geometry::Pose;
 use crate::model::history::History;
 use crate::model::params::ModelState;
@@ -76,10 +76,9 @@ impl Replay {
         let Some(then) = history.nearest(update.answers) else {
             return;
         };
-        self.body = Body {
-            state: update.state.into(),
-            god: then.god,
-        };
+        let (state, mut god) = (BodyState::from(update.state), then.god);
+        god.after_jump(&state.footprint, &state.pose, then.hip);
+        self.body = Body { state, god };
         self.progress = Progress::Behind(then.stamp);
     }
 
