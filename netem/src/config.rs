@@ -6,6 +6,7 @@ use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 
+mod cross;
 mod delay;
 mod loss;
 mod probability;
@@ -16,6 +17,7 @@ mod slot;
 #[cfg(test)]
 mod tests;
 
+pub use cross::Cross;
 pub use delay::{Correlation, Delay, Order, Reorder, Shape, TAU_MIN};
 pub use loss::{BURST_MIN, FourState, GilbertElliott, Loss, Outage, PacketList, TimedBursts};
 pub use probability::{Chance, Probability};
@@ -28,6 +30,8 @@ use crate::trace::path::Replay;
 
 /// The most steps of a profile, and the most outages of a link.
 pub const STEPS_MAX: usize = 1000;
+/// The most links in a chain.
+pub const LINKS_MAX: usize = 8;
 /// The largest limit in packets.
 pub const LIMIT_MAX: u32 = 1_000_000;
 /// The largest limit in bytes: 1 TiB.
@@ -67,6 +71,8 @@ pub struct LinkConfig {
     pub rate: Option<Rate>,
     /// What may wait before the bottleneck; without a rate nothing ever waits.
     pub queue: Queue,
+    /// Packets of others before the same bottleneck.
+    pub cross: Option<Cross>,
     /// What may be in flight; one packet more is dropped ([`crate::DropCause::Limit`]).
     pub limit: Limit,
     /// A recorded path that stands in the place of `delay` and `loss`.
@@ -75,6 +81,8 @@ pub struct LinkConfig {
     pub seed: Option<u64>,
     /// What changes as time goes by.
     pub profile: Profile,
+    /// The link behind this one.
+    pub then: Option<Box<LinkConfig>>,
 }
 
 /// What may be in flight on a link.
@@ -114,7 +122,7 @@ pub struct Step {
     /// How long the way there takes from `at` on: delay, jitter, independent loss and constant rate go
     /// evenly, in 32 parts; everything else changes at its end. Zero: at once.
     pub ramp: Duration,
-    /// The settings, without a profile of their own.
+    /// The settings, without a profile and without a link behind them.
     pub settings: LinkConfig,
 }
 
@@ -124,6 +132,21 @@ impl LinkConfig {
     /// The limit counts packets in flight; without delay there are none.
     #[must_use]
     pub fn is_transparent(&self) -> bool {
+        self.links().all(Self::is_transparent_itself)
+    }
+
+    /// The links of the chain that begins here, in order; mostly one.
+    pub(crate) fn links(&self) -> impl Iterator<Item = &Self> {
+        std::iter::successors(Some(self), |link| link.then.as_deref())
+    }
+
+    /// Whether others send through this link, the first of its chain, at any time.
+    pub(crate) fn has_cross_traffic(&self) -> bool {
+        let steps = &mut self.profile.steps.iter();
+        self.cross.is_some() || steps.any(|step| step.settings.cross.is_some())
+    }
+
+    fn is_transparent_itself(&self) -> bool {
         self.delay.is_zero()
             && self.slot.is_none()
             && self.loss.never()
@@ -140,6 +163,10 @@ impl LinkConfig {
     /// for one with tails. What a play-out buffer has to take. The queue's wait is not in it.
     #[must_use]
     pub fn jitter_span(&self) -> Duration {
+        self.links().map(Self::own_jitter_span).sum()
+    }
+
+    fn own_jitter_span(&self) -> Duration {
         let own = match &self.replay {
             Some(replay) => replay.path.span(),
             None => self.delay.span(),
@@ -148,7 +175,7 @@ impl LinkConfig {
         let own = own.saturating_add(turn);
         let later = self.profile.steps.iter();
         later
-            .map(|step| step.settings.jitter_span())
+            .map(|step| step.settings.own_jitter_span())
             .fold(own, Duration::max)
     }
 }

@@ -63,6 +63,19 @@ impl Drops {
         tally.count(bytes);
     }
 
+    /// The sum of two counts.
+    #[must_use]
+    pub fn plus(self, other: Self) -> Self {
+        Self {
+            loss: self.loss.plus(other.loss),
+            outage: self.outage.plus(other.outage),
+            mtu: self.mtu.plus(other.mtu),
+            queue: self.queue.plus(other.queue),
+            codel: self.codel.plus(other.codel),
+            limit: self.limit.plus(other.limit),
+        }
+    }
+
     /// The count of one cause.
     #[must_use]
     pub fn of(&self, cause: DropCause) -> Tally {
@@ -101,4 +114,38 @@ pub struct LinkCounters {
     pub marked: Tally,
     /// Packets and copies that the link dropped.
     pub dropped: Drops,
+    /// Cross traffic, which is in no other count.
+    pub cross: CrossCounters,
+}
+
+/// What became of the packets of others before the bottleneck, as far as it mattered to a packet so far:
+/// offered = sent + dropped + those that wait.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct CrossCounters {
+    /// Packets that came.
+    pub offered: Tally,
+    /// Those that the bottleneck sent.
+    pub sent: Tally,
+    /// Those that found no room, or that `CoDel` dropped.
+    pub dropped: Tally,
+}
+
+impl LinkCounters {
+    /// The counts of this link and the one behind it, as those of one link.
+    #[must_use]
+    pub fn followed_by(self, next: Self) -> Self {
+        Self {
+            offered: self.offered,
+            duplicated: self.duplicated.plus(next.duplicated),
+            delivered: next.delivered,
+            corrupted: next.corrupted,
+            marked: next.marked,
+            dropped: self.dropped.plus(next.dropped),
+            cross: CrossCounters {
+                offered: self.cross.offered.plus(next.cross.offered),
+                sent: self.cross.sent.plus(next.cross.sent),
+                dropped: self.cross.dropped.plus(next.cross.dropped),
+            },
+        }
+    }
 }

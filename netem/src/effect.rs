@@ -80,21 +80,17 @@ impl LinkConfig {
         let stream = Stream::through(self, offers)?;
         let mean_ms = mean(&stream.delays_ms);
         // a wait is only that of the order where nothing else waits
-        let in_order = self.order == Order::Fifo && self.profile.steps.is_empty();
+        let waits_in_order =
+            |link: &Self| link.order == Order::Fifo && link.profile.steps.is_empty();
+        let in_order = self.links().all(waits_in_order);
         let free_mean_ms = if in_order && self.jitter_span() > Duration::ZERO {
-            let unordered = LinkConfig {
-                order: Order::Free,
-                ..self.clone()
-            };
-            mean(&Stream::through(&unordered, offers)?.delays_ms)
+            mean(&Stream::through(&self.unordered(), offers)?.delays_ms)
         } else {
             mean_ms
         };
         let of_all = |packets: u64| packets as f64 / offers.packets.len().max(1) as f64;
-        let only_the_model = self.only_the_model();
-        let known = self.loss.share().filter(|_| only_the_model);
         let known_burst = self.loss.mean_burst(offers.rate_hz);
-        let known_burst = known_burst.filter(|_| only_the_model);
+        let known_burst = known_burst.filter(|_| self.only_the_model() && self.then.is_none());
         let drops = &stream.drops;
         let sampled = drops.loss.plus(drops.outage).plus(drops.mtu).packets;
         let lengths = offers.packets.iter().map(|(_, bytes)| *bytes as f64);
@@ -105,7 +101,7 @@ impl LinkConfig {
             sd_ms: standard_deviation(&stream.delays_ms, mean_ms),
             p99_ms: p99(&stream.delays_ms),
             waiting_ms: (mean_ms - free_mean_ms).max(0.0) + 0.0,
-            loss: known.unwrap_or(of_all(sampled)),
+            loss: self.known_loss().unwrap_or(of_all(sampled)),
             burst_packets: known_burst.unwrap_or_else(|| mean_run(&offers.runs(&stream.lost))),
             queue_drops: of_all(drops.queue.plus(drops.codel).packets),
             over_limit: of_all(drops.limit.packets),
@@ -114,7 +110,25 @@ impl LinkConfig {
         })
     }
 
-    /// Whether nothing but the loss model loses packets.
+    /// The share that is lost in the long run, 0 to 1, where the settings have a formula for it.
+    fn known_loss(&self) -> Option<f64> {
+        let own = self.loss.share().filter(|_| self.only_the_model())?;
+        match &self.then {
+            Some(then) => Some(1.0 - (1.0 - own) * (1.0 - then.known_loss()?)),
+            None => Some(own),
+        }
+    }
+
+    /// The same, but that jitter may reorder.
+    fn unordered(&self) -> Self {
+        Self {
+            order: Order::Free,
+            then: self.then.as_ref().map(|then| Box::new(then.unordered())),
+            ..self.clone()
+        }
+    }
+
+    /// Whether nothing but the loss model loses packets on this link.
     fn only_the_model(&self) -> bool {
         self.outages.is_empty()
             && self.mtu.is_none()
@@ -125,6 +139,10 @@ impl LinkConfig {
 
     /// After how long all that these settings name has come once; zero where nothing changes with time.
     fn period(&self) -> Duration {
+        self.links().map(Self::own_period).max().unwrap_or_default()
+    }
+
+    fn own_period(&self) -> Duration {
         let outage = |outage: &Outage| {
             let once = outage.at.saturating_add(outage.length.saturating_mul(2));
             outage.every.map_or(once, |every| outage.at + every)
@@ -141,7 +159,7 @@ impl LinkConfig {
             trace,
             self.profile.repeat.or(end),
         ];
-        let of_steps = steps.iter().map(|step| step.settings.period());
+        let of_steps = steps.iter().map(|step| step.settings.own_period());
         own.into_iter()
             .flatten()
             .chain(of_steps)
@@ -172,7 +190,9 @@ impl Stream {
             lost: vec![false; offers.packets.len()],
         };
         let mut newest = 0;
-        let ecn_capable = config.ecn || config.profile.steps.iter().any(|step| step.settings.ecn);
+        let marks =
+            |link: &LinkConfig| link.ecn || link.profile.steps.iter().any(|step| step.settings.ecn);
+        let ecn_capable = config.links().any(marks);
         for (now, bytes) in &offers.packets {
             stream.collect(&mut link, *now, &mut newest);
             let packet = Packet {

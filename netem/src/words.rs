@@ -19,12 +19,12 @@ mod tests;
 
 pub use error::{ParseError, Reason};
 
-use crate::config::{LinkConfig, Profile, STEPS_MAX, Shape, Step};
+use crate::config::{LINKS_MAX, LinkConfig, Profile, STEPS_MAX, Shape, Step};
 use draft::Draft;
 use number::time;
 
 const A_WORD: &str = "delay, loss, outage, order, reorder, duplicate, corrupt, mtu, rate, queue, codel, \
-                      slot, ecn, limit, trace, seed, preset or none";
+                      cross, slot, ecn, limit, trace, seed, preset or none";
 
 /// The distributions by name, but for tables.
 const SHAPES: [(&str, Shape); 6] = [
@@ -97,6 +97,8 @@ impl Word<'_> {
 struct Parser<'a, 'r> {
     words: Peekable<std::vec::IntoIter<Word<'a>>>,
     end: Word<'a>,
+    /// The links of the chain begun so far.
+    links: usize,
     read: &'r mut ReadFile<'r>,
 }
 
@@ -109,6 +111,7 @@ impl<'a, 'r> Parser<'a, 'r> {
         Self {
             words: split(text).into_iter().peekable(),
             end,
+            links: 0,
             read,
         }
     }
@@ -128,13 +131,16 @@ impl<'a, 'r> Parser<'a, 'r> {
         self.words.next_if(|word| word.text == text).is_some()
     }
 
-    /// Everything: settings, and what changes later.
+    /// Everything: settings, what changes later, and the links behind.
     fn link(&mut self) -> Result<LinkConfig, ParseError> {
+        self.links += 1;
         let mut config = self.settings()?;
         let mut profile = Profile::default();
         while let Some(semicolon) = self.words.next() {
             let word = self.argument();
             match word.text {
+                "then" if self.links < LINKS_MAX => config.then = Some(Box::new(self.link()?)),
+                "then" => return Err(word.expected("8 links in a chain at most")),
                 "at" if profile.repeat.is_none() && profile.steps.len() < STEPS_MAX => {
                     self.step(&mut profile)?;
                 }
@@ -142,10 +148,14 @@ impl<'a, 'r> Parser<'a, 'r> {
                     profile.repeat = Some(self.loop_time(&profile)?);
                 }
                 _ if profile.repeat.is_some() => {
-                    return Err(semicolon.expected("nothing after the loop"));
+                    return Err(semicolon.expected("nothing after the loop but `then`"));
                 }
                 "loop" => return Err(word.expected("at TIME before a loop")),
-                _ => return Err(word.expected("at TIME and settings, or loop TIME")),
+                _ => {
+                    return Err(
+                        word.expected("at TIME and settings, loop TIME, or then and a link")
+                    );
+                }
             }
         }
         config.profile = profile;

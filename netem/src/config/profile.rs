@@ -14,6 +14,7 @@ impl Profile {
     pub(crate) fn stretches(&self, base: &LinkConfig) -> Vec<(Duration, LinkConfig)> {
         let base = LinkConfig {
             profile: Self::default(),
+            then: None,
             ..base.clone()
         };
         let mut stretches = vec![(Duration::ZERO, base.clone())];

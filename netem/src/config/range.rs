@@ -3,7 +3,8 @@
 use std::time::Duration;
 
 use super::{
-    DELAY_MAX, LIMIT_MAX, LIMIT_MAX_BYTES, LinkConfig, Loss, RATE_MAX_BIT_S, STEPS_MAX, Service,
+    DELAY_MAX, LIMIT_MAX, LIMIT_MAX_BYTES, LINKS_MAX, LinkConfig, Loss, RATE_MAX_BIT_S, STEPS_MAX,
+    Service,
 };
 
 /// A setting of a link out of its range.
@@ -49,6 +50,12 @@ impl LinkConfig {
     /// # Errors
     /// The first setting out of its range, with the range.
     pub fn check(&self) -> Result<(), ConfigError> {
+        let links = self.links().count() <= LINKS_MAX;
+        holds(links, "the links in a chain", "8 at most")?;
+        self.links().try_for_each(Self::check_itself)
+    }
+
+    fn check_itself(&self) -> Result<(), ConfigError> {
         self.check_delay()?;
         let limit = self.limit.packets;
         if !(1..=LIMIT_MAX).contains(&limit) {
@@ -105,6 +112,12 @@ impl LinkConfig {
 
     fn check_bottleneck(&self) -> Result<(), ConfigError> {
         holds(self.mtu != Some(0), "the MTU", "at least 1 byte")?;
+        let cross = self.cross.is_none_or(|cross| cross.in_range());
+        holds(
+            cross,
+            "the cross traffic",
+            "of 1 to 65535 bytes a packet, at most 1000000 packets/s",
+        )?;
         if let Some(codel) = self.queue.codel {
             let fits = !codel.target.is_zero() && !codel.interval.is_zero();
             holds(fits, "target and interval of CoDel", "above zero")?;
@@ -139,6 +152,11 @@ impl LinkConfig {
                 step.settings.profile.steps.is_empty(),
                 "a step of a profile",
                 "without steps of its own",
+            )?;
+            holds(
+                step.settings.then.is_none(),
+                "a step of a profile",
+                "without a link behind it",
             )?;
             holds(
                 step.settings.seed.is_none(),

@@ -85,24 +85,29 @@ impl Offers {
 
 /// Whether there is a bottleneck at any time.
 fn has_rate(config: &LinkConfig) -> bool {
-    let steps = &mut config.profile.steps.iter();
-    config.rate.is_some() || steps.any(|step| step.settings.rate.is_some())
+    config.links().any(|link| {
+        let steps = &mut link.profile.steps.iter();
+        link.rate.is_some() || steps.any(|step| step.settings.rate.is_some())
+    })
 }
 
 /// How many packets show what these settings do.
 fn sample_size(config: &LinkConfig, rate_hz: f64) -> u32 {
     // a thousand times the time over which delays hang together, and a whole trace with its queue
-    let together = match config.correlation {
+    let together = config.links().map(|link| match link.correlation {
         Correlation::InTime(tau) => tau.saturating_mul(1000),
         Correlation::None | Correlation::PerPacket(_) => Duration::ZERO,
-    };
+    });
+    let together = together.max().unwrap_or_default();
     let whole = if has_rate(config) {
         config.period()
     } else {
         Duration::ZERO
     };
     let needed = together.max(whole).as_secs_f64() * rate_hz;
-    let sampled_bursts = matches!(config.loss, Loss::Bursts(_)) && !config.only_the_model();
+    let by_formula = config.then.is_none() && config.only_the_model();
+    let bursts = |link: &LinkConfig| matches!(link.loss, Loss::Bursts(_));
+    let sampled_bursts = config.links().any(bursts) && !by_formula;
     let needed = if sampled_bursts {
         needed.max(f64::from(PACKETS_MAX))
     } else {

@@ -151,6 +151,27 @@ fn the_sizes_of_the_packets_count_and_so_do_their_times() {
 }
 
 #[test]
+fn the_effect_of_a_chain_is_that_of_all_its_links() {
+    let effect = at_1_khz("delay 20ms loss 10%; then delay 30ms loss 20%");
+    assert!((effect.mean_ms - 50.0).abs() < 1e-6, "{effect}");
+    assert!((effect.loss - 0.28).abs() < 1e-12, "{effect}");
+    assert!((effect.burst_packets - 1.0 / 0.72).abs() < 0.02, "{effect}");
+    // without a formula it is sampled
+    let effect = at_1_khz("loss 10%; then outage 1s for 1s every 2s");
+    assert!((effect.loss - 0.55).abs() < 0.01, "{effect}");
+    // a queue sends in the order in which packets come to it
+    let effect = at_1_khz("delay 20ms 5ms order free; then rate 100mbit");
+    assert!(effect.reordered > 0.1, "{effect}");
+    let fifo = at_1_khz("delay 20ms 5ms; then delay 20ms 5ms");
+    let free = at_1_khz("delay 20ms 5ms order free; then delay 20ms 5ms order free");
+    assert_eq!(fifo.reordered, 0.0);
+    assert!((fifo.mean_ms - fifo.waiting_ms - free.mean_ms).abs() < 1e-9);
+    // half as much again as the second bottleneck sends: all lose, but not all alike
+    let effect = at_1_khz("delay 5ms; then rate 1600kbit queue 20p cross 1600kbit poisson 100");
+    assert!((0.15..0.35).contains(&effect.queue_drops), "{effect}");
+}
+
+#[test]
 fn a_whole_trace_shows_and_no_stream_keeps_step_with_it() {
     use crate::trace::Sample;
     use crate::trace::path::{PathTrace, Replay};

@@ -6,13 +6,18 @@ use mmt_shared::time::Time;
 
 use crate::packet::Departure;
 
-/// A departure ordered by its time, then by number of offer, a copy last.
+/// A departure ordered by its time, then by its place among the packets of this link, a copy last.
 #[derive(Clone, Debug)]
-pub(super) struct ByTime<T>(pub(super) Departure<T>);
+pub(super) struct ByTime<T> {
+    pub(super) departure: Departure<T>,
+    pub(super) place: u64,
+    /// Whether its sender takes a mark for a loss: a link behind this one has to know.
+    pub(super) ecn_capable: bool,
+}
 
 impl<T> ByTime<T> {
     fn key(&self) -> (Time, u64, bool) {
-        (self.0.due, self.0.number, self.0.copy)
+        (self.departure.due, self.place, self.departure.copy)
     }
 }
 

@@ -6,9 +6,10 @@ use std::time::Duration;
 
 use mmt_shared::time::Time;
 
-use super::bottleneck::{Bottleneck, ROOM, Sent};
+use super::bottleneck::{Bottleneck, ROOM};
 use super::by_time::ByTime;
 use super::correlated::ByPacket;
+use super::cross::Arrivals;
 use super::loss_model::LossModel;
 use super::propagation::{Propagation, Way};
 use super::streams::{Streams, substream};
@@ -18,6 +19,8 @@ use crate::counters::LinkCounters;
 use crate::direction::LinkId;
 use crate::packet::{Departure, DropCause, Fate, Packet};
 
+mod queueing;
+
 /// The packets on a link, the states of its stages, and the counts.
 #[derive(Clone, Debug)]
 pub(super) struct Stages<T> {
@@ -25,7 +28,10 @@ pub(super) struct Stages<T> {
     loss: LossModel,
     duplicating: ByPacket,
     corrupting: ByPacket,
-    bottleneck: Bottleneck<Transit<T>>,
+    arrivals: Arrivals,
+    bottleneck: Bottleneck<Before<T>>,
+    /// Packets before it without the cross traffic.
+    waiting: usize,
     propagation: Propagation,
     /// What leaves at a known time, and what was dropped.
     out: BinaryHeap<Reverse<ByTime<T>>>,
@@ -38,10 +44,20 @@ pub(super) struct Stages<T> {
 #[derive(Clone, Debug)]
 struct Transit<T> {
     departure: Departure<T>,
+    /// The how-manieth packet of this link it is; a link behind another one counts what comes to it.
+    place: u64,
     ecn_capable: bool,
     /// The delay of the recorded path.
     replayed: Option<Duration>,
     way: Way,
+}
+
+/// What stands before the bottleneck.
+#[derive(Clone, Debug)]
+enum Before<T> {
+    Packet(Transit<T>),
+    /// A packet of the cross traffic, of so many bytes.
+    Cross(usize),
 }
 
 /// What chance does to a packet, or to its copy.
@@ -61,7 +77,9 @@ impl<T> Stages<T> {
             loss: LossModel::new(bursts),
             duplicating: ByPacket::default(),
             corrupting: ByPacket::default(),
+            arrivals: Arrivals::new(seed, id),
             bottleneck: Bottleneck::new(limit),
+            waiting: 0,
             propagation: Propagation::new(seed, id),
             out: BinaryHeap::with_capacity(ROOM.min(limit as usize)),
             in_flight: 0,
@@ -70,21 +88,16 @@ impl<T> Stages<T> {
         }
     }
 
-    /// Takes in a packet, and perhaps makes a copy of it.
-    pub(super) fn offer(&mut self, timeline: &Timeline, at: Time, packet: Packet<T>)
+    /// Takes in a packet that finds `backlog` others on the way, and perhaps makes a copy of it.
+    pub(super) fn offer(&mut self, timeline: &Timeline, at: Time, packet: Packet<T>, backlog: usize)
     where
         T: Clone,
     {
-        let now = timeline.elapsed(at);
-        self.advance(timeline, now);
-        let settings = timeline.at(now);
-        let marks = settings.ecn && packet.ecn_capable;
-        let (chances, of_copy) = self.draw(settings, now, packet.bytes, marks);
         let departure = Departure {
             number: self.counters.offered.packets,
             offered_at: at,
             bytes: packet.bytes,
-            backlog: u32::try_from(self.in_flight).unwrap_or(u32::MAX),
+            backlog: u32::try_from(backlog).unwrap_or(u32::MAX),
             copy: false,
             due: at,
             queued: Duration::ZERO,
@@ -94,18 +107,42 @@ impl<T> Stages<T> {
             },
             payload: packet.payload,
         };
-        self.counters.offered.count(packet.bytes);
+        self.take_in(timeline, departure, packet.ecn_capable);
+    }
+
+    /// Takes in what left the link before this one. What that link dropped is only handed on.
+    pub(super) fn follow(&mut self, timeline: &Timeline, before: ByTime<T>)
+    where
+        T: Clone,
+    {
+        match before.departure.fate {
+            Fate::Dropped(cause) => self.report(timeline, before.place, before.departure, cause),
+            Fate::Delivered { .. } => self.take_in(timeline, before.departure, before.ecn_capable),
+        }
+    }
+
+    /// Takes in a packet at the time when it is due here.
+    fn take_in(&mut self, timeline: &Timeline, departure: Departure<T>, ecn_capable: bool)
+    where
+        T: Clone,
+    {
+        let (now, bytes) = (timeline.elapsed(departure.due), departure.bytes);
+        while self.goes_on(timeline, now) {}
+        let settings = timeline.at(now);
+        let (chances, of_copy) = self.draw(settings, now, bytes, settings.ecn && ecn_capable);
         let itself = Transit {
             departure,
-            ecn_capable: packet.ecn_capable,
+            place: self.counters.offered.packets,
+            ecn_capable,
             replayed: None,
             way: chances.way,
         };
+        self.counters.offered.count(bytes);
         let copy = of_copy.map(|chances| (itself.clone(), chances));
         self.admit(timeline, now, itself, chances);
         if let Some((mut copy, chances)) = copy {
             copy.departure.copy = true;
-            self.counters.duplicated.count(packet.bytes);
+            self.counters.duplicated.count(bytes);
             self.admit(timeline, now, copy, chances);
         }
     }
@@ -163,10 +200,15 @@ impl<T> Stages<T> {
     ) {
         let (settings, bytes) = (timeline.at(now), packet.departure.bytes);
         packet.way = chances.way;
-        packet.departure.fate = Fate::Delivered {
-            corrupted_bit: chances.corrupted_bit,
-            marked: chances.marked,
-        };
+        if let Fate::Delivered {
+            corrupted_bit,
+            marked,
+        } = &mut packet.departure.fate
+        {
+            // one bit at most is turned over, by whichever link of a chain does so first
+            *corrupted_bit = corrupted_bit.or(chances.corrupted_bit);
+            *marked |= chances.marked;
+        }
         let passes = self
             .survives(settings, now, &mut packet, chances.lost)
             .and_then(|()| self.finds_room(timeline, now, bytes));
@@ -175,13 +217,15 @@ impl<T> Stages<T> {
                 self.in_flight = self.in_flight.saturating_add(1);
                 self.bytes_in_flight = self.bytes_in_flight.saturating_add(bytes as u64);
                 let ecn_capable = packet.ecn_capable;
-                self.bottleneck.push(packet, weight, ecn_capable, now);
+                self.waiting = self.waiting.saturating_add(1);
+                self.bottleneck
+                    .push(Before::Packet(packet), weight, ecn_capable, now);
                 self.advance(timeline, now);
             }
             Err(cause) => {
                 self.counters.dropped.count(cause, bytes);
                 if !packet.departure.copy {
-                    self.report(timeline, packet.departure, cause);
+                    self.report(timeline, packet.place, packet.departure, cause);
                 }
             }
         }
@@ -216,82 +260,36 @@ impl<T> Stages<T> {
         Err(dropped)
     }
 
-    /// The weight of a packet before the bottleneck, bytes, if it finds room on the link.
-    fn finds_room(
+    /// Puts a drop among what is polled. Who never polls gets the first ones only, as many as the limit.
+    fn report(
         &mut self,
         timeline: &Timeline,
-        now: Duration,
-        bytes: usize,
-    ) -> Result<u64, DropCause> {
-        let settings = timeline.at(now);
-        let held = self.bytes_in_flight.saturating_add(bytes as u64);
-        if self.in_flight >= settings.limit.packets as usize || held > settings.limit.bytes {
-            return Err(DropCause::Limit);
-        }
-        let Some(rate) = &settings.rate else {
-            return Ok(0);
-        };
-        let (queue, weight) = (&settings.queue, rate.framing.weight(bytes));
-        while self.bottleneck.is_full(rate, queue, now, weight) {
-            let victim = queue.drop_head.then(|| self.bottleneck.drop_head(now));
-            let victim = victim.flatten().ok_or(DropCause::Queue)?;
-            self.pass_on(timeline, victim);
-        }
-        Ok(weight)
-    }
-
-    /// Lets everything happen that happens by `now`.
-    fn advance(&mut self, timeline: &Timeline, now: Duration) {
-        while let Some(sent) = self.bottleneck.poll(timeline, now) {
-            self.pass_on(timeline, sent);
-        }
-    }
-
-    /// Sends on what left the bottleneck.
-    fn pass_on(&mut self, timeline: &Timeline, sent: Sent<Transit<T>>) {
-        let Transit {
-            mut departure,
-            replayed,
-            way,
-            ..
-        } = sent.packet;
-        departure.queued = sent.queued;
-        departure.due = timeline.time(sent.at);
-        if let Some(cause) = sent.dropped {
-            self.forget(departure.bytes);
-            self.counters.dropped.count(cause, departure.bytes);
-            if !departure.copy {
-                self.report(timeline, departure, cause);
-            }
-            return;
-        }
-        if let Fate::Delivered { marked, .. } = &mut departure.fate {
-            *marked |= sent.marked;
-        }
-        let settings = timeline.at(sent.at);
-        let leaves = self
-            .propagation
-            .leave(settings, sent.at, departure.bytes, replayed, way);
-        departure.due = timeline.time(leaves);
-        self.out.push(Reverse(ByTime(departure)));
-    }
-
-    /// Puts a drop among what is polled. Who never polls gets the first ones only, as many as the limit.
-    fn report(&mut self, timeline: &Timeline, mut departure: Departure<T>, cause: DropCause) {
+        place: u64,
+        mut departure: Departure<T>,
+        cause: DropCause,
+    ) {
         departure.fate = Fate::Dropped(cause);
-        let held = self.out.len().saturating_add(self.bottleneck.len());
+        let held = self.out.len().saturating_add(self.waiting);
         if held.saturating_sub(self.in_flight) < timeline.config.limit.packets as usize {
-            self.out.push(Reverse(ByTime(departure)));
+            self.out.push(Reverse(ByTime {
+                departure,
+                place,
+                ecn_capable: false,
+            }));
         }
     }
 
-    pub(super) fn poll(&mut self, timeline: &Timeline, now: Time) -> Option<Departure<T>> {
+    /// When the next packet leaves, or left, by `now`.
+    pub(super) fn next_due(&mut self, timeline: &Timeline, now: Time) -> Option<Time> {
         self.advance(timeline, timeline.elapsed(now));
         let Reverse(next) = self.out.peek()?;
-        if next.0.due > now {
-            return None;
-        }
-        let Reverse(ByTime(departure)) = self.out.pop()?;
+        Some(next.departure.due).filter(|due| *due <= now)
+    }
+
+    pub(super) fn poll(&mut self, timeline: &Timeline, now: Time) -> Option<ByTime<T>> {
+        self.next_due(timeline, now)?;
+        let Reverse(next) = self.out.pop()?;
+        let departure = &next.departure;
         if let Fate::Delivered { marked, .. } = departure.fate {
             self.forget(departure.bytes);
             self.counters.delivered.count(departure.bytes);
@@ -302,7 +300,7 @@ impl<T> Stages<T> {
                 self.counters.marked.count(departure.bytes);
             }
         }
-        Some(departure)
+        Some(next)
     }
 
     /// A packet is on the link no more.
@@ -312,16 +310,17 @@ impl<T> Stages<T> {
     }
 
     pub(super) fn next_event(&self, timeline: &Timeline) -> Option<Time> {
-        let next = self.bottleneck.next_event(timeline);
-        let next = next.map(|next| timeline.time(next));
-        let out = self.out.peek().map(|Reverse(next)| next.0.due);
+        let waits = (self.waiting > 0).then(|| self.bottleneck.next_event(timeline));
+        let next = waits.flatten().map(|next| timeline.time(next));
+        let out = self.out.peek().map(|Reverse(next)| next.departure.due);
         next.into_iter().chain(out).min()
     }
 
     /// Carries everything on to `at`, from when on other settings are in force.
     pub(super) fn settle(&mut self, timeline: &Timeline, at: Time) {
         let now = timeline.elapsed(at);
-        self.advance(timeline, now);
+        while self.goes_on(timeline, now) {}
+        self.arrivals.skip_to(now);
         self.bottleneck.change_at(now);
     }
 }

@@ -8,8 +8,10 @@ use crate::direction::Direction;
 use crate::packet::{DropCause, Fate};
 
 mod bottleneck;
+mod chain;
 mod codel_reference;
 mod conservation;
+mod cross;
 mod jitter;
 mod losses;
 mod order;

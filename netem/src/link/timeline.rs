@@ -13,6 +13,8 @@ pub(super) struct Timeline {
     pub(super) config: LinkConfig,
     /// The stretches of constant settings, each with its beginning.
     stretches: Vec<(Duration, LinkConfig)>,
+    /// Whether there is cross traffic at any time.
+    pub(super) crossed: bool,
 }
 
 impl Timeline {
@@ -20,6 +22,7 @@ impl Timeline {
         Self {
             origin,
             stretches: config.profile.stretches(&config),
+            crossed: config.has_cross_traffic(),
             config,
         }
     }

@@ -75,7 +75,8 @@ impl<'a> Draft<'a> {
         if trace.is_some() {
             (self.config.delay, self.config.loss) = (Delay::default(), Loss::default());
         }
-        if let Some(word) = self.seen("queue").or(self.seen("codel"))
+        let before_it = ["queue", "codel", "cross"];
+        if let Some(word) = before_it.into_iter().find_map(|name| self.seen(name))
             && self.config.rate.is_none()
         {
             return Err(word.expected("a rate beside it: without one nothing ever waits"));

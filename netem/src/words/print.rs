@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use super::SHAPES;
 use crate::config::{
-    Chance, Codel, Correlation, Delay, Limit, LinkConfig, Loss, Order, Outage, Probability,
+    Chance, Codel, Correlation, Cross, Delay, Limit, LinkConfig, Loss, Order, Outage, Probability,
     Profile, Queue, Rate, Service, Shape, Slot, SlotGap,
 };
 use crate::distribution::Cdf;
@@ -24,7 +24,11 @@ impl fmt::Display for LinkConfig {
             f.write_str("none")?;
         }
         f.write_str(&sentences.join(" "))?;
-        self.profile.fmt(f)
+        self.profile.fmt(f)?;
+        match &self.then {
+            Some(then) => write!(f, "; then {then}"),
+            None => Ok(()),
+        }
     }
 }
 
@@ -55,6 +59,7 @@ impl LinkConfig {
             self.rate.as_ref().map(rate),
             queue(&self.queue),
             self.queue.codel.map(codel),
+            self.cross.map(cross),
             limit(self.limit),
             self.seed.map(|seed| format!("seed {seed}")),
         ]);
@@ -238,6 +243,11 @@ fn codel(codel: Codel) -> String {
         return "codel".to_owned();
     }
     format!("codel {} {}", Exact(codel.target), Exact(codel.interval))
+}
+
+fn cross(cross: Cross) -> String {
+    let rate = bits(cross.bits_per_second);
+    format!("cross {rate} poisson {}", cross.bytes)
 }
 
 /// A chance in words: its share, and its correlation if it has one.

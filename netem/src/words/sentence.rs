@@ -8,8 +8,8 @@ use super::number::{
 };
 use super::{A_WORD, ParseError, Parser, Reason, SHAPES, Word};
 use crate::config::{
-    Chance, Codel, Correlation, Delay, Framing, LIMIT_MAX, Limit, Order, Probability, Queue, Rate,
-    STEPS_MAX, Service, Shape, Slot, SlotGap, TAU_MIN,
+    Chance, Codel, Correlation, Cross, Delay, Framing, LIMIT_MAX, Limit, Order, Probability, Queue,
+    Rate, STEPS_MAX, Service, Shape, Slot, SlotGap, TAU_MIN,
 };
 use crate::direction::Direction;
 use crate::distribution::{Cdf, Table};
@@ -87,6 +87,7 @@ impl<'a> Parser<'a, '_> {
                 }
             }
             "codel" => config.queue.codel = Some(self.codel()?),
+            "cross" => config.cross = Some(self.cross()?),
             "limit" => config.limit = self.limit()?,
             "trace" => config.replay = Some(self.replay()?),
             "slot" => config.slot = Some(self.slot()?),
@@ -294,6 +295,23 @@ impl<'a> Parser<'a, '_> {
             target: time_from(target, least)?,
             interval: time_from(self.argument(), least)?,
         })
+    }
+
+    fn cross(&mut self) -> Result<Cross, ParseError> {
+        let word = self.argument();
+        let bits_per_second = bits_per_second(word)?;
+        let arrivals = self.argument();
+        if arrivals.text != "poisson" {
+            return Err(arrivals.expected("poisson and the size of a packet"));
+        }
+        let cross = Cross {
+            bits_per_second,
+            bytes: self.count(65_535, "bytes")?,
+        };
+        if !cross.in_range() {
+            return Err(word.expected("a rate of at most 1000000 packets/s"));
+        }
+        Ok(cross)
     }
 
     fn replay(&mut self) -> Result<Replay, ParseError> {

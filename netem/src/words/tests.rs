@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use super::*;
 use crate::config::{
-    Chance, Codel, ConfigError, Correlation, Delay, Framing, GilbertElliott, LIMIT_MAX,
+    Chance, Codel, ConfigError, Correlation, Cross, Delay, Framing, GilbertElliott, LIMIT_MAX,
     LIMIT_MAX_BYTES, Limit, Loss, Order, Outage, PacketList, Probability, Queue, RATE_MAX_BIT_S,
     Rate, Reorder, Service, Slot, SlotGap, TimedBursts,
 };
@@ -204,6 +204,11 @@ fn an_error_tells_the_word_its_column_and_what_was_expected() {
         ),
         ("trace lan.json", 7, "lan.json", "on the command line only"),
         ("delay 5ms é", 11, "é", "delay, loss"),
+        ("cross 2mbit poisson 1200", 1, "cross", "a rate beside it"),
+        ("rate 9mbit cross 2mbit 1200", 24, "1200", "poisson"),
+        ("rate 9mbit cross 2gbit poisson 1", 18, "2gbit", "packets/s"),
+        ("delay 5ms; than loss 1%", 12, "than", "then and a link"),
+        ("at 5s; loop 5s", 1, "at", "delay, loss"),
     ] {
         let error = refused(text);
         assert_eq!(
@@ -249,9 +254,37 @@ fn settings_print_in_the_words_they_are_written_in() {
         "rate 1mbit queue 100p drop-head codel",
         "delay 20ms; at 10s over 5s delay 80ms loss 2%; at 20s none; loop 30s",
         "loss 100%",
+        "rate 10mbit 28 queue 100p cross 2mbit poisson 1200",
+        "delay 5ms loss 1%; then rate 10mbit; then none",
+        "delay 20ms; at 10s delay 80ms; loop 30s; then delay 5ms; at 1s loss 2%",
     ] {
         assert_eq!(parsed(text).to_string(), text);
     }
+}
+
+#[test]
+fn a_chain_has_eight_links_at_most_and_a_preset_can_be_any_of_them() {
+    let chain = |links: usize| vec!["delay 1ms"; links].join("; then ");
+    assert_eq!(parsed(&chain(8)).links().count(), 8);
+    let error = refused(&chain(9));
+    assert_eq!(error.word, "then");
+    assert!(error.to_string().contains("8 links"), "{error}");
+    let chain = parsed("preset lan; then preset geo loss 1%");
+    let then = chain.then.as_deref();
+    assert_eq!(then, Some(&parsed("preset geo loss 1%")));
+    assert_eq!(
+        LinkConfig {
+            then: None,
+            ..chain
+        },
+        parsed("preset lan")
+    );
+    assert!(parsed("none; then none").is_transparent());
+    assert!(!parsed("none; then delay 1ms").is_transparent());
+    assert_eq!(
+        parsed("delay 5ms 1ms; then delay 9ms 2ms").jitter_span(),
+        6 * MS
+    );
 }
 
 #[test]

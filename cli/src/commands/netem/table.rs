@@ -11,7 +11,7 @@ use super::{DEGRADED, NetemReport};
 pub(super) type Count = fn(&DirectionCounters) -> Tally;
 
 /// The rows; those below the first two are left out while they are zero.
-pub(super) const ROWS: [(&str, Count); 14] = [
+pub(super) const ROWS: [(&str, Count); 16] = [
     ("offered", |direction| direction.link.offered),
     ("sent on", |direction| direction.sent),
     ("lost on the link", |direction| direction.link.dropped.loss),
@@ -28,6 +28,8 @@ pub(super) const ROWS: [(&str, Count); 14] = [
     ("socket full", |direction| direction.blocked),
     ("socket error", |direction| direction.failed),
     ("client forgotten", |direction| direction.abandoned),
+    ("cross, sent", |direction| direction.link.cross.sent),
+    ("cross, dropped", |direction| direction.link.cross.dropped),
 ];
 /// Rows that are always there.
 pub(super) const ALWAYS: usize = 2;

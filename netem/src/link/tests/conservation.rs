@@ -83,7 +83,7 @@ fn a_link_that_nobody_polls_stays_small_and_counts_all() {
     assert_eq!(std::iter::from_fn(|| link.poll(Time::MAX)).count(), 10);
 }
 
-const WORDS: [&str; 8] = [
+const WORDS: [&str; 12] = [
     "none",
     "delay 5ms",
     "delay 5ms 4ms order free loss 10%",
@@ -92,6 +92,10 @@ const WORDS: [&str; 8] = [
     "rate 4mbit queue 3p delay 1ms duplicate 20%",
     "rate 2mbit 28 queue 9ms drop-head loss 5% corrupt 50%",
     "rate 3mbit codel 1ms 5ms limit 20; at 20ms over 9ms rate 9mbit codel; at 50ms none; loop 60ms",
+    "rate 2mbit queue 5p cross 1mbit poisson 300 delay 1ms loss 5%",
+    "rate 2mbit queue 9ms drop-head codel 1ms 5ms cross 3mbit poisson 900; at 20ms rate 9mbit; loop 60ms",
+    "delay 5ms 4ms order free loss 10% duplicate 20%; then rate 4mbit queue 3p; then delay 2ms 1ms loss 10%",
+    "rate 3mbit cross 1mbit poisson 300; at 20ms none; then duplicate 30% rate 2mbit queue 5p drop-head",
 ];
 
 proptest! {

@@ -177,8 +177,17 @@ fn any_settings() -> impl Strategy<Value = LinkConfig> {
     let bytes = prop_oneof![Just(Limit::default().bytes), 1..=LIMIT_MAX_BYTES];
     let limit = (1..=LIMIT_MAX, bytes).prop_map(|(packets, bytes)| Limit { packets, bytes });
     let second = (any_chance(), any_chance(), mtu, any_rate(), limit);
-    let third = (prop::option::of(any_slot()), any::<bool>());
-    (first, second, third).prop_map(|(first, second, (slot, ecn))| {
+    let cross = (1..=8_000_000_u64, 1..=65_535_u32);
+    let cross = cross.prop_map(|(bits_per_second, bytes)| Cross {
+        bits_per_second,
+        bytes,
+    });
+    let third = (
+        prop::option::of(any_slot()),
+        any::<bool>(),
+        prop::option::of(cross),
+    );
+    (first, second, third).prop_map(|(first, second, (slot, ecn, cross))| {
         let ((delay, correlation), order, reorder, loss, outages) = first;
         let (duplicate, corrupt, mtu, (rate, queue), limit) = second;
         let movable = delay != Delay::default();
@@ -200,6 +209,7 @@ fn any_settings() -> impl Strategy<Value = LinkConfig> {
             duplicate,
             corrupt,
             mtu,
+            cross: cross.filter(|_| rate.is_some()),
             rate,
             queue,
             limit,
@@ -209,6 +219,16 @@ fn any_settings() -> impl Strategy<Value = LinkConfig> {
 }
 
 fn any_config() -> impl Strategy<Value = LinkConfig> {
+    prop::collection::vec(any_link(), 1..4).prop_map(|links| {
+        let links = links.into_iter().rev();
+        let chain = links.fold(None, |then, link| {
+            Some(Box::new(LinkConfig { then, ..link }))
+        });
+        *chain.unwrap()
+    })
+}
+
+fn any_link() -> impl Strategy<Value = LinkConfig> {
     let step = (1..1000_u32, 0..1000_u32, any_settings());
     let steps = prop::collection::vec(step, 0..3);
     let seed = prop::option::of(any::<u64>());
@@ -269,6 +289,9 @@ fn nearly_words() -> impl Strategy<Value = String> {
             "; at",
             "over",
             "; loop",
+            "; then",
+            "cross",
+            "poisson",
             "%",
             "ms",
             "é",
