@@ -59,6 +59,8 @@ fn execute(command: Command) -> Result<(), Failure> {
         Command::Master(arguments) => commands::master::run(arguments, &messages),
         Command::Netem(arguments) => commands::netem::run(&arguments, &messages),
         Command::Replay(arguments) => commands::replay::run(&arguments),
+        Command::Report(arguments) => commands::report::run(&arguments),
+        Command::Export(arguments) => commands::export::run(&arguments),
         Command::Reproduce(arguments) => commands::reproduce::run(&arguments),
         Command::Sweep(arguments) => commands::sweep::run(&arguments),
         Command::Bench(arguments) => commands::bench::run(&arguments),

@@ -2,6 +2,7 @@
 //!
 //! The crate is pure; its QUIC endpoint and its haptic thread live in `io` behind the feature of that name.
 
+pub mod again;
 pub mod commands;
 pub mod device;
 pub mod end;

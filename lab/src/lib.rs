@@ -1,5 +1,6 @@
 //! Experiments in virtual time: everything that is computed about the system rather than by it.
 
+pub mod again;
 pub mod architecture;
 pub mod baselines;
 mod digest;
@@ -7,10 +8,12 @@ pub mod experiment;
 #[cfg(feature = "io")]
 pub mod experiments;
 pub mod figure;
+pub mod forces;
 #[cfg(feature = "io")]
 pub mod io;
 pub mod overlay;
 pub mod physics;
+pub mod record_report;
 pub mod replay;
 pub mod setting;
 pub mod statistics;

@@ -3,6 +3,7 @@
 //! The crate is pure; its QUIC endpoint and its 1 kHz thread live in `io` behind the feature of that
 //! name. Only `environment` names the physics engine.
 
+pub mod again;
 pub mod contact;
 pub mod end;
 pub mod environment;

@@ -15,6 +15,7 @@ pub mod model;
 pub mod pairing;
 pub mod passivity;
 pub mod range;
+pub mod record;
 pub mod recording;
 pub mod report;
 pub mod rng;

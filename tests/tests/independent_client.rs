@@ -6,10 +6,11 @@
 #![allow(clippy::disallowed_methods, reason = "starts processes")]
 
 use std::path::Path;
-use std::process::{Command, Stdio};
+use std::process::Command;
 use std::time::Duration;
 
 use crate::harness::process::{Ended, ProcessError, Running, did_not_run, number};
+use crate::harness::python::python;
 use crate::harness::tshark::{TsharkError, tshark};
 use crate::harness::{alone, root};
 use serde_json::{Value, json};
@@ -23,24 +24,6 @@ const NO_PROTOCOL: i32 = 5;
 
 fn ok<T>(result: Result<T, ProcessError>) -> T {
     result.unwrap_or_else(|error| panic!("{error}"))
-}
-
-/// A Python that has aioquic: the checks' own, or the system's. Says so if there is none.
-fn python(test: &str) -> Option<String> {
-    let own = root().join("target/python/bin/python");
-    let pythons = [own.to_string_lossy().into_owned(), "python3".to_owned()];
-    let mut pythons = pythons.into_iter();
-    let found = pythons.find(|python| {
-        let mut command = Command::new(python);
-        command.args(["-c", "import aioquic"]).stderr(Stdio::null());
-        command.status().is_ok_and(|status| status.success())
-    });
-    if found.is_none() {
-        let how = "no Python has aioquic: make one with `python3 -m venv target/python` and \
-                   `target/python/bin/pip install -r tests/protocol/requirements.txt`";
-        did_not_run(test, how);
-    }
-    found
 }
 
 /// A slave with an identity of its own, and its pairing string.
@@ -89,7 +72,7 @@ fn altered(pairing: &str, key: &str) -> String {
 fn a_master_that_knows_only_the_document_pushes_the_box_of_the_real_slave() {
     let _turn = alone();
     let test = "the session of the independent client";
-    let Some(python) = python(test) else {
+    let Some(python) = python(test, "aioquic") else {
         return;
     };
     let place = tempfile::tempdir().unwrap();
@@ -198,7 +181,7 @@ fn the_dissector_shows_it(test: &str, client: &Value, capture: &Path, keys: &Pat
 #[test]
 fn who_has_another_pin_or_token_or_version_gets_no_session() {
     let _turn = alone();
-    let Some(python) = python("the refusals of the independent client") else {
+    let Some(python) = python("the refusals of the independent client", "aioquic") else {
         return;
     };
     let place = tempfile::tempdir().unwrap();

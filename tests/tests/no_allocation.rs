@@ -15,13 +15,12 @@ use std::cell::Cell;
 use std::hint::black_box;
 use std::time::Duration;
 
+use mmt_client::again::MasterSetting;
 use mmt_client::commands::CommandConfig;
 use mmt_client::device::DeviceProfile;
-use mmt_client::end::MasterEnd;
 use mmt_client::io::MasterLive;
 use mmt_client::io::haptic::HapticLoop;
-use mmt_client::limiter::ForceLimiter;
-use mmt_client::master::Master;
+use mmt_client::io::record;
 use mmt_client::operator::Operator;
 use mmt_client::operator::scripted::{Scripted, ScriptedConfig};
 use mmt_client::path::PathRecorder;
@@ -34,7 +33,9 @@ use mmt_server::slave::{Slave, SlaveConfig, SlaveTick};
 use mmt_server::trigger::{Trigger, TriggerConfig, TriggerInput};
 use mmt_shared::channel::datagram_channel::DatagramChannel;
 use mmt_shared::channel::rate_control::StretchMax;
+use mmt_shared::io::clock::Clock;
 use mmt_shared::io::loop_thread::{self, Frame, LoopHandle, LoopSide};
+use mmt_shared::io::record::Recorder;
 use mmt_shared::io::schedule::Tick;
 use mmt_shared::model::geometry::Vec2;
 use mmt_shared::model::sample::HipSample;
@@ -118,7 +119,7 @@ fn slave_end() -> SlaveEndConfig {
     }
 }
 
-/// Both sides over a link that delivers at once: the master's loop with the rings and frames of a live session.
+/// Both sides over a link that delivers at once: the master's loop with the rings, frames and record of a live session.
 struct Loop {
     haptic: HapticLoop,
     side: LoopSide<MasterLive>,
@@ -128,6 +129,7 @@ struct Loop {
     up: Vec<Frame>,
     contact: u64,
     _runtime: tokio::runtime::Runtime,
+    _folder: tempfile::TempDir,
 }
 
 impl Loop {
@@ -143,16 +145,20 @@ impl Loop {
             scheme: Label::clipped("any"),
             program: Label::clipped("test"),
         };
-        let limiter = ForceLimiter::try_new(device.limits()).unwrap();
-        let master = Master::with_architecture(&welcome, limiter, architecture);
-        let scripted = Scripted::try_new(ScriptedConfig::default(), master.view()).unwrap();
+        let setting = MasterSetting {
+            began: Time::ZERO,
+            welcome,
+            architecture,
+            limits: device.limits(),
+            commands: commands().for_architecture(architecture),
+        };
+        let end = setting.end().unwrap();
+        let scripted = Scripted::try_new(ScriptedConfig::default(), end.master().view()).unwrap();
         let operator = Operator::Scripted(Box::new(scripted));
         slave.start_at(operator.start());
-        let end = MasterEnd::new(
-            Time::ZERO,
-            master,
-            commands().for_architecture(architecture),
-        );
+        let folder = tempfile::tempdir().unwrap();
+        let recorder = Recorder::create(&folder.path().join("a.mcap")).unwrap();
+        let record = record::begin(&recorder, Clock::start(), &setting, &());
         let (network, side, _) = loop_thread::pair(&MasterLive::default()).unwrap();
         drop(entered);
         let config = SlaveEndConfig {
@@ -161,13 +167,15 @@ impl Loop {
         };
         Self {
             haptic: HapticLoop::new(end, operator, None)
-                .observed_by(None, Some(PathRecorder::with_room())),
+                .observed_by(None, Some(PathRecorder::with_room()))
+                .recorded(record),
             side,
             network,
             slave: SlaveEnd::new(Time::ZERO, slave, config),
             up: Vec::new(),
             contact: 0,
             _runtime: runtime,
+            _folder: folder,
         }
     }
 

@@ -1,44 +1,48 @@
-//! A live session whose inputs were kept runs again through the same ends to the same bits at each tick.
+//! A live session that was recorded runs again through fresh ends to the same bits at each tick.
 //!
 //! Both hosts run over real sockets with an emulated path that delays, jitters and loses. What each loop was given — device
-//! readings, frames with their arrival times, deadlines — goes through a fresh end in virtual time.
+//! readings, frames with their arrival times, deadlines — comes back from the file.
 
-#![allow(clippy::unwrap_used, reason = "a test may panic")]
+#![allow(
+    clippy::unwrap_used,
+    clippy::indexing_slicing,
+    reason = "a test may panic"
+)]
 #![allow(
     clippy::disallowed_types,
-    reason = "a session leaves its record behind a lock"
+    clippy::disallowed_methods,
+    reason = "a test reads files and hands a watch to a session"
 )]
 
-use std::fmt::Debug;
-use std::sync::{Arc, Mutex};
+use std::path::Path;
+use std::sync::Arc;
 use std::time::Duration;
 
 use mmt_client::commands::CommandConfig;
 use mmt_client::device::DeviceProfile;
-use mmt_client::io::haptic::MasterRecord;
 use mmt_client::io::{MasterLive, MasterOptions, OperatorChoice};
 use mmt_client::operator::scripted::ScriptedConfig;
+use mmt_lab::again::{AgainError, RanAgain, SessionsAgain};
 use mmt_netem::LinkConfig;
 use mmt_netem::io::socket::SocketExtras;
-use mmt_server::end::SlaveEnd;
-use mmt_server::io::{SlaveHost, SlaveLive, SlaveOptions, SlaveRecord};
+use mmt_server::io::{SlaveHost, SlaveLive, SlaveOptions};
 use mmt_server::slave::SlaveConfig;
 use mmt_shared::io::identity::Identity;
-use mmt_shared::io::input_log::{Input, RecordWanted};
+use mmt_shared::io::record::{Ended, RecordError, RecordOutcome, Recorder, read};
 use mmt_shared::io::transport::Transport;
-use mmt_shared::wire::{Architecture, DATAGRAM_MAX};
+use mmt_shared::record::cdr::CdrWriter;
+use mmt_shared::record::messages::{Arrival, Message, Session};
+use mmt_shared::wire::Architecture;
 use tokio::sync::watch;
 
 use crate::harness::alone;
 
-/// More than four seconds have: 1000 ticks a second and as many frames.
-const INPUTS: usize = 10_000;
 const DURATION: Duration = Duration::from_secs(4);
 
-/// Runs a session over loopback and returns what both loops were given.
-async fn session(architecture: Architecture) -> (MasterRecord, SlaveRecord) {
+/// Runs a session over loopback, both ends of which go into one record.
+async fn session(architecture: Architecture, path: &Path) {
     let netem: LinkConfig = "delay 5ms 2ms loss 5%".parse().unwrap();
-    let (from_slave, from_master) = (Arc::default(), Arc::default());
+    let recorder = Recorder::create(path).unwrap();
     let host = SlaveHost::bind(SlaveOptions {
         listen: "127.0.0.1:0".parse().unwrap(),
         transport: Transport::Quic,
@@ -49,14 +53,13 @@ async fn session(architecture: Architecture) -> (MasterRecord, SlaveRecord) {
         netem_extras: SocketExtras::default(),
         once: true,
         truth: None,
-        record: Some(RecordWanted {
-            inputs: INPUTS,
-            kept: Arc::clone(&from_slave),
-        }),
+        record: Some(recorder.clone()),
     });
     let host = host.unwrap();
+    let pairing = host.pairing(None);
+    let token = pairing.token.reveal().to_string();
     let options = MasterOptions {
-        pairing: host.pairing(None),
+        pairing,
         transport: Transport::Quic,
         device: DeviceProfile::default(),
         operator: OperatorChoice::Scripted(ScriptedConfig::default()),
@@ -68,10 +71,7 @@ async fn session(architecture: Architecture) -> (MasterRecord, SlaveRecord) {
         netem_seed: 2,
         netem_extras: SocketExtras::default(),
         path: None,
-        record: Some(RecordWanted {
-            inputs: INPUTS,
-            kept: Arc::clone(&from_master),
-        }),
+        record: Some(recorder.clone()),
         truth: None,
     };
     let (_stop, stopped) = watch::channel(false);
@@ -80,85 +80,103 @@ async fn session(architecture: Architecture) -> (MasterRecord, SlaveRecord) {
         tokio::spawn(host.run(stopped.clone(), Arc::<watch::Sender<SlaveLive>>::default()));
     mmt_client::io::run(options, stopped, live).await.unwrap();
     served.await.unwrap().unwrap();
-    (taken(&from_master), taken(&from_slave))
+    assert_eq!(recorder.finish(), RecordOutcome::default());
+    holds_no_secret(path, &token);
 }
 
-fn taken<T>(kept: &Mutex<Option<T>>) -> T {
-    kept.lock().unwrap().take().unwrap()
+/// Neither as text nor as bytes.
+fn holds_no_secret(path: &Path, token: &str) {
+    let bytes = std::fs::read(path).unwrap();
+    let holds = |part: &[u8]| bytes.windows(part.len()).any(|window| window == part);
+    let secret: Vec<u8> = (0..token.len())
+        .step_by(2)
+        .map(|at| u8::from_str_radix(&token[at..at + 2], 16).unwrap())
+        .collect();
+    assert!(!holds(token.as_bytes()) && !holds(&secret));
+    assert!(holds(b"mmt_msgs/msg/MasterTick"), "the search finds");
 }
 
-/// What the master's end gives for the record's inputs; without the frames if they are to be left out.
-fn master_again(record: &MasterRecord, with_frames: bool) -> Vec<String> {
-    let (mut end, mut out) = (record.start.clone(), [0; DATAGRAM_MAX]);
-    let mut ticks = Vec::new();
-    for input in record.log.inputs() {
-        match input {
-            Input::Frame(frame) if with_frames => end.handle_datagram(frame.at, frame.bytes()),
-            Input::Frame(_) => {}
-            Input::Tick {
-                deadline,
-                given,
-                sent,
-            } => {
-                if given.releases {
-                    end.release();
-                }
-                ticks.push(format!("{:?}", end.tick(*deadline, given.reading)));
-                while end.poll_transmit(*sent, &mut out).unwrap().is_some() {}
-            }
-        }
+/// Every message of a record, with its topic.
+fn messages(path: &Path) -> Vec<(String, Vec<u8>)> {
+    let mut found = Vec::new();
+    let ended = read::<RecordError>(path, |topic, message| {
+        found.push((topic.to_owned(), message.to_vec()));
+        Ok(())
+    });
+    assert_eq!(ended.unwrap(), Ended::Whole);
+    found
+}
+
+/// Runs messages again, each as `changed` makes it.
+fn again(
+    messages: &[(String, Vec<u8>)],
+    mut changed: impl FnMut(&str, &[u8]) -> Vec<u8>,
+) -> Result<Vec<(&'static str, u32, RanAgain)>, AgainError> {
+    let mut sessions = SessionsAgain::default();
+    for (topic, message) in messages {
+        sessions.take(topic, &changed(topic, message))?;
     }
-    ticks
+    Ok(sessions.ran().collect())
 }
 
-/// What the slave's end gives for the record's inputs; without a hundred of the frames if they are to be left out.
-fn slave_again(record: &SlaveRecord, with_all_frames: bool) -> Vec<String> {
-    let end = SlaveEnd::of_session(record.began, &SlaveConfig::default(), &record.hello);
-    let (mut end, mut out) = (end.unwrap(), [0; DATAGRAM_MAX]);
-    let (mut ticks, mut frames) = (Vec::new(), 0);
-    for input in record.log.inputs() {
-        match input {
-            Input::Frame(frame) => {
-                frames += 1;
-                if with_all_frames || !(50..150).contains(&frames) {
-                    end.handle_datagram(frame.at, frame.bytes());
-                }
-            }
-            Input::Tick { deadline, sent, .. } => {
-                ticks.push(format!("{:?}", end.tick(*deadline)));
-                while end.poll_transmit(*sent, &mut out).unwrap().is_some() {}
-            }
-        }
-    }
-    ticks
-}
-
-/// Every number in a text that reads back to the same bits.
-fn texts(ticks: &[impl Debug]) -> Vec<String> {
-    ticks.iter().map(|tick| format!("{tick:?}")).collect()
-}
-
-fn same(again: &[String], live: &[String]) {
-    assert_eq!(again.len(), live.len());
-    for (n, (again, live)) in again.iter().zip(live).enumerate() {
-        assert_eq!(again, live, "tick {n}");
-    }
+fn written(message: &impl Message) -> Vec<u8> {
+    let mut out = CdrWriter::default();
+    message.write(out.begin());
+    out.message().to_vec()
 }
 
 #[test]
 fn a_live_session_runs_again_to_the_same_bits_at_each_tick_of_both_ends() {
     let _turn = alone();
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("session.mcap");
     for architecture in Architecture::ALL {
         let mut runtime = tokio::runtime::Builder::new_current_thread();
         let runtime = runtime.enable_all().build().unwrap();
-        let (master, slave) = runtime.block_on(session(architecture));
-        let live = texts(master.log.ticks());
-        assert!(live.len() > 500, "{} ticks of the master", live.len());
-        same(&master_again(&master, true), &live);
-        assert!(master_again(&master, false) != live, "frames count");
-        let live = texts(slave.log.ticks());
-        assert!(live.len() > 500, "{} ticks of the slave", live.len());
-        same(&slave_again(&slave, true), &live);
-        assert!(slave_again(&slave, false) != live, "frames count");
+        runtime.block_on(session(architecture, &path));
+        let messages = messages(&path);
+        let ran = again(&messages, |_, message| message.to_vec()).unwrap();
+        let sides: Vec<_> = ran.iter().map(|(side, n, _)| (*side, *n)).collect();
+        assert_eq!(sides, [("master", 1), ("slave", 1)]);
+        for (side, _, ran) in ran {
+            assert!(ran.ticks > 500 && !ran.has_gap, "{side}: {ran:?}");
+        }
+        frames_count(&messages, "/master/arrivals", "master");
+        frames_count(&messages, "/slave/arrivals", "slave");
+        another_version_is_refused_by_name(&messages);
     }
+}
+
+/// Without a hundred of its datagrams a session gives something else, and the tick is named.
+fn frames_count(messages: &[(String, Vec<u8>)], of: &str, end: &str) {
+    let mut seen = 0;
+    let differs = again(messages, |topic, message| {
+        if topic != of {
+            return message.to_vec();
+        }
+        seen += 1;
+        let mut arrival = Arrival::read(message).unwrap();
+        if (20..120).contains(&seen) {
+            arrival.datagram.clear();
+        }
+        written(&arrival)
+    });
+    let error = differs.unwrap_err();
+    assert!(
+        matches!(error, AgainError::Difference { side, tick, .. } if side == end && tick > 0),
+        "{error}"
+    );
+}
+
+fn another_version_is_refused_by_name(messages: &[(String, Vec<u8>)]) {
+    let refused = again(messages, |topic, message| {
+        if topic != "/master/session" {
+            return message.to_vec();
+        }
+        let mut session = Session::read(message).unwrap();
+        session.program = "mmt 0.0.7".to_owned();
+        written(&session)
+    });
+    let text = refused.unwrap_err().to_string();
+    assert!(text.contains("mmt 0.0.7"), "{text}");
 }

@@ -3,5 +3,6 @@
 mod harness;
 mod independent_client;
 mod live;
+mod records;
 mod run_again;
 mod two_hosts;

@@ -21,6 +21,12 @@ pub(super) const NETEM: &str = include_str!("help/netem.txt").trim_ascii_end();
 /// Examples of `mmt replay`.
 pub(super) const REPLAY: &str = include_str!("help/replay.txt").trim_ascii_end();
 
+/// Examples of `mmt report`.
+pub(super) const REPORT: &str = include_str!("help/report.txt").trim_ascii_end();
+
+/// Examples of `mmt export`.
+pub(super) const EXPORT: &str = include_str!("help/export.txt").trim_ascii_end();
+
 /// Examples of `mmt reproduce`.
 pub(super) const REPRODUCE: &str = include_str!("help/reproduce.txt").trim_ascii_end();
 

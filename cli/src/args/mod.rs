@@ -3,6 +3,7 @@
 mod bench;
 mod help;
 mod netem;
+mod records;
 mod reproduce;
 mod sweep;
 mod transport;
@@ -17,7 +18,6 @@ use std::time::Duration;
 use clap::{Args, Parser, Subcommand};
 use mmt_client::commands::CommandConfig;
 use mmt_client::device::DeviceProfile;
-use mmt_lab::replay::ReplayConfig;
 use mmt_netem::LinkConfig;
 use mmt_server::repeats::Repeats;
 use mmt_server::trigger::Scheme;
@@ -28,10 +28,11 @@ use mmt_shared::wire::Architecture;
 
 pub(crate) use self::netem::EmulationArguments;
 pub(crate) use bench::{BenchArguments, BenchSubject, TransportBenchArguments};
+pub(crate) use records::{ExportArguments, ReplayArguments, ReportArguments};
 pub(crate) use reproduce::ReproduceArguments;
 pub(crate) use sweep::SweepArguments;
 pub(crate) use transport::TransportArguments;
-pub(crate) use values::{OperatorWords, PairingWords, Period};
+pub(crate) use values::{OperatorWords, PairingWords};
 
 /// The command line.
 #[derive(Debug, Parser)]
@@ -57,9 +58,15 @@ pub(crate) enum Command {
     /// Emulate a network between two hosts: a UDP relay
     #[command(after_help = help::NETEM)]
     Netem(Box<NetemArguments>),
-    /// Replay recorded pushes of a real object through estimator and trigger
+    /// Replay recorded pushes of a real object, or run recorded sessions again to the same bits
     #[command(after_help = help::REPLAY)]
     Replay(ReplayArguments),
+    /// The table and the figures of a recorded run
+    #[command(after_help = help::REPORT)]
+    Report(ReportArguments),
+    /// Tables of a recorded session: comma-separated values, one file a topic
+    #[command(after_help = help::EXPORT)]
+    Export(ExportArguments),
     /// Reproduce the paper's figures, and go beyond them, in virtual time
     #[command(after_help = help::REPRODUCE, subcommand_required = true, arg_required_else_help = true)]
     Reproduce(ReproduceArguments),
@@ -92,6 +99,9 @@ pub(crate) struct DemoArguments {
     /// Record and control of the emulated networks
     #[command(flatten)]
     pub(crate) emulation: EmulationArguments,
+    /// Record the session of both ends in this file, MCAP: for mmt replay, report, export and the tools of ROS 2
+    #[arg(long, value_name = "FILE")]
+    pub(crate) record: Option<PathBuf>,
     /// The bundle of choices
     #[arg(long, value_name = "NAME", default_value = "recommended", value_parser = values::mode())]
     pub(crate) mode: Mode,
@@ -153,6 +163,9 @@ pub(crate) struct SlaveArguments {
     /// Record and control of the emulated network
     #[command(flatten)]
     pub(crate) emulation: EmulationArguments,
+    /// Record the slave's sessions in this file, MCAP: for mmt replay, report, export and the tools of ROS 2
+    #[arg(long, value_name = "FILE")]
+    pub(crate) record: Option<PathBuf>,
     /// Seed of sensors and network [default: the file's, else 1]
     #[arg(long, value_name = "N")]
     pub(crate) seed: Option<u64>,
@@ -203,6 +216,9 @@ pub(crate) struct MasterArguments {
     /// Record and control of the emulated network
     #[command(flatten)]
     pub(crate) emulation: EmulationArguments,
+    /// Record the master's session in this file, MCAP: for mmt replay, report, export and the tools of ROS 2
+    #[arg(long, value_name = "FILE")]
+    pub(crate) record: Option<PathBuf>,
     /// Keep the path to the slave in this file: half of each round trip, and losses; a trace for --netem
     #[arg(long, value_name = "FILE")]
     pub(crate) record_path: Option<PathBuf>,
@@ -287,29 +303,6 @@ pub(crate) struct NetemReportArguments {
     #[arg(value_name = "FILE")]
     pub(crate) file: PathBuf,
     /// Print everything as one JSON document: the numbers, delay histogram, loss bursts, queue
-    #[arg(long)]
-    pub(crate) json: bool,
-}
-
-/// Arguments of `mmt replay`.
-#[derive(Debug, Args)]
-pub(crate) struct ReplayArguments {
-    /// Recorded pushes
-    #[arg(value_name = "FILE", required = true)]
-    pub(crate) files: Vec<PathBuf>,
-    /// Delta of (12): the force error that calls for an update
-    #[arg(long, value_name = "PERCENT", default_value = "10%", value_parser = values::deadband)]
-    pub(crate) deadband: f64,
-    /// Longest time without an update in contact; none for the pure deadband
-    #[arg(long, value_name = "TIME", default_value = "150ms", value_parser = values::period)]
-    pub(crate) t_update: Period,
-    /// Random splits into fitted and held-out pushes
-    #[arg(long, value_name = "N", default_value_t = ReplayConfig::default().repeats, value_parser = clap::value_parser!(u32).range(1..=10_000))]
-    pub(crate) splits: u32,
-    /// Seed of the splits
-    #[arg(long, value_name = "N", default_value_t = 1)]
-    pub(crate) seed: u64,
-    /// Print one JSON document instead of tables
     #[arg(long)]
     pub(crate) json: bool,
 }

@@ -3,6 +3,7 @@
 use clap::CommandFactory;
 use mmt_lab::experiments::ALL;
 
+use super::values::Period;
 use super::*;
 
 fn parse(words: &[&str]) -> Result<Command, String> {

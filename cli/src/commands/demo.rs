@@ -20,6 +20,7 @@ use mmt_shared::report::RunReport;
 use mmt_shared::wire::Architecture;
 
 use super::netem::wrap::{Emulation, effect};
+use super::record::Record;
 use super::viewer::Viewer;
 use super::{master, slave};
 use crate::args::DemoArguments;
@@ -47,19 +48,22 @@ pub(crate) fn run(arguments: &DemoArguments, messages: &Messages) -> Result<(), 
     note(effect(Direction::Down, down)?);
     arguments.transport.warning().into_iter().for_each(note);
     let transport = arguments.transport.choose()?;
+    let record = Record::start(arguments.record.as_deref())?;
     let (stop, stop_slave) = (Stop::on_signals()?, Stop::new());
     // both sides stretch as far
     let stretch_max = config.stretch_max;
     let seed = arguments.seed;
     let emulation = Emulation::start(&arguments.emulation, seed, Some(up), Some(down))?;
     let (truth_from, truth_to) = truth::pair();
-    let options = slave_options(arguments, transport, &emulation, config, truth_from)?;
+    let mut options = slave_options(arguments, transport, &emulation, config, truth_from)?;
+    options.record = record.recorder();
     let (slave, started) = slave::start(options, None, stop_slave.receiver())?;
     let Ok(started) = started.recv() else {
         return slave.join().map(|_| ());
     };
     let mut options = master_options(arguments, transport, &emulation, started.pairing, truth_to);
     options.commands.stretch_max = stretch_max;
+    options.record = record.recorder();
     let dashboard = !arguments.json && !emulation.takes_orders();
     options.scene_hz = Viewer::scene_hz(dashboard);
     let (master, master_live) = master::start(options, stop.receiver())?;
@@ -89,6 +93,7 @@ pub(crate) fn run(arguments: &DemoArguments, messages: &Messages) -> Result<(), 
     } else {
         print(&report)?
     }
+    record.finish()?;
     master::judge(master_live.borrow().ended)
 }
 

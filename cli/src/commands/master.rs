@@ -23,6 +23,7 @@ use tokio::sync::watch;
 
 use super::host::{Host, spawn};
 use super::netem::wrap::{Emulation, effect};
+use super::record::Record;
 use super::viewer::Viewer;
 use crate::args::{MasterArguments, OperatorWords, PairingWords};
 use crate::failure::{Exit, Failure};
@@ -42,6 +43,8 @@ const TRACE_START_M: (f64, f64) = (-0.25, 0.0);
 /// Wrong input, no session, or a session that broke.
 pub(crate) fn run(arguments: MasterArguments, messages: &Messages) -> Result<(), Failure> {
     let mut options = options(&arguments)?;
+    let record = Record::start(arguments.record.as_deref())?;
+    options.record = record.recorder();
     // not before the pairing has been read from stdin: the orders come after it
     let (netem, seed) = (Some(&arguments.netem), arguments.seed);
     let emulation = Emulation::start(&arguments.emulation, seed, netem, None)?;
@@ -80,6 +83,7 @@ pub(crate) fn run(arguments: MasterArguments, messages: &Messages) -> Result<(),
     } else {
         print(&report)?
     }
+    record.finish()?;
     judge(live.borrow().ended)
 }
 

@@ -2,10 +2,13 @@
 
 pub(crate) mod bench;
 pub(crate) mod demo;
+pub(crate) mod export;
 mod host;
 pub(crate) mod master;
 pub(crate) mod netem;
+mod record;
 pub(crate) mod replay;
+pub(crate) mod report;
 pub(crate) mod reproduce;
 pub(crate) mod slave;
 pub(crate) mod sweep;

@@ -1,4 +1,6 @@
-//! `mmt replay`: recorded real pushes through `mmt_lab::replay`.
+//! `mmt replay`: recorded real pushes through `mmt_lab::replay`, and recorded sessions through their own ends again.
+//!
+//! The kind of the files decides.
 
 use std::path::Path;
 
@@ -12,6 +14,7 @@ use crate::output::{print, print_json};
 use crate::progress::Bar;
 
 mod document;
+mod session;
 
 use document::{Document, Replayed};
 
@@ -20,6 +23,9 @@ use document::{Document, Replayed};
 /// # Errors
 /// A file cannot be read or is no recording; stdout cannot be written to.
 pub(crate) fn run(arguments: &ReplayArguments) -> Result<(), Failure> {
+    if session::are_records(&arguments.files)? {
+        return session::run(arguments);
+    }
     let config = ReplayConfig {
         deadband: arguments.deadband,
         t_update_s: arguments.t_update.0.map(|period| period.as_secs_f64()),

@@ -19,6 +19,7 @@ use tokio::sync::watch;
 
 use super::host::{Host, spawn};
 use super::netem::wrap::{Emulation, effect};
+use super::record::Record;
 use super::viewer::Viewer;
 use crate::args::SlaveArguments;
 use crate::config::{scene, slave_config};
@@ -34,6 +35,8 @@ use crate::view::{Caption, Snapshot};
 /// Wrong input, an address that cannot be had, a host that failed.
 pub(crate) fn run(arguments: SlaveArguments, messages: &Messages) -> Result<(), Failure> {
     let mut options = options(&arguments)?;
+    let record = Record::start(arguments.record.as_deref())?;
+    options.record = record.recorder();
     let (netem, seed) = (Some(&arguments.netem), options.netem_seed);
     let emulation = Emulation::start(&arguments.emulation, seed, None, netem)?;
     options.netem_extras = emulation.extras(Direction::Down);
@@ -52,10 +55,11 @@ pub(crate) fn run(arguments: SlaveArguments, messages: &Messages) -> Result<(), 
     let report = host.join()?.map(RunReport::from);
     emulation.finish()?;
     match (arguments.json, report) {
-        (true, report) => print_json(&report.unwrap_or(unserved)),
-        (false, Some(report)) => print(report),
-        (false, None) => Ok(()),
+        (true, report) => print_json(&report.unwrap_or(unserved))?,
+        (false, Some(report)) => print(report)?,
+        (false, None) => {}
     }
+    record.finish()
 }
 
 /// Plain lines while a master is connected.

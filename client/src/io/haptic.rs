@@ -7,8 +7,8 @@ use std::ops::ControlFlow;
 use std::time::Duration;
 
 use mmt_shared::io::clock::Clock;
-use mmt_shared::io::input_log::InputLog;
 use mmt_shared::io::loop_thread::LoopSide;
+use mmt_shared::io::record::Ticked;
 use mmt_shared::io::schedule::Tick;
 use mmt_shared::io::ticker::{Ticker, TickerReport};
 use mmt_shared::io::truth::TruthReceiver;
@@ -17,6 +17,7 @@ use mmt_shared::model::geometry::Vec2;
 use mmt_shared::model::tool::Scene;
 use mmt_shared::time::Time;
 
+use super::record::{MasterShown, MasterSink};
 use super::{MasterLive, SessionEnd};
 use crate::end::MasterEnd;
 use crate::failsafe::LinkState;
@@ -40,15 +41,6 @@ pub struct MasterGiven {
     pub releases: bool,
 }
 
-/// The beginning of a session: the end as it was, its inputs, and what its ticks gave.
-#[derive(Clone, Debug)]
-pub struct MasterRecord {
-    /// The end before the first input.
-    pub start: MasterEnd,
-    /// What came.
-    pub log: InputLog<MasterGiven, MasterTick>,
-}
-
 /// The haptic loop. It belongs to one thread, which hands it back when it ends.
 #[derive(Debug)]
 pub struct HapticLoop {
@@ -60,8 +52,8 @@ pub struct HapticLoop {
     truth: Option<TruthReceiver>,
     /// Where the path of the session is kept, if anybody wants it.
     pub(super) path: Option<PathRecorder>,
-    /// The inputs, if anybody wants to run them again.
-    pub(super) record: Option<MasterRecord>,
+    /// Where the session is recorded, if anybody wants that.
+    record: Option<MasterSink>,
     first: Option<Time>,
     /// From the first to the newest tick.
     pub(super) elapsed: Duration,
@@ -105,13 +97,10 @@ impl HapticLoop {
         self
     }
 
-    /// The same with a record of the first so many inputs.
+    /// The same with a record of all that it is given and does.
     #[must_use]
-    pub fn recorded(mut self, inputs: usize) -> Self {
-        self.record = Some(MasterRecord {
-            start: self.end.clone(),
-            log: InputLog::with_room(inputs),
-        });
+    pub fn recorded(mut self, record: MasterSink) -> Self {
+        self.record = Some(record);
         self
     }
 
@@ -159,14 +148,19 @@ impl HapticLoop {
             self.why.get_or_insert(SessionEnd::ModelBroken);
         }
         let sent = now();
-        self.transmit(side, sent);
         if let Some(record) = &mut self.record {
             let given = MasterGiven { reading, releases };
-            record.log.keep_tick(stamp, given, sent, done);
+            record.ticked(Ticked {
+                tick,
+                given,
+                sent,
+                done,
+            });
         }
+        self.transmit(side, sent);
         let at_rest = self.end.master().limiter().at_rest();
         if at_rest || self.ticks.is_multiple_of(SNAPSHOT_TICKS) {
-            side.publish(self.snapshot(&done, stamp));
+            self.show(&done, stamp, side);
         }
         if at_rest {
             ControlFlow::Break(())
@@ -184,7 +178,7 @@ impl HapticLoop {
         while let Some(frame) = side.next_arrival() {
             self.end.handle_datagram(frame.at, frame.bytes());
             if let Some(record) = &mut self.record {
-                record.log.keep_frame(&frame);
+                record.arrived(&frame);
             }
             if let Some(path) = &mut self.path {
                 path.note(frame.at, self.end.channel().peer());
@@ -194,7 +188,22 @@ impl HapticLoop {
 
     fn transmit(&mut self, side: &mut LoopSide<MasterLive>, now: Time) {
         // a session whose numbers are used up falls silent, which ends it
-        side.send(now, |out| self.end.poll_transmit(now, out).ok().flatten());
+        side.send(now, |out| {
+            let length = self.end.poll_transmit(now, out).ok().flatten()?;
+            if let (Some(record), Some(bytes)) = (&mut self.record, out.get(..length)) {
+                record.sent(now, bytes);
+            }
+            Some(length)
+        });
+    }
+
+    fn show(&mut self, done: &MasterTick, now: Time, side: &mut LoopSide<MasterLive>) {
+        let live = self.snapshot(done, now);
+        if let Some(record) = &mut self.record {
+            let twist = self.end.master().model().state().twist;
+            record.shown(now, MasterShown { live, twist });
+        }
+        side.publish(live);
     }
 
     /// Holds the model as it was at a HIP sample against the object as the tool met it for the same sample.

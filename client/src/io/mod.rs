@@ -12,6 +12,7 @@ mod end;
 mod error;
 pub mod haptic;
 mod open;
+pub mod record;
 mod report;
 mod session;
 #[cfg(test)]
@@ -23,7 +24,7 @@ use std::time::Duration;
 use mmt_netem::LinkConfig;
 use mmt_netem::io::socket::SocketExtras;
 use mmt_shared::channel::peer::Loss;
-use mmt_shared::io::input_log::RecordWanted;
+use mmt_shared::io::record::Recorder;
 use mmt_shared::io::transport::Transport;
 use mmt_shared::io::truth::TruthReceiver;
 use mmt_shared::model::geometry::{BoxFootprint, Pose, Vec2};
@@ -44,7 +45,6 @@ use crate::path::PathRecorder;
 
 pub use end::SessionEnd;
 pub use error::MasterHostError;
-use haptic::MasterRecord;
 pub use session::run;
 
 /// Who operates.
@@ -112,8 +112,8 @@ pub struct MasterOptions {
     pub netem_extras: SocketExtras,
     /// Where the path of the session is kept, if anybody wants it.
     pub path: Option<SharedPath>,
-    /// A record of the loop's inputs, if anybody wants to run them again.
-    pub record: Option<RecordWanted<MasterRecord>>,
+    /// Where the session is recorded, if anybody wants that.
+    pub record: Option<Recorder>,
     /// The object's true pose, where the slave lives in this process: for the report.
     pub truth: Option<TruthReceiver>,
 }

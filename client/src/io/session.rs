@@ -17,11 +17,13 @@ use tokio::time::{Instant, error::Elapsed, timeout_at};
 use super::haptic::HapticLoop;
 use super::open::{Opened, TIMEOUTS, Timeouts, open};
 use super::report::half;
-use super::{MasterHostError, MasterLive, MasterOptions, MasterReport, SessionEnd};
-use crate::end::MasterEnd;
+use super::{
+    MasterConfiguration, MasterHostError, MasterLive, MasterOptions, MasterReport, SessionEnd,
+    record,
+};
+use crate::again::MasterSetting;
 use crate::failsafe::LinkState;
 use crate::limiter::ForceLimiter;
-use crate::master::Master;
 use crate::operator::scripted::View;
 use crate::path::PathRecorder;
 
@@ -63,7 +65,8 @@ pub(super) async fn run_with(
     timeouts: Timeouts,
 ) -> Result<MasterReport, MasterHostError> {
     options.commands = options.commands.for_architecture(options.architecture);
-    let limiter = ForceLimiter::try_new(options.device.limits())?;
+    // before anybody is asked
+    ForceLimiter::try_new(options.device.limits())?;
     let start = options.operator.begin(first_view())?.start();
     let opened = tokio::select! {
         opened = open(&options, start, &timeouts) => opened?,
@@ -74,15 +77,27 @@ pub(super) async fn run_with(
         slave = %opened.connected.address, program = %welcome.program, scheme = %welcome.scheme,
         "the session begins"
     );
-    let master = Master::with_architecture(welcome, limiter, options.architecture);
-    let operator = options.operator.begin(master.view())?;
     let clock = Clock::start();
-    let end = MasterEnd::new(clock.now(), master, options.commands);
+    let setting = MasterSetting {
+        began: clock.now(),
+        welcome: *welcome,
+        architecture: options.architecture,
+        limits: options.device.limits(),
+        commands: options.commands,
+    };
+    let end = setting.end()?;
+    let operator = options.operator.begin(end.master().view())?;
     let path = options.path.is_some().then(PathRecorder::with_room);
     let mut haptic =
         HapticLoop::new(end, operator, options.duration).observed_by(options.truth.take(), path);
-    if let Some(wanted) = &options.record {
-        haptic = haptic.recorded(wanted.inputs);
+    if let Some(recorder) = &options.record {
+        let sink = record::begin(
+            recorder,
+            clock,
+            &setting,
+            &MasterConfiguration::from(&options),
+        );
+        haptic = haptic.recorded(sink);
     }
     let body = move |side, ticker| haptic.run(side, ticker, clock);
     operate(&options, opened, clock, body, stop, live, &timeouts).await
@@ -145,9 +160,6 @@ pub(super) async fn operate(
     let own = half(&haptic, &session.task, &connected, duration);
     if let (Some(kept), Some(path)) = (&options.path, haptic.path.take()) {
         *kept.lock().unwrap_or_else(PoisonError::into_inner) = path;
-    }
-    if let Some(wanted) = &options.record {
-        wanted.keep(haptic.record.take());
     }
     Ok(MasterReport {
         seed: options.netem_seed,

@@ -7,15 +7,14 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use mmt_netem::io::socket::{SocketMeter, WrapError};
 use mmt_shared::io::clock::Clock;
-use mmt_shared::io::input_log::RecordWanted;
 use mmt_shared::io::quic::EndpointError;
+use mmt_shared::io::record::Recorder;
 use mmt_shared::io::socket::BindError;
 use mmt_shared::io::transport::{Insecure, Listener, Transport};
 use mmt_shared::io::truth::TruthSender;
 
 use super::SlaveConfiguration;
 use super::acceptor::Refusals;
-use super::slave_loop::SlaveRecord;
 use crate::slave::{SlaveConfig, SlaveError};
 
 /// Why a slave host could not start or go on.
@@ -64,7 +63,7 @@ pub(super) struct Context {
     pub(super) refusals: Arc<Refusals>,
     /// Until a session has taken it.
     pub(super) truth: Mutex<Option<TruthSender>>,
-    pub(super) record: Option<RecordWanted<SlaveRecord>>,
+    pub(super) record: Option<Recorder>,
 }
 
 impl Context {

@@ -11,6 +11,7 @@
 mod acceptor;
 mod context;
 mod host;
+mod record;
 mod session;
 mod slave_loop;
 #[cfg(test)]
@@ -22,7 +23,7 @@ use mmt_netem::LinkConfig;
 use mmt_netem::io::socket::SocketExtras;
 use mmt_shared::channel::peer::Loss;
 use mmt_shared::io::identity::Identity;
-use mmt_shared::io::input_log::RecordWanted;
+use mmt_shared::io::record::Recorder;
 use mmt_shared::io::transport::Transport;
 use mmt_shared::io::truth::TruthSender;
 use mmt_shared::model::geometry::{BoxFootprint, Pose, Vec2};
@@ -34,7 +35,6 @@ use crate::slave::SlaveConfig;
 
 pub use context::SlaveHostError;
 pub use host::SlaveHost;
-pub use slave_loop::SlaveRecord;
 
 /// Name and version of this program, as it gives them to the other side.
 const PROGRAM: &str = concat!("mmt ", env!("CARGO_PKG_VERSION"));
@@ -60,8 +60,8 @@ pub struct SlaveOptions {
     pub once: bool,
     /// Takes the object's true pose to a master of this process, for its report; of the first session only.
     pub truth: Option<TruthSender>,
-    /// A record of the loop's inputs, if anybody wants to run them again.
-    pub record: Option<RecordWanted<SlaveRecord>>,
+    /// Where sessions are recorded, if anybody wants that.
+    pub record: Option<Recorder>,
 }
 
 /// A snapshot of a running slave, for a screen.

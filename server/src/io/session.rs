@@ -27,7 +27,7 @@ use tokio::time::{sleep, timeout};
 use super::acceptor::{Admitted, refuse};
 use super::context::{Context, SlaveHostError};
 use super::slave_loop::{Finished, SlaveLoop, Snapshot};
-use super::{PROGRAM, SlaveLive, SlaveReport};
+use super::{PROGRAM, SlaveLive, SlaveReport, record};
 use crate::end::{SlaveEnd, session_config};
 use crate::slave::{Slave, SlaveConfig};
 
@@ -83,7 +83,8 @@ pub(super) async fn serve_with(
         lease: _lease,
     } = admitted;
     let clock = context.clock;
-    let end = match SlaveEnd::of_session(clock.now(), &context.config, &hello) {
+    let began = clock.now();
+    let end = match SlaveEnd::of_session(began, &context.config, &hello) {
         Ok(end) => end,
         Err(error) => {
             tracing::warn!("no slave for a device of {:?}: {error}", hello.coupling);
@@ -102,8 +103,8 @@ pub(super) async fn serve_with(
     }
     announce(&connection, &hello);
     let mut slave_loop = SlaveLoop::new(end, context.take_truth());
-    if let Some(wanted) = &context.record {
-        slave_loop = slave_loop.recorded(wanted.inputs, hello);
+    if let Some(recorder) = &context.record {
+        slave_loop = slave_loop.recorded(record::begin(recorder, context, began, &hello));
     }
     let body = move |side, ticker| body(slave_loop, side, ticker, clock);
     let handle = loop_thread::spawn(THREAD, clock, &Snapshot::default(), body)?;
@@ -201,9 +202,6 @@ impl Session<'_> {
         let theirs = answer(theirs, self.connection.closed(), sleep(FAREWELL_WAIT)).await;
         self.connection
             .close(CLOSE_FINISHED, b"the session is over");
-        if let (Some(wanted), Some(finished)) = (&self.context.record, finished) {
-            wanted.keep(finished.record);
-        }
         Ok(SlaveReport {
             seed: self.config.seed,
             duration_s,

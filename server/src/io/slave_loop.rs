@@ -3,14 +3,15 @@
 //! It never waits for the network, locks nothing and logs nothing.
 
 use mmt_shared::io::clock::Clock;
-use mmt_shared::io::input_log::InputLog;
 use mmt_shared::io::loop_thread::LoopSide;
+use mmt_shared::io::record::Ticked;
+use mmt_shared::io::schedule::Tick;
 use mmt_shared::io::ticker::{Ticker, TickerReport};
 use mmt_shared::io::truth::TruthSender;
 use mmt_shared::time::Time;
-use mmt_shared::wire::Hello;
 
 use super::SlaveLive;
+use super::record::{SlaveShown, SlaveSink};
 use crate::end::SlaveEnd;
 use crate::slave::SlaveTick;
 
@@ -33,18 +34,6 @@ pub(super) struct Finished {
     pub(super) end: SlaveEnd,
     /// How the loop kept its time.
     pub(super) ticker: TickerReport,
-    pub(super) record: Option<SlaveRecord>,
-}
-
-/// The beginning of a session: what the end was made of, its inputs, and what its ticks gave.
-#[derive(Clone, Debug)]
-pub struct SlaveRecord {
-    /// When the end began.
-    pub began: Time,
-    /// The hello that it was made for.
-    pub hello: Hello,
-    /// What came.
-    pub log: InputLog<(), Option<SlaveTick>>,
 }
 
 /// The loop.
@@ -54,8 +43,8 @@ pub(super) struct SlaveLoop {
     pub(super) truth: Option<TruthSender>,
     pub(super) numbers_spent: bool,
     pub(super) newest: Option<SlaveTick>,
-    /// The inputs, if anybody wants to run them again.
-    pub(super) record: Option<SlaveRecord>,
+    /// Where the session is recorded, if anybody wants that.
+    record: Option<SlaveSink>,
 }
 
 impl SlaveLoop {
@@ -69,13 +58,9 @@ impl SlaveLoop {
         }
     }
 
-    /// The same with a record of the first so many inputs of a session that `hello` opened.
-    pub(super) fn recorded(mut self, inputs: usize, hello: Hello) -> Self {
-        self.record = Some(SlaveRecord {
-            began: self.end.channel().began(),
-            hello,
-            log: InputLog::with_room(inputs),
-        });
+    /// The same with a record of all that it is given and does.
+    pub(super) fn recorded(mut self, record: SlaveSink) -> Self {
+        self.record = Some(record);
         self
     }
 
@@ -88,9 +73,9 @@ impl SlaveLoop {
     ) -> Finished {
         while !side.is_stopped() {
             let tick = ticker.wait();
-            self.tick(tick.deadline, &mut side, || clock.now());
+            self.tick(tick, &mut side, || clock.now());
             if tick.index.is_multiple_of(SNAPSHOT_TICKS) {
-                side.publish(self.snapshot(tick.deadline));
+                self.show(tick.deadline, &mut side);
             }
         }
         // what came before the end counts
@@ -98,43 +83,61 @@ impl SlaveLoop {
         Finished {
             end: self.end,
             ticker: ticker.report(),
-            record: self.record,
         }
     }
 
     /// One tick, at its deadline: the stamp is free of wake-up jitter. `now` is when what it sends leaves.
     pub(super) fn tick(
         &mut self,
-        deadline: Time,
+        tick: Tick,
         side: &mut LoopSide<Snapshot>,
         now: impl FnOnce() -> Time,
     ) {
         self.receive(side);
-        let done = self.end.tick(deadline);
+        let done = self.end.tick(tick.deadline);
         if let Some(tick) = done {
             if let Some(truth) = &mut self.truth {
                 truth.send(tick.stamp, tick.truth);
             }
             self.newest = Some(tick);
         }
-        let now = now();
-        side.send(now, |out| match self.end.poll_transmit(now, out) {
-            Ok(length) => length,
+        let sent = now();
+        if let Some(record) = &mut self.record {
+            record.ticked(Ticked {
+                tick,
+                given: (),
+                sent,
+                done,
+            });
+        }
+        side.send(sent, |out| match self.end.poll_transmit(sent, out) {
+            Ok(length) => {
+                let bytes = out.get(..length?).unwrap_or_default();
+                if let Some(record) = &mut self.record {
+                    record.sent(sent, bytes);
+                }
+                length
+            }
             Err(_) => {
                 self.numbers_spent = true;
                 None
             }
         });
+    }
+
+    fn show(&mut self, now: Time, side: &mut LoopSide<Snapshot>) {
+        let snapshot = self.snapshot(now);
         if let Some(record) = &mut self.record {
-            record.log.keep_tick(deadline, (), now, done);
+            record.shown(now, SlaveShown::new(&self.end, snapshot.live));
         }
+        side.publish(snapshot);
     }
 
     fn receive(&mut self, side: &mut LoopSide<Snapshot>) {
         while let Some(frame) = side.next_arrival() {
             self.end.handle_datagram(frame.at, frame.bytes());
             if let Some(record) = &mut self.record {
-                record.log.keep_frame(&frame);
+                record.arrived(&frame);
             }
         }
     }

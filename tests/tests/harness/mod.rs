@@ -11,6 +11,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 pub(crate) mod hosts;
 pub(crate) mod process;
+pub(crate) mod python;
 pub(crate) mod tshark;
 
 /// The root of the repository.

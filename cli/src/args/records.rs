@@ -1,0 +1,56 @@
+//! The arguments of the commands that take what was recorded: replay, report, export.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use mmt_lab::replay::ReplayConfig;
+
+use super::values::{self, Period};
+
+/// Arguments of `mmt replay`.
+#[derive(Debug, Args)]
+pub(crate) struct ReplayArguments {
+    /// Recorded pushes, or records of sessions (MCAP), of which the options below change nothing
+    #[arg(value_name = "FILE", required = true)]
+    pub(crate) files: Vec<PathBuf>,
+    /// Delta of (12): the force error that calls for an update
+    #[arg(long, value_name = "PERCENT", default_value = "10%", value_parser = values::deadband)]
+    pub(crate) deadband: f64,
+    /// Longest time without an update in contact; none for the pure deadband
+    #[arg(long, value_name = "TIME", default_value = "150ms", value_parser = values::period)]
+    pub(crate) t_update: Period,
+    /// Random splits into fitted and held-out pushes
+    #[arg(long, value_name = "N", default_value_t = ReplayConfig::default().repeats, value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    pub(crate) splits: u32,
+    /// Seed of the splits
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub(crate) seed: u64,
+    /// Print one JSON document instead of tables
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// Arguments of `mmt report`.
+#[derive(Debug, Args)]
+pub(crate) struct ReportArguments {
+    /// Records of one run made with --record: of a demo, or of both hosts
+    #[arg(value_name = "FILE", required = true)]
+    pub(crate) files: Vec<PathBuf>,
+    /// Folder for CSV and SVG; made if it is not there
+    #[arg(long, value_name = "DIR", default_value = "report")]
+    pub(crate) out: PathBuf,
+    /// Print one JSON document instead of tables
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// Arguments of `mmt export`.
+#[derive(Debug, Args)]
+pub(crate) struct ExportArguments {
+    /// A record made with --record
+    #[arg(value_name = "FILE")]
+    pub(crate) file: PathBuf,
+    /// Folder for the tables; made if it is not there
+    #[arg(long, value_name = "DIR", default_value = "tables")]
+    pub(crate) out: PathBuf,
+}

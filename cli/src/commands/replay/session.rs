@@ -1,0 +1,150 @@
+//! Recorded sessions, run again to the same bits.
+
+use std::path::{Path, PathBuf};
+
+use mmt_lab::again::{AgainError, RanAgain, SessionsAgain};
+use mmt_shared::io::record::{Ended, RecordError, is_record, read};
+use serde::Serialize;
+
+use crate::args::ReplayArguments;
+use crate::failure::Failure;
+use crate::output::{print, print_json};
+
+/// A record that ran again, as the document shows it.
+#[derive(Debug, Serialize)]
+struct Record {
+    file: String,
+    /// Whether it is whole; if not, it was cut off.
+    is_whole: bool,
+    sessions: Vec<Session>,
+}
+
+#[derive(Debug, Serialize)]
+struct Session {
+    side: &'static str,
+    session: u32,
+    /// Ticks that gave the same bits.
+    ticks: u64,
+    /// Whether inputs are missing after these ticks.
+    has_gap: bool,
+    digest: String,
+}
+
+#[derive(Debug, Serialize)]
+struct Document {
+    version: &'static str,
+    command: &'static str,
+    records: Vec<Record>,
+}
+
+/// Why a record was not run again.
+#[derive(Debug, thiserror::Error)]
+enum Error {
+    #[error(transparent)]
+    Record(#[from] RecordError),
+    #[error(transparent)]
+    Again(#[from] AgainError),
+}
+
+/// Whether the files are records of sessions and not recorded pushes.
+///
+/// # Errors
+/// One cannot be read, or there are both.
+pub(super) fn are_records(files: &[PathBuf]) -> Result<bool, Failure> {
+    let mut records = 0;
+    for path in files {
+        // who cannot be read is named by who reads it whole
+        records += usize::from(is_record(path).unwrap_or(false));
+    }
+    if records > 0 && records < files.len() {
+        let what = "some of the files are records of sessions and some are recorded pushes";
+        return Err(Failure::usage(what).remedy("replay them one kind at a time"));
+    }
+    Ok(records > 0)
+}
+
+/// Runs every session of every record again.
+///
+/// # Errors
+/// A record cannot be read, is of another version, or gave something else.
+pub(super) fn run(arguments: &ReplayArguments) -> Result<(), Failure> {
+    let mut records = Vec::new();
+    for path in &arguments.files {
+        let record = again(path).map_err(|error| failure(path, &error))?;
+        if !arguments.json {
+            show(&record)?;
+        }
+        records.push(record);
+    }
+    if arguments.json {
+        print_json(&Document {
+            version: env!("CARGO_PKG_VERSION"),
+            command: "replay",
+            records,
+        })?;
+    }
+    Ok(())
+}
+
+fn again(path: &Path) -> Result<Record, Error> {
+    let mut sessions = SessionsAgain::default();
+    let ended = read(path, |topic, message| -> Result<(), Error> {
+        Ok(sessions.take(topic, message)?)
+    })?;
+    let ran = sessions.ran().map(|(side, session, ran)| {
+        let RanAgain {
+            ticks,
+            digest,
+            has_gap,
+            ..
+        } = ran;
+        Session {
+            side,
+            session,
+            ticks,
+            has_gap,
+            digest: format!("{digest:016x}"),
+        }
+    });
+    Ok(Record {
+        file: path.display().to_string(),
+        is_whole: ended == Ended::Whole,
+        sessions: ran.collect(),
+    })
+}
+
+fn show(record: &Record) -> Result<(), Failure> {
+    print(&record.file)?;
+    for of in &record.sessions {
+        let Session {
+            side,
+            session,
+            ticks,
+            digest,
+            ..
+        } = of;
+        print(format_args!(
+            "  {side}, session {session}: {ticks} ticks ran again to the same bits, digest {digest}"
+        ))?;
+        if of.has_gap {
+            print("    then inputs are missing: the disk was too slow for the record")?;
+        }
+    }
+    if !record.is_whole {
+        print("  the record is cut off here")?;
+    }
+    Ok(())
+}
+
+fn failure(path: &Path, error: &Error) -> Failure {
+    let what = format!("the record {}: {error}", path.display());
+    match error {
+        Error::Again(AgainError::Difference { .. }) => Failure::failed(what).remedy(
+            "see whether the same build made it: a build of other code computes other bits",
+        ),
+        Error::Again(AgainError::OtherProgram { .. }) => {
+            Failure::usage(what).remedy("take the version that made it; mmt export reads it anyway")
+        }
+        _ => Failure::usage(what).remedy("give a file that mmt made with --record"),
+    }
+}

@@ -1,0 +1,108 @@
+//! `mmt report`: the table and the figures of a recorded run.
+
+use std::path::Path;
+
+use mmt_lab::io::Folder;
+use mmt_lab::record_report::{Findings, RecordReport};
+use mmt_shared::io::record::{Ended, RecordError, read};
+use serde::Serialize;
+use serde_json::{Map, Value};
+
+use crate::args::ReportArguments;
+use crate::failure::Failure;
+use crate::output::{note, print, print_json};
+
+/// The report as one document.
+#[derive(Serialize)]
+struct Document<'a> {
+    version: &'static str,
+    command: &'static str,
+    files: Vec<String>,
+    run: &'a mmt_lab::table::Table,
+    #[serde(flatten)]
+    tables: Map<String, Value>,
+}
+
+/// Runs `mmt report`.
+///
+/// # Errors
+/// A record cannot be read, or a file cannot be written.
+pub(crate) fn run(arguments: &ReportArguments) -> Result<(), Failure> {
+    let mut report = RecordReport::default();
+    for path in &arguments.files {
+        let ended = take(&mut report, path).map_err(|error| {
+            Failure::usage(format!("the record {}: {error}", path.display()))
+                .remedy("give a file that mmt made with --record")
+        })?;
+        if ended == Ended::CutOff {
+            let path = path.display();
+            note(format_args!(
+                "{path} is cut off: the report ends where it does"
+            ));
+        }
+    }
+    let names: Vec<String> = arguments
+        .files
+        .iter()
+        .map(|path| path.display().to_string())
+        .collect();
+    let findings = report.findings(&names.join(", "));
+    keep(&findings, &arguments.out)?;
+    if arguments.json {
+        return print_json(&Document {
+            version: env!("CARGO_PKG_VERSION"),
+            command: "report",
+            files: names,
+            run: &findings.summary,
+            tables: documents(&findings)?,
+        });
+    }
+    print(&findings.summary)?;
+    findings
+        .tables
+        .iter()
+        .try_for_each(|(_, table)| print(table))?;
+    note(format_args!(
+        "figures and tables: {}",
+        arguments.out.display()
+    ));
+    Ok(())
+}
+
+fn take(report: &mut RecordReport, path: &Path) -> Result<Ended, RecordError> {
+    read(path, |topic, message| {
+        report.take(topic, message).map_err(|why| {
+            let topic = topic.to_owned();
+            RecordError::Message { topic, why }
+        })
+    })
+}
+
+/// Writes every table and figure.
+fn keep(findings: &Findings, out: &Path) -> Result<(), Failure> {
+    let unwritten = |error: std::io::Error| {
+        Failure::failed(format!("cannot write to {}: {error}", out.display()))
+            .remedy("give --out a folder that can be written, with room")
+    };
+    let folder = Folder::open(out).map_err(unwritten)?;
+    for (name, table) in findings.tables.iter().chain(&findings.forces) {
+        folder.keep(name, &table.to_csv()).map_err(unwritten)?;
+    }
+    for (name, figure) in &findings.figures {
+        let drawn = figure.draw();
+        let svg = drawn.map_err(|why| Failure::failed(format!("cannot draw {name}: {why}")))?;
+        folder.keep(name, svg.as_bytes()).map_err(unwritten)?;
+    }
+    Ok(())
+}
+
+/// The tables by the names of their files, without the ending.
+fn documents(findings: &Findings) -> Result<Map<String, Value>, Failure> {
+    let mut tables = Map::new();
+    for (name, table) in &findings.tables {
+        let value = serde_json::to_value(table);
+        let value = value.map_err(|error| Failure::failed(format!("no JSON: {error}")))?;
+        tables.insert(name.trim_end_matches(".csv").to_owned(), value);
+    }
+    Ok(tables)
+}

@@ -1,0 +1,165 @@
+//! The master's end of a recorded session, run again: the same inputs give the same bits.
+//!
+//! Pure. What the end is made of is written into the record and read back from it here, in one place; numbers from a file
+//! pass the same doors as numbers off the wire.
+
+use mmt_shared::model::geometry::Vec2;
+use mmt_shared::range::OutOfRange;
+use mmt_shared::record::PROGRAM;
+use mmt_shared::record::digest::RunDigest;
+use mmt_shared::record::messages::{Arrival, MasterTick, Session, Stamp};
+use mmt_shared::time::Time;
+use mmt_shared::wire::{
+    Architecture, DATAGRAM_MAX, DecodeError, STREAM_MESSAGE_MAX, Side, StreamMessage, Welcome,
+    WelcomeError,
+};
+use serde::{Deserialize, Serialize};
+
+use crate::commands::CommandConfig;
+use crate::end::MasterEnd;
+use crate::limiter::{ForceLimiter, Limits};
+use crate::master::Master;
+
+/// What a session's end at the master is made of besides the welcome.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Numbers {
+    architecture: Architecture,
+    limits: Limits,
+    commands: CommandConfig,
+}
+
+/// What the master's end of a session is made of.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MasterSetting {
+    /// When the end begins.
+    pub began: Time,
+    /// The slave's welcome.
+    pub welcome: Welcome,
+    /// Whose force the hand feels.
+    pub architecture: Architecture,
+    /// The device's limits.
+    pub limits: Limits,
+    /// How commands are made.
+    pub commands: CommandConfig,
+}
+
+/// Why a recorded session cannot be run again.
+#[derive(Debug, thiserror::Error)]
+pub enum MasterAgainError {
+    /// The welcome cannot be read.
+    #[error("its welcome: {0}")]
+    Unreadable(#[from] DecodeError),
+    /// Something else than a welcome.
+    #[error("it has no welcome")]
+    NoWelcome,
+    /// The welcome's numbers are not accepted.
+    #[error("its welcome: {0}")]
+    Welcome(#[from] WelcomeError),
+    /// The rest of its setting cannot be read.
+    #[error("its setting: {0}")]
+    Setting(#[from] serde_json::Error),
+    /// The device's limits are not accepted.
+    #[error("its device: {0}")]
+    Limits(#[from] OutOfRange),
+}
+
+impl MasterSetting {
+    /// The end.
+    ///
+    /// # Errors
+    /// The device's limits are not accepted.
+    pub fn end(&self) -> Result<MasterEnd, OutOfRange> {
+        let limiter = ForceLimiter::try_new(self.limits)?;
+        let master = Master::with_architecture(&self.welcome, limiter, self.architecture);
+        Ok(MasterEnd::new(self.began, master, self.commands))
+    }
+
+    /// The beginning of its record; stamp and number come with the record.
+    pub fn session(&self, configuration: &impl Serialize) -> Session {
+        let mut opening = [0; STREAM_MESSAGE_MAX];
+        // an accepted welcome can be written; without it the record cannot run again, which is seen then
+        let length = StreamMessage::Welcome((&self.welcome).into()).encode(&mut opening);
+        let opening = opening.get(..length.unwrap_or(0)).unwrap_or_default();
+        let numbers = Numbers {
+            architecture: self.architecture,
+            limits: self.limits,
+            commands: self.commands,
+        };
+        Session {
+            stamp: Stamp::default(),
+            session: 0,
+            program: PROGRAM.to_owned(),
+            began_ns: self.began.as_nanos(),
+            opening: opening.to_vec(),
+            setting: serde_json::to_string(&numbers).unwrap_or_default(),
+            configuration: serde_json::to_string(configuration).unwrap_or_default(),
+        }
+    }
+
+    /// What a record says.
+    ///
+    /// # Errors
+    /// A part of it cannot be read or is not accepted.
+    pub fn of_session(session: &Session) -> Result<Self, MasterAgainError> {
+        let StreamMessage::Welcome(welcome) = StreamMessage::decode(&session.opening, Side::Slave)?
+        else {
+            return Err(MasterAgainError::NoWelcome);
+        };
+        let numbers: Numbers = serde_json::from_str(&session.setting)?;
+        Ok(Self {
+            began: Time::from_nanos(session.began_ns),
+            welcome: welcome.accept(&welcome.settings.coupling)?,
+            architecture: numbers.architecture,
+            limits: numbers.limits,
+            commands: numbers.commands,
+        })
+    }
+}
+
+/// A recorded session at work again.
+#[derive(Debug)]
+pub struct MasterAgain {
+    end: MasterEnd,
+    digest: RunDigest,
+}
+
+impl MasterAgain {
+    /// The session at its beginning.
+    ///
+    /// # Errors
+    /// The record does not say all that it is made of.
+    pub fn try_new(session: &Session) -> Result<Self, MasterAgainError> {
+        Ok(Self {
+            end: MasterSetting::of_session(session)?.end()?,
+            digest: RunDigest::default(),
+        })
+    }
+
+    /// The end as it is now.
+    pub fn end(&self) -> &MasterEnd {
+        &self.end
+    }
+
+    /// A datagram that arrived.
+    pub fn arrival(&mut self, arrival: &Arrival) {
+        let at = Time::from_nanos(arrival.at_ns);
+        self.end.handle_datagram(at, &arrival.datagram);
+    }
+
+    /// A tick; returns the digest of all that was given before its datagrams, which is to be the recorded one.
+    pub fn tick(&mut self, tick: &MasterTick) -> u64 {
+        if tick.releases {
+            self.end.release();
+        }
+        let reading = Vec2::new(tick.reading_x_m, tick.reading_y_m);
+        let done = self.end.tick(Time::from_nanos(tick.deadline_ns), reading);
+        self.digest.tick(&done);
+        let value = self.digest.value();
+        let (sent, mut out) = (Time::from_nanos(tick.sent_ns), [0; DATAGRAM_MAX]);
+        while let Ok(Some(length)) = self.end.poll_transmit(sent, &mut out) {
+            self.digest.datagram(out.get(..length).unwrap_or_default());
+        }
+        value
+    }
+}

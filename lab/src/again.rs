@@ -1,0 +1,242 @@
+//! Recorded sessions run again: the ends of a record, fed with the inputs that they had, must give the same bits.
+//!
+//! Pure: whoever reads the file hands over message by message.
+
+use std::collections::BTreeMap;
+
+use mmt_client::again::{MasterAgain, MasterAgainError};
+use mmt_server::again::{SlaveAgain, SlaveAgainError};
+use mmt_shared::clean::clean;
+use mmt_shared::record::PROGRAM;
+use mmt_shared::record::cdr::CdrError;
+use mmt_shared::record::messages::{Arrival, MasterTick, Message, Session, SlaveTick};
+
+/// Why a record did not run again.
+#[derive(Debug, thiserror::Error)]
+pub enum AgainError {
+    /// Another version may compute otherwise.
+    #[error("it was made by {made}, and this is {PROGRAM}: only that version runs it again")]
+    OtherProgram {
+        /// What made it.
+        made: String,
+    },
+    /// A message is broken.
+    #[error("a message on {topic} is broken: {why}")]
+    Message {
+        /// Where.
+        topic: String,
+        /// Why.
+        why: CdrError,
+    },
+    /// The master's end cannot be made.
+    #[error("the master's session {0}")]
+    Master(#[from] MasterAgainError),
+    /// The slave's end cannot be made.
+    #[error("the slave's session {0}")]
+    Slave(#[from] SlaveAgainError),
+    /// A tick of a session whose beginning is not there.
+    #[error("session {session} of the {side} has no beginning")]
+    NoBeginning {
+        /// Which end.
+        side: &'static str,
+        /// Its number.
+        session: u32,
+    },
+    /// A tick gave something else.
+    #[error(
+        "tick {tick} of session {session} of the {side} gave something else than when it was recorded"
+    )]
+    Difference {
+        /// Which end.
+        side: &'static str,
+        /// Number of the session.
+        session: u32,
+        /// Number of the tick in its session, from 0.
+        tick: u64,
+    },
+}
+
+/// How far a session ran again.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct RanAgain {
+    /// Ticks that gave the same bits.
+    pub ticks: u64,
+    /// Digest of all that they gave.
+    pub digest: u64,
+    /// Whether inputs are missing after these ticks: it runs no further.
+    pub has_gap: bool,
+    next_input: u64,
+}
+
+impl RanAgain {
+    /// Whether the input of this number is the next one.
+    fn is_next(&mut self, index: u64) -> bool {
+        self.has_gap |= index != self.next_input;
+        self.next_input += 1;
+        !self.has_gap
+    }
+}
+
+/// An end that runs again.
+trait End: Sized {
+    /// Its name, and the first part of its topics.
+    const SIDE: &'static str;
+    /// A tick of it.
+    type Tick: Message;
+
+    fn begin(session: &Session) -> Result<Self, AgainError>;
+
+    fn arrival(&mut self, arrival: &Arrival);
+
+    /// Session and number of the input.
+    fn place(tick: &Self::Tick) -> (u32, u64);
+
+    /// Digest of what it gives now, and of what it gave.
+    fn tick(&mut self, tick: &Self::Tick) -> (u64, u64);
+}
+
+impl End for MasterAgain {
+    const SIDE: &'static str = "master";
+    type Tick = MasterTick;
+
+    fn begin(session: &Session) -> Result<Self, AgainError> {
+        Ok(Self::try_new(session)?)
+    }
+
+    fn arrival(&mut self, arrival: &Arrival) {
+        self.arrival(arrival);
+    }
+
+    fn place(tick: &MasterTick) -> (u32, u64) {
+        (tick.session, tick.index)
+    }
+
+    fn tick(&mut self, tick: &MasterTick) -> (u64, u64) {
+        (self.tick(tick), tick.digest)
+    }
+}
+
+impl End for SlaveAgain {
+    const SIDE: &'static str = "slave";
+    type Tick = SlaveTick;
+
+    fn begin(session: &Session) -> Result<Self, AgainError> {
+        Ok(Self::try_new(session)?)
+    }
+
+    fn arrival(&mut self, arrival: &Arrival) {
+        self.arrival(arrival);
+    }
+
+    fn place(tick: &SlaveTick) -> (u32, u64) {
+        (tick.session, tick.index)
+    }
+
+    fn tick(&mut self, tick: &SlaveTick) -> (u64, u64) {
+        (self.tick(tick), tick.digest)
+    }
+}
+
+/// The sessions of one end.
+struct Sessions<E>(BTreeMap<u32, (E, RanAgain)>);
+
+impl<E> Default for Sessions<E> {
+    fn default() -> Self {
+        Self(BTreeMap::new())
+    }
+}
+
+impl<E: End> Sessions<E> {
+    /// `what`: the rest of the topic.
+    fn take(&mut self, what: &str, topic: &str, message: &[u8]) -> Result<(), AgainError> {
+        match what {
+            "session" => {
+                let session = beginning(topic, message)?;
+                let began = (E::begin(&session)?, RanAgain::default());
+                self.0.insert(session.session, began);
+            }
+            "arrivals" => {
+                let arrival: Arrival = parse(topic, message)?;
+                let (end, ran) = self.session(arrival.session)?;
+                if ran.is_next(arrival.index) {
+                    end.arrival(&arrival);
+                }
+            }
+            "ticks" => {
+                let tick: E::Tick = parse(topic, message)?;
+                let (session, index) = E::place(&tick);
+                let (end, ran) = self.session(session)?;
+                if ran.is_next(index) {
+                    let (gives, gave) = end.tick(&tick);
+                    if gives != gave {
+                        return Err(AgainError::Difference {
+                            side: E::SIDE,
+                            session,
+                            tick: ran.ticks,
+                        });
+                    }
+                    (ran.ticks, ran.digest) = (ran.ticks + 1, gives);
+                }
+            }
+            _ => {}
+        }
+        Ok(())
+    }
+
+    fn session(&mut self, session: u32) -> Result<&mut (E, RanAgain), AgainError> {
+        let side = E::SIDE;
+        let found = self.0.get_mut(&session);
+        found.ok_or(AgainError::NoBeginning { side, session })
+    }
+
+    fn ran(&self) -> impl Iterator<Item = (&'static str, u32, RanAgain)> {
+        let sessions = self.0.iter();
+        sessions.map(|(number, (_, ran))| (E::SIDE, *number, *ran))
+    }
+}
+
+/// The sessions of a record.
+#[derive(Default)]
+pub struct SessionsAgain {
+    masters: Sessions<MasterAgain>,
+    slaves: Sessions<SlaveAgain>,
+}
+
+impl SessionsAgain {
+    /// Takes the next message of the record; one that is no input changes nothing.
+    ///
+    /// # Errors
+    /// The message is broken, a session cannot begin, or a tick gave something else.
+    pub fn take(&mut self, topic: &str, message: &[u8]) -> Result<(), AgainError> {
+        if let Some(what) = topic.strip_prefix("/master/") {
+            self.masters.take(what, topic, message)
+        } else if let Some(what) = topic.strip_prefix("/slave/") {
+            self.slaves.take(what, topic, message)
+        } else {
+            Ok(())
+        }
+    }
+
+    /// Each session with its side and number, the master's first.
+    pub fn ran(&self) -> impl Iterator<Item = (&'static str, u32, RanAgain)> {
+        self.masters.ran().chain(self.slaves.ran())
+    }
+}
+
+fn parse<M: Message>(topic: &str, message: &[u8]) -> Result<M, AgainError> {
+    M::read(message).map_err(|why| AgainError::Message {
+        topic: clean(topic),
+        why,
+    })
+}
+
+/// The beginning of a session of this very program.
+fn beginning(topic: &str, message: &[u8]) -> Result<Session, AgainError> {
+    let session: Session = parse(topic, message)?;
+    if session.program == PROGRAM {
+        Ok(session)
+    } else {
+        let made = clean(&session.program);
+        Err(AgainError::OtherProgram { made })
+    }
+}

@@ -1,0 +1,131 @@
+//! The slave's end of a recorded session, run again: the same inputs give the same bits.
+//!
+//! Pure. What the end is made of is written into the record and read back from it here, in one place. The hello is kept as
+//! it was on the wire, but for its token, which is zero: no record holds a secret.
+
+use mmt_shared::pairing::{SECRET_BYTES, Token};
+use mmt_shared::record::PROGRAM;
+use mmt_shared::record::digest::RunDigest;
+use mmt_shared::record::messages::{Arrival, Session, SlaveTick, Stamp};
+use mmt_shared::time::Time;
+use mmt_shared::wire::{
+    DATAGRAM_MAX, DecodeError, Hello, HelloError, STREAM_MESSAGE_MAX, Side, StreamMessage,
+};
+use serde::Serialize;
+
+use crate::end::SlaveEnd;
+use crate::slave::{SlaveConfig, SlaveError};
+
+/// Why a recorded session cannot be run again.
+#[derive(Debug, thiserror::Error)]
+pub enum SlaveAgainError {
+    /// The hello cannot be read.
+    #[error("its hello: {0}")]
+    Unreadable(#[from] DecodeError),
+    /// Something else than a hello.
+    #[error("it has no hello")]
+    NoHello,
+    /// The hello's numbers are not accepted.
+    #[error("its hello: {0}")]
+    Hello(#[from] HelloError),
+    /// The configuration cannot be read.
+    #[error("its setting: {0}")]
+    Setting(#[from] serde_json::Error),
+    /// The configuration is not accepted.
+    #[error("its setting: {0}")]
+    Slave(#[from] SlaveError),
+}
+
+/// The beginning of the record of a session that begins at `began` with `hello`; stamp and number come with the record.
+#[must_use]
+pub fn session(
+    began: Time,
+    config: &SlaveConfig,
+    hello: &Hello,
+    configuration: &impl Serialize,
+) -> Session {
+    let hello = Hello {
+        token: Token::new([0; SECRET_BYTES]),
+        ..*hello
+    };
+    let mut opening = [0; STREAM_MESSAGE_MAX];
+    // an accepted hello can be written; without it the record cannot run again, which is seen then
+    let length = StreamMessage::Hello(hello).encode(&mut opening);
+    let opening = opening.get(..length.unwrap_or(0)).unwrap_or_default();
+    Session {
+        stamp: Stamp::default(),
+        session: 0,
+        program: PROGRAM.to_owned(),
+        began_ns: began.as_nanos(),
+        opening: opening.to_vec(),
+        setting: serde_json::to_string(config).unwrap_or_default(),
+        configuration: serde_json::to_string(configuration).unwrap_or_default(),
+    }
+}
+
+/// A recorded session at work again.
+pub struct SlaveAgain {
+    end: SlaveEnd,
+    digest: RunDigest,
+}
+
+impl SlaveAgain {
+    /// The session at its beginning.
+    ///
+    /// # Errors
+    /// The record does not say all that it is made of.
+    pub fn try_new(session: &Session) -> Result<Self, SlaveAgainError> {
+        let StreamMessage::Hello(hello) = StreamMessage::decode(&session.opening, Side::Master)?
+        else {
+            return Err(SlaveAgainError::NoHello);
+        };
+        let config: SlaveConfig = serde_json::from_str(&session.setting)?;
+        let began = Time::from_nanos(session.began_ns);
+        Ok(Self {
+            end: SlaveEnd::of_session(began, &config, &hello.accept()?)?,
+            digest: RunDigest::default(),
+        })
+    }
+
+    /// The end as it is now.
+    #[must_use]
+    pub fn end(&self) -> &SlaveEnd {
+        &self.end
+    }
+
+    /// A datagram that arrived.
+    pub fn arrival(&mut self, arrival: &Arrival) {
+        let at = Time::from_nanos(arrival.at_ns);
+        self.end.handle_datagram(at, &arrival.datagram);
+    }
+
+    /// A tick; returns the digest of all that was given before its datagrams, which is to be the recorded one.
+    pub fn tick(&mut self, tick: &SlaveTick) -> u64 {
+        let done = self.end.tick(Time::from_nanos(tick.deadline_ns));
+        self.digest.tick(&done);
+        let value = self.digest.value();
+        let (sent, mut out) = (Time::from_nanos(tick.sent_ns), [0; DATAGRAM_MAX]);
+        while let Ok(Some(length)) = self.end.poll_transmit(sent, &mut out) {
+            self.digest.datagram(out.get(..length).unwrap_or_default());
+        }
+        value
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use mmt_shared::model::settings::Mode;
+
+    #[test]
+    fn every_number_of_a_configuration_reads_back_to_the_same_bits() {
+        for mode in [Mode::Paper, Mode::Recommended] {
+            let mut config = SlaveConfig::of_mode(mode);
+            // a number that a parser of little care reads one bit off
+            config.environment.mass_kg = 0.1 + 0.7;
+            let text = serde_json::to_string(&config).unwrap();
+            let again: SlaveConfig = serde_json::from_str(&text).unwrap();
+            assert_eq!(again, config);
+        }
+    }
+}

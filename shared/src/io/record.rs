@@ -1,0 +1,195 @@
+//! Records of sessions: a ring out of each loop, one thread that writes the file, and the way back.
+//!
+//! A loop leaves what it was given and what it did in a bounded ring: it never waits, and what finds no room is counted. A
+//! thread of its own makes messages of that and writes them. A disk that is slow or full costs parts of the record, which
+//! is reported, and never a tick. A file that is cut off in the middle opens up to there.
+
+mod file;
+mod read;
+mod sink;
+mod source;
+#[cfg(test)]
+mod tests;
+
+use std::fs::File;
+use std::io;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
+use std::sync::mpsc::{self, Receiver, Sender, TryRecvError};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+
+use super::clock::Clock;
+use crate::record::messages::{Session, Stamp};
+use crate::time::Time;
+use crate::wire::Side;
+
+pub use file::RecordWriter;
+pub use read::{Ended, RecordError, is_record, read};
+pub use sink::{RecordSink, Ticked};
+pub use source::{TickAbout, Topics};
+
+use sink::ROOM;
+use source::{Drain, Source};
+
+/// How long the thread rests when the rings are empty.
+const REST: Duration = Duration::from_millis(5);
+/// What is older than this is on the disk: so much a cut loses.
+const FLUSH: Duration = Duration::from_secs(1);
+/// How long the last messages may take to be written.
+const FINISH: Duration = Duration::from_secs(5);
+
+/// The wall clock at a moment of an end's clock: both ends of a record lie on one axis.
+#[derive(Clone, Copy, Debug)]
+pub struct Wall {
+    stamp: Stamp,
+    at: Time,
+}
+
+impl Wall {
+    /// Now.
+    pub fn now(clock: Clock) -> Self {
+        let since = SystemTime::now().duration_since(UNIX_EPOCH);
+        let nanos = since.map_or(0, |since| since.as_nanos());
+        Self {
+            stamp: Stamp(u64::try_from(nanos).unwrap_or(0)),
+            at: clock.now(),
+        }
+    }
+
+    /// This moment of the wall clock and of the end's.
+    pub fn of(stamp: Stamp, at: Time) -> Self {
+        Self { stamp, at }
+    }
+
+    /// A moment of the end's clock on the wall clock.
+    pub fn stamp(&self, at: Time) -> Stamp {
+        let since = at.signed_since(self.at);
+        Stamp(self.stamp.0.saturating_add_signed(since))
+    }
+}
+
+/// What the thread is asked for.
+enum Order {
+    Begin(Box<dyn Drain>),
+    Finish,
+}
+
+/// What a record came to.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct RecordOutcome {
+    /// Inputs and events that found no room on their way to the file.
+    pub missed: u64,
+    /// Why the file could not be written.
+    pub error: Option<String>,
+}
+
+/// A record at work. Copies write into the same file.
+#[derive(Clone, Debug)]
+pub struct Recorder {
+    path: Arc<PathBuf>,
+    orders: Sender<Order>,
+    done: Arc<Mutex<Receiver<RecordOutcome>>>,
+    missed: Arc<AtomicU64>,
+    /// Sessions so far at the master and at the slave.
+    sessions: Arc<[AtomicU32; 2]>,
+}
+
+impl Recorder {
+    /// Creates the file; an older one of that name is overwritten.
+    ///
+    /// # Errors
+    /// It cannot be created, or no thread is to be had.
+    pub fn create(path: &Path) -> io::Result<Self> {
+        let file = File::create(path)?;
+        let (orders, inbox) = mpsc::channel();
+        let (outcome, done) = mpsc::channel();
+        let missed = Arc::new(AtomicU64::new(0));
+        let counted = Arc::clone(&missed);
+        std::thread::Builder::new()
+            .name("mmt-record".to_owned())
+            .spawn(move || {
+                let error = write(file, &inbox, &counted);
+                let missed = counted.load(Ordering::Relaxed);
+                // an error means that nobody waits for it any more
+                let _ = outcome.send(RecordOutcome { missed, error });
+            })?;
+        Ok(Self {
+            path: Arc::new(path.to_owned()),
+            orders,
+            done: Arc::new(Mutex::new(done)),
+            missed,
+            sessions: Arc::default(),
+        })
+    }
+
+    /// Where the file is.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Begins a session: what its loop leaves in the sink is written as `topics` say. `session` describes all that its
+    /// end was made of; its number and stamp are given here.
+    pub fn begin<T: Topics>(
+        &self,
+        wall: Wall,
+        mut session: Session,
+        topics: T,
+    ) -> RecordSink<T::Given, T::Done, T::Shown> {
+        let [masters, slaves] = &*self.sessions;
+        let sessions = match T::SIDE {
+            Side::Master => masters,
+            Side::Slave => slaves,
+        };
+        session.session = sessions.fetch_add(1, Ordering::Relaxed) + 1;
+        session.stamp = wall.stamp(Time::from_nanos(session.began_ns));
+        let (sink, entries) = RecordSink::with_room(ROOM, Arc::clone(&self.missed));
+        let source = Source::new(wall, session, topics, entries);
+        // the thread that has ended has left its outcome
+        let _ = self.orders.send(Order::Begin(Box::new(source)));
+        sink
+    }
+
+    /// Waits until all that was left so far is written; what comes later is not.
+    pub fn finish(&self) -> RecordOutcome {
+        let _ = self.orders.send(Order::Finish);
+        let done = self.done.lock().unwrap_or_else(PoisonError::into_inner);
+        done.recv_timeout(FINISH).unwrap_or_else(|_| RecordOutcome {
+            missed: self.missed.load(Ordering::Relaxed),
+            error: Some(format!("the disk took more than {FINISH:?} for the end")),
+        })
+    }
+}
+
+/// What the thread does; returns the file's error.
+fn write(file: File, orders: &Receiver<Order>, missed: &AtomicU64) -> Option<String> {
+    let mut out = RecordWriter::create(file);
+    let mut sources: Vec<Box<dyn Drain>> = Vec::new();
+    let mut flushed = Instant::now();
+    let mut warned = false;
+    loop {
+        let mut ends = false;
+        while !ends {
+            match orders.try_recv() {
+                Ok(Order::Begin(source)) => sources.push(source),
+                Err(TryRecvError::Empty) => break,
+                // or nobody is left who could ask
+                Ok(Order::Finish) | Err(TryRecvError::Disconnected) => ends = true,
+            }
+        }
+        let lost = missed.load(Ordering::Relaxed);
+        sources.retain_mut(|source| source.drain(lost, &mut out));
+        if ends {
+            return out.finish();
+        }
+        if lost > 0 && !warned {
+            warned = true;
+            tracing::warn!("the disk is too slow for the record: parts of it are missing");
+        }
+        if flushed.elapsed() >= FLUSH {
+            flushed = Instant::now();
+            out.flush();
+        }
+        std::thread::sleep(REST);
+    }
+}

@@ -1,0 +1,95 @@
+//! What a loop leaves for its record, and the ring in which it leaves it.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use rtrb::{Consumer, Producer, RingBuffer};
+
+use crate::io::loop_thread::Frame;
+use crate::io::schedule::Tick;
+use crate::time::Time;
+
+/// Entries that may wait for the thread: at 2000 a second, four seconds in which a disk stands.
+pub(super) const ROOM: usize = 8192;
+
+/// A tick: when it was, what it was given besides, when what it sent left, and what it did.
+#[derive(Clone, Copy, Debug)]
+pub struct Ticked<G, D> {
+    /// Its deadline, and how late it was.
+    pub tick: Tick,
+    /// What its end was given.
+    pub given: G,
+    /// When what it sent left.
+    pub sent: Time,
+    /// What it did.
+    pub done: D,
+}
+
+/// What a loop left.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Entry<G, D, S> {
+    Arrived { index: u64, frame: Frame },
+    Ticked { index: u64, tick: Ticked<G, D> },
+    Sent(Frame),
+    Shown { at: Time, shown: S },
+}
+
+/// The loop's side of a record. It never waits or allocates; what finds no room is counted.
+#[derive(Debug)]
+pub struct RecordSink<G, D, S> {
+    entries: Producer<Entry<G, D, S>>,
+    missed: Arc<AtomicU64>,
+    /// The number of the next input: inputs so far, and whatever found no room.
+    inputs: u64,
+}
+
+impl<G, D, S> RecordSink<G, D, S> {
+    pub(super) fn with_room(
+        entries: usize,
+        missed: Arc<AtomicU64>,
+    ) -> (Self, Consumer<Entry<G, D, S>>) {
+        let (entries, taken) = RingBuffer::new(entries);
+        let sink = Self {
+            entries,
+            missed,
+            inputs: 0,
+        };
+        (sink, taken)
+    }
+
+    /// Keeps a datagram that was handled.
+    pub fn arrived(&mut self, frame: &Frame) {
+        let (index, frame) = (self.count(), *frame);
+        self.keep(Entry::Arrived { index, frame });
+    }
+
+    /// Keeps a tick, before what it sends.
+    pub fn ticked(&mut self, tick: Ticked<G, D>) {
+        let index = self.count();
+        self.keep(Entry::Ticked { index, tick });
+    }
+
+    /// Keeps a datagram that leaves at `at`.
+    pub fn sent(&mut self, at: Time, bytes: &[u8]) {
+        self.keep(Entry::Sent(Frame::new(at, bytes)));
+    }
+
+    /// Keeps what is shown of the session at `at`.
+    pub fn shown(&mut self, at: Time, shown: S) {
+        self.keep(Entry::Shown { at, shown });
+    }
+
+    fn count(&mut self) -> u64 {
+        let index = self.inputs;
+        self.inputs += 1;
+        index
+    }
+
+    fn keep(&mut self, entry: Entry<G, D, S>) {
+        if self.entries.push(entry).is_err() {
+            self.missed.fetch_add(1, Ordering::Relaxed);
+            // whatever is missing, the numbers of the inputs show that something is
+            self.inputs += 1;
+        }
+    }
+}

@@ -1,0 +1,208 @@
+use std::fs::OpenOptions;
+use std::os::unix::fs::OpenOptionsExt;
+use std::path::PathBuf;
+
+use super::*;
+use crate::io::loop_thread::Frame;
+use crate::io::schedule::Tick;
+use crate::record::PROGRAM;
+use crate::record::messages::{Arrival, Loop, Message, Packet};
+
+/// An end that counts.
+struct Counting;
+
+impl Topics for Counting {
+    const SIDE: Side = Side::Slave;
+    type Given = ();
+    type Done = u64;
+    type Shown = ();
+
+    fn ticked(&mut self, about: &TickAbout, _: &Ticked<(), u64>, out: &mut RecordWriter) {
+        let message = Loop {
+            stamp: about.stamp,
+            session: about.session,
+            ticks: about.index,
+            skipped: 0,
+            lateness_mean_us: 0.0,
+            lateness_max_us: 0.0,
+            missed: about.digest,
+        };
+        out.put("/slave/ticks", about.stamp, &message);
+    }
+
+    fn shown(&mut self, _: Stamp, _: u32, (): &(), _: &mut RecordWriter) {}
+}
+
+fn session() -> Session {
+    Session {
+        stamp: Stamp(0),
+        session: 0,
+        program: PROGRAM.to_owned(),
+        began_ns: 5,
+        opening: vec![1, 2, 3],
+        setting: "{}".to_owned(),
+        configuration: "{}".to_owned(),
+    }
+}
+
+fn ticked(n: u64) -> Ticked<(), u64> {
+    Ticked {
+        tick: Tick {
+            index: n,
+            deadline: Time::from_millis(n),
+            skipped: 0,
+            lateness: Duration::from_nanos(n),
+        },
+        given: (),
+        sent: Time::from_millis(n),
+        done: n,
+    }
+}
+
+/// A record of so many ticks, each with a datagram each way.
+fn record(path: &Path, ticks: u64) -> RecordOutcome {
+    let recorder = Recorder::create(path).unwrap();
+    let wall = Wall::of(Stamp(1_000), Time::ZERO);
+    let mut sink = recorder.begin(wall, session(), Counting);
+    for n in 0..ticks {
+        sink.arrived(&Frame::new(Time::from_millis(n), b"in"));
+        sink.ticked(ticked(n));
+        sink.sent(Time::from_millis(n), b"out");
+    }
+    recorder.finish()
+}
+
+/// Topic and bytes of each message, and how the file ended.
+fn messages(path: &Path) -> (Vec<(String, Vec<u8>)>, Ended) {
+    let mut found = Vec::new();
+    let ended = read::<RecordError>(path, |topic, message| {
+        found.push((topic.to_owned(), message.to_vec()));
+        Ok(())
+    });
+    (found, ended.unwrap())
+}
+
+fn place() -> (tempfile::TempDir, PathBuf) {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.mcap");
+    (folder, path)
+}
+
+#[test]
+fn what_a_loop_leaves_is_read_back_in_its_order_and_gives_the_same_bytes_each_time() {
+    let (folder, path) = place();
+    assert_eq!(record(&path, 10), RecordOutcome::default());
+    let (found, ended) = messages(&path);
+    assert_eq!(ended, Ended::Whole);
+    assert_eq!(found.len(), 1 + 4 * 10);
+    let (topic, first) = found.first().unwrap();
+    let first = Session::read(first).unwrap();
+    assert_eq!((topic.as_str(), first.session), ("/slave/session", 1));
+    assert_eq!(
+        first.stamp,
+        Stamp(1_005),
+        "5 ns after the wall clock's moment"
+    );
+    let arrivals = found.iter().filter(|(topic, _)| topic == "/slave/arrivals");
+    let arrivals: Vec<_> = arrivals
+        .map(|(_, message)| Arrival::read(message).unwrap())
+        .collect();
+    let indices: Vec<u64> = arrivals.iter().map(|arrival| arrival.index).collect();
+    assert_eq!(indices, (0..20).step_by(2).collect::<Vec<_>>());
+    assert!(arrivals.iter().all(|arrival| arrival.datagram == b"in"));
+    let packets = found.iter().filter(|(topic, _)| topic == "/slave/packets");
+    let fates: Vec<String> = packets
+        .map(|(_, message)| Packet::read(message).unwrap().fate)
+        .collect();
+    assert_eq!(fates.get(..2).unwrap(), ["malformed", "sent"]);
+    let again = folder.path().join("b.mcap");
+    record(&again, 10);
+    assert_eq!(std::fs::read(path).unwrap(), std::fs::read(again).unwrap());
+}
+
+#[test]
+fn a_record_that_is_cut_off_anywhere_reads_up_to_there_and_a_changed_byte_is_seen() {
+    let (_folder, path) = place();
+    record(&path, 1000);
+    let whole = std::fs::read(&path).unwrap();
+    let (all, _) = messages(&path);
+    for part in [0.1, 0.5, 0.9] {
+        let cut = (whole.len() as f64 * part) as usize;
+        std::fs::write(&path, whole.get(..cut).unwrap()).unwrap();
+        let (found, ended) = messages(&path);
+        assert_eq!(ended, Ended::CutOff);
+        assert!(found.len() > (all.len() as f64 * part * 0.5) as usize);
+        assert_eq!(found, all.get(..found.len()).unwrap());
+    }
+    let mut changed = whole.clone();
+    let middle = changed.len() / 3;
+    changed[middle] ^= 1;
+    std::fs::write(&path, changed).unwrap();
+    assert!(read::<RecordError>(&path, |_, _| Ok(())).is_err());
+    std::fs::write(&path, b"0 1 2").unwrap();
+    assert!(!is_record(&path).unwrap());
+    std::fs::write(&path, whole).unwrap();
+    assert!(is_record(&path).unwrap());
+}
+
+#[test]
+fn a_full_disk_is_reported_and_stops_nobody() {
+    let outcome = record(Path::new("/dev/full"), 100);
+    assert_eq!(outcome.missed, 0);
+    let error = outcome.error.unwrap();
+    assert!(error.contains("No space left"), "{error}");
+}
+
+#[test]
+fn a_disk_that_stands_costs_parts_of_the_record_and_no_time_of_the_loop() {
+    let (_folder, path) = place();
+    let made = std::process::Command::new("mkfifo").arg(&path).status();
+    assert!(made.unwrap().success());
+    // somebody who opens the pipe and never reads from it
+    let nobody = OpenOptions::new()
+        .read(true)
+        .custom_flags(libc::O_NONBLOCK)
+        .open(&path)
+        .unwrap();
+    let recorder = Recorder::create(&path).unwrap();
+    let wall = Wall::of(Stamp(0), Time::ZERO);
+    let mut sink = recorder.begin(wall, session(), Counting);
+    let full = [7; 1000];
+    let mut pushed = 0_u64;
+    // until nothing more goes into the pipe, the chunk and the ring; no push ever waits
+    while recorder.missed.load(Ordering::Relaxed) == 0 && pushed < 1_000_000 {
+        sink.sent(Time::ZERO, &full);
+        pushed += 1;
+    }
+    let outcome = recorder.finish();
+    assert!(outcome.missed > 0 || outcome.error.is_some(), "{outcome:?}");
+    assert!(outcome.error.unwrap().contains("took more than"));
+    drop(nobody);
+}
+
+#[test]
+fn a_gap_is_seen_in_the_numbers_of_the_inputs() {
+    let missed = Arc::new(AtomicU64::new(0));
+    let (mut sink, mut entries) = RecordSink::<(), u64, ()>::with_room(2, Arc::clone(&missed));
+    sink.ticked(ticked(0));
+    sink.ticked(ticked(1));
+    // not an input, and yet the digest of the next tick has it
+    sink.sent(Time::ZERO, b"out");
+    assert_eq!(missed.load(Ordering::Relaxed), 1);
+    while entries.pop().is_ok() {}
+    sink.ticked(ticked(2));
+    let entry = entries.pop().unwrap();
+    assert!(matches!(entry, sink::Entry::Ticked { index: 3, .. }));
+}
+
+#[test]
+fn a_record_that_everybody_has_let_go_is_ended() {
+    let (_folder, path) = place();
+    let recorder = Recorder::create(&path).unwrap();
+    drop(recorder);
+    let end = Instant::now() + Duration::from_secs(60);
+    while !read::<RecordError>(&path, |_, _| Ok(())).is_ok_and(|ended| ended == Ended::Whole) {
+        assert!(Instant::now() < end);
+        std::thread::sleep(REST);
+    }
+}

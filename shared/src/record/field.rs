@@ -1,0 +1,176 @@
+//! What a field of a flat message can be: how it is written, read and shown in a table.
+
+use super::cdr::{CdrError, CdrReader, CdrWriter};
+
+/// A moment on the wall clock: nanoseconds since 1970.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Stamp(pub u64);
+
+impl Stamp {
+    const NANOS: u64 = 1_000_000_000;
+
+    /// Writes it as `builtin_interfaces/Time`.
+    pub fn write(self, out: &mut CdrWriter) {
+        out.i32((self.0 / Self::NANOS) as i32);
+        out.u32((self.0 % Self::NANOS) as u32);
+    }
+}
+
+/// What a field can be.
+pub(super) trait Field: Sized {
+    /// Its type in a schema.
+    const ROS: &'static str;
+    /// Writes it.
+    fn write(&self, out: &mut CdrWriter);
+    /// Reads it.
+    ///
+    /// # Errors
+    /// The message ends before or is malformed.
+    fn read(input: &mut CdrReader<'_>) -> Result<Self, CdrError>;
+    /// Its cell in a table of comma-separated values.
+    fn cell(&self) -> String;
+}
+
+macro_rules! numbers {
+    ($($of:ty: $ros:literal),*) => { $(
+        impl Field for $of {
+            const ROS: &'static str = $ros;
+
+            fn write(&self, out: &mut CdrWriter) {
+                out.number(self.to_le_bytes());
+            }
+
+            fn read(input: &mut CdrReader<'_>) -> Result<Self, CdrError> {
+                input.number().map(Self::from_le_bytes)
+            }
+
+            fn cell(&self) -> String {
+                self.to_string()
+            }
+        }
+    )* };
+}
+
+numbers!(u32: "uint32", u64: "uint64");
+
+impl Field for f64 {
+    const ROS: &'static str = "float64";
+
+    fn write(&self, out: &mut CdrWriter) {
+        out.f64(*self);
+    }
+
+    fn read(input: &mut CdrReader<'_>) -> Result<Self, CdrError> {
+        input.number().map(Self::from_le_bytes)
+    }
+
+    fn cell(&self) -> String {
+        if self.is_nan() {
+            String::new()
+        } else {
+            self.to_string()
+        }
+    }
+}
+
+impl Field for bool {
+    const ROS: &'static str = "bool";
+
+    fn write(&self, out: &mut CdrWriter) {
+        out.bool(*self);
+    }
+
+    fn read(input: &mut CdrReader<'_>) -> Result<Self, CdrError> {
+        input.number().map(|[byte]| byte != 0)
+    }
+
+    fn cell(&self) -> String {
+        self.to_string()
+    }
+}
+
+impl Field for String {
+    const ROS: &'static str = "string";
+
+    fn write(&self, out: &mut CdrWriter) {
+        out.text(self);
+    }
+
+    fn read(input: &mut CdrReader<'_>) -> Result<Self, CdrError> {
+        input.text().map(str::to_owned)
+    }
+
+    fn cell(&self) -> String {
+        if self.contains([',', '"', '\n']) {
+            format!("\"{}\"", self.replace('"', "\"\""))
+        } else {
+            self.clone()
+        }
+    }
+}
+
+impl Field for Vec<u8> {
+    const ROS: &'static str = "uint8[]";
+
+    fn write(&self, out: &mut CdrWriter) {
+        out.bytes(self);
+    }
+
+    fn read(input: &mut CdrReader<'_>) -> Result<Self, CdrError> {
+        input.bytes().map(<[u8]>::to_vec)
+    }
+
+    fn cell(&self) -> String {
+        hex::encode(self)
+    }
+}
+
+impl Field for [f64; 9] {
+    const ROS: &'static str = "float64[9]";
+
+    fn write(&self, out: &mut CdrWriter) {
+        self.iter().for_each(|value| value.write(out));
+    }
+
+    fn read(input: &mut CdrReader<'_>) -> Result<Self, CdrError> {
+        let mut values = [0.0; 9];
+        for value in &mut values {
+            *value = Field::read(input)?;
+        }
+        Ok(values)
+    }
+
+    fn cell(&self) -> String {
+        self.map(|value| value.cell()).join(" ").trim().to_owned()
+    }
+}
+
+impl Field for Stamp {
+    const ROS: &'static str = "builtin_interfaces/Time";
+
+    fn write(&self, out: &mut CdrWriter) {
+        (*self).write(out);
+    }
+
+    fn read(input: &mut CdrReader<'_>) -> Result<Self, CdrError> {
+        let sec = i32::from_le_bytes(input.number()?);
+        let nanosec = u32::from_le_bytes(input.number()?);
+        let sec = u64::try_from(sec).unwrap_or(0);
+        Ok(Self(sec * Self::NANOS + u64::from(nanosec)))
+    }
+
+    fn cell(&self) -> String {
+        self.0.to_string()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_cell_with_a_comma_or_a_quote_is_quoted() {
+        assert_eq!("a,\"b\"".to_owned().cell(), "\"a,\"\"b\"\"\"");
+        assert_eq!(vec![0_u8, 255].cell(), "00ff");
+    }
+}
