@@ -9,7 +9,9 @@
     reason = "the drivers are the shell: they read the clock, own sockets and threads"
 )]
 
+pub mod capture_file;
 pub mod driver;
+mod file_thread;
 pub mod lateness;
 pub mod record_file;
 pub mod relay;

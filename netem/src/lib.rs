@@ -4,6 +4,7 @@
 //! no clock and touches no socket. The drivers: *sim* is a link stepped in virtual time; *wrap* decorates a
 //! QUIC socket and *relay* stands between two hosts, both in `io` behind the feature of that name.
 
+pub mod capture;
 pub mod config;
 pub mod counters;
 mod direction;

@@ -275,6 +275,9 @@ pub(crate) struct NetemArguments {
     /// Record every packet in this file: CSV if its name ends in .csv, else a compact form
     #[arg(long, value_name = "FILE")]
     pub(crate) record: Option<PathBuf>,
+    /// Write every packet, as it comes and as it leaves, to this file (pcapng), with its fate as a comment
+    #[arg(long, value_name = "FILE")]
+    pub(crate) pcap: Option<PathBuf>,
     /// Give every master a new port toward the slave this often, as a NAT that forgets
     #[arg(long, value_name = "TIME", value_parser = values::duration)]
     pub(crate) rebind: Option<Duration>,
@@ -294,6 +297,25 @@ pub(crate) struct NetemArguments {
 pub(crate) enum NetemCommand {
     /// Compare a record with the settings it was made with
     Report(NetemReportArguments),
+    /// Make a record of a real path from captures at both its ends
+    Trace(NetemTraceArguments),
+}
+
+/// Arguments of `mmt netem trace`.
+#[derive(Debug, Args)]
+pub(crate) struct NetemTraceArguments {
+    /// Capture at one end (pcap or pcapng): up is from there
+    #[arg(value_name = "FROM")]
+    pub(crate) from: PathBuf,
+    /// Capture of the same time at the other end
+    #[arg(value_name = "TO")]
+    pub(crate) to: PathBuf,
+    /// Where the record goes, CSV [default: stdout]
+    #[arg(long, value_name = "FILE")]
+    pub(crate) out: Option<PathBuf>,
+    /// Believe the clocks: both captures were made by one clock, or by two that agree
+    #[arg(long)]
+    pub(crate) same_clock: bool,
 }
 
 /// Arguments of `mmt netem report`.

@@ -7,6 +7,7 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use mmt_netem::config::ConfigError;
+use mmt_netem::io::capture_file::CaptureFile;
 use mmt_netem::io::record_file::RecordFile;
 use mmt_netem::io::relay::{Extras, Relay, RelayError, RelayHandle, RelaySnapshot};
 use mmt_netem::record::Heading;
@@ -24,6 +25,7 @@ pub(super) mod control;
 mod gauge;
 mod report;
 mod table;
+mod trace;
 pub(super) mod wrap;
 
 use control::Command;
@@ -68,8 +70,10 @@ struct NetemConfiguration {
 /// The slave's name is unknown, the address cannot be had, the record cannot be written, the relay
 /// breaks; of a report, its file is none.
 pub(crate) fn run(arguments: &NetemArguments, messages: &Messages) -> Result<(), Failure> {
-    if let Some(NetemCommand::Report(arguments)) = &arguments.command {
-        return report::run(arguments);
+    match &arguments.command {
+        Some(NetemCommand::Report(arguments)) => return report::run(arguments),
+        Some(NetemCommand::Trace(arguments)) => return trace::run(arguments),
+        None => {}
     }
     let (Some(listen), Some(to)) = (arguments.listen, &arguments.to) else {
         return Err(Failure::usage("a relay needs --listen and --to").remedy("give both"));
@@ -80,8 +84,12 @@ pub(crate) fn run(arguments: &NetemArguments, messages: &Messages) -> Result<(),
     let record = arguments.record.as_ref();
     let record = record.map(|path| record_file(path, &heading(arguments)));
     let record = record.transpose()?;
+    let capture = arguments.pcap.as_ref();
+    let capture = capture.map(|path| capture_file(path, &heading(arguments)));
+    let capture = capture.transpose()?;
     let extras = Extras {
         record: record.as_ref().map(RecordFile::writer),
+        capture: capture.as_ref().map(CaptureFile::writer),
         rebind_every: arguments.rebind,
         clients: Some(arguments.clients),
     };
@@ -118,6 +126,8 @@ pub(crate) fn run(arguments: &NetemArguments, messages: &Messages) -> Result<(),
     let (effect_up, effect_down) = effects.map_err(Failure::usage)?;
     let written = record.map(RecordFile::finish).transpose();
     written.map_err(|error| Failure::failed(format!("the record: {error}")))?;
+    let written = capture.map(CaptureFile::finish).transpose();
+    written.map_err(|error| Failure::failed(format!("the capture: {error}")))?;
     let report = NetemReport {
         version: env!("CARGO_PKG_VERSION"),
         command: "netem",
@@ -176,6 +186,17 @@ fn heading(arguments: &NetemArguments) -> Heading {
 fn record_file(path: &Path, heading: &Heading) -> Result<RecordFile, Failure> {
     RecordFile::create(path, heading).map_err(|error| {
         let what = format!("cannot write the record {}: {error}", path.display());
+        Failure::usage(what).remedy("give a path that can be written")
+    })
+}
+
+/// A capture to be written.
+///
+/// # Errors
+/// It cannot be.
+fn capture_file(path: &Path, heading: &Heading) -> Result<CaptureFile, Failure> {
+    CaptureFile::create(path, heading).map_err(|error| {
+        let what = format!("cannot write the capture {}: {error}", path.display());
         Failure::usage(what).remedy("give a path that can be written")
     })
 }

@@ -8,8 +8,10 @@ use mmt_shared::time::Time;
 use quinn::udp::EcnCodepoint;
 use serde::Serialize;
 
+use super::capture_file::CaptureWriter;
 use super::lateness::Recorder;
 use super::record_file::RecordWriter;
+use crate::capture::{Event, Sides};
 use crate::config::{ConfigError, LinkConfig};
 use crate::counters::{LinkCounters, Tally};
 use crate::direction::LinkId;
@@ -78,6 +80,9 @@ pub(super) struct Datagram<A> {
     pub(super) contents: Vec<u8>,
 }
 
+/// The addresses on both sides of the link of a datagram with this address; none: it has its IP header itself.
+pub(super) type SidesOf<A> = fn(&A) -> Option<Sides>;
+
 /// The link of one direction with all that is kept of it.
 #[derive(Debug)]
 pub(super) struct Driver<A> {
@@ -87,6 +92,8 @@ pub(super) struct Driver<A> {
     lateness: Arc<Recorder>,
     /// From offer to sending, if anybody wants to know.
     delays: Option<Arc<Recorder>>,
+    /// Where every packet is kept, and how its addresses are known.
+    capture: Option<(CaptureWriter, SidesOf<A>)>,
     /// What became of what the link delivered; `link` and `in_flight` are not kept here.
     counters: DirectionCounters,
 }
@@ -112,6 +119,7 @@ impl<A: Clone> Driver<A> {
             record,
             lateness,
             delays: None,
+            capture: None,
             counters: DirectionCounters::default(),
         })
     }
@@ -119,6 +127,12 @@ impl<A: Clone> Driver<A> {
     /// The same with a record of how long what is sent took.
     pub(super) fn timed(mut self, delays: Arc<Recorder>) -> Self {
         self.delays = Some(delays);
+        self
+    }
+
+    /// The same with a capture of every packet.
+    pub(super) fn captured(mut self, capture: Option<CaptureWriter>, sides: SidesOf<A>) -> Self {
+        self.capture = capture.map(|capture| (capture, sides));
         self
     }
 
@@ -140,7 +154,7 @@ impl<A: Clone> Driver<A> {
                 return Some(departure);
             }
             let dropped = Entry::of(self.id.direction, &departure);
-            self.put_on_record(dropped);
+            self.put_on_record(dropped, &departure);
         }
         None
     }
@@ -173,12 +187,28 @@ impl<A: Clone> Driver<A> {
             End::Sent { sent, .. } if outcome == Outcome::Sent => *sent = moment,
             end => *end = End::Unsent,
         }
-        self.put_on_record(entry);
+        self.put_on_record(entry, departure);
     }
 
-    fn put_on_record(&self, entry: Entry) {
+    fn put_on_record(&self, entry: Entry, departure: &Departure<Datagram<A>>) {
         if let Some(writer) = &self.record {
             writer.push(entry);
+        }
+        if let Some((capture, sides)) = &self.capture {
+            let (corrupted_bit, marked) = match departure.fate {
+                Fate::Delivered {
+                    corrupted_bit,
+                    marked,
+                } => (corrupted_bit, marked),
+                Fate::Dropped(_) => (None, false),
+            };
+            capture.push(Event {
+                entry,
+                corrupted_bit,
+                marked,
+                sides: sides(&departure.payload.address),
+                contents: departure.payload.contents.clone(),
+            });
         }
     }
 

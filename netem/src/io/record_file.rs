@@ -1,15 +1,12 @@
-//! Writes the record of a driver to a file on a thread of its own. A driver must never wait for a disk.
+//! The record of a driver as a file.
 
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::path::Path;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
-use std::thread::JoinHandle;
 
 use mmt_shared::time::Time;
 
+use super::file_thread::{FileThread, Queue};
 use super::now;
 use crate::record::{Entry, Heading, binary, csv};
 
@@ -19,32 +16,27 @@ const WAITING_MAX: usize = 1 << 16;
 /// A record being written.
 #[derive(Debug)]
 pub struct RecordFile {
-    writer: RecordWriter,
-    thread: Option<JoinHandle<io::Result<()>>>,
+    file: FileThread<Entry>,
+    origin: Time,
 }
 
 /// What puts packets into a record; copies write into the same one.
 #[derive(Clone, Debug)]
 pub struct RecordWriter {
-    /// None: the end of the record.
-    sender: SyncSender<Option<Entry>>,
-    missed: Arc<AtomicU64>,
+    queue: Queue<Entry>,
     origin: Time,
 }
 
 impl RecordWriter {
     /// Hands over a packet, with times of the drivers' clock; never waits.
     pub(super) fn push(&self, entry: Entry) {
-        let entry = entry.since(self.origin);
-        if self.sender.try_send(Some(entry)).is_err() {
-            self.missed.fetch_add(1, Ordering::Relaxed);
-        }
+        self.queue.push(entry.since(self.origin));
     }
 
     /// Packets that the record misses: the disk was too slow, or the record was finished before.
     #[must_use]
     pub fn missed(&self) -> u64 {
-        self.missed.load(Ordering::Relaxed)
+        self.queue.missed()
     }
 }
 
@@ -74,25 +66,20 @@ impl RecordFile {
         };
         file.write_all(&bytes)?;
         file.flush()?;
-        let (sender, receiver) = sync_channel(WAITING_MAX);
-        let thread = std::thread::Builder::new()
-            .name("netem-record".to_owned())
-            .spawn(move || write(file, form, &receiver))?;
-        let writer = RecordWriter {
-            sender,
-            missed: Arc::default(),
-            origin: now(),
-        };
+        let write = move |entries: &mut dyn Iterator<Item = Entry>| write(file, form, entries);
         Ok(Self {
-            writer,
-            thread: Some(thread),
+            file: FileThread::start("netem-record", WAITING_MAX, write)?,
+            origin: now(),
         })
     }
 
     /// For a driver.
     #[must_use]
     pub fn writer(&self) -> RecordWriter {
-        self.writer.clone()
+        RecordWriter {
+            queue: self.file.queue(),
+            origin: self.origin,
+        }
     }
 
     /// Waits until all that was put in so far is written; what comes later is missed. Returns how many
@@ -100,35 +87,18 @@ impl RecordFile {
     ///
     /// # Errors
     /// Those of the file.
-    pub fn finish(mut self) -> io::Result<u64> {
-        self.end().map(|()| self.writer.missed())
-    }
-
-    fn end(&mut self) -> io::Result<()> {
-        // It fails only when the thread has ended with an error, which joining it returns.
-        let _ = self.writer.sender.send(None);
-        match self.thread.take().map(JoinHandle::join) {
-            None => Ok(()),
-            Some(Ok(written)) => written,
-            Some(Err(_)) => Err(io::Error::other("the thread of the record panicked")),
-        }
-    }
-}
-
-impl Drop for RecordFile {
-    fn drop(&mut self) {
-        // Whoever wants to know the error calls `finish`.
-        let _ = self.end();
+    pub fn finish(self) -> io::Result<u64> {
+        self.file.finish()
     }
 }
 
 fn write(
     mut file: BufWriter<File>,
     mut form: Form,
-    entries: &Receiver<Option<Entry>>,
+    entries: &mut dyn Iterator<Item = Entry>,
 ) -> io::Result<()> {
     let (mut text, mut bytes) = (String::new(), Vec::new());
-    while let Ok(Some(entry)) = entries.recv() {
+    for entry in entries {
         match &mut form {
             Form::Csv => {
                 text.clear();

@@ -15,6 +15,7 @@ use mmt_shared::io::alarm::Alarm;
 use mmt_shared::stats::histogram::Quantiles;
 use serde::Serialize;
 
+use super::capture_file::CaptureWriter;
 use super::driver::{DirectionCounters, Driver};
 use super::lateness::{Lateness, Recorder};
 use super::record_file::RecordWriter;
@@ -31,7 +32,7 @@ mod worker;
 
 use clients::Clients;
 use port::Port;
-use worker::Worker;
+use worker::{Origin, Worker};
 
 /// Clients at one time unless [`Extras::clients`] sets another number; datagrams of one more are dropped and
 /// counted. Each holds one descriptor.
@@ -99,6 +100,8 @@ pub struct RelaySnapshot {
     pub rebinds: u64,
     /// Packets that the record misses, because the disk was too slow.
     pub unrecorded: u64,
+    /// Packets that the capture misses, because the disk was too slow.
+    pub uncaptured: u64,
     /// How late packets left, both directions.
     pub lateness: Lateness,
 }
@@ -108,6 +111,8 @@ pub struct RelaySnapshot {
 pub struct Extras {
     /// Where every packet is recorded.
     pub record: Option<RecordWriter>,
+    /// Where every packet is kept, as it came and as it left.
+    pub capture: Option<CaptureWriter>,
     /// How often every client gets a new port toward the target, as behind a NAT that forgets: what the
     /// target sends to the old port is lost.
     pub rebind_every: Option<Duration>,
@@ -144,7 +149,8 @@ impl Relay {
         let delays = [(); 2].map(|()| Arc::new(Recorder::default()));
         let driver = |config, id| {
             let (record, lateness) = (extras.record.clone(), Arc::clone(&lateness));
-            Driver::try_new(config, seed, id, origin, record, lateness)
+            let driver = Driver::try_new(config, seed, id, origin, record, lateness)?;
+            Ok::<_, ConfigError>(driver.captured(extras.capture.clone(), Origin::sides))
         };
         let [of_up, of_down] = &delays;
         let up = driver(up, LinkId::UP)?.timed(Arc::clone(of_up));
@@ -172,8 +178,9 @@ impl Relay {
         });
         let clients = Clients::try_new(to, extras.clients.unwrap_or(CLIENTS));
         let clients = clients.map_err(RelayError::Thread)?;
-        let mut worker = Worker::new(port, clients, up, down, extras.record, shared.clone());
+        let mut worker = Worker::new((port, local), clients, up, down, shared.clone());
         worker.rebind_every(extras.rebind_every, origin);
+        worker.writes_to(extras.record, extras.capture);
         let thread = std::thread::Builder::new()
             .name("netem-relay".to_owned())
             .spawn(move || worker.run())

@@ -8,6 +8,8 @@ use std::time::Duration;
 use serde_json::Value;
 
 use super::{document, finish, mmt, start};
+use crate::harness::process::did_not_run;
+use crate::harness::tshark::{TsharkError, tshark};
 
 /// p99.9 above 1 ms, as far as the numbers beside the mark show it.
 fn is_marked_rightly(p99_us: &Value, max_us: &Value, degraded: &Value) -> bool {
@@ -284,5 +286,162 @@ fn a_record_is_compared_with_the_settings_it_was_made_with() {
     assert!(
         text.contains("configured") && text.contains("lost in a row"),
         "{text}"
+    );
+}
+
+/// A column of what tshark shows of a capture, a line a packet; none without tshark, which is not allowed in CI.
+fn columns(capture: &std::path::Path, names: &[&str]) -> Option<Vec<Vec<String>>> {
+    let names = names.iter().flat_map(|name| ["-e", name]);
+    let options: Vec<String> = ["-T", "fields"]
+        .into_iter()
+        .chain(names)
+        .map(str::to_owned)
+        .collect();
+    match tshark(capture, &options) {
+        Err(TsharkError::Missing(error)) => {
+            did_not_run("a capture of the relay in tshark", &error.to_string());
+            None
+        }
+        shown => {
+            let line = |line: &str| line.split('\t').map(str::to_owned).collect();
+            Some(shown.unwrap().lines().map(line).collect())
+        }
+    }
+}
+
+#[test]
+fn a_capture_opens_in_tshark_with_fates_and_times_and_its_two_sides_make_a_trace() {
+    let home = tempfile::tempdir().unwrap();
+    let target = UdpSocket::bind("127.0.0.1:0").unwrap();
+    target
+        .set_read_timeout(Some(Duration::from_secs(30)))
+        .unwrap();
+    let to = target.local_addr().unwrap();
+    let file = home.path().join("run.pcapng");
+    let relay = ["netem", "--listen", "127.0.0.1:0", "--to", &to.to_string()].map(str::to_owned);
+    let words = [
+        "--up",
+        "delay 20ms loss list 3",
+        "--down",
+        "delay 10ms duplicate 100%",
+    ]
+    .map(str::to_owned);
+    let arguments: Vec<String> = relay.into_iter().chain(words).collect();
+    let mut arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
+    arguments.extend(["--pcap", "run.pcapng"]);
+    let (relay, line) = start(mmt(&home, &arguments));
+    let address: SocketAddr = line.parse().unwrap();
+    let source = UdpSocket::bind("127.0.0.1:0").unwrap();
+    source
+        .set_read_timeout(Some(Duration::from_secs(30)))
+        .unwrap();
+    let mut buffer = [0; 100];
+    for number in 0..10_u8 {
+        source.send_to(&[7, number], address).unwrap();
+        if number != 3 {
+            let (_, from) = target.recv_from(&mut buffer).unwrap();
+            target.send_to(&[8, number], from).unwrap();
+            assert_eq!(source.recv(&mut buffer).unwrap(), 2);
+            assert_eq!(source.recv(&mut buffer).unwrap(), 2, "the copy");
+        }
+    }
+    relay.interrupt().unwrap();
+    assert_eq!(finish(relay).1, Some(0));
+
+    let fields = [
+        "frame.interface_name",
+        "frame.time_epoch",
+        "udp.payload",
+        "udp.srcport",
+        "udp.dstport",
+        "frame.comment",
+    ];
+    let Some(packets) = columns(&file, &fields) else {
+        return;
+    };
+    let on = |side: &'static str| packets.iter().filter(move |packet| packet[0] == side);
+    let counts = ["up in", "up out", "down in", "down out"].map(|side| on(side).count());
+    assert_eq!(counts, [10, 9, 9, 18]);
+    let ns = |packet: &[String]| -> i64 {
+        let (s, part) = packet[1].split_once('.').unwrap();
+        s.parse::<i64>().unwrap() * 1_000_000_000 + part.parse::<i64>().unwrap()
+    };
+    assert!(packets.is_sorted_by_key(|packet| ns(packet)), "{packets:?}");
+    for came in on("up in") {
+        let port = |at: SocketAddr| at.port().to_string();
+        assert_eq!(
+            came[3..5],
+            [port(source.local_addr().unwrap()), port(address)]
+        );
+        if came[2] == "0703" {
+            assert_eq!(came[5], "up 3: lost (loss)");
+            continue;
+        }
+        let left = on("up out").find(|left| left[2] == came[2]).unwrap();
+        assert_eq!(left[4], port(to));
+        let delay = (ns(left) - ns(came)) as f64 / 1e6;
+        assert!(delay >= 20.0, "{delay} ms");
+        assert!(
+            came[5].contains(&format!("delayed {delay:.6} ms")),
+            "{came:?} {delay}"
+        );
+        assert_eq!(came[5], left[5]);
+    }
+    assert_eq!(
+        on("down out")
+            .filter(|left| left[5].ends_with(", a copy"))
+            .count(),
+        9
+    );
+
+    // what a capture before the relay and one behind it would hold
+    for (side, name) in [("0", "from"), ("1", "to")] {
+        let kept = home.path().join(format!("{name}.pcapng"));
+        let options = [
+            "-Y",
+            &format!("frame.interface_id == {side}"),
+            "-w",
+            kept.to_str().unwrap(),
+        ];
+        tshark(&file, &options.map(str::to_owned)).unwrap();
+    }
+    let trace = [
+        "netem",
+        "trace",
+        "from.pcapng",
+        "to.pcapng",
+        "--out",
+        "path.csv",
+    ];
+    let output = mmt(&home, &trace).output().unwrap();
+    assert!(output.status.success(), "{output:?}");
+    let report = document(
+        &mmt(&home, &["netem", "report", "path.csv", "--json"])
+            .output()
+            .unwrap(),
+    );
+    let up = &report["up"]["achieved"];
+    assert_eq!(up["offered"]["packets"], 10);
+    assert_eq!(up["dropped"]["loss"], 1);
+    assert!(up["mean_ms"].as_f64().unwrap() >= 20.0, "{up}");
+    let plays = [
+        "netem",
+        "--listen",
+        "127.0.0.1:0",
+        "--to",
+        "127.0.0.1:9",
+        "--up",
+        "trace path.csv up",
+        "--duration",
+        "10ms",
+        "--json",
+    ];
+    let output = mmt(&home, &plays).output().unwrap();
+    let printed = String::from_utf8_lossy(&output.stdout).into_owned();
+    let relay: Value = serde_json::from_str(printed.split_once('\n').unwrap().1).unwrap();
+    let effect = &relay["configuration"]["effect_up"];
+    assert!(
+        effect["mean_ms"].as_f64().unwrap() >= 20.0 && effect["loss"].as_f64().unwrap() > 0.0,
+        "{effect}"
     );
 }

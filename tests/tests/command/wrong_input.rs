@@ -69,6 +69,10 @@ fn a_wrong_trace_or_record_is_refused_with_its_line() {
             &["record.csv", "line 2", "nine fields"],
         ),
         (
+            &["netem", "trace", "record.csv", "record.csv"],
+            &["record.csv", "neither pcap nor pcapng", "two captures"],
+        ),
+        (
             &["netem", "report", "none.csv"],
             &["none.csv", "check the path"],
         ),

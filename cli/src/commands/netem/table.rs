@@ -75,6 +75,7 @@ impl NetemReport {
             ("receive errors", counters.receive_errors),
             ("new ports (NAT)", counters.rebinds),
             ("not on record", counters.unrecorded),
+            ("not captured", counters.uncaptured),
         ] {
             if count > 0 {
                 writeln!(f, "{label:20} {count:>12}")?;

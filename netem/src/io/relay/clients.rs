@@ -13,6 +13,7 @@ use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
 
 use super::CLIENT_IDLE;
 use super::port::{Port, Received};
+use crate::capture::Sides;
 
 /// Clients whose sockets are read before the times are looked at again.
 const READY_MAX: usize = 64;
@@ -25,12 +26,23 @@ pub(super) struct Client {
     pub(super) addr: SocketAddr,
     /// The relay's address that the client uses.
     pub(super) local_ip: Option<IpAddr>,
-    /// The socket toward the target.
+    /// The socket toward the target, and its address.
     pub(super) port: Port,
+    pub(super) port_addr: SocketAddr,
     last_seen: Time,
 }
 
 impl Client {
+    /// Where a datagram of this class from this client was sent, and where it goes.
+    pub(super) fn sides(&self, listen: SocketAddr, target: SocketAddr, class: u8) -> Sides {
+        let ip = self.local_ip.unwrap_or(listen.ip());
+        Sides {
+            came: [self.addr, SocketAddr::new(ip, listen.port())],
+            leaves: [self.port_addr, target],
+            class,
+        }
+    }
+
     pub(super) fn seen(&mut self, now: Time) {
         self.last_seen = now;
     }
@@ -84,11 +96,11 @@ impl Clients {
     }
 
     /// A socket toward the target whose datagrams are for client `number`.
-    fn port_for(&self, number: u64) -> io::Result<Port> {
-        let port = port_toward(self.to)?;
+    fn port_for(&self, number: u64) -> io::Result<(Port, SocketAddr)> {
+        let (port, addr) = port_toward(self.to)?;
         let (data, flags) = (epoll::EventData::new_u64(number), epoll::EventFlags::IN);
         epoll::add(&self.sockets, &port, data, flags)?;
-        Ok(port)
+        Ok((port, addr))
     }
 
     /// Where all clients' packets go.
@@ -126,10 +138,12 @@ impl Clients {
             return None;
         }
         let number = self.met;
+        let (port, port_addr) = self.port_for(number).ok()?;
         let client = Client {
             addr: datagram.from,
             local_ip: datagram.local_ip,
-            port: self.port_for(number).ok()?,
+            port,
+            port_addr,
             last_seen: now,
         };
         self.met = number.saturating_add(1);
@@ -147,7 +161,7 @@ impl Clients {
             if let Ok(port) = self.port_for(number)
                 && let Some(client) = self.by_number.get_mut(&number)
             {
-                client.port = port;
+                (client.port, client.port_addr) = port;
                 rebound += 1;
             }
         }
@@ -184,14 +198,15 @@ fn make_room(wanted: u64) {
 }
 
 /// A socket connected to `to`: the kernel keeps strangers' datagrams out of it.
-fn port_toward(to: SocketAddr) -> io::Result<Port> {
+fn port_toward(to: SocketAddr) -> io::Result<(Port, SocketAddr)> {
     let any: IpAddr = match to {
         SocketAddr::V4(_) => Ipv4Addr::UNSPECIFIED.into(),
         SocketAddr::V6(_) => Ipv6Addr::UNSPECIFIED.into(),
     };
     let socket = UdpSocket::bind((any, 0))?;
     socket.connect(to)?;
-    Port::try_new(socket)
+    let addr = socket.local_addr()?;
+    Ok((Port::try_new(socket)?, addr))
 }
 
 #[cfg(test)]

@@ -1,6 +1,7 @@
 //! The thread of a relay: receives, offers to the links, and sends what they deliver.
 
 use std::io;
+use std::net::SocketAddr;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
@@ -15,8 +16,10 @@ use mmt_shared::time::Time;
 use super::clients::Clients;
 use super::port::{Port, Received, Receiver, Sending};
 use super::{RelaySnapshot, Shared};
+use crate::capture::Sides;
 use crate::counters::Tally;
 use crate::direction::Direction;
+use crate::io::capture_file::CaptureWriter;
 use crate::io::driver::{Datagram, Driver, Outcome};
 use crate::io::lateness::Lateness;
 use crate::io::record_file::RecordWriter;
@@ -29,6 +32,8 @@ const BATCHES: usize = 16;
 /// Everything the thread owns.
 pub(super) struct Worker {
     listen: Port,
+    /// The address that it listens on.
+    local: SocketAddr,
     clients: Clients,
     receiver: Receiver,
     /// The links, whose datagrams know their client.
@@ -40,6 +45,7 @@ pub(super) struct Worker {
     overflows_up: u64,
     overflows_down: u64,
     record: Option<RecordWriter>,
+    capture: Option<CaptureWriter>,
     refused: Tally,
     unreachable: u64,
     receive_errors: u64,
@@ -52,10 +58,18 @@ pub(super) struct Worker {
 }
 
 /// Whose datagram it is, and its DSCP in the place that it has in the traffic class.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct Origin {
     number: u64,
     dscp: u8,
+    /// Where it was sent and goes; kept for a capture only.
+    sides: Option<Box<Sides>>,
+}
+
+impl Origin {
+    pub(super) fn sides(&self) -> Option<Sides> {
+        self.sides.as_deref().copied()
+    }
 }
 
 /// The sockets with something to read.
@@ -66,20 +80,21 @@ struct Ready {
 
 impl Worker {
     pub(super) fn new(
-        listen: Port,
+        (listen, local): (Port, SocketAddr),
         clients: Clients,
         up: Driver<Origin>,
         down: Driver<Origin>,
-        record: Option<RecordWriter>,
         shared: Arc<Shared>,
     ) -> Self {
         Self {
             listen,
+            local,
             clients,
             receiver: Receiver::new(),
             up,
             down,
-            record,
+            record: None,
+            capture: None,
             offered_up: Time::ZERO,
             offered_down: Time::ZERO,
             overflows_up: 0,
@@ -92,6 +107,15 @@ impl Worker {
             receive_errors: 0,
             shared,
         }
+    }
+
+    /// Where what becomes of packets is written.
+    pub(super) fn writes_to(
+        &mut self,
+        record: Option<RecordWriter>,
+        capture: Option<CaptureWriter>,
+    ) {
+        (self.record, self.capture) = (record, capture);
     }
 
     /// Gives every client a new port toward the target as often as this.
@@ -180,17 +204,24 @@ impl Worker {
     fn receive_up(&mut self) {
         let Self {
             listen,
+            local,
             clients,
             receiver,
             up,
             offered_up,
             refused,
+            capture,
             ..
         } = self;
         let mut take = |received: Received<'_>| match clients.meet(&received, now()) {
-            Some(client) => {
+            Some(number) => {
                 *offered_up = received.arrived.max(*offered_up);
-                up.offer(*offered_up, datagram(client, &received));
+                let mut datagram = datagram(number, &received);
+                if let Some(client) = capture.as_ref().and_then(|_| clients.get(number)) {
+                    let sides = client.sides(*local, clients.target(), received.class);
+                    datagram.address.sides = Some(Box::new(sides));
+                }
+                up.offer(*offered_up, datagram);
             }
             None => refused.count(received.contents.len()),
         };
@@ -208,11 +239,15 @@ impl Worker {
         let Some(client) = self.clients.get_mut(number) else {
             return;
         };
+        let (local, captures) = (self.local, self.capture.is_some());
         for _ in 0..BATCHES {
             let (down, offered) = (&mut self.down, &mut self.offered_down);
             let received = self.receiver.receive(&client.port, |received| {
                 *offered = received.arrived.max(*offered);
-                down.offer(*offered, datagram(number, &received));
+                let mut datagram = datagram(number, &received);
+                let turned = || client.sides(local, received.from, received.class).turned();
+                datagram.address.sides = captures.then(|| Box::new(turned()));
+                down.offer(*offered, datagram);
             });
             let overflows = client.port.new_overflows();
             self.overflows_down = self.overflows_down.saturating_add(overflows);
@@ -233,20 +268,20 @@ impl Worker {
     }
 
     fn release_due(&mut self) {
-        while let Some(packet) = self.up.poll(now()) {
+        while let Some(mut packet) = self.up.poll(now()) {
             let moment = now();
-            let outcome = self.send(Direction::Up, &packet);
+            let outcome = self.send(Direction::Up, &mut packet);
             self.up.finish(&packet, outcome, moment);
         }
-        while let Some(packet) = self.down.poll(now()) {
+        while let Some(mut packet) = self.down.poll(now()) {
             let moment = now();
-            let outcome = self.send(Direction::Down, &packet);
+            let outcome = self.send(Direction::Down, &mut packet);
             self.down.finish(&packet, outcome, moment);
         }
     }
 
     /// Sends to the target from the client's own port, or to the client from the address that it knows.
-    fn send(&mut self, direction: Direction, packet: &Departure<Datagram<Origin>>) -> Outcome {
+    fn send(&mut self, direction: Direction, packet: &mut Departure<Datagram<Origin>>) -> Outcome {
         let Some(client) = self.clients.get(packet.payload.address.number) else {
             return Outcome::Abandoned;
         };
@@ -254,6 +289,10 @@ impl Worker {
             Direction::Up => (&client.port, self.clients.target(), None),
             Direction::Down => (&self.listen, client.addr, client.local_ip),
         };
+        if let (Direction::Up, Some(sides)) = (direction, &mut packet.payload.address.sides) {
+            // it may have another port than when the packet came
+            sides.leaves = [client.port_addr, to];
+        }
         let ecn = packet.payload.ecn.map_or(0, |ecn| ecn as u8);
         let sending = Sending {
             to,
@@ -276,6 +315,7 @@ impl Worker {
             receive_errors: self.receive_errors,
             rebinds: self.rebinds,
             unrecorded: self.record.as_ref().map_or(0, RecordWriter::missed),
+            uncaptured: self.capture.as_ref().map_or(0, CaptureWriter::missed),
             // the handle reads the histogram itself
             lateness: Lateness::default(),
         };
@@ -287,6 +327,7 @@ fn datagram(number: u64, received: &Received<'_>) -> Datagram<Origin> {
         address: Origin {
             number,
             dscp: received.class & !3,
+            sides: None,
         },
         ecn: EcnCodepoint::from_bits(received.class & 3),
         contents: received.contents.to_owned(),
