@@ -1,3 +1,5 @@
+//! What one end alone tells of a run, and what both tell together.
+
 use super::*;
 use crate::table::Cell;
 

@@ -1,3 +1,5 @@
+//! What a record keeps, and what becomes of it when a disk is full, stands still, or is cut off.
+
 use std::fs::OpenOptions;
 use std::os::unix::fs::OpenOptionsExt;
 use std::path::PathBuf;
