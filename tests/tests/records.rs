@@ -16,6 +16,7 @@ use std::path::Path;
 use std::process::Command;
 use std::time::Duration;
 
+use mmt_client::operator::trace::Trace;
 use serde_json::Value;
 
 use crate::harness::process::{Ended, Running, number};
@@ -90,6 +91,12 @@ fn a_demo_is_recorded_runs_again_and_is_read_by_decoders_that_know_nothing_of_it
         .filter(|(fate, kind)| *fate == "sent" && *kind == "update")
         .count();
     assert_eq!(Some(sent as f64), number(&report, "/updates/sent"));
+    let hand = std::fs::read_to_string(tables.join("hand.csv")).unwrap();
+    let hand = Trace::from_csv(&hand).unwrap();
+    assert!(
+        hand.duration() > Duration::from_secs(3),
+        "a trace for an operator"
+    );
     decoded(record, &tables);
     reported(record, &folder.path().join("report"), &report);
 }

@@ -1,12 +1,15 @@
 //! `mmt export`: the tables of a record as comma-separated values, one file a topic.
 
 use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
 use std::fs::{File, create_dir_all};
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
+use mmt_client::operator::trace::CSV_HEADER;
 use mmt_shared::io::record::{Ended, RecordError, read};
-use mmt_shared::record::table::row;
+use mmt_shared::record::messages::{MasterTick, Message};
+use mmt_shared::record::table::{Row, row};
 
 use crate::args::ExportArguments;
 use crate::failure::Failure;
@@ -56,34 +59,74 @@ pub(crate) fn run(arguments: &ExportArguments) -> Result<(), Failure> {
 
 fn export(record: &Path, out: &Path, sheets: &mut BTreeMap<String, Sheet>) -> Result<Ended, Error> {
     create_dir_all(out).map_err(|source| unwritten(out, source))?;
+    let mut hand = Hand::default();
     read(record, |topic, message| -> Result<(), Error> {
+        let broken = |why| RecordError::Message {
+            topic: topic.to_owned(),
+            why,
+        };
         let Some(row) = row(topic, message) else {
             return Ok(());
         };
-        let row = row.map_err(|why| RecordError::Message {
-            topic: topic.to_owned(),
-            why,
-        })?;
-        if !sheets.contains_key(topic) {
-            // only known topics have rows: the name is one of ours
-            let name = topic.trim_start_matches('/').replace('/', "-");
+        // only known topics have rows: the name is one of ours
+        let name = topic.trim_start_matches('/').replace('/', "-");
+        put(sheets, out, &name, &row.map_err(broken)?)?;
+        if topic == "/master/ticks" {
+            let tick = MasterTick::read(message).map_err(broken)?;
+            put(sheets, out, HAND, &hand.row(&tick))?;
+        }
+        Ok(())
+    })
+}
+
+/// The table of what the device read: a trace for `mmt master --operator`.
+const HAND: &str = "hand";
+
+/// Where the hand was, from the first tick on.
+#[derive(Debug, Default)]
+struct Hand {
+    began_ns: Option<u64>,
+}
+
+impl Hand {
+    fn row(&mut self, tick: &MasterTick) -> Row {
+        let began_ns = *self.began_ns.get_or_insert(tick.deadline_ns);
+        let t_ns = tick.deadline_ns.saturating_sub(began_ns);
+        let t_s = format!("{}.{:09}", t_ns / 1_000_000_000, t_ns % 1_000_000_000);
+        Row {
+            columns: CSV_HEADER.split(',').collect(),
+            cells: vec![
+                t_s,
+                tick.reading_x_m.to_string(),
+                tick.reading_y_m.to_string(),
+            ],
+        }
+    }
+}
+
+/// Adds a row to the table of this name, which begins with its first row.
+fn put(
+    sheets: &mut BTreeMap<String, Sheet>,
+    out: &Path,
+    name: &str,
+    row: &Row,
+) -> Result<(), Error> {
+    let sheet = match sheets.entry(name.to_owned()) {
+        Entry::Occupied(sheet) => sheet.into_mut(),
+        Entry::Vacant(place) => {
             let path = out.join(format!("{name}.csv"));
             let begun = begin(&path, &row.columns);
             let file = begun.map_err(|source| unwritten(&path, source))?;
-            let sheet = Sheet {
+            place.insert(Sheet {
                 path,
                 file,
                 rows: 0,
-            };
-            sheets.insert(topic.to_owned(), sheet);
+            })
         }
-        let Some(sheet) = sheets.get_mut(topic) else {
-            return Ok(());
-        };
-        sheet.rows += 1;
-        let line = writeln!(sheet.file, "{}", row.cells.join(","));
-        line.map_err(|source| unwritten(&sheet.path, source))
-    })
+    };
+    sheet.rows += 1;
+    let line = writeln!(sheet.file, "{}", row.cells.join(","));
+    line.map_err(|source| unwritten(&sheet.path, source))
 }
 
 fn begin(path: &Path, columns: &[&str]) -> io::Result<BufWriter<File>> {
