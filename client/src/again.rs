@@ -152,6 +152,7 @@ impl MasterAgain {
         if tick.releases {
             self.end.release();
         }
+        self.end.hold(tick.engaged);
         let reading = Vec2::new(tick.reading_x_m, tick.reading_y_m);
         let done = self.end.tick(Time::from_nanos(tick.deadline_ns), reading);
         self.digest.tick(&done);

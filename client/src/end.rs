@@ -8,18 +8,34 @@ use mmt_shared::channel::peer::{Freshness, NumbersSpent, SequenceWindow};
 use mmt_shared::metrics::{AgeOfInformation, ContactBreaks, ForcePeak};
 use mmt_shared::model::geometry::Vec2;
 use mmt_shared::model::tool::{HandPort, Scene};
-use mmt_shared::model::update::Update;
+use mmt_shared::model::update::{Cause, Update};
 use mmt_shared::report::{
     ArchitectureReport, MasterHalf, PassivityReport, ReceivedUpdates, SessionStats, named,
 };
 use mmt_shared::stats::session::UpdateDrops;
 use mmt_shared::time::Time;
 use mmt_shared::wire::{Architecture, Command, Message, RawState, Side};
+use serde::Serialize;
 
 use crate::commands::{CommandConfig, CommandPacker};
 use crate::failsafe::LinkState;
 use crate::master::{Master, MasterTick};
 use crate::operator::scripted::View;
+
+/// What an applied update found wrong in the local model, for viewers.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Change {
+    /// Number of the update.
+    pub sequence: u32,
+    /// Why it was sent.
+    pub cause: Cause,
+    /// m (kg), b (N s/m), c (N): the update's less the ones in use.
+    pub params: [f64; 3],
+    /// From the model's place at the moment that the update answers to the update's, m, world.
+    pub shift: Vec2,
+    /// The same for the angle, rad.
+    pub turn: f64,
+}
 
 /// What the master's end counts.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -54,6 +70,7 @@ pub struct MasterEnd {
     /// Stamp of the HIP sample that the newest applied update answers.
     answers: Option<Time>,
     scene: Option<Scene>,
+    change: Option<Change>,
     counts: MasterCounts,
 }
 
@@ -69,6 +86,7 @@ impl MasterEnd {
             update: None,
             answers: None,
             scene: None,
+            change: None,
             counts: MasterCounts::default(),
         }
     }
@@ -139,9 +157,19 @@ impl MasterEnd {
         self.scene.as_ref()
     }
 
+    /// What the newest applied update found wrong in the model; none before the first.
+    pub fn change(&self) -> Option<&Change> {
+        self.change.as_ref()
+    }
+
     /// Begins to ramp the force out: the session ends.
     pub fn release(&mut self) {
         self.master.release();
+    }
+
+    /// Whether a hand holds the device from now on ([`Master::hold`]).
+    pub fn hold(&mut self, engaged: bool) {
+        self.master.hold(engaged);
     }
 
     /// Takes in a datagram that arrived at `at`.
@@ -181,13 +209,31 @@ impl MasterEnd {
 
     /// Applies the newest accepted update, as the next tick would; returns what the operator sees of the model then.
     pub fn update_model(&mut self) -> View {
-        if let Some(update) = self.update.take()
-            && self.master.apply(&update)
-        {
+        if let Some(update) = self.update.take() {
+            let change = self.change_by(&update);
+            if !self.master.apply(&update) {
+                return self.master.view();
+            }
+            self.change = Some(change);
             self.answers = Some(update.answers);
             self.counts.newest_applied = update.sequence;
         }
         self.master.view()
+    }
+
+    /// What this update finds wrong in the model, before it is applied.
+    fn change_by(&self, update: &Update) -> Change {
+        let model = self.master.model();
+        let (old, new) = (model.state().params, update.state.params());
+        let then = model.history().at(update.answers);
+        let pose = then.map_or(model.state().pose, |then| then.motion.pose);
+        Change {
+            sequence: update.sequence,
+            cause: update.cause,
+            params: [new.m() - old.m(), new.b() - old.b(), new.c() - old.c()],
+            shift: update.state.pose().position - pose.position,
+            turn: update.state.pose().angle - pose.angle,
+        }
     }
 
     /// One sample period. `now` is the tick's deadline, the stamp of its sample; `reading` the device's HIP (m, world).

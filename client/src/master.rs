@@ -46,6 +46,8 @@ pub struct Master {
     tdpa: Option<TdpaHand>,
     limiter: ForceLimiter,
     link: LinkState,
+    /// The session ends: the hand is not engaged again.
+    ended: bool,
     port: PortObserver,
     hip: HipCounts,
     bad_readings: u64,
@@ -71,6 +73,7 @@ impl Master {
             tdpa: architecture.feels_tool().then(TdpaHand::default),
             limiter,
             link: LinkState::Fresh,
+            ended: false,
             port: PortObserver::default(),
             hip: HipCounts::default(),
             bad_readings: 0,
@@ -133,7 +136,18 @@ impl Master {
 
     /// Begins to ramp the force out: the session ends.
     pub fn release(&mut self) {
+        self.ended = true;
         self.limiter.release();
+    }
+
+    /// Whether a hand holds the device from now on: force ramps in, or out. After the session's end, or once the link
+    /// has released the hand, it is not engaged again.
+    pub fn hold(&mut self, engaged: bool) {
+        if !engaged {
+            self.limiter.release();
+        } else if !self.ended && self.link != LinkState::Released {
+            self.limiter.engage();
+        }
     }
 
     /// Applies an accepted update, unless the hand has been released; returns whether it did.
@@ -171,7 +185,7 @@ impl Master {
         let hip = self.hip.metres();
         let rendered = self.model.step(stamp, hip);
         if self.model.not_finite() > 0 {
-            self.limiter.release();
+            self.release();
         }
         let felt = match &mut self.tdpa {
             Some(tdpa) => tdpa.step(hip),

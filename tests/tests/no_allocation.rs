@@ -22,6 +22,7 @@ use mmt_client::io::MasterLive;
 use mmt_client::io::haptic::HapticLoop;
 use mmt_client::io::record;
 use mmt_client::operator::Operator;
+use mmt_client::operator::pointer::{Driver, HandEvent, Person, PointerSample};
 use mmt_client::operator::scripted::{Scripted, ScriptedConfig};
 use mmt_client::path::PathRecorder;
 use mmt_server::end::{SlaveEnd, SlaveEndConfig};
@@ -42,6 +43,7 @@ use mmt_shared::model::sample::HipSample;
 use mmt_shared::model::settings::Mode;
 use mmt_shared::time::{TICK, Time};
 use mmt_shared::wire::{Architecture, DATAGRAM_MAX, Label, Message, Side, Welcome};
+use rtrb::{Consumer, Producer, RingBuffer};
 
 /// The system's allocator, with a count of every call that takes memory.
 struct Counting;
@@ -134,6 +136,28 @@ struct Loop {
 
 impl Loop {
     fn new(mode: Mode, architecture: Architecture) -> Self {
+        let scripted = |scripted| Operator::Scripted(Box::new(scripted));
+        Self::operated_by(scripted, None, mode, architecture)
+    }
+
+    /// One whose hand a person at a pointer has, who does what is put into the ring.
+    fn held_by_a_person() -> (Producer<HandEvent>, Self) {
+        let (events, to_loop) = RingBuffer::new(64);
+        let person = |scripted| {
+            let person = Person::new(scripted, Driver::Pointer);
+            Operator::Person(Box::new(person))
+        };
+        let (mode, architecture) = (Mode::Recommended, Architecture::Mmt);
+        let sides = Self::operated_by(person, Some(to_loop), mode, architecture);
+        (events, sides)
+    }
+
+    fn operated_by(
+        operator: impl Fn(Scripted) -> Operator,
+        events: Option<Consumer<HandEvent>>,
+        mode: Mode,
+        architecture: Architecture,
+    ) -> Self {
         let mut runtime = tokio::runtime::Builder::new_current_thread();
         let runtime = runtime.enable_io().build().unwrap();
         let entered = runtime.enter();
@@ -154,7 +178,7 @@ impl Loop {
         };
         let end = setting.end().unwrap();
         let scripted = Scripted::try_new(ScriptedConfig::default(), end.master().view()).unwrap();
-        let operator = Operator::Scripted(Box::new(scripted));
+        let operator = operator(scripted);
         slave.start_at(operator.start());
         let folder = tempfile::tempdir().unwrap();
         let recorder = Recorder::create(&folder.path().join("a.mcap")).unwrap();
@@ -168,6 +192,7 @@ impl Loop {
         Self {
             haptic: HapticLoop::new(end, operator, None)
                 .observed_by(None, Some(PathRecorder::with_room()))
+                .operated_through(events)
                 .recorded(record),
             side,
             network,
@@ -251,6 +276,31 @@ fn the_haptic_tick_never_allocates() {
         let pushes = sides.network.snapshot().pushes;
         assert!(pushes >= Some(1), "{mode:?}: {pushes:?}");
     }
+}
+
+#[test]
+fn a_tick_that_a_pointer_feeds_never_allocates() {
+    let (mut events, mut sides) = Loop::held_by_a_person();
+    let mut now = Time::ZERO;
+    for tick in 0..TICKS {
+        now += TICK;
+        // presses, pushes into the box and lets go, again and again
+        let (part, page_s) = (tick % 2000, 50.0 + tick as f64 * 1e-3);
+        let sample = PointerSample {
+            page_s,
+            at: Vec2::new(2e-4 * part as f64, 0.0),
+        };
+        let event = match part {
+            0 => HandEvent::Press(sample),
+            1500 => HandEvent::Release,
+            _ => HandEvent::Move(sample),
+        };
+        events.push(event).unwrap();
+        let ((), calls) = counted(|| sides.haptic_tick(now));
+        assert_eq!(calls, 0, "allocator called in tick {tick}");
+        sides.slave_tick(now);
+    }
+    assert!(sides.contact > TICKS / 5, "{} ticks", sides.contact);
 }
 
 /// The slave's parts, fed beside a slave with what that slave met.

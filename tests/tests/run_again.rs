@@ -63,6 +63,7 @@ async fn session(architecture: Architecture, path: &Path) {
         transport: Transport::Quic,
         device: DeviceProfile::default(),
         operator: OperatorChoice::Scripted(ScriptedConfig::default()),
+        events: std::sync::Mutex::default(),
         duration: Some(DURATION),
         architecture,
         scene_hz: 40,

@@ -1,6 +1,7 @@
 //! The arguments of every command, as clap takes them, with help and examples.
 
 mod bench;
+mod console;
 mod help;
 mod netem;
 mod records;
@@ -28,6 +29,7 @@ use mmt_shared::wire::Architecture;
 
 pub(crate) use self::netem::EmulationArguments;
 pub(crate) use bench::{BenchArguments, BenchSubject, TransportBenchArguments};
+pub(crate) use console::ConsoleArguments;
 pub(crate) use records::{ExportArguments, ReplayArguments, ReportArguments};
 pub(crate) use reproduce::ReproduceArguments;
 pub(crate) use sweep::SweepArguments;
@@ -79,9 +81,9 @@ pub(crate) enum Command {
 }
 
 /// Arguments of `mmt demo`.
-#[derive(Debug, Args)]
+#[derive(Clone, Debug, Args)]
 pub(crate) struct DemoArguments {
-    /// How long the operator works
+    /// How long the operator works; a demo that a browser shows goes on until that is closed
     #[arg(long, value_name = "TIME", default_value = "20s", value_parser = values::duration)]
     pub(crate) duration: Duration,
     /// Seed of operator, sensors and network
@@ -127,6 +129,9 @@ pub(crate) struct DemoArguments {
     /// [default: the mode's]
     #[arg(long, value_name = "FACTOR")]
     pub(crate) stretch_max: Option<StretchMax>,
+    /// The console; on a terminal there is one unless it is switched off.
+    #[command(flatten)]
+    pub(crate) console: ConsoleArguments,
     /// Print the report as one JSON document; plain lines instead of the live view
     #[arg(long)]
     pub(crate) json: bool,
@@ -192,7 +197,7 @@ pub(crate) struct MasterArguments {
     /// What `mmt slave` printed, in quotes; - reads it from stdin
     #[arg(value_name = "PAIRING")]
     pub(crate) pairing: PairingWords,
-    /// Who moves the hand: scripted, or trace:FILE
+    /// Who moves the hand: scripted, pointer (in the console), or trace:FILE
     #[arg(long, value_name = "WHO", default_value = "scripted", value_parser = values::operator)]
     pub(crate) operator: OperatorWords,
     /// Of recorded pushes only this one, from 0 [default: all, joined]
@@ -237,6 +242,9 @@ pub(crate) struct MasterArguments {
     /// Greatest factor that congestion may stretch the time between samples by; 1: off
     #[arg(long, value_name = "FACTOR", default_value_t = CommandConfig::default().stretch_max)]
     pub(crate) stretch_max: StretchMax,
+    /// The console.
+    #[command(flatten)]
+    pub(crate) console: ConsoleArguments,
     /// Print the report as one JSON document
     #[arg(long)]
     pub(crate) json: bool,

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 
 /// Record and control of an emulated network.
-#[derive(Debug, Args)]
+#[derive(Clone, Debug, Args)]
 pub(crate) struct EmulationArguments {
     /// Record every datagram that meets the emulated network in this file, as mmt netem --record does
     #[arg(long, value_name = "FILE")]

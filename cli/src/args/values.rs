@@ -33,6 +33,8 @@ const UNITS: [(&str, f64); 5] = [
 pub(crate) enum OperatorWords {
     /// The scripted operator.
     Scripted,
+    /// A person at the console's pointer.
+    Pointer,
     /// A recorded path in a file.
     Trace(PathBuf),
 }
@@ -158,8 +160,12 @@ pub(super) fn host(text: &str) -> Result<Host, String> {
 pub(super) fn operator(text: &str) -> Result<OperatorWords, String> {
     match (text, text.strip_prefix("trace:")) {
         ("scripted", _) => Ok(OperatorWords::Scripted),
+        ("pointer", _) => Ok(OperatorWords::Pointer),
         (_, Some(file)) if !file.is_empty() => Ok(OperatorWords::Trace(file.into())),
-        _ => Err("write scripted, or trace:FILE with the path of a recorded tool path".to_owned()),
+        _ => Err(
+            "write scripted, pointer, or trace:FILE with the path of a recorded tool path"
+                .to_owned(),
+        ),
     }
 }
 

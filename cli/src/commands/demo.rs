@@ -1,35 +1,40 @@
 //! `mmt demo`: real slave, real master, real QUIC sockets on loopback, an emulated network between them.
 
 use std::net::{Ipv4Addr, SocketAddr};
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use mmt_client::commands::CommandConfig;
 use mmt_client::device::DeviceProfile;
-use mmt_client::io::{MasterOptions, OperatorChoice};
+use mmt_client::io::console::Order;
+use mmt_client::io::{MasterConfiguration, MasterLive, MasterOptions, OperatorChoice, SessionEnd};
+use mmt_client::operator::pointer::Driver;
 use mmt_client::operator::scripted::ScriptedConfig;
-use mmt_netem::{Direction, LinkConfig};
-use mmt_server::io::SlaveOptions;
-use mmt_server::playout::PlayoutConfig;
+use mmt_netem::Direction;
+use mmt_server::io::{SlaveConfiguration, SlaveOptions};
 use mmt_server::slave::SlaveConfig;
 use mmt_shared::io::identity::Identity;
 use mmt_shared::io::transport::Transport;
 use mmt_shared::io::truth::{self, TruthReceiver, TruthSender};
 use mmt_shared::model::settings::Mode;
 use mmt_shared::pairing::Pairing;
-use mmt_shared::report::RunReport;
+use mmt_shared::report::{Both, RunReport};
 use mmt_shared::wire::Architecture;
 
+use super::console::{self, Desk};
 use super::netem::wrap::{Emulation, effect};
 use super::record::Record;
 use super::viewer::Viewer;
 use super::{master, slave};
 use crate::args::DemoArguments;
-use crate::config::scene;
 use crate::failure::Failure;
 use crate::log::Messages;
 use crate::output::{note, print, print_json};
 use crate::stop::Stop;
-use crate::view::{Caption, Snapshot};
+use crate::view::{Caption, Screen, Snapshot};
+
+mod setting;
+use setting::{Setting, down, up};
 
 /// Samples in a command.
 const SAMPLES_PER_COMMAND: u8 = 10;
@@ -41,91 +46,196 @@ const FAREWELL: Duration = Duration::from_secs(3);
 /// # Errors
 /// A host could not start, or the session broke.
 pub(crate) fn run(arguments: &DemoArguments, messages: &Messages) -> Result<(), Failure> {
-    let config = slave_config(arguments)?;
-    let caption = caption(arguments, &config);
+    let mut setting = Setting::new(arguments);
+    setting.slave_config()?;
     let (up, down) = (up(arguments), down(arguments));
     note(effect(Direction::Up, up)?);
     note(effect(Direction::Down, down)?);
     arguments.transport.warning().into_iter().for_each(note);
-    let transport = arguments.transport.choose()?;
     let record = Record::start(arguments.record.as_deref())?;
-    let (stop, stop_slave) = (Stop::on_signals()?, Stop::new());
-    // both sides stretch as far
-    let stretch_max = config.stretch_max;
-    let seed = arguments.seed;
-    let emulation = Emulation::start(&arguments.emulation, seed, Some(up), Some(down))?;
-    let (truth_from, truth_to) = truth::pair();
-    let mut options = slave_options(arguments, transport, &emulation, config, truth_from)?;
-    options.record = record.recorder();
-    let (slave, started) = slave::start(options, None, stop_slave.receiver())?;
-    let Ok(started) = started.recv() else {
-        return slave.join().map(|_| ());
-    };
-    let mut options = master_options(arguments, transport, &emulation, started.pairing, truth_to);
-    options.commands.stretch_max = stretch_max;
-    options.record = record.recorder();
-    let dashboard = !arguments.json && !emulation.takes_orders();
-    options.scene_hz = Viewer::scene_hz(dashboard);
-    let (master, master_live) = master::start(options, stop.receiver())?;
-
-    let mut viewer = Viewer::new(caption, dashboard, messages, &stop);
-    let mut master_ended = None;
-    while master.is_running() || slave.is_running() {
-        // copied first: a borrow that lives through the viewer's wait would stop the hosts' tasks
-        let (slave_now, master_now) = (*started.live.borrow(), *master_live.borrow());
-        viewer.look(Snapshot {
-            slave: Some(slave_now).filter(|slave| slave.connected),
-            master: Some(master_now),
-        });
-        if !master.is_running() {
-            let since = *master_ended.get_or_insert_with(Instant::now);
-            if since.elapsed() > FAREWELL {
-                stop_slave.end();
-            }
+    let stop = Stop::on_signals()?;
+    let dashboard = !arguments.json && !arguments.emulation.netem_control;
+    let mut desk = Desk::start(&arguments.console, dashboard && Screen::is_there())?;
+    let controlled = desk.is_some();
+    let emulation = &arguments.emulation;
+    let emulation = Emulation::start(emulation, controlled, arguments.seed, Some(up), Some(down))?;
+    let mut viewer = Viewer::new(Caption::default(), dashboard, messages, &stop);
+    let ended = loop {
+        let mut round = Round {
+            setting: &mut setting,
+            emulation: &emulation,
+            record: &record,
+            stop: &stop,
+            dashboard,
+            viewer: &mut viewer,
+            desk: desk.as_mut(),
+            again: None,
+        };
+        let ended = round.session();
+        if ended.is_ok() {
+            round.wait();
         }
-    }
+        match round.again.take() {
+            Some(again) if ended.is_ok() => setting = again,
+            _ => break ended,
+        }
+    };
     drop(viewer);
-    let (master, slave) = (master.join(), slave.join());
     emulation.finish()?;
-    let report = RunReport::of_both(master?, slave?);
+    let Some((report, end)) = ended? else {
+        return Ok(());
+    };
     if arguments.json {
         print_json(&report)?
     } else {
         print(&report)?
     }
     record.finish()?;
-    master::judge(master_live.borrow().ended)
+    master::judge(end)
 }
 
-fn up(arguments: &DemoArguments) -> &LinkConfig {
-    arguments.netem_up.as_ref().unwrap_or(&arguments.netem)
+/// A session of a demo, and the wait for the next.
+struct Round<'a> {
+    setting: &'a mut Setting,
+    emulation: &'a Emulation,
+    record: &'a Record,
+    stop: &'a Stop,
+    dashboard: bool,
+    viewer: &'a mut Viewer,
+    desk: Option<&'a mut Desk>,
+    /// The session that a viewer wants next.
+    again: Option<Setting>,
 }
 
-fn down(arguments: &DemoArguments) -> &LinkConfig {
-    arguments.netem_down.as_ref().unwrap_or(&arguments.netem)
-}
+/// What a session came to: its report and why it ended.
+type Ended = Option<(
+    RunReport<Both<MasterConfiguration, SlaveConfiguration>>,
+    Option<SessionEnd>,
+)>;
 
-fn architecture(arguments: &DemoArguments) -> Architecture {
-    arguments.architecture
-}
-
-fn slave_config(arguments: &DemoArguments) -> Result<SlaveConfig, Failure> {
-    let mut config = SlaveConfig::of_mode(arguments.mode);
-    config.seed = arguments.seed;
-    if let Some(path) = &arguments.scene {
-        config.scene = scene(path)?;
+impl Round<'_> {
+    /// Runs slave and master to their end; none if the slave ended before it listened.
+    fn session(&mut self) -> Result<Ended, Failure> {
+        let config = self.setting.slave_config()?;
+        let arguments = &self.setting.arguments;
+        let mut caption = caption(arguments, &config);
+        let transport = arguments.transport.choose()?;
+        let (stop, stop_slave) = (Stop::new(), Stop::new());
+        // both sides stretch as far
+        let stretch_max = config.stretch_max;
+        let (truth_from, truth_to) = truth::pair();
+        let mut options = slave_options(arguments, transport, self.emulation, config, truth_from)?;
+        options.record = self.record.recorder();
+        let (slave, started) = slave::start(options, None, stop_slave.receiver())?;
+        let Ok(started) = started.recv() else {
+            return slave.join().map(|_| None);
+        };
+        let mut options = master_options(
+            arguments,
+            transport,
+            self.emulation,
+            started.pairing,
+            truth_to,
+        );
+        options.commands.stretch_max = stretch_max;
+        options.record = self.record.recorder();
+        options.scene_hz = Viewer::scene_hz(self.dashboard);
+        if let Some(desk) = &self.desk {
+            operated_at(desk, &mut options);
+        }
+        let (master, master_live) = master::start(options, stop.receiver())?;
+        if let Some(desk) = &mut self.desk {
+            let (slave, master) = (Arc::clone(&started.live), master_live.clone());
+            let connected = move || Some(*slave.borrow()).filter(|slave| slave.connected);
+            desk.show(&caption, move || *master.borrow(), connected);
+            desk.tell(self.setting.shown());
+            caption.setting = format!("{}  {}", desk.address(), caption.setting);
+        }
+        self.viewer.caption(caption);
+        let mut master_ended = None;
+        while master.is_running() || slave.is_running() {
+            // copied first: a borrow that lives through the viewer's wait would stop the hosts' tasks
+            let (slave_now, master_now) = (*started.live.borrow(), *master_live.borrow());
+            self.viewer.look(Snapshot {
+                slave: Some(slave_now).filter(|slave| slave.connected),
+                master: Some(master_now),
+            });
+            self.attend(&stop);
+            if self.stop.asked() || self.again.is_some() {
+                stop.end();
+            }
+            self.finish_unwatched(&master_now);
+            if !master.is_running() {
+                let since = *master_ended.get_or_insert_with(Instant::now);
+                if since.elapsed() > FAREWELL {
+                    stop_slave.end();
+                }
+            }
+        }
+        let (master, slave) = (master.join(), slave.join());
+        let report = RunReport::of_both(master?, slave?);
+        let end = master_live.borrow().ended;
+        if let Some(desk) = &mut self.desk {
+            desk.tell_end(&end.map(|end| end.to_string()).unwrap_or_default());
+        }
+        Ok(Some((report, end)))
     }
-    // where the tool may be felt the play-out finds out by itself how long it has to wait
-    if !architecture(arguments).feels_tool() {
-        let jitter = up(arguments).jitter_span();
-        config.playout = PlayoutConfig::for_packing_and_jitter(SAMPLES_PER_COMMAND, jitter);
+
+    /// With a console the loop has no duration of its own: nobody's hand is taken away.
+    fn finish_unwatched(&self, master: &MasterLive) {
+        let duration_s = self.setting.arguments.duration.as_secs_f64();
+        if let Some(desk) = &self.desk
+            && master.elapsed_s >= duration_s
+            && !desk.is_watched()
+        {
+            desk.finish();
+        }
     }
-    if let Some(scheme) = arguments.scheme {
-        config.trigger.scheme = scheme;
+
+    /// After a session: as long as somebody looks on, they may want another.
+    fn wait(&mut self) {
+        while self.again.is_none() && !self.stop.asked() {
+            if !self.desk.as_ref().is_some_and(|desk| desk.is_watched()) {
+                return;
+            }
+            self.viewer.look(Snapshot::default());
+            self.attend(&Stop::new());
+        }
     }
-    config.repeats_ms = arguments.repeats.unwrap_or(config.repeats_ms);
-    config.stretch_max = arguments.stretch_max.unwrap_or(config.stretch_max);
-    Ok(config)
+
+    /// Does what viewers want.
+    fn attend(&mut self, stop: &Stop) {
+        let Some(desk) = &mut self.desk else {
+            return;
+        };
+        while let Some(order) = desk.next_order() {
+            match order {
+                Order::Stop => stop.end(),
+                Order::Network(wish) => {
+                    let networks = self.setting.networks();
+                    desk.change_networks(&wish, self.emulation, networks.map(Some));
+                    desk.tell(self.setting.shown());
+                }
+                Order::Restart(wish) => match self.setting.wished(&wish) {
+                    Ok(setting) => self.again = Some(setting),
+                    Err(what) => desk.tell([("note", what.into())]),
+                },
+            }
+        }
+    }
+}
+
+/// A person may take the hand of the scripted operator.
+fn operated_at(desk: &Desk, options: &mut MasterOptions) {
+    options.scene_hz = console::SCENE_HZ;
+    options.events = std::sync::Mutex::new(Some(desk.events()));
+    options.duration = None;
+    if let OperatorChoice::Scripted(scripted) = options.operator {
+        options.operator = OperatorChoice::Person {
+            scripted,
+            driver: Driver::Scripted,
+        };
+    }
 }
 
 fn caption(arguments: &DemoArguments, config: &SlaveConfig) -> Caption {
@@ -141,7 +251,7 @@ fn caption(arguments: &DemoArguments, config: &SlaveConfig) -> Caption {
         (up, down) if up == down => format!("network each way: {up}"),
         (up, down) => format!("network up: {up}, down: {down}"),
     };
-    let mode = match architecture(arguments) {
+    let mode = match arguments.architecture {
         Architecture::Mmt => mode.to_owned(),
         other => format!("{mode}, {}", other.name()),
     };
@@ -190,8 +300,9 @@ fn master_options(
             seed: arguments.seed,
             ..ScriptedConfig::default()
         }),
+        events: std::sync::Mutex::default(),
         duration: Some(arguments.duration),
-        architecture: architecture(arguments),
+        architecture: arguments.architecture,
         scene_hz: 0,
         commands: CommandConfig {
             samples_per_command: SAMPLES_PER_COMMAND,
@@ -204,24 +315,5 @@ fn master_options(
         path: None,
         truth: Some(truth),
         record: None,
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_play_out_waits_for_packing_and_the_whole_jitter() {
-        let peak_to_peak = |text: &str| {
-            let link: mmt_netem::LinkConfig = text.parse().unwrap();
-            link.jitter_span()
-        };
-        assert_eq!(peak_to_peak("delay 50ms"), Duration::ZERO);
-        assert_eq!(peak_to_peak("delay 50ms 5ms"), Duration::from_millis(10));
-        let normal = peak_to_peak("delay 50ms 4ms distribution normal");
-        assert_eq!(normal, Duration::from_millis(20));
-        let playout = PlayoutConfig::for_packing_and_jitter(10, peak_to_peak("delay 50ms 5ms"));
-        assert_eq!(playout.delay_ms, 21.0);
     }
 }

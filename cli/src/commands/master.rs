@@ -5,10 +5,12 @@ use std::path::Path;
 use std::sync::PoisonError;
 
 use mmt_client::commands::CommandConfig;
+use mmt_client::io::console::Order;
 use mmt_client::io::{
     MasterHostError, MasterLive, MasterOptions, MasterReport, OperatorChoice, SessionEnd,
     SharedPath,
 };
+use mmt_client::operator::pointer::Driver;
 use mmt_client::operator::scripted::ScriptedConfig;
 use mmt_client::operator::trace::Trace;
 use mmt_netem::Direction;
@@ -19,8 +21,10 @@ use mmt_shared::io::connect::ConnectError;
 use mmt_shared::model::geometry::Vec2;
 use mmt_shared::pairing::Pairing;
 use mmt_shared::report::RunReport;
+use serde_json::json;
 use tokio::sync::watch;
 
+use super::console::{self, Desk};
 use super::host::{Host, spawn};
 use super::netem::wrap::{Emulation, effect};
 use super::record::Record;
@@ -47,14 +51,21 @@ pub(crate) fn run(arguments: MasterArguments, messages: &Messages) -> Result<(),
     options.record = record.recorder();
     // not before the pairing has been read from stdin: the orders come after it
     let (netem, seed) = (Some(&arguments.netem), arguments.seed);
-    let emulation = Emulation::start(&arguments.emulation, seed, netem, None)?;
+    let wanted = matches!(arguments.operator, OperatorWords::Pointer);
+    let mut desk = Desk::start(&arguments.console, wanted)?;
+    let controlled = desk.is_some();
+    let emulation = Emulation::start(&arguments.emulation, controlled, seed, netem, None)?;
     options.netem_extras = emulation.extras(Direction::Up);
     let dashboard = !arguments.json && !emulation.takes_orders();
     options.scene_hz = Viewer::scene_hz(dashboard);
+    if let Some(desk) = &desk {
+        options.scene_hz = console::SCENE_HZ;
+        options.events = std::sync::Mutex::new(Some(desk.events()));
+    }
     if !arguments.netem.is_transparent() {
         note(effect(Direction::Up, &arguments.netem)?);
     }
-    let caption = Caption {
+    let mut caption = Caption {
         command: "master",
         duration_s: options.duration.map(|time| time.as_secs_f64()),
         setting: format!("slave at {}, {}", options.pairing.address, arguments.netem),
@@ -64,6 +75,13 @@ pub(crate) fn run(arguments: MasterArguments, messages: &Messages) -> Result<(),
     let stop = Stop::on_signals()?;
     let path = options.path.clone();
     let (host, live) = start(options, stop.receiver())?;
+    let mut link = arguments.netem.clone();
+    if let Some(desk) = &mut desk {
+        let shown = live.clone();
+        desk.show(&caption, move || *shown.borrow(), || None);
+        desk.tell([("network", json!({"up": link.to_string()}))]);
+        caption.setting = format!("{}  {}", desk.address(), caption.setting);
+    }
     let mut viewer = Viewer::new(caption, dashboard, messages, &stop);
     while host.is_running() {
         let master = Some(*live.borrow());
@@ -71,6 +89,18 @@ pub(crate) fn run(arguments: MasterArguments, messages: &Messages) -> Result<(),
             slave: None,
             master,
         });
+        while let Some(order) = desk.as_mut().and_then(Desk::next_order) {
+            match order {
+                Order::Stop => stop.end(),
+                Order::Network(wish) => {
+                    let Some(desk) = &mut desk else { continue };
+                    desk.change_networks(&wish, &emulation, [Some(&mut link), None]);
+                    desk.tell([("network", json!({"up": link.to_string()}))]);
+                }
+                // the object is another host's
+                Order::Restart(_) => {}
+            }
+        }
     }
     drop(viewer);
     let report = RunReport::from(host.join()?);
@@ -127,6 +157,7 @@ fn options(arguments: &MasterArguments) -> Result<MasterOptions, Failure> {
         pairing: pairing(&arguments.pairing)?,
         device: device.map_err(|error| Failure::usage(format!("--stiffness: {error}")))?,
         operator: operator(arguments)?,
+        events: std::sync::Mutex::default(),
         duration: arguments.duration,
         architecture: arguments.architecture,
         scene_hz: 0,
@@ -169,19 +200,25 @@ fn pairing(words: &PairingWords) -> Result<Pairing, Failure> {
 }
 
 fn operator(arguments: &MasterArguments) -> Result<OperatorChoice, Failure> {
+    let scripted = ScriptedConfig {
+        seed: arguments.seed,
+        ..ScriptedConfig::default()
+    };
+    let person = |driver| OperatorChoice::Person { scripted, driver };
     match &arguments.operator {
-        OperatorWords::Scripted if arguments.push.is_some() => {
-            Err(Failure::usage("--push goes with recorded pushes only")
-                .remedy("add --operator trace:FILE, or leave --push out"))
-        }
-        OperatorWords::Scripted => Ok(OperatorChoice::Scripted(ScriptedConfig {
-            seed: arguments.seed,
-            ..ScriptedConfig::default()
-        })),
         OperatorWords::Trace(path) => Ok(OperatorChoice::Trace {
             trace: trace(path, arguments.push)?,
             name: format!("trace:{}", path.display()),
         }),
+        _ if arguments.push.is_some() => {
+            Err(Failure::usage("--push goes with recorded pushes only")
+                .remedy("add --operator trace:FILE, or leave --push out"))
+        }
+        OperatorWords::Pointer => Ok(person(Driver::Pointer)),
+        OperatorWords::Scripted if arguments.console.options(false)?.is_some() => {
+            Ok(person(Driver::Scripted))
+        }
+        OperatorWords::Scripted => Ok(OperatorChoice::Scripted(scripted)),
     }
 }
 

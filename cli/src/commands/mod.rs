@@ -1,6 +1,7 @@
 //! The commands, one file each: arguments to configuration to run.
 
 pub(crate) mod bench;
+mod console;
 pub(crate) mod demo;
 pub(crate) mod export;
 mod host;

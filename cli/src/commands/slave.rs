@@ -38,7 +38,7 @@ pub(crate) fn run(arguments: SlaveArguments, messages: &Messages) -> Result<(), 
     let record = Record::start(arguments.record.as_deref())?;
     options.record = record.recorder();
     let (netem, seed) = (Some(&arguments.netem), options.netem_seed);
-    let emulation = Emulation::start(&arguments.emulation, seed, None, netem)?;
+    let emulation = Emulation::start(&arguments.emulation, false, seed, None, netem)?;
     options.netem_extras = emulation.extras(Direction::Down);
     if !arguments.netem.is_transparent() {
         note(effect(Direction::Down, &arguments.netem)?);

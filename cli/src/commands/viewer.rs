@@ -35,6 +35,11 @@ impl Viewer {
         }
     }
 
+    /// The same run goes on with other settings.
+    pub(super) fn caption(&mut self, caption: Caption) {
+        self.caption = caption;
+    }
+
     /// How many scenes a second are looked at, with a dashboard or without one.
     pub(super) fn scene_hz(dashboard: bool) -> u8 {
         if dashboard && Screen::is_there() {

@@ -3,9 +3,11 @@
 use std::fmt;
 
 use mmt_shared::wire::Ending;
+use serde::Serialize;
 
 /// Why a session ended, as the master saw it. The first cause counts.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
 pub enum SessionEnd {
     /// The duration that was asked for is over.
     DurationOver,

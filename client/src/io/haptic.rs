@@ -16,19 +16,23 @@ use mmt_shared::metrics::PoseError;
 use mmt_shared::model::geometry::Vec2;
 use mmt_shared::model::tool::Scene;
 use mmt_shared::time::Time;
+use rtrb::Consumer;
 
 use super::record::{MasterShown, MasterSink};
-use super::{MasterLive, SessionEnd};
+use super::{MasterLive, PersonLive, SessionEnd};
 use crate::end::MasterEnd;
 use crate::failsafe::LinkState;
 use crate::master::MasterTick;
 use crate::operator::Operator;
+use crate::operator::pointer::HandEvent;
 use crate::path::PathRecorder;
 
-/// A snapshot for a screen every so many ticks: 50 a second.
-const SNAPSHOT_TICKS: u64 = 20;
+/// A snapshot for a screen every so many ticks: 62 a second.
+const SNAPSHOT_TICKS: u64 = 16;
 /// The loop computes its own quantiles, which takes microseconds, every so many ticks.
 const TIMING_TICKS: u64 = 500;
+/// Events of a person that a tick takes in at most: a pointer gives one or two in a millisecond.
+const EVENTS_PER_TICK: usize = 64;
 /// True poses that a tick judges at most: it must not grow long when the slave catches up.
 const TRUTHS_PER_TICK: usize = 4;
 
@@ -37,6 +41,8 @@ const TRUTHS_PER_TICK: usize = 4;
 pub struct MasterGiven {
     /// The device's HIP, m, world.
     pub reading: Vec2,
+    /// Whether a hand holds the device.
+    pub engaged: bool,
     /// Whether the hand is to be released from this tick on.
     pub releases: bool,
 }
@@ -46,6 +52,8 @@ pub struct MasterGiven {
 pub struct HapticLoop {
     pub(super) end: MasterEnd,
     pub(super) operator: Operator,
+    /// What a person does, where one operates.
+    events: Option<Consumer<HandEvent>>,
     /// How long; for ever if absent.
     duration: Option<Duration>,
     /// The true pose, where the slave lives in this process: for the report.
@@ -74,6 +82,7 @@ impl HapticLoop {
         Self {
             end,
             operator,
+            events: None,
             duration,
             truth: None,
             path: None,
@@ -94,6 +103,13 @@ impl HapticLoop {
     #[must_use]
     pub fn observed_by(mut self, truth: Option<TruthReceiver>, path: Option<PathRecorder>) -> Self {
         (self.truth, self.path) = (truth, path);
+        self
+    }
+
+    /// The same, operated by whoever fills these events.
+    #[must_use]
+    pub fn operated_through(mut self, events: Option<Consumer<HandEvent>>) -> Self {
+        self.events = events;
         self
     }
 
@@ -135,9 +151,12 @@ impl HapticLoop {
         self.ticks = self.ticks.saturating_add(1);
         self.skipped = self.skipped.saturating_add(tick.skipped);
         self.receive(side);
+        self.handle_events();
         let releases = self.consider_end(side.is_stopped());
         let view = self.end.update_model();
         let reading = self.operator.step(self.elapsed, &view, self.hand_force);
+        let engaged = self.operator.engaged();
+        self.end.hold(engaged);
         let done = self.end.tick(stamp, reading);
         self.hand_force = done.hand_force;
         self.judge_pose();
@@ -149,7 +168,11 @@ impl HapticLoop {
         }
         let sent = now();
         if let Some(record) = &mut self.record {
-            let given = MasterGiven { reading, releases };
+            let given = MasterGiven {
+                reading,
+                engaged,
+                releases,
+            };
             record.ticked(Ticked {
                 tick,
                 given,
@@ -158,7 +181,8 @@ impl HapticLoop {
             });
         }
         self.transmit(side, sent);
-        let at_rest = self.end.master().limiter().at_rest();
+        // a hand that is let go is at rest too
+        let at_rest = self.releasing && self.end.master().limiter().at_rest();
         if at_rest || self.ticks.is_multiple_of(SNAPSHOT_TICKS) {
             self.show(&done, stamp, side);
         }
@@ -172,6 +196,18 @@ impl HapticLoop {
     /// The master's end.
     pub fn end(&self) -> &MasterEnd {
         &self.end
+    }
+
+    fn handle_events(&mut self) {
+        let Some(events) = &mut self.events else {
+            return;
+        };
+        for _ in 0..EVENTS_PER_TICK {
+            let Ok(event) = events.pop() else {
+                return;
+            };
+            self.operator.handle(self.elapsed, event);
+        }
     }
 
     fn receive(&mut self, side: &mut LoopSide<MasterLive>) {
@@ -251,6 +287,10 @@ impl HapticLoop {
             footprint: Some(state.footprint),
             params: [params.m(), params.b(), params.c()],
             in_contact: master.view().in_contact,
+            proxy: done.rendered.touch.map(|touch| touch.proxy),
+            engaged: master.limiter().engaged(),
+            person: self.operator.person().map(PersonLive::from),
+            change: self.end.change().copied(),
             updates_applied: u64::from(master.applied()),
             pushes: self.operator.pushes_completed(),
             link: done.link,

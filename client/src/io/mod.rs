@@ -8,6 +8,7 @@
     reason = "the shell: clocks, threads and sockets are its business"
 )]
 
+pub mod console;
 mod end;
 mod error;
 pub mod haptic;
@@ -33,12 +34,15 @@ use mmt_shared::pairing::Pairing;
 use mmt_shared::range::OutOfRange;
 use mmt_shared::report::MasterSession;
 use mmt_shared::wire::Architecture;
+use rtrb::Consumer;
 use serde::Serialize;
 
 use crate::commands::CommandConfig;
 use crate::device::DeviceProfile;
+use crate::end::Change;
 use crate::failsafe::LinkState;
 use crate::operator::Operator;
+use crate::operator::pointer::{Driver, HandEvent, Person};
 use crate::operator::scripted::{Scripted, ScriptedConfig, View};
 use crate::operator::trace::Trace;
 use crate::path::PathRecorder;
@@ -52,6 +56,13 @@ pub use session::run;
 pub enum OperatorChoice {
     /// The scripted operator.
     Scripted(ScriptedConfig),
+    /// A person at a pointer. Until the first press `driver` moves the HIP.
+    Person {
+        /// What the scripted operator does in the meantime.
+        scripted: ScriptedConfig,
+        /// Who begins.
+        driver: Driver,
+    },
     /// A recorded path, with the name it is reported by.
     Trace {
         /// The path.
@@ -71,6 +82,8 @@ impl OperatorChoice {
             Self::Scripted(config) => Scripted::try_new(*config, view)
                 .map(|scripted| Operator::Scripted(Box::new(scripted))),
             Self::Trace { trace, .. } => Ok(Operator::Trace(trace.clone())),
+            Self::Person { scripted, driver } => Scripted::try_new(*scripted, view)
+                .map(|scripted| Operator::Person(Box::new(Person::new(scripted, *driver)))),
         }
     }
 
@@ -78,6 +91,14 @@ impl OperatorChoice {
         match self {
             Self::Scripted(_) => "scripted",
             Self::Trace { name, .. } => name,
+            Self::Person {
+                driver: Driver::Scripted,
+                ..
+            } => "scripted or pointer",
+            Self::Person {
+                driver: Driver::Pointer,
+                ..
+            } => "pointer",
         }
     }
 }
@@ -96,6 +117,8 @@ pub struct MasterOptions {
     pub device: DeviceProfile,
     /// Who operates.
     pub operator: OperatorChoice,
+    /// What a person does, where one operates; the session takes it.
+    pub events: Mutex<Option<Consumer<HandEvent>>>,
     /// How long; until the operator has finished or a person ends it if absent.
     pub duration: Option<Duration>,
     /// Whose force the hand feels.
@@ -119,7 +142,7 @@ pub struct MasterOptions {
 }
 
 /// A snapshot of a running master, for a screen.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct MasterLive {
     /// Seconds since the session began.
     pub elapsed_s: f64,
@@ -141,6 +164,14 @@ pub struct MasterLive {
     pub scene_age_s: Option<f64>,
     /// Whether the HIP touches the model.
     pub in_contact: bool,
+    /// The proxy: the HIP's foot on the face that it touches, m.
+    pub proxy: Option<Vec2>,
+    /// Whether force may act on the hand.
+    pub engaged: bool,
+    /// The person, where one operates.
+    pub person: Option<PersonLive>,
+    /// What the newest applied update found wrong in the model.
+    pub change: Option<Change>,
     /// Updates applied.
     pub updates_applied: u64,
     /// Pushes completed.
@@ -163,6 +194,24 @@ pub struct MasterLive {
     pub ended: Option<SessionEnd>,
 }
 
+/// A person at a pointer, for a screen.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct PersonLive {
+    /// Who moves the HIP.
+    pub driver: Driver,
+    /// Whether the hand rests.
+    pub paused: bool,
+}
+
+impl From<&Person> for PersonLive {
+    fn from(person: &Person) -> Self {
+        Self {
+            driver: person.driver(),
+            paused: person.is_paused(),
+        }
+    }
+}
+
 /// The configuration as the report shows it.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct MasterConfiguration {
@@ -172,7 +221,7 @@ pub struct MasterConfiguration {
     pub transport: &'static str,
     /// The device.
     pub device: DeviceProfile,
-    /// `scripted` or the trace's name.
+    /// `scripted`, `scripted or pointer`, `pointer` or the trace's name.
     pub operator: String,
     /// The scripted operator's numbers.
     pub scripted: Option<ScriptedConfig>,

@@ -129,6 +129,7 @@ fn message(about: &TickAbout, tick: &Ticked<MasterGiven, MasterTick>) -> TickMes
         skipped: tick.tick.skipped,
         reading_x_m: given.reading.x,
         reading_y_m: given.reading.y,
+        engaged: given.engaged,
         releases: given.releases,
         sent_ns: tick.sent.as_nanos(),
         hip_x_m: hip.x,

@@ -38,7 +38,10 @@ impl From<&MasterOptions> for MasterConfiguration {
             device: options.device,
             operator: options.operator.name().to_owned(),
             scripted: match &options.operator {
-                OperatorChoice::Scripted(config) => Some(*config),
+                OperatorChoice::Scripted(config)
+                | OperatorChoice::Person {
+                    scripted: config, ..
+                } => Some(*config),
                 OperatorChoice::Trace { .. } => None,
             },
             architecture: options.architecture,

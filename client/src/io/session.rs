@@ -31,7 +31,7 @@ use crate::path::PathRecorder;
 const THREAD: &str = "mmt-haptic";
 
 /// Runs a master against the slave of a pairing string until its duration is over, its operator has
-/// finished, `stop` becomes true, or the other side or the link ends it. `live` gets a snapshot 25 times a
+/// finished, `stop` becomes true, or the other side or the link ends it. `live` gets a snapshot 62 times a
 /// second; the last one has the reason why the session ended.
 ///
 /// A session that began always gives a report: one that the link or the slave broke has the ending
@@ -88,8 +88,9 @@ pub(super) async fn run_with(
     let end = setting.end()?;
     let operator = options.operator.begin(end.master().view())?;
     let path = options.path.is_some().then(PathRecorder::with_room);
-    let mut haptic =
-        HapticLoop::new(end, operator, options.duration).observed_by(options.truth.take(), path);
+    let mut haptic = HapticLoop::new(end, operator, options.duration)
+        .observed_by(options.truth.take(), path)
+        .operated_through(options.events.get_mut().ok().and_then(Option::take));
     if let Some(recorder) = &options.record {
         let sink = record::begin(
             recorder,

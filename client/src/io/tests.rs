@@ -38,6 +38,7 @@ fn scripted(fake: &Fake) -> MasterOptions {
         pairing: fake.pairing(),
         device: DeviceProfile::default(),
         operator: OperatorChoice::Scripted(ScriptedConfig::default()),
+        events: std::sync::Mutex::default(),
         duration: Some(Duration::from_millis(400)),
         commands: CommandConfig::default(),
         netem: LinkConfig::default(),

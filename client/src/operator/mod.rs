@@ -1,6 +1,7 @@
-//! Who moves the HIP: the scripted operator or a recorded path.
+//! Who moves the HIP: the scripted operator, a recorded path or a person.
 
 pub mod hand;
+pub mod pointer;
 mod route;
 pub mod scripted;
 pub mod trace;
@@ -9,6 +10,7 @@ use std::time::Duration;
 
 use mmt_shared::model::geometry::Vec2;
 
+use pointer::{HandEvent, Person};
 use scripted::{Scripted, View};
 use trace::Trace;
 
@@ -19,6 +21,8 @@ pub enum Operator {
     Scripted(Box<Scripted>),
     /// Follows a recorded path, whatever the force.
     Trace(Trace),
+    /// A person at a pointer.
+    Person(Box<Person>),
 }
 
 impl Operator {
@@ -27,6 +31,7 @@ impl Operator {
         match self {
             Self::Scripted(scripted) => scripted.hip(),
             Self::Trace(trace) => trace.at(Duration::ZERO),
+            Self::Person(person) => person.hip(),
         }
     }
 
@@ -38,6 +43,30 @@ impl Operator {
         match self {
             Self::Scripted(scripted) => scripted.step(view, force_on_hand),
             Self::Trace(trace) => trace.at(elapsed),
+            Self::Person(person) => person.step(elapsed, view, force_on_hand),
+        }
+    }
+
+    /// Takes in what a person did, which arrived at `elapsed`; other operators take nothing.
+    pub fn handle(&mut self, elapsed: Duration, event: HandEvent) {
+        if let Self::Person(person) = self {
+            person.handle(elapsed, event);
+        }
+    }
+
+    /// Whether a hand holds the device: only then force may act on it.
+    pub fn engaged(&self) -> bool {
+        match self {
+            Self::Person(person) => person.engaged(),
+            Self::Scripted(_) | Self::Trace(_) => true,
+        }
+    }
+
+    /// The person, if it is one.
+    pub fn person(&self) -> Option<&Person> {
+        match self {
+            Self::Person(person) => Some(person),
+            Self::Scripted(_) | Self::Trace(_) => None,
         }
     }
 
@@ -46,6 +75,7 @@ impl Operator {
         match self {
             Self::Scripted(scripted) => Some(scripted.pushes_completed()),
             Self::Trace(_) => None,
+            Self::Person(person) => Some(person.scripted().pushes_completed()),
         }
     }
 
@@ -54,6 +84,7 @@ impl Operator {
         match self {
             Self::Scripted(_) => false,
             Self::Trace(trace) => elapsed >= trace.duration(),
+            Self::Person(person) => person.finished(),
         }
     }
 }

@@ -6,6 +6,7 @@
 //! the finite numbers, and never enter the box but by the face it means to push.
 
 mod config;
+mod handover;
 mod nudge_policy;
 mod push_profile;
 mod view;

@@ -201,7 +201,7 @@ impl Bilateral {
 pub(super) fn pushes(operator: &Operator) -> bool {
     match operator {
         Operator::Scripted(scripted) => scripted.phase() == Phase::Push,
-        Operator::Trace(_) => true,
+        Operator::Trace(_) | Operator::Person(_) => true,
     }
 }
 

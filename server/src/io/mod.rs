@@ -65,7 +65,7 @@ pub struct SlaveOptions {
 }
 
 /// A snapshot of a running slave, for a screen.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct SlaveLive {
     /// Whether a master is connected.
     pub connected: bool,

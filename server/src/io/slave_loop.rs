@@ -15,8 +15,8 @@ use super::record::{SlaveShown, SlaveSink};
 use crate::end::SlaveEnd;
 use crate::slave::SlaveTick;
 
-/// A snapshot for the network task every so many ticks: 50 a second.
-const SNAPSHOT_TICKS: u64 = 20;
+/// A snapshot for the network task every so many ticks: 62 a second.
+const SNAPSHOT_TICKS: u64 = 16;
 
 /// What the network task sees of a running loop.
 #[derive(Clone, Copy, Debug, Default)]

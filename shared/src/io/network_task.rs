@@ -15,8 +15,8 @@ use super::loop_thread::LoopHandle;
 use super::transport::{Connection, ConnectionError, SendDatagramError};
 use crate::report::SessionStats;
 
-/// Between two beats, at which a caller reads the loop's snapshot: 25 a second.
-pub const BEAT: Duration = Duration::from_millis(40);
+/// Between two beats, at which a caller reads the loop's snapshot: 62 a second, a frame of most screens.
+pub const BEAT: Duration = Duration::from_millis(16);
 /// More datagrams than QUIC's queue holds.
 pub const WAITING_MAX: usize = 4096;
 

@@ -120,6 +120,8 @@ messages! {
         reading_x_m: f64,
         /// The same.
         reading_y_m: f64,
+        /// Whether a hand holds the device.
+        engaged: bool,
         /// Whether the hand is to be released from here on.
         releases: bool,
         /// When what it sends leaves, by the master's clock, ns.

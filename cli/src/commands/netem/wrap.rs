@@ -24,22 +24,27 @@ const DOWN_HZ: f64 = 40.0;
 pub(crate) struct Emulation {
     record: Option<(PathBuf, RecordFile)>,
     controls: Option<[SocketControl; 2]>,
+    /// Whether stdin gives commands.
+    orders: bool,
 }
 
 impl Emulation {
-    /// Opens the record and begins to take commands. `up` and `down`: the networks of this run; none where
+    /// Opens the record and begins to take commands: from stdin if the arguments say so, else, if it is `controlled`, from
+    /// this process. `up` and `down`: the networks of this run; none where
     /// this process sends nothing.
     ///
     /// # Errors
     /// The record cannot be written.
     pub(crate) fn start(
         arguments: &EmulationArguments,
+        controlled: bool,
         seed: u64,
         up: Option<&LinkConfig>,
         down: Option<&LinkConfig>,
     ) -> Result<Self, Failure> {
         let words =
             |link: Option<&LinkConfig>| link.map_or_else(String::new, LinkConfig::to_string);
+        let controlled = controlled || arguments.netem_control;
         let heading = Heading {
             seed,
             up: words(up),
@@ -51,9 +56,12 @@ impl Emulation {
         };
         let emulation = Self {
             record,
-            controls: arguments.netem_control.then(Default::default),
+            controls: controlled.then(Default::default),
+            orders: arguments.netem_control,
         };
-        if let Some([control_up, control_down]) = emulation.controls.clone() {
+        if let Some([control_up, control_down]) =
+            (emulation.controls.clone()).filter(|_| emulation.orders)
+        {
             let up = up.map(|_| control_up);
             let down = down.map(|_| control_down);
             control::from_stdin(move |line| {
@@ -80,7 +88,28 @@ impl Emulation {
 
     /// Whether commands come from stdin: then a live view would take the keys away.
     pub(crate) fn takes_orders(&self) -> bool {
-        self.controls.is_some()
+        self.orders
+    }
+
+    /// New settings in this direction from now on.
+    ///
+    /// # Errors
+    /// A setting out of its range, or nothing to set.
+    pub(crate) fn reconfigure(
+        &self,
+        direction: Direction,
+        link: &LinkConfig,
+    ) -> Result<(), String> {
+        let Some([up, down]) = &self.controls else {
+            return Err("these networks cannot be changed".to_owned());
+        };
+        let control = match direction {
+            Direction::Up => up,
+            Direction::Down => down,
+        };
+        control
+            .reconfigure(link.clone())
+            .map_err(|error| error.to_string())
     }
 
     /// Waits until the record is written.
@@ -168,7 +197,7 @@ mod tests {
             netem_record: Some("/no/such/folder/run.csv".into()),
             netem_control: false,
         };
-        let failure = Emulation::start(&arguments, 1, None, None).unwrap_err();
+        let failure = Emulation::start(&arguments, false, 1, None, None).unwrap_err();
         assert!(failure.to_string().contains("/no/such/folder/run.csv"));
     }
 

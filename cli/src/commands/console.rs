@@ -1,0 +1,159 @@
+//! The operator's console as a command serves it: what it shows, and what it may change.
+
+use mmt_client::io::MasterLive;
+use mmt_client::io::console::{Console, NetworkWish, Order};
+use mmt_client::operator::pointer::HandEvent;
+use mmt_netem::Direction;
+use mmt_netem::LinkConfig;
+use mmt_netem::presets::PRESETS;
+use mmt_server::io::SlaveLive;
+use mmt_shared::model::update::Cause;
+use rtrb::Consumer;
+use serde::Serialize;
+use serde_json::{Map, Value, json};
+
+use super::netem::wrap::Emulation;
+use crate::args::ConsoleArguments;
+use crate::failure::Failure;
+use crate::output::note;
+use crate::view::Caption;
+
+/// Scenes a second that a console asks the slave for.
+pub(super) const SCENE_HZ: u8 = 30;
+
+/// Both sides at one moment, as the page reads them.
+#[derive(Serialize)]
+struct Frame {
+    master: MasterLive,
+    slave: Option<SlaveLive>,
+}
+
+/// A console, and what it shows besides the frames.
+pub(super) struct Desk {
+    console: Console,
+    about: Map<String, Value>,
+    sessions: u64,
+}
+
+impl Desk {
+    /// Starts a console if the arguments ask for one, or if it is `wanted` without; notes its address.
+    ///
+    /// # Errors
+    /// It cannot be served there.
+    pub(super) fn start(
+        arguments: &ConsoleArguments,
+        wanted: bool,
+    ) -> Result<Option<Self>, Failure> {
+        let Some(options) = arguments.options(wanted)? else {
+            return Ok(None);
+        };
+        let console = Console::start(options).map_err(Failure::failed)?;
+        note(format_args!("console: {}", console.address()));
+        let causes: Vec<&str> = Cause::ALL.into_iter().map(Cause::name).collect();
+        let presets: Vec<Value> = PRESETS
+            .iter()
+            .map(|preset| json!({"name": preset.name, "words": preset.words}))
+            .collect();
+        let mut about = Map::new();
+        about.insert("causes".to_owned(), json!(causes));
+        about.insert("presets".to_owned(), json!(presets));
+        about.insert("version".to_owned(), json!(env!("CARGO_PKG_VERSION")));
+        Ok(Some(Self {
+            console,
+            about,
+            sessions: 0,
+        }))
+    }
+
+    /// What a person opens.
+    pub(super) fn address(&self) -> &str {
+        self.console.address()
+    }
+
+    /// What a person does in the session that begins.
+    pub(super) fn events(&self) -> Consumer<HandEvent> {
+        self.console.events()
+    }
+
+    /// Shows a session that has begun.
+    pub(super) fn show(
+        &mut self,
+        caption: &Caption,
+        mut master: impl FnMut() -> MasterLive + Send + 'static,
+        mut slave: impl FnMut() -> Option<SlaveLive> + Send + 'static,
+    ) {
+        self.sessions += 1;
+        let source = move || {
+            let frame = Frame {
+                master: master(),
+                slave: slave(),
+            };
+            // numbers and names only: it cannot fail
+            serde_json::to_string(&frame).unwrap_or_default()
+        };
+        self.console.show(Box::new(source));
+        self.tell([
+            ("command", json!(caption.command)),
+            ("setting", json!(caption.setting)),
+            ("truth", json!(caption.truth)),
+            ("session", json!(self.sessions)),
+            ("state", json!("running")),
+            ("why", Value::Null),
+            ("note", Value::Null),
+        ]);
+    }
+
+    /// Shows what has changed.
+    pub(super) fn tell<const N: usize>(&mut self, changes: [(&str, Value); N]) {
+        for (key, value) in changes {
+            self.about.insert(key.to_owned(), value);
+        }
+        let about = json!({"about": self.about});
+        self.console.tell(about.to_string());
+    }
+
+    /// Shows that no session runs, and why.
+    pub(super) fn tell_end(&mut self, why: &str) {
+        self.tell([("state", json!("ended")), ("why", json!(why))]);
+    }
+
+    /// What a viewer wants done.
+    pub(super) fn next_order(&mut self) -> Option<Order> {
+        self.console.next_order()
+    }
+
+    /// Whether anybody looks on.
+    pub(super) fn is_watched(&self) -> bool {
+        self.console.viewers() > 0
+    }
+
+    /// Lets the session end as one whose operator has finished.
+    pub(super) fn finish(&self) {
+        self.console.give(HandEvent::Finish);
+    }
+
+    /// Changes these emulated networks as a viewer wishes; shows what came of it.
+    pub(super) fn change_networks(
+        &mut self,
+        wish: &NetworkWish,
+        emulation: &Emulation,
+        networks: [Option<&mut LinkConfig>; 2],
+    ) {
+        let mut wrong = None;
+        let wishes = [(Direction::Up, &wish.up), (Direction::Down, &wish.down)];
+        for ((direction, words), now) in wishes.into_iter().zip(networks) {
+            let (Some(words), Some(now)) = (words, now) else {
+                continue;
+            };
+            // files can be named on the command line only
+            let link = words
+                .parse::<LinkConfig>()
+                .map_err(|error| error.to_string());
+            match link.and_then(|link| emulation.reconfigure(direction, &link).map(|()| link)) {
+                Ok(link) => *now = link,
+                Err(error) => wrong = Some(error),
+            }
+        }
+        self.tell([("note", json!(wrong))]);
+    }
+}

@@ -1,0 +1,59 @@
+// The socket to the master: messages in, the newest frame kept; what the person does out.
+
+const RETRY_MS = 1000;
+
+export class Link extends EventTarget {
+  constructor() {
+    super();
+    this.frame = null;
+    this.about = {};
+    this.role = "observer";
+    this.open = false;
+    this.#connect();
+  }
+
+  /** Sends a message; false where there is nobody to send to. */
+  send(message) {
+    if (!this.open) return false;
+    this.socket.send(JSON.stringify(message));
+    return true;
+  }
+
+  get operates() {
+    return this.open && this.role === "operator";
+  }
+
+  #connect() {
+    const socket = new WebSocket(`ws://${location.host}/ws${location.search}`);
+    this.socket = socket;
+    socket.onopen = () => {
+      this.open = true;
+      this.#tell("open");
+    };
+    socket.onclose = () => {
+      const was = this.open;
+      this.open = false;
+      this.role = "observer";
+      if (was) this.#tell("closed");
+      else this.#tell("unreachable");
+      setTimeout(() => this.#connect(), RETRY_MS);
+    };
+    socket.onmessage = ({ data }) => {
+      const message = JSON.parse(data);
+      if (message.role) {
+        this.role = message.role;
+        this.#tell("role");
+      } else if (message.about) {
+        this.about = message.about;
+        this.#tell("about");
+      } else if (message.master) {
+        this.frame = message;
+        this.#tell("frame");
+      }
+    };
+  }
+
+  #tell(name) {
+    this.dispatchEvent(new Event(name));
+  }
+}

@@ -1,0 +1,226 @@
+//! A person at a pointer: mouse, pen or finger in a browser; until they press, the scripted operator may work.
+//!
+//! The pointer moves the HIP as a hand on a table moves a cursor: a press engages where the HIP is, the way of the
+//! pointer from there is the way of the HIP. Its readings carry the page's stamps. They are mapped to the loop's clock
+//! ([`clock_map`]), read at 1 kHz a fixed play-out later ([`resampler`]) and filtered ([`filter`]). A hand that lets go
+//! or falls silent is released: the HIP stays, and no force is left on the hand.
+//!
+//! Pure and without allocation in a tick; a reading that is not finite is not taken.
+
+mod clock_map;
+mod filter;
+mod resampler;
+#[cfg(test)]
+mod tests;
+
+use std::time::Duration;
+
+use mmt_shared::model::geometry::Vec2;
+use serde::{Deserialize, Serialize};
+
+use super::scripted::{Scripted, View};
+use clock_map::ClockMap;
+use filter::Filter;
+use resampler::Resampler;
+
+/// From a reading's stamp to its use, s. A page reads its pointer every 1 to 16 ms and hands readings over up to a frame
+/// late: with this one that is late by 24 ms is still in time. It adds to the filter's 27 ms.
+const PLAYOUT_S: f64 = 0.024;
+/// A pressed pointer of which nothing came for so long is let go: the page sends while it is pressed, even at rest.
+pub const SILENCE: Duration = Duration::from_millis(120);
+/// The HIP stays within this of the origin on each axis, m.
+pub const REACH_M: f64 = 1.5;
+
+/// Where the pointer was, and when by the page's clock.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PointerSample {
+    /// s, the page's clock.
+    pub page_s: f64,
+    /// m, world.
+    pub at: Vec2,
+}
+
+/// Who moves the HIP of a person's session.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Driver {
+    /// The scripted operator.
+    #[default]
+    Scripted,
+    /// The pointer.
+    Pointer,
+}
+
+/// What a person does.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum HandEvent {
+    /// Another page, with another clock, has the pointer.
+    NewPage,
+    /// What the page's clock shows, s.
+    Clock(f64),
+    /// The pointer is pressed: whoever moved the HIP, now the pointer does.
+    Press(PointerSample),
+    /// The pressed pointer is here.
+    Move(PointerSample),
+    /// The pointer is let go.
+    Release,
+    /// Who moves the HIP from now on.
+    Drive(Driver),
+    /// Whether the hand rests.
+    Pause(bool),
+    /// The session is to end.
+    Finish,
+}
+
+/// The operator.
+#[derive(Clone, Debug)]
+pub struct Person {
+    scripted: Scripted,
+    driver: Driver,
+    paused: bool,
+    finished: bool,
+    clock: ClockMap,
+    readings: Resampler,
+    filter: Filter,
+    hip: Vec2,
+    /// From the pointer to the HIP, m, while it is pressed.
+    grip: Option<Vec2>,
+    /// When the last reading of the pressed pointer came.
+    last_reading: Duration,
+}
+
+impl Person {
+    /// A person who begins where `scripted` does; until the first press `driver` moves the HIP.
+    pub fn new(scripted: Scripted, driver: Driver) -> Self {
+        let hip = scripted.hip();
+        Self {
+            scripted,
+            driver,
+            paused: false,
+            finished: false,
+            clock: ClockMap::default(),
+            readings: Resampler::new(),
+            filter: Filter::at_rest(hip),
+            hip,
+            grip: None,
+            last_reading: Duration::ZERO,
+        }
+    }
+
+    /// Where the HIP is, m, world.
+    pub fn hip(&self) -> Vec2 {
+        self.hip
+    }
+
+    /// The scripted operator's share.
+    pub fn scripted(&self) -> &Scripted {
+        &self.scripted
+    }
+
+    /// Who moves the HIP.
+    pub fn driver(&self) -> Driver {
+        self.driver
+    }
+
+    /// Whether the hand rests.
+    pub fn is_paused(&self) -> bool {
+        self.paused
+    }
+
+    /// Whether the session is to end.
+    pub fn finished(&self) -> bool {
+        self.finished
+    }
+
+    /// Whether a hand holds the device: only then force may act on it.
+    pub fn engaged(&self) -> bool {
+        !self.paused && (self.driver == Driver::Scripted || self.grip.is_some())
+    }
+
+    /// Takes in what the person did; it arrived at `now`, in the time since the first tick.
+    pub fn handle(&mut self, now: Duration, event: HandEvent) {
+        match event {
+            HandEvent::NewPage => {
+                self.let_go();
+                self.clock = ClockMap::default();
+            }
+            HandEvent::Clock(page_s) if page_s.is_finite() => {
+                self.clock.push(now.as_secs_f64(), page_s);
+            }
+            HandEvent::Press(sample) if sample.is_finite() => self.press(now, sample),
+            HandEvent::Move(sample) if sample.is_finite() && self.grip.is_some() => {
+                self.read(now, sample);
+            }
+            HandEvent::Release => self.let_go(),
+            HandEvent::Drive(driver) => self.drive(driver),
+            HandEvent::Pause(paused) => {
+                self.paused = paused;
+                self.let_go();
+                self.scripted.go_on_from(self.hip);
+            }
+            HandEvent::Finish => self.finished = true,
+            HandEvent::Clock(_) | HandEvent::Press(_) | HandEvent::Move(_) => {}
+        }
+    }
+
+    /// One sample period: the HIP, m. As [`super::Operator::step`].
+    pub fn step(&mut self, elapsed: Duration, view: &View, force_on_hand: Vec2) -> Vec2 {
+        if elapsed.saturating_sub(self.last_reading) >= SILENCE {
+            self.let_go();
+        }
+        if self.paused {
+            return self.hip;
+        }
+        self.hip = match self.driver {
+            Driver::Scripted => self.scripted.step(view, force_on_hand),
+            Driver::Pointer => self.follow(elapsed).unwrap_or(self.hip),
+        };
+        self.hip
+    }
+
+    fn press(&mut self, now: Duration, sample: PointerSample) {
+        if self.paused {
+            return;
+        }
+        self.drive(Driver::Pointer);
+        self.let_go();
+        self.grip = Some(self.hip - sample.at);
+        self.read(now, sample);
+    }
+
+    fn read(&mut self, now: Duration, sample: PointerSample) {
+        self.clock.push(now.as_secs_f64(), sample.page_s);
+        self.readings.push(sample);
+        self.last_reading = now;
+    }
+
+    /// The HIP stays where it is.
+    fn let_go(&mut self) {
+        self.grip = None;
+        self.readings.clear();
+        self.filter = Filter::at_rest(self.hip);
+    }
+
+    fn drive(&mut self, driver: Driver) {
+        if driver != self.driver {
+            self.driver = driver;
+            self.let_go();
+            self.scripted.go_on_from(self.hip);
+        }
+    }
+
+    /// One tick behind the pointer; none while nobody presses.
+    fn follow(&mut self, elapsed: Duration) -> Option<Vec2> {
+        let grip = self.grip?;
+        let page_s = self.clock.page_s(elapsed.as_secs_f64())?;
+        let target = self.readings.at(page_s - PLAYOUT_S)? + grip;
+        let within = target.map(|metres| metres.clamp(-REACH_M, REACH_M));
+        Some(self.filter.step(within))
+    }
+}
+
+impl PointerSample {
+    fn is_finite(&self) -> bool {
+        self.page_s.is_finite() && self.at.x.is_finite() && self.at.y.is_finite()
+    }
+}

@@ -1,0 +1,45 @@
+//! The operator's console in a real browser (`tests/console/check.py`) against a running demo.
+//!
+//! Needs Python with playwright, and chromium: without, it says so, and with `CI` set it fails.
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a test may panic")]
+#![allow(clippy::disallowed_methods, reason = "starts processes")]
+
+use std::process::{Command, Stdio};
+use std::time::Duration;
+
+use crate::harness::process::{PROGRAM, Running, did_not_run};
+use crate::harness::{alone, root};
+
+/// It takes 15 s; the host may be busy.
+const GENEROUS: Duration = Duration::from_secs(240);
+
+fn runs(command: &mut Command) -> bool {
+    let quiet = command.stdout(Stdio::null()).stderr(Stdio::null());
+    quiet.status().is_ok_and(|status| status.success())
+}
+
+#[test]
+fn a_person_at_a_browser_pushes_the_box_and_changes_the_run() {
+    let _turn = alone();
+    let own = root().join("target/python/bin/python");
+    let pythons = [own.to_string_lossy().into_owned(), "python3".to_owned()];
+    let mut pythons = pythons.into_iter();
+    let has = |python: &String| runs(Command::new(python).args(["-c", "import playwright"]));
+    let python = pythons.find(has);
+    let browser = runs(Command::new("chromium").arg("--version"));
+    let Some(python) = python.filter(|_| browser) else {
+        let how = "no Python has playwright, or there is no chromium: `target/python/bin/pip install -r \
+                   tests/console/requirements.txt`, and the system's package chromium";
+        did_not_run("the console in a browser", how);
+        return;
+    };
+    let mut command = Command::new(python);
+    command
+        .arg(root().join("tests/console/check.py"))
+        .arg(PROGRAM);
+    let ended = Running::start(command).and_then(|check| check.end(GENEROUS));
+    let ended = ended.unwrap_or_else(|error| panic!("{error}"));
+    let printed = ended.out.join("\n");
+    assert!(ended.status.success(), "{printed}\n{}", ended.err);
+    assert!(printed.contains("a drag moves the box"), "{printed}");
+}
