@@ -22,6 +22,7 @@ use mmt_shared::model::local_model::BodyState;
 use mmt_shared::model::params::ModelState;
 use mmt_shared::model::settings::Mode;
 use mmt_shared::model::update::{Cause, Update};
+use mmt_shared::pairing::Token;
 use mmt_shared::time::{TICK, Time};
 use mmt_shared::wire::{DATAGRAM_MAX, Label, Message, Side, Welcome};
 
@@ -42,6 +43,8 @@ impl Haptic {
         let welcome = Welcome {
             settings: mode.model_settings(coupling),
             state: square_at_rest(0.7, 3.0, 2.06, 0.36),
+            tool: Vec2::new(-0.45, 0.0),
+            resume: Token::new([0; 32]),
             scheme: Label::clipped("any"),
             program: Label::clipped("bench"),
         };

@@ -4,6 +4,7 @@
 //! pass the same doors as numbers off the wire.
 
 use mmt_shared::model::geometry::Vec2;
+use mmt_shared::pairing::{SECRET_BYTES, Token};
 use mmt_shared::range::OutOfRange;
 use mmt_shared::record::PROGRAM;
 use mmt_shared::record::digest::RunDigest;
@@ -77,9 +78,13 @@ impl MasterSetting {
 
     /// The beginning of its record; stamp and number come with the record.
     pub fn session(&self, configuration: &impl Serialize) -> Session {
+        let welcome = Welcome {
+            resume: Token::new([0; SECRET_BYTES]),
+            ..self.welcome
+        };
         let mut opening = [0; STREAM_MESSAGE_MAX];
         // an accepted welcome can be written; without it the record cannot run again, which is seen then
-        let length = StreamMessage::Welcome((&self.welcome).into()).encode(&mut opening);
+        let length = StreamMessage::Welcome((&welcome).into()).encode(&mut opening);
         let opening = opening.get(..length.unwrap_or(0)).unwrap_or_default();
         let numbers = Numbers {
             architecture: self.architecture,

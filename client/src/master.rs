@@ -231,6 +231,7 @@ mod tests {
     use mmt_shared::model::params::{ModelParams, ModelState};
     use mmt_shared::model::settings::Mode;
     use mmt_shared::model::update::Cause;
+    use mmt_shared::pairing::Token;
     use mmt_shared::wire::Label;
 
     fn welcome() -> Welcome {
@@ -241,6 +242,8 @@ mod tests {
             settings: Mode::Recommended.model_settings(coupling),
             state: ModelState::try_new(params, footprint, pose, Twist::default(), &coupling)
                 .unwrap(),
+            tool: Vec2::new(-0.45, 0.0),
+            resume: Token::new([0; 32]),
             scheme: Label::clipped("timer 150ms"),
             program: Label::clipped("test"),
         }

@@ -42,8 +42,8 @@ declare("uint32", "length number echo.number echo.received newest_update samples
 declare("uint64", "sent echo.sent echo.held_ns samples.stamp answers")
 declare("int32", "samples.x samples.y samples.force_x samples.force_y force.x force.y")
 declare("bool", "slave_in_contact in_contact")
-declare("string", "cause role architecture program friction smoothing correction scheme refusal ending")
-declare("bytes", "token report")
+declare("string", "cause role claim architecture program friction smoothing correction scheme refusal ending")
+declare("bytes", "token resume report")
 declare("double", "object tool force in_j port.in_j hip stiffness_n_per_m damping_ns_per_m lambda tau_s")
 
 local STATE = "m b c inertia e east north west south x y angle v_x v_y omega"
@@ -313,6 +313,9 @@ end
 local function hello(r)
     r.tree:add(fields.token, r:take(32))
     r:choice("role", { "operator" })
+    if r:choice("claim", { "if_free", "resume", "take_over" }) == "resume" then
+        r.tree:add(fields.resume, r:take(32))
+    end
     r:floats("", "stiffness_n_per_m damping_ns_per_m")
     r.tree:add(fields.samples_per_command, r:take(1))
     r:choice("architecture", { "mmt", "tdpa" })
@@ -328,6 +331,8 @@ local function welcome(r)
     r:f64(smoothing == "per_packet" and "lambda" or "tau_s")
     r:choice("correction", { "snap", "matched_stamps", "replay" })
     state(r)
+    r:floats("", "tool tool")
+    r.tree:add(fields.resume, r:take(32))
     r:text("scheme")
     r:text("program")
 end

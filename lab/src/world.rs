@@ -20,6 +20,7 @@ use mmt_server::environment::Environment;
 use mmt_server::slave::{Slave, SlaveTick};
 use mmt_shared::metrics::{ForceSummary, PoseError, Staleness};
 use mmt_shared::model::geometry::Vec2;
+use mmt_shared::pairing::Token;
 use mmt_shared::time::{TICK, Time};
 use mmt_shared::wire::{DATAGRAM_MAX, Label, Welcome};
 use sha2::{Digest, Sha256};
@@ -107,6 +108,8 @@ impl World {
         let welcome = Welcome {
             settings,
             state: *slave.state(),
+            tool: slave.tool_at(),
+            resume: Token::new([0; 32]),
             scheme: Label::clipped(&config.slave.trigger.scheme.to_string()),
             program: Label::clipped("lab"),
         };

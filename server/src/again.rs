@@ -1,7 +1,7 @@
 //! The slave's end of a recorded session, run again: the same inputs give the same bits.
 //!
 //! Pure. What the end is made of is written into the record and read back from it here, in one place. The hello is kept as
-//! it was on the wire, but for its token, which is zero: no record holds a secret.
+//! it was on the wire, but for its token, which is zero, and its claim: no record holds a secret.
 
 use mmt_shared::pairing::{SECRET_BYTES, Token};
 use mmt_shared::record::PROGRAM;
@@ -9,12 +9,12 @@ use mmt_shared::record::digest::RunDigest;
 use mmt_shared::record::messages::{Arrival, Session, SlaveTick, Stamp};
 use mmt_shared::time::Time;
 use mmt_shared::wire::{
-    DATAGRAM_MAX, DecodeError, Hello, HelloError, STREAM_MESSAGE_MAX, Side, StreamMessage,
+    Claim, DATAGRAM_MAX, DecodeError, Hello, HelloError, STREAM_MESSAGE_MAX, Side, StreamMessage,
 };
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::end::SlaveEnd;
-use crate::slave::{SlaveConfig, SlaveError};
+use crate::slave::{Memory, SlaveConfig, SlaveError};
 
 /// Why a recorded session cannot be run again.
 #[derive(Debug, thiserror::Error)]
@@ -36,29 +36,45 @@ pub enum SlaveAgainError {
     Slave(#[from] SlaveError),
 }
 
-/// The beginning of the record of a session that begins at `began` with `hello`; stamp and number come with the record.
+/// What a session's end at the slave is made of besides the hello.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Setting {
+    slave: SlaveConfig,
+    /// What an earlier session left; none at the first.
+    earlier: Option<Memory>,
+}
+
+/// The beginning of the record of a session that begins at `began` with `hello`, where an `earlier` one ended; stamp and
+/// number come with the record.
 #[must_use]
 pub fn session(
     began: Time,
     config: &SlaveConfig,
     hello: &Hello,
+    earlier: Option<&Memory>,
     configuration: &impl Serialize,
 ) -> Session {
     let hello = Hello {
         token: Token::new([0; SECRET_BYTES]),
+        claim: Claim::IfFree,
         ..*hello
     };
     let mut opening = [0; STREAM_MESSAGE_MAX];
     // an accepted hello can be written; without it the record cannot run again, which is seen then
     let length = StreamMessage::Hello(hello).encode(&mut opening);
     let opening = opening.get(..length.unwrap_or(0)).unwrap_or_default();
+    let setting = Setting {
+        slave: config.clone(),
+        earlier: earlier.cloned(),
+    };
     Session {
         stamp: Stamp::default(),
         session: 0,
         program: PROGRAM.to_owned(),
         began_ns: began.as_nanos(),
         opening: opening.to_vec(),
-        setting: serde_json::to_string(config).unwrap_or_default(),
+        setting: serde_json::to_string(&setting).unwrap_or_default(),
         configuration: serde_json::to_string(configuration).unwrap_or_default(),
     }
 }
@@ -79,10 +95,10 @@ impl SlaveAgain {
         else {
             return Err(SlaveAgainError::NoHello);
         };
-        let config: SlaveConfig = serde_json::from_str(&session.setting)?;
+        let Setting { slave, earlier } = serde_json::from_str(&session.setting)?;
         let began = Time::from_nanos(session.began_ns);
         Ok(Self {
-            end: SlaveEnd::of_session(began, &config, &hello.accept()?)?,
+            end: SlaveEnd::of_session(began, &slave, &hello.accept()?, earlier.as_ref())?,
             digest: RunDigest::default(),
         })
     }

@@ -59,6 +59,11 @@ impl ContactStage {
         &mut self.environment
     }
 
+    /// Begins with this body as the one that was touched last.
+    pub fn begin_with(&mut self, body: usize) {
+        self.body = body;
+    }
+
     /// One tick with the tool at `tool` (m), moving at `velocity` (m/s).
     pub fn step(&mut self, now: Time, tool: Vec2, velocity: Vec2) -> Contact {
         let met = self.environment.step(tool, velocity);

@@ -15,7 +15,7 @@ use mmt_shared::time::Time;
 use mmt_shared::wire::{Architecture, Command, Hello, Message, Side};
 
 use crate::repeats::{Repeating, Repeats};
-use crate::slave::{Slave, SlaveConfig, SlaveError, SlaveTick};
+use crate::slave::{Memory, Slave, SlaveConfig, SlaveError, SlaveTick};
 
 mod half;
 
@@ -101,14 +101,25 @@ impl SlaveEnd {
         }
     }
 
-    /// The end of a session from `now` on that a master opens with `hello`: the tool starts at its HIP.
+    /// The end of a session from `now` on that a master opens with `hello`. It goes on where an earlier session ended;
+    /// if there was none the tool starts at the hello's HIP.
     ///
     /// # Errors
     /// When the configuration's numbers are not accepted for the master's device.
-    pub fn of_session(now: Time, config: &SlaveConfig, hello: &Hello) -> Result<Self, SlaveError> {
+    pub fn of_session(
+        now: Time,
+        config: &SlaveConfig,
+        hello: &Hello,
+        earlier: Option<&Memory>,
+    ) -> Result<Self, SlaveError> {
         let config = session_config(config, hello);
-        let mut slave = Slave::try_new(&config, hello.coupling)?;
-        slave.start_at(hello.hip);
+        let slave = if let Some(memory) = earlier {
+            Slave::remembering(&config, hello.coupling, memory)?
+        } else {
+            let mut slave = Slave::try_new(&config, hello.coupling)?;
+            slave.start_at(hello.hip);
+            slave
+        };
         let config = SlaveEndConfig {
             repeats: config.repeats_ms,
             stretch_max: config.stretch_max,

@@ -26,11 +26,13 @@ use crate::tool::port::ToolPort;
 use crate::trigger::{ContactDetector, Scheme, Trigger};
 
 mod config;
+mod memory;
 mod object;
 mod reference;
 mod update_builder;
 
 pub use config::{SlaveConfig, SlaveError, StartModel};
+pub use memory::Memory;
 
 use object::ObjectEstimate;
 use reference::ForceReference;
@@ -72,6 +74,8 @@ pub struct Slave {
     updates: UpdateBuilder,
     /// The state that the master starts from.
     start: ModelState,
+    /// Where the tool is, m.
+    tool_at: Vec2,
     force: ForceMetrics,
 }
 
@@ -82,6 +86,41 @@ impl Slave {
     /// When the configuration's numbers are not accepted.
     pub fn try_new(config: &SlaveConfig, coupling: Coupling) -> Result<Self, SlaveError> {
         Self::with_settings(config, config.mode.model_settings(coupling))
+    }
+
+    /// A slave that goes on where an earlier session ended.
+    ///
+    /// # Errors
+    /// As [`Slave::try_new`].
+    pub fn remembering(
+        config: &SlaveConfig,
+        coupling: Coupling,
+        memory: &Memory,
+    ) -> Result<Self, SlaveError> {
+        let mut slave = Self::try_new(config, coupling)?;
+        let environment = slave.contact.environment_mut();
+        environment.place(&memory.bodies);
+        environment.select(memory.touched);
+        let pose = environment.pose();
+        slave.object.remember(&memory.found, memory.touched, pose);
+        slave.contact.begin_with(memory.touched);
+        let params = slave.object.params;
+        let footprint = slave.object.observer.footprint();
+        slave.start = ModelState::nearest(params, footprint, pose, Twist::default(), &coupling)?;
+        slave.shadow = Shadow::new(slave.settings, slave.start);
+        slave.place_tool(memory.tool);
+        Ok(slave)
+    }
+
+    /// What the next session goes on with.
+    #[must_use]
+    pub fn memory(&self) -> Memory {
+        Memory {
+            bodies: self.environment().poses(),
+            touched: self.object.body(),
+            found: self.object.found(),
+            tool: self.tool_at,
+        }
     }
 
     /// A slave whose local model is run by other settings than its mode's.
@@ -125,6 +164,7 @@ impl Slave {
             trigger: Trigger::new(config.trigger),
             updates: UpdateBuilder::new(settings.correction, timer_carries_pose),
             start,
+            tool_at: Vec2::zeros(),
             force: ForceMetrics::default(),
         })
     }
@@ -253,9 +293,21 @@ impl Slave {
         }
     }
 
-    /// Where the tool is before the first sample, m.
+    /// Puts a simulated tool, which is nowhere yet, to `hip` (m), or, if that is inside of a body, in front of it.
     pub fn start_at(&mut self, hip: Vec2) {
-        self.playout.start_at(hip);
+        let place = self.contact.environment_mut().free_place(hip);
+        self.place_tool(place);
+    }
+
+    /// Where the tool is, m, world frame.
+    #[must_use]
+    pub fn tool_at(&self) -> Vec2 {
+        self.tool_at
+    }
+
+    fn place_tool(&mut self, place: Vec2) {
+        self.tool_at = place;
+        self.playout.start_at(place);
     }
 
     /// One sample period. None before the first HIP sample is due.
@@ -263,6 +315,7 @@ impl Slave {
         let before = self.playout.played_hip();
         let played = self.playout.advance(now)?;
         let played = self.tool.step(before, played);
+        self.tool_at = played.hip;
         let contact = self.contact.step(now, played.hip, played.velocity);
         self.tool.measured(contact.force);
         let held_back = self.tool.is_held_back();

@@ -179,10 +179,14 @@ def coupling(r):
     return {name: r.f64(name) for name in ("stiffness_n_per_m", "damping_ns_per_m")}
 
 
+def claim(r):
+    name = r.choice(["if_free", "resume", "take_over"])
+    return {"claim": name, **({"resume": r.take(32).hex()} if name == "resume" else {})}
+
+
 def hello(r):
-    return {"token": r.take(32).hex(), "role": r.choice(["operator"]),
-            **coupling(r), "samples_per_command": r.u8(),
-            "architecture": r.choice(["mmt", "tdpa"]), "scene_hz": r.u8(),
+    return {"token": r.take(32).hex(), "role": r.choice(["operator"]), **claim(r), **coupling(r),
+            "samples_per_command": r.u8(), "architecture": r.choice(["mmt", "tdpa"]), "scene_hz": r.u8(),
             "hip": r.floats("hip", 2), "program": r.text()}
 
 
@@ -192,7 +196,7 @@ def welcome(r):
     name = "lambda" if fields["smoothing"] == "per_packet" else "tau_s"
     fields[name] = r.f64(name)
     return {**fields, "correction": r.choice(["snap", "matched_stamps", "replay"]), "state": state(r),
-            "scheme": r.text(), "program": r.text()}
+            "tool": r.floats("tool", 2), "resume": r.take(32).hex(), "scheme": r.text(), "program": r.text()}
 
 
 def refused(r):

@@ -86,8 +86,8 @@ def command(fields, newest_update, samples):
 
 
 def hello(token, coupling, samples_per_command, hip, program):
-    operator, mmt, no_scenes = u32(0), u32(0), bytes([0])
-    return (header(HELLO) + token + operator + f64(*coupling) + bytes([samples_per_command])
+    operator, if_free, mmt, no_scenes = u32(0), u32(0), u32(0), bytes([0])
+    return (header(HELLO) + token + operator + if_free + f64(*coupling) + bytes([samples_per_command])
             + mmt + no_scenes + f64(*hip) + text(program))
 
 

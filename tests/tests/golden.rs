@@ -154,14 +154,23 @@ fn of_stream_message(message: &StreamMessage<'_>) -> Decoded {
         StreamMessage::Hello(hello) => {
             assert_eq!(hello.accept(), Ok(*hello));
             let Role::Operator = hello.role;
-            json!({
+            let mut fields = json!({
                 "token": hello.token.reveal().to_string(), "role": "operator",
                 "stiffness_n_per_m": hello.coupling.stiffness_n_per_m,
                 "damping_ns_per_m": hello.coupling.damping_ns_per_m,
                 "samples_per_command": hello.samples_per_command,
                 "architecture": hello.architecture.name(), "scene_hz": hello.scene_hz,
                 "hip": [hello.hip.x, hello.hip.y], "program": hello.program,
-            })
+                "claim": match hello.claim {
+                    Claim::IfFree => "if_free",
+                    Claim::Resume(_) => "resume",
+                    Claim::TakeOver => "take_over",
+                },
+            });
+            if let Claim::Resume(secret) = hello.claim {
+                fields["resume"] = secret.reveal().to_string().into();
+            }
+            fields
         }
         StreamMessage::Welcome(raw) => of_welcome(raw),
         StreamMessage::Refused(refusal) => {
@@ -204,6 +213,7 @@ fn of_welcome(raw: &Welcome<RawState>) -> Value {
             PoseCorrection::Replay => "replay",
         },
         "state": state(&welcome.state),
+        "tool": [welcome.tool.x, welcome.tool.y], "resume": welcome.resume.reveal().to_string(),
         "scheme": welcome.scheme, "program": welcome.program,
     });
     let (name, number) = match settings.smoothing {

@@ -5,7 +5,7 @@
 
 use std::time::Duration;
 
-use crate::harness::process::{Ended, ProcessError, Running, number};
+use crate::harness::process::{Ended, PROGRAM, ProcessError, Running, number};
 use crate::harness::{alone, is_by_chance};
 use serde_json::Value;
 
@@ -278,4 +278,53 @@ fn a_token_of_another_slave_is_refused_by_name() {
     ok(slave.interrupt());
     let slave = ok(slave.end(SOON));
     assert!(!slave.err.contains("panicked"), "{}", slave.err);
+}
+
+/// A command of an operator who keeps state in a place of their own.
+fn of_operator(state: &std::path::Path, arguments: &[&str]) -> Running {
+    let mut command = std::process::Command::new(PROGRAM);
+    command.args(arguments).env("XDG_STATE_HOME", state);
+    ok(Running::start(command))
+}
+
+#[test]
+fn a_master_that_was_killed_is_back_at_once_and_another_operator_has_to_ask() {
+    let _turn = alone();
+    let (here, elsewhere) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    let arguments = ["slave", "--listen", "127.0.0.1:0", "--json", "--once"];
+    let mut slave = of_operator(here.path(), &arguments);
+    let pairing = ok(slave.wait_for_line(SOON, |line| line.starts_with("mmt://")));
+    let master = |state, options: &[&str]| {
+        let arguments = [&["master", &pairing, "--json", "--duration"], options].concat();
+        of_operator(state, &arguments)
+    };
+    let begun = |line: &str| line.contains("the session begins");
+
+    let mut killed = master(here.path(), &["60s"]);
+    ok(killed.wait_for_line(SOON, begun));
+    // neither a second one here, while the first lives, nor one elsewhere
+    for state in [here.path(), elsewhere.path()] {
+        let refused = ok(master(state, &["1s"]).end(SOON));
+        ended_with(3, &refused);
+        assert!(refused.err.contains("--take-over"), "{}", refused.err);
+    }
+    drop(killed);
+    let mut resumed = master(here.path(), &["60s"]);
+    ok(resumed.wait_for_line(SOON, begun));
+
+    let other = master(elsewhere.path(), &["1s", "--take-over"]);
+    let lost = ok(resumed.end(SOON));
+    ended_with(1, &lost);
+    assert!(
+        lost.err
+            .contains("another operator has taken the slave over"),
+        "{}",
+        lost.err
+    );
+    let finished = ok(other.end(SOON));
+    ended_with(0, &finished);
+    assert_eq!(ending(&ok(finished.document(0))), "finished");
+    let served = ok(slave.end(SOON));
+    ended_with(0, &served);
+    assert_eq!(ending(&ok(served.document(1))), "finished");
 }

@@ -41,6 +41,7 @@ use mmt_shared::io::schedule::Tick;
 use mmt_shared::model::geometry::Vec2;
 use mmt_shared::model::sample::HipSample;
 use mmt_shared::model::settings::Mode;
+use mmt_shared::pairing::Token;
 use mmt_shared::time::{TICK, Time};
 use mmt_shared::wire::{Architecture, DATAGRAM_MAX, Label, Message, Side, Welcome};
 use rtrb::{Consumer, Producer, RingBuffer};
@@ -166,6 +167,8 @@ impl Loop {
         let welcome = Welcome {
             settings: *slave.settings(),
             state: *slave.state(),
+            tool: Vec2::new(-0.45, 0.0),
+            resume: Token::new([0; 32]),
             scheme: Label::clipped("any"),
             program: Label::clipped("test"),
         };

@@ -72,6 +72,8 @@ async fn session(architecture: Architecture, path: &Path) {
         netem_seed: 2,
         netem_extras: SocketExtras::default(),
         path: None,
+        take_over: false,
+        resume: None,
         record: Some(recorder.clone()),
         truth: None,
     };

@@ -224,6 +224,9 @@ pub(crate) struct MasterArguments {
     /// Record the master's session in this file, MCAP: for mmt replay, report, export and the tools of ROS 2
     #[arg(long, value_name = "FILE")]
     pub(crate) record: Option<PathBuf>,
+    /// End the session of another operator of the slave, and operate it
+    #[arg(long)]
+    pub(crate) take_over: bool,
     /// Keep the path to the slave in this file: half of each round trip, and losses; a trace for --netem
     #[arg(long, value_name = "FILE")]
     pub(crate) record_path: Option<PathBuf>,

@@ -313,6 +313,8 @@ fn master_options(
         netem_seed: arguments.seed,
         netem_extras: emulation.extras(Direction::Up),
         path: None,
+        take_over: false,
+        resume: None,
         truth: Some(truth),
         record: None,
     }

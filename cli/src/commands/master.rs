@@ -7,8 +7,8 @@ use std::sync::PoisonError;
 use mmt_client::commands::CommandConfig;
 use mmt_client::io::console::Order;
 use mmt_client::io::{
-    MasterHostError, MasterLive, MasterOptions, MasterReport, OperatorChoice, SessionEnd,
-    SharedPath,
+    MasterHostError, MasterLive, MasterOptions, MasterReport, OperatorChoice, ResumeFile,
+    SessionEnd, SharedPath,
 };
 use mmt_client::operator::pointer::Driver;
 use mmt_client::operator::scripted::ScriptedConfig;
@@ -18,6 +18,7 @@ use mmt_netem::io::socket::SocketExtras;
 use mmt_netem::trace::mmt::path_text;
 use mmt_shared::clean::clean;
 use mmt_shared::io::connect::ConnectError;
+use mmt_shared::io::identity_file::default_directory;
 use mmt_shared::model::geometry::Vec2;
 use mmt_shared::pairing::Pairing;
 use mmt_shared::report::RunReport;
@@ -152,9 +153,9 @@ pub(super) fn judge(end: Option<SessionEnd>) -> Result<(), Failure> {
 
 fn options(arguments: &MasterArguments) -> Result<MasterOptions, Failure> {
     let device = arguments.device.used_with(arguments.stiffness, None);
+    let pairing = pairing(&arguments.pairing)?;
     Ok(MasterOptions {
         transport: arguments.transport.choose()?,
-        pairing: pairing(&arguments.pairing)?,
         device: device.map_err(|error| Failure::usage(format!("--stiffness: {error}")))?,
         operator: operator(arguments)?,
         events: std::sync::Mutex::default(),
@@ -172,7 +173,28 @@ fn options(arguments: &MasterArguments) -> Result<MasterOptions, Failure> {
         record: None,
         path: arguments.record_path.is_some().then(SharedPath::default),
         truth: None,
+        take_over: arguments.take_over,
+        resume: resume_file(&pairing),
+        pairing,
     })
+}
+
+/// The file for this slave's session, for a master that is killed; without one it waits until the slave has missed it.
+fn resume_file(pairing: &Pairing) -> Option<ResumeFile> {
+    let pin = pairing.pin.to_string();
+    let name = format!("resume-{}", pin.get(..16)?);
+    let opened = default_directory().map(|directory| ResumeFile::open(&directory.join(name)));
+    match opened {
+        Ok(Ok(file)) => file,
+        Ok(Err(error)) => {
+            tracing::warn!("a master that is killed will not resume at once: {error}");
+            None
+        }
+        Err(_) => {
+            tracing::warn!("a master that is killed will not resume at once: there is no HOME");
+            None
+        }
+    }
 }
 
 /// Writes the path that the session met, to be met again as a trace.

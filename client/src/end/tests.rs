@@ -11,6 +11,7 @@ use mmt_shared::model::sample::ForceCounts;
 use mmt_shared::model::settings::Mode;
 use mmt_shared::model::tool::Tool;
 use mmt_shared::model::update::Cause;
+use mmt_shared::pairing::Token;
 use mmt_shared::time::TICK;
 use mmt_shared::wire::{Architecture, DATAGRAM_MAX, Label, Welcome};
 
@@ -34,6 +35,8 @@ fn end(config: CommandConfig, architecture: Architecture) -> MasterEnd {
     let welcome = Welcome {
         settings: Mode::Recommended.model_settings(coupling),
         state: state(0.7, &coupling),
+        tool: Vec2::new(-0.45, 0.0),
+        resume: Token::new([0; 32]),
         scheme: Label::clipped("timer 150ms"),
         program: Label::clipped("test"),
     };

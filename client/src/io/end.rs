@@ -21,6 +21,8 @@ pub enum SessionEnd {
     LinkSilent,
     /// A number of the local model was none, and the hand was released.
     ModelBroken,
+    /// Another operator has taken the slave over.
+    TakenOver,
     /// The connection broke or was closed.
     ConnectionLost,
     /// The slave sent on the stream what it must not send there, or closed it.
@@ -34,9 +36,11 @@ impl SessionEnd {
             Self::DurationOver | Self::OperatorFinished => Ending::Finished,
             Self::Stopped => Ending::Interrupted,
             Self::SlaveEnded(ending) => ending,
-            Self::LinkSilent | Self::ModelBroken | Self::ConnectionLost | Self::StreamBroken => {
-                Ending::Failed
-            }
+            Self::LinkSilent
+            | Self::ModelBroken
+            | Self::TakenOver
+            | Self::ConnectionLost
+            | Self::StreamBroken => Ending::Failed,
         }
     }
 }
@@ -58,6 +62,7 @@ impl fmt::Display for SessionEnd {
                 "a number of the local model was not finite and the hand was released: this is a \
                  defect of mmt; please report it with the report of this session"
             }
+            Self::TakenOver => "another operator has taken the slave over",
             Self::ConnectionLost => {
                 "the connection to the slave was lost: see whether it still runs, and start again"
             }

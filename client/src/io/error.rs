@@ -110,7 +110,7 @@ pub enum MasterHostError {
     },
     /// Another master is there.
     #[error(
-        "the slave at {address} is busy: another master operates it; end that one, or try again later"
+        "the slave at {address} is busy: another master operates it; end that one, try again later, or give --take-over"
     )]
     Busy {
         /// The slave.

@@ -15,6 +15,7 @@ pub mod haptic;
 mod open;
 pub mod record;
 mod report;
+mod resume;
 mod session;
 #[cfg(test)]
 mod tests;
@@ -49,6 +50,7 @@ use crate::path::PathRecorder;
 
 pub use end::SessionEnd;
 pub use error::MasterHostError;
+pub use resume::ResumeFile;
 pub use session::run;
 
 /// Who operates.
@@ -139,6 +141,10 @@ pub struct MasterOptions {
     pub record: Option<Recorder>,
     /// The object's true pose, where the slave lives in this process: for the report.
     pub truth: Option<TruthReceiver>,
+    /// Whether another operator of the slave has to go.
+    pub take_over: bool,
+    /// Where the secret is kept with which this master, started again, resumes at once.
+    pub resume: Option<ResumeFile>,
 }
 
 /// A snapshot of a running master, for a screen.

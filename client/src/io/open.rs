@@ -16,12 +16,12 @@ use mmt_shared::io::transport::{
 };
 use mmt_shared::model::geometry::Vec2;
 use mmt_shared::wire::{
-    Architecture, DATAGRAM_MAX, Hello, Label, Refusal, Role, STREAM_MESSAGE_MAX, Side,
+    Architecture, Claim, DATAGRAM_MAX, Hello, Label, Refusal, Role, STREAM_MESSAGE_MAX, Side,
     StreamMessage, Welcome,
 };
 use tokio::time::timeout;
 
-use super::{MasterHostError, MasterOptions};
+use super::{MasterHostError, MasterOptions, ResumeFile};
 use crate::commands::CommandConfig;
 
 /// How the program names itself to the slave.
@@ -213,12 +213,22 @@ fn hello(options: &MasterOptions, hip: Vec2) -> Hello {
     Hello {
         token: options.pairing.token,
         role: Role::Operator,
+        claim: claim(options),
         coupling: options.device.coupling(),
         samples_per_command: options.commands.samples_per_command,
         architecture: options.architecture,
         scene_hz: options.scene_hz,
         hip,
         program: Label::clipped(PROGRAM),
+    }
+}
+
+fn claim(options: &MasterOptions) -> Claim {
+    let resume = options.resume.as_ref().and_then(ResumeFile::secret);
+    if options.take_over {
+        Claim::TakeOver
+    } else {
+        resume.map_or(Claim::IfFree, Claim::Resume)
     }
 }
 

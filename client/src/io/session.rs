@@ -77,6 +77,9 @@ pub(super) async fn run_with(
         slave = %opened.connected.address, program = %welcome.program, scheme = %welcome.scheme,
         "the session begins"
     );
+    if let Some(resume) = &options.resume {
+        resume.keep(&welcome.resume);
+    }
     let clock = Clock::start();
     let setting = MasterSetting {
         began: clock.now(),
@@ -86,7 +89,8 @@ pub(super) async fn run_with(
         commands: options.commands,
     };
     let end = setting.end()?;
-    let operator = options.operator.begin(end.master().view())?;
+    let view = end.master().view();
+    let operator = options.operator.begin(view)?.led_from(welcome.tool, &view);
     let path = options.path.is_some().then(PathRecorder::with_room);
     let mut haptic = HapticLoop::new(end, operator, options.duration)
         .observed_by(options.truth.take(), path)
@@ -155,6 +159,9 @@ pub(super) async fn operate(
             delivered(&send, deadline.saturating_duration_since(Instant::now())).await;
         }
     }
+    if let (Some(_), Some(resume)) = (&session.farewell, &options.resume) {
+        resume.forget();
+    }
     connected.close(&why.to_string(), timeouts.idle).await;
     session.show(Some(why));
     // the farewell and the close are part of what a session costs
@@ -202,7 +209,7 @@ impl Session<'_> {
                     if self.farewell.is_none() {
                         tracing::warn!(%error, "the connection to the slave is gone");
                     }
-                    self.end(SessionEnd::ConnectionLost);
+                    self.end(self.loss());
                 }
             }
         }
@@ -231,13 +238,22 @@ impl Session<'_> {
         self.task.handle().stop();
     }
 
+    /// Why the connection is gone.
+    fn loss(&self) -> SessionEnd {
+        if self.task.is_taken_over() {
+            SessionEnd::TakenOver
+        } else {
+            SessionEnd::ConnectionLost
+        }
+    }
+
     fn handle_farewell(&mut self, read: FarewellRead) {
         match read {
             Ok(farewell) => {
                 self.end(SessionEnd::SlaveEnded(farewell.ending));
                 self.farewell = Some(farewell);
             }
-            Err(error) if error.is_loss() => self.end(SessionEnd::ConnectionLost),
+            Err(error) if error.is_loss() => self.end(self.loss()),
             Err(error) => {
                 tracing::error!(%error, "the slave's farewell");
                 self.end(SessionEnd::StreamBroken);

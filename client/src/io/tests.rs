@@ -45,6 +45,8 @@ fn scripted(fake: &Fake) -> MasterOptions {
         netem_seed: 1,
         netem_extras: SocketExtras::default(),
         path: None,
+        take_over: false,
+        resume: None,
         record: None,
         truth: None,
     }

@@ -26,6 +26,18 @@ pub enum Operator {
 }
 
 impl Operator {
+    /// The same, beginning where the tool is (m, world): it goes round the box in `view` to its own start.
+    pub fn led_from(self, tool: Vec2, view: &View) -> Self {
+        match self {
+            Self::Scripted(scripted) => Self::Scripted(Box::new(scripted.starting_at(tool))),
+            Self::Trace(trace) => {
+                let start = trace.at(Duration::ZERO);
+                let way = route::way(&view.footprint, &view.pose, tool, start);
+                Self::Trace(trace.led_along(tool, &way))
+            }
+        }
+    }
+
     /// Where the HIP is before the first tick, m, world.
     pub fn start(&self) -> Vec2 {
         match self {

@@ -3,12 +3,15 @@
 //! Everything is in the object's frame, m. Each leg stays in a half-plane in front of one face, so no
 //! leg can cut through the box.
 
-use mmt_shared::model::geometry::{BoxFootprint, Face, Vec2};
+use mmt_shared::model::geometry::{BoxFootprint, Face, Pose, Vec2};
 
 /// Nearer to the box than this, the way leads straight out first, m.
 pub(super) const CLOSE_M: f64 = 0.04;
 /// Distance of the way-points at the corners from both of their faces, m.
 const CORNER_M: f64 = 0.10;
+
+/// Most legs of a way: straight out, two corners, the goal.
+const LEGS_MAX: usize = 4;
 
 /// The next face counter-clockwise: West, South, East, North, West …
 pub(super) fn next_face(face: Face) -> Face {
@@ -58,6 +61,18 @@ pub(super) fn way_point(footprint: &BoxFootprint, from: Vec2, face: Face, goal: 
     } else {
         corner(footprint, side, next_face(next_face(face)))
     }
+}
+
+/// The way from one point to another (m, world) round a box: the points that it leads over, the goal last.
+pub(super) fn way(footprint: &BoxFootprint, pose: &Pose, from: Vec2, goal: Vec2) -> Vec<Vec2> {
+    let (mut at, goal) = (pose.point_to_object(from), pose.point_to_object(goal));
+    let (face, _) = footprint.nearest(goal);
+    let mut legs = Vec::new();
+    while at != goal && legs.len() < LEGS_MAX {
+        at = way_point(footprint, at, face, goal);
+        legs.push(pose.point_to_world(at));
+    }
+    legs
 }
 
 fn previous_face(face: Face) -> Face {

@@ -25,6 +25,8 @@ pub const COORDINATE_MAX_M: f64 = 100.0;
 pub const APPROACH_M: f64 = 0.06;
 /// Its speed, m/s: the scripted operator's.
 const APPROACH_M_PER_S: f64 = 0.06;
+/// Speed at which the hand is led from the tool to where a path begins, m/s.
+const LEAD_M_PER_S: f64 = 0.2;
 /// From the last sample of a push to the first of the next, s: the recordings' own sample period.
 const BETWEEN_S: f64 = 0.03;
 /// A finger that ends nearer than this to where it began has no direction, m.
@@ -178,6 +180,26 @@ impl Trace {
             .iter_mut()
             .for_each(|(_, point)| *point += shift);
         self
+    }
+
+    /// This path after a straight way (world, m) from `from` over `points`, the last of which is where it begins.
+    #[must_use]
+    pub(super) fn led_along(self, from: Vec2, points: &[Vec2]) -> Self {
+        let mut way = vec![(0.0, from)];
+        let (mut at, mut led_s) = (from, 0.0);
+        for point in points {
+            led_s += (point - at).norm() / LEAD_M_PER_S;
+            at = *point;
+            way.push((led_s, at));
+        }
+        // its last point is the path's first
+        way.pop();
+        way.extend(
+            self.samples
+                .iter()
+                .map(|(t_s, point)| (led_s + t_s, *point)),
+        );
+        Self { samples: way }
     }
 
     /// The tool point (world, m) at a time since the start: linear between samples, held after the last.

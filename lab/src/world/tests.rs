@@ -7,6 +7,7 @@ use mmt_server::playout::PlayoutConfig;
 use mmt_server::slave::SlaveConfig;
 use mmt_shared::model::contact::Coupling;
 use mmt_shared::model::settings::Mode;
+use mmt_shared::pairing::Token;
 
 mod estimation;
 mod shapes;
@@ -283,6 +284,8 @@ fn what_the_master_refuses_the_slaves_confirmed_shadow_never_takes_and_both_side
     let welcome = Welcome {
         settings: config.slave.mode.model_settings(coupling),
         state: *world.slave().state(),
+        tool: Vec2::new(-0.45, 0.0),
+        resume: Token::new([0; 32]),
         scheme: Label::clipped("any"),
         program: Label::clipped("test"),
     };

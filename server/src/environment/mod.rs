@@ -43,6 +43,11 @@ const AGREED_M_PER_S: f64 = 1e-9;
 /// these goes on in the next period.
 const ROUNDS_MAX: usize = 60;
 
+/// A tool that is put before a surface is this far from it, m.
+const CLEAR_M: f64 = 1e-3;
+/// Most surfaces that a place is looked for in front of: bodies that touch each other leave few.
+const PLACES_MAX: usize = 16;
+
 /// What the tool met in one step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Contact {
@@ -162,6 +167,42 @@ impl Environment {
         objects
             .find(|object| object.number == number)
             .map(Object::pose)
+    }
+
+    /// Poses of all bodies, in the order of their numbers.
+    #[must_use]
+    pub fn poses(&self) -> Vec<Pose> {
+        (0..=self.others.len())
+            .filter_map(|number| self.pose_of(number))
+            .collect()
+    }
+
+    /// Puts movable bodies at rest at these poses, in the order of their numbers.
+    pub fn place(&mut self, poses: &[Pose]) {
+        let Self {
+            touched,
+            others,
+            world,
+            ..
+        } = self;
+        for object in all(touched, others) {
+            if let Some(pose) = poses.get(object.number) {
+                object.place(world, *pose);
+            }
+        }
+    }
+
+    /// The place nearest to `tool` (m) where a tool touches no body: in front of the surface that it is behind.
+    #[must_use]
+    pub fn free_place(&mut self, tool: Vec2) -> Vec2 {
+        let mut place = tool;
+        for _ in 0..PLACES_MAX {
+            let Some(touch) = self.touch(place, Vec2::zeros()).touch else {
+                break;
+            };
+            place = touch.proxy - touch.inward * CLEAR_M;
+        }
+        place
     }
 
     /// Takes another body for the one that is touched: initial conditions of tests and studies.

@@ -99,6 +99,17 @@ impl Object {
         }
     }
 
+    /// Puts a movable body at rest at `pose`, its centroid's.
+    pub(super) fn place(&mut self, world: &mut World, pose: Pose) {
+        if self.fixed {
+            return;
+        }
+        let Pose { position, angle } = pose;
+        let position = position + rotate(angle, self.load.centre_of_mass);
+        self.body.place(world, Pose { position, angle });
+        self.gained = Twist::default();
+    }
+
     /// Gives a movable body a velocity of its centroid, at once.
     pub(super) fn set_twist(&mut self, twist: Twist) {
         if self.fixed {

@@ -151,6 +151,20 @@ impl Body {
         }
     }
 
+    /// Puts the body at rest with its centre of mass at `pose`.
+    pub(super) fn place(&mut self, world: &mut World, pose: Pose) {
+        let Some(body) = world.0.bodies.get_mut(self.handle) else {
+            return;
+        };
+        let at = RigidBodyBuilder::fixed()
+            .translation(vector(pose.position))
+            .rotation(pose.angle)
+            .build();
+        self.start = *at.position();
+        body.set_position(self.start, true);
+        (self.pose, self.twist) = (pose, Twist::default());
+    }
+
     /// Gives the body a velocity without moving it.
     pub(super) fn set_twist(&mut self, twist: Twist) {
         self.twist = admitted(twist);

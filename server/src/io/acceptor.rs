@@ -15,9 +15,11 @@ use mmt_shared::io::transport::{
 };
 use mmt_shared::pairing::Token;
 use mmt_shared::wire::{DecodeError, Hello, Refusal, STREAM_MESSAGE_MAX, Side, StreamMessage};
-use tokio::sync::{OwnedSemaphorePermit, Semaphore, mpsc, watch};
+use tokio::sync::{mpsc, watch};
 use tokio::task::JoinSet;
 use tokio::time::timeout;
+
+use super::lease::{Lease, Leases};
 
 /// A hello may take this long after the handshake: two round trips of 2 s and the wait for a lost packet.
 const HELLO_WAIT: Duration = Duration::from_secs(8);
@@ -26,13 +28,13 @@ const REFUSAL_WAIT: Duration = Duration::from_secs(2);
 /// Who has finished the handshake and not yet sent a hello: more are turned away.
 const JUDGED_AT_ONCE: usize = 16;
 
-/// A master that may operate. Holding it is holding the slave: others are refused as long as it lives.
+/// A master that may operate.
 pub(super) struct Admitted {
     pub(super) connection: Connection,
     pub(super) send: SendStream,
     pub(super) receive: RecvStream,
     pub(super) hello: Hello,
-    pub(super) lease: OwnedSemaphorePermit,
+    pub(super) lease: Lease,
 }
 
 /// Masters that were not let in, by reason, since the host was started.
@@ -54,7 +56,7 @@ pub(super) struct Refusals {
 #[derive(Clone)]
 pub(super) struct Acceptor {
     token: Token,
-    lease: Arc<Semaphore>,
+    leases: Leases,
     refusals: Arc<Refusals>,
     stop: watch::Receiver<bool>,
     admitted: mpsc::Sender<Admitted>,
@@ -85,7 +87,7 @@ impl Acceptor {
         let (admitted, receiver) = mpsc::channel(1);
         let acceptor = Self {
             token,
-            lease: Arc::new(Semaphore::new(1)),
+            leases: Leases::new(),
             refusals,
             stop,
             admitted,
@@ -150,7 +152,7 @@ impl Acceptor {
         receive: RecvStream,
         hello: &Hello,
     ) {
-        match self.verdict(address, hello) {
+        match self.verdict(address, hello).await {
             Ok((hello, lease)) => {
                 let admitted = Admitted {
                     connection,
@@ -175,11 +177,7 @@ impl Acceptor {
         }
     }
 
-    fn verdict(
-        &self,
-        address: SocketAddr,
-        hello: &Hello,
-    ) -> Result<(Hello, OwnedSemaphorePermit), Refusal> {
+    async fn verdict(&self, address: SocketAddr, hello: &Hello) -> Result<(Hello, Lease), Refusal> {
         if hello.token != self.token {
             return Err(Refusal::WrongToken);
         }
@@ -190,7 +188,11 @@ impl Acceptor {
         if *self.stop.borrow() {
             return Err(Refusal::Ending);
         }
-        let lease = Arc::clone(&self.lease).try_acquire_owned();
+        let resume = Token::generate().map_err(|error| {
+            tracing::error!("{error}");
+            Refusal::Busy
+        })?;
+        let lease = self.leases.claim(&hello.claim, resume).await;
         lease.map_or(Err(Refusal::Busy), |lease| Ok((hello, lease)))
     }
 }

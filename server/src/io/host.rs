@@ -143,7 +143,7 @@ impl SlaveHost {
         stop: &mut watch::Receiver<bool>,
         live: &watch::Sender<SlaveLive>,
     ) -> Result<Option<SlaveReport>, SlaveHostError> {
-        let mut last = None;
+        let (mut last, mut memory) = (None, None);
         let mut socket_before = self.context.meter.snapshot();
         loop {
             let admitted = tokio::select! {
@@ -154,12 +154,16 @@ impl SlaveHost {
             let Some(admitted) = admitted else {
                 return Ok(last);
             };
-            let report = session::serve(&self.context, admitted, socket_before, stop, live).await?;
+            let (context, earlier) = (&self.context, memory.as_ref());
+            let served =
+                session::serve(context, admitted, earlier, socket_before, stop, live).await?;
             socket_before = self.context.meter.snapshot();
             live.send_replace(SlaveLive::default());
-            let served = report.is_some();
-            last = report.or(last);
-            if served && self.once {
+            let Some(served) = served else {
+                continue;
+            };
+            (last, memory) = (Some(served.report), Some(served.memory));
+            if self.once && !served.taken_over {
                 return Ok(last);
             }
         }

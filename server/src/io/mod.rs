@@ -11,6 +11,7 @@
 mod acceptor;
 mod context;
 mod host;
+mod lease;
 mod record;
 mod session;
 mod slave_loop;

@@ -13,7 +13,7 @@ use super::context::Context;
 use crate::again;
 use crate::end::{SlaveEnd, session_config};
 use crate::estimator::Estimate;
-use crate::slave::SlaveTick;
+use crate::slave::{Memory, SlaveTick};
 
 /// Standard messages of every so many ticks: 100 a second.
 const STANDARD_TICKS: u64 = 10;
@@ -44,15 +44,16 @@ impl SlaveShown {
 /// Where a slave's loop leaves its record.
 pub(super) type SlaveSink = RecordSink<(), Option<SlaveTick>, SlaveShown>;
 
-/// Begins the record of a session that begins at `began` with `hello`.
+/// Begins the record of a session that begins at `began` with `hello`, where an `earlier` one ended.
 pub(super) fn begin(
     recorder: &Recorder,
     context: &Context,
     began: Time,
     hello: &Hello,
+    earlier: Option<&Memory>,
 ) -> SlaveSink {
     let configuration = context.configuration(&session_config(&context.config, hello));
-    let session = again::session(began, &context.config, hello, &configuration);
+    let session = again::session(began, &context.config, hello, earlier, &configuration);
     recorder.begin(Wall::now(context.clock), session, SlaveTopics::default())
 }
 

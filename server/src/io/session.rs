@@ -17,7 +17,9 @@ use mmt_shared::io::loop_thread::{self, LoopSide};
 use mmt_shared::io::network_task::{Event, NetworkTask, WAITING_MAX};
 use mmt_shared::io::stream::{WriteFrameError, write_message};
 use mmt_shared::io::ticker::Ticker;
-use mmt_shared::io::transport::{CLOSE_FINISHED, Connection, RecvStream, SendStream};
+use mmt_shared::io::transport::{
+    CLOSE_FINISHED, CLOSE_TAKEN_OVER, Connection, RecvStream, SendStream,
+};
 use mmt_shared::model::contact::Coupling;
 use mmt_shared::report::{MasterHalf, SlaveHalf};
 use mmt_shared::wire::{Ending, Hello, Label, Refusal, Side, StreamMessage, Welcome};
@@ -26,10 +28,11 @@ use tokio::time::{sleep, timeout};
 
 use super::acceptor::{Admitted, refuse};
 use super::context::{Context, SlaveHostError};
+use super::lease::Lease;
 use super::slave_loop::{Finished, SlaveLoop, Snapshot};
 use super::{PROGRAM, SlaveLive, SlaveReport, record};
 use crate::end::{SlaveEnd, session_config};
-use crate::slave::{Slave, SlaveConfig};
+use crate::slave::{Memory, Slave, SlaveConfig};
 
 use end::{End, SILENCE_MAX};
 
@@ -43,6 +46,15 @@ const LOOP_WAIT: Duration = Duration::from_secs(5);
 /// The loop's thread.
 const THREAD: &str = "mmt-slave";
 
+/// A session that is over.
+pub(super) struct Served {
+    pub(super) report: SlaveReport,
+    /// What the next session goes on with.
+    pub(super) memory: Memory,
+    /// Whether it ended because another operator has taken over.
+    pub(super) taken_over: bool,
+}
+
 /// A session that has begun.
 struct Session<'a> {
     context: &'a Context,
@@ -51,40 +63,43 @@ struct Session<'a> {
     send: SendStream,
     task: NetworkTask<Snapshot, Finished>,
     socket_before: SocketCounters,
+    lease: Lease,
 }
 
-/// Serves an admitted master. No report if no session came about. `socket_before` is what the socket had
+/// Serves an admitted master, from where an `earlier` session ended. Nothing if no session came about. `socket_before` is what the socket had
 /// counted when nobody had connected for this session yet: the handshake is part of what a session costs.
 pub(super) async fn serve(
     context: &Context,
     admitted: Admitted,
+    earlier: Option<&Memory>,
     socket_before: SocketCounters,
     stop: &mut watch::Receiver<bool>,
     live: &watch::Sender<SlaveLive>,
-) -> Result<Option<SlaveReport>, SlaveHostError> {
+) -> Result<Option<Served>, SlaveHostError> {
     let body = |slave_loop: SlaveLoop, side, ticker, clock| slave_loop.run(side, ticker, clock);
-    serve_with(context, admitted, socket_before, stop, live, body).await
+    serve_with(context, admitted, earlier, socket_before, stop, live, body).await
 }
 
 /// Serves with a loop of the caller's making.
 pub(super) async fn serve_with(
     context: &Context,
     admitted: Admitted,
+    earlier: Option<&Memory>,
     socket_before: SocketCounters,
     stop: &mut watch::Receiver<bool>,
     live: &watch::Sender<SlaveLive>,
     body: impl FnOnce(SlaveLoop, LoopSide<Snapshot>, Ticker, Clock) -> Finished + Send + 'static,
-) -> Result<Option<SlaveReport>, SlaveHostError> {
+) -> Result<Option<Served>, SlaveHostError> {
     let Admitted {
         connection,
         mut send,
         receive,
         hello,
-        lease: _lease,
+        lease,
     } = admitted;
     let clock = context.clock;
     let began = clock.now();
-    let end = match SlaveEnd::of_session(began, &context.config, &hello) {
+    let end = match SlaveEnd::of_session(began, &context.config, &hello, earlier) {
         Ok(end) => end,
         Err(error) => {
             tracing::warn!("no slave for a device of {:?}: {error}", hello.coupling);
@@ -94,7 +109,7 @@ pub(super) async fn serve_with(
     };
     // Datagrams from before the welcome belong to no session.
     discard(&connection).await;
-    if let Err(error) = welcome(&mut send, &context.config, end.slave()).await {
+    if let Err(error) = welcome(&mut send, &context.config, end.slave(), &lease).await {
         tracing::warn!(
             "{} left before its welcome: {error}",
             connection.remote_address()
@@ -104,7 +119,7 @@ pub(super) async fn serve_with(
     announce(&connection, &hello);
     let mut slave_loop = SlaveLoop::new(end, context.take_truth());
     if let Some(recorder) = &context.record {
-        slave_loop = slave_loop.recorded(record::begin(recorder, context, began, &hello));
+        slave_loop = slave_loop.recorded(record::begin(recorder, context, began, &hello, earlier));
     }
     let body = move |side, ticker| body(slave_loop, side, ticker, clock);
     let handle = loop_thread::spawn(THREAD, clock, &Snapshot::default(), body)?;
@@ -115,6 +130,7 @@ pub(super) async fn serve_with(
         connection,
         send,
         socket_before,
+        lease,
     };
     session.operate(receive, stop, live).await.map(Some)
 }
@@ -135,10 +151,13 @@ async fn welcome(
     send: &mut SendStream,
     config: &SlaveConfig,
     slave: &Slave,
+    lease: &Lease,
 ) -> Result<(), WriteFrameError> {
     let welcome = Welcome {
         settings: *slave.settings(),
         state: *slave.state(),
+        tool: slave.tool_at(),
+        resume: lease.resume(),
         scheme: Label::clipped(&config.trigger.scheme.to_string()),
         program: Label::clipped(PROGRAM),
     };
@@ -165,7 +184,7 @@ impl Session<'_> {
         mut receive: RecvStream,
         stop: &mut watch::Receiver<bool>,
         live: &watch::Sender<SlaveLive>,
-    ) -> Result<SlaveReport, SlaveHostError> {
+    ) -> Result<Served, SlaveHostError> {
         let began = self.context.clock.now();
         let farewell = receive_farewell(&mut receive, Side::Master);
         tokio::pin!(farewell);
@@ -177,7 +196,7 @@ impl Session<'_> {
         };
         let ending = match &end {
             _ if finished.is_none() => Ending::Failed,
-            End::Asked => Ending::Interrupted,
+            End::Asked | End::TakenOver => Ending::Interrupted,
             End::Farewell(theirs) => theirs.ending,
             _ => Ending::Failed,
         };
@@ -186,8 +205,43 @@ impl Session<'_> {
         let own = finished
             .as_ref()
             .map(|finished| self.half(finished, duration_s));
+        let taken_over = matches!(end, End::TakenOver);
+        let theirs = if taken_over {
+            (self.connection).close(CLOSE_TAKEN_OVER, b"another operator has taken over");
+            None
+        } else {
+            self.part(end, ending, own.as_ref(), farewell).await
+        };
+        let memory = finished
+            .as_ref()
+            .map(|finished| finished.end.slave().memory());
+        Ok(Served {
+            report: SlaveReport {
+                seed: self.config.seed,
+                duration_s,
+                ending,
+                own: own.ok_or(SlaveHostError::Panicked)?,
+                other: theirs.and_then(|theirs| theirs.report),
+                configuration: self.context.configuration(&self.config),
+            },
+            memory: memory.ok_or(SlaveHostError::Panicked)?,
+            taken_over,
+        })
+    }
+
+    /// Sends the farewell and waits for the master's, and for its close: one of ours could overtake our farewell.
+    async fn part<F>(
+        &mut self,
+        end: End,
+        ending: Ending,
+        own: Option<&SlaveHalf>,
+        farewell: Pin<&mut F>,
+    ) -> Option<ReceivedFarewell<MasterHalf>>
+    where
+        F: Future<Output = MastersFarewell>,
+    {
         let nothing = SlaveHalf::default();
-        let report = own.as_ref().unwrap_or(&nothing);
+        let report = own.unwrap_or(&nothing);
         let sent = send_farewell(&mut self.send, ending, report, FAREWELL_WAIT).await;
         let theirs = async {
             match end {
@@ -198,18 +252,10 @@ impl Session<'_> {
                 _ => farewell.await.ok(),
             }
         };
-        // The master closes: a close of ours could overtake our farewell.
         let theirs = answer(theirs, self.connection.closed(), sleep(FAREWELL_WAIT)).await;
         self.connection
             .close(CLOSE_FINISHED, b"the session is over");
-        Ok(SlaveReport {
-            seed: self.config.seed,
-            duration_s,
-            ending,
-            own: own.ok_or(SlaveHostError::Panicked)?,
-            other: theirs.and_then(|theirs| theirs.report),
-            configuration: self.context.configuration(&self.config),
-        })
+        theirs
     }
 
     /// Moves datagrams until something ends the session.
@@ -223,7 +269,11 @@ impl Session<'_> {
         F: Future<Output = MastersFarewell>,
     {
         loop {
-            match self.task.next(farewell.as_mut(), stop).await {
+            let event = tokio::select! {
+                event = self.task.next(farewell.as_mut(), stop) => event,
+                () = self.lease.taken_over() => return End::TakenOver,
+            };
+            match event {
                 Event::Farewell(Ok(farewell)) => return End::Farewell(Box::new(farewell)),
                 Event::Farewell(Err(error)) => return End::Stream(error),
                 Event::Stopped => return End::Asked,

@@ -7,10 +7,10 @@ use std::time::Duration;
 
 use mmt_netem::LinkConfig;
 use mmt_shared::io::identity::Identity;
-use mmt_shared::io::transport::Transport;
+use mmt_shared::io::transport::{CLOSE_TAKEN_OVER, Transport};
 use mmt_shared::pairing::{Pairing, Token};
 use mmt_shared::report::RunReport;
-use mmt_shared::wire::{Architecture, Ending, Refusal};
+use mmt_shared::wire::{Architecture, Claim, Ending, Refusal};
 use tokio::sync::watch;
 use tokio::task::JoinHandle;
 use tokio::time::sleep;
@@ -331,6 +331,7 @@ async fn a_panic_of_the_thread_ends_the_session_as_failed_and_is_an_error() {
     let served = session::serve_with(
         context,
         admitted,
+        None,
         context.meter.snapshot(),
         &mut stopped,
         &live,
@@ -412,4 +413,39 @@ async fn raw_udp_beyond_this_host_is_refused_unless_somebody_insists() {
     };
     assert!(matches!(bind(false), Err(SlaveHostError::Insecure(_))));
     assert!(bind(true).is_ok());
+}
+
+#[tokio::test]
+async fn a_master_that_was_killed_resumes_at_once_and_finds_the_world_as_it_left_it() {
+    let host = run(SlaveOptions {
+        once: true,
+        ..options()
+    });
+    let (mut killed, welcome) = patiently(Master::operate(&host.pairing)).await;
+    patiently(killed.push(100)).await;
+    for claim in [Claim::IfFree, Claim::Resume(Token::new([1; 32]))] {
+        let mut other = Master::connect(&host.pairing).await;
+        other.claim = claim;
+        let refused = patiently(other.hello(host.pairing.token, 1000.0)).await;
+        assert_eq!(refused, Err(Refusal::Busy));
+    }
+    for claim in [Claim::Resume(welcome.resume), Claim::TakeOver] {
+        let mut next = Master::connect(&host.pairing).await;
+        next.claim = claim;
+        let again = patiently(next.hello(host.pairing.token, 1000.0))
+            .await
+            .unwrap();
+        // the tool is where it was pushed to, and not where the hello has the HIP
+        assert!(again.tool.x > welcome.tool.x + 0.1, "{}", again.tool);
+        assert!(again.resume != welcome.resume);
+        let closed = patiently(killed.connection.closed()).await;
+        let quinn::ConnectionError::ApplicationClosed(close) = closed else {
+            panic!("{closed}")
+        };
+        assert_eq!(close.error_code, CLOSE_TAKEN_OVER);
+        killed = next;
+    }
+    patiently(killed.farewell()).await;
+    // a session that was taken over is not the first that was over
+    assert!(host.served().await.is_some());
 }

@@ -9,6 +9,7 @@ use mmt_shared::model::geometry::{BoxFootprint, Pose};
 use mmt_shared::model::params::{ModelParams, inertia_of_square};
 use mmt_shared::model::settings::Mode;
 use mmt_shared::time::Time;
+use serde::{Deserialize, Serialize};
 
 use super::config::{SlaveConfig, SlaveError};
 use crate::contact::Contact;
@@ -32,13 +33,15 @@ pub(super) struct ObjectEstimate {
     found: BTreeMap<usize, Found>,
     /// What is taken for true of a body that has never been touched.
     start: Found,
+    start_params: ModelParams,
 }
 
 /// What is remembered of a body.
-#[derive(Clone, Copy, Debug)]
-struct Found {
-    /// What the model got.
-    params: ModelParams,
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Found {
+    /// What the model got: m, b, c, I, e.
+    params: [f64; 5],
     /// The estimator's m, b and c.
     mbc: [f64; 3],
     footprint: BoxFootprint,
@@ -67,15 +70,16 @@ impl ObjectEstimate {
             .unwrap_or_else(|| EstimatorConfig::of_mode(config.mode, coupling))
             .starting_at(mbc);
         estimator.check()?;
+        let params = ModelParams::of_square(m, b, c, start.side_m, &coupling)?;
         let start = Found {
-            params: ModelParams::of_square(m, b, c, start.side_m, &coupling)?,
+            params: params.to_array(),
             mbc,
             footprint: BoxFootprint::square(start.side_m),
         };
         Ok(Self {
             observer: PoseObserver::new(observer, pose, start.footprint),
             estimator: Estimator::new(&estimator, coupling),
-            params: start.params,
+            params,
             refused: 0,
             coupling,
             observer_config: observer,
@@ -83,6 +87,7 @@ impl ObjectEstimate {
             body: 0,
             found: BTreeMap::new(),
             start,
+            start_params: params,
         })
     }
 
@@ -92,23 +97,49 @@ impl ObjectEstimate {
         if contact.body == self.body {
             return false;
         }
+        self.found.insert(self.body, self.own());
+        self.take_up(contact.body, contact.truth);
+        true
+    }
+
+    /// Number of the body.
+    pub(super) fn body(&self) -> usize {
+        self.body
+    }
+
+    /// What was found of all bodies, by their numbers.
+    pub(super) fn found(&self) -> BTreeMap<usize, Found> {
+        let mut all = self.found.clone();
+        all.insert(self.body, self.own());
+        all
+    }
+
+    fn own(&self) -> Found {
         let Estimate { m, b, c, .. } = *self.estimator.estimate();
-        let found = Found {
-            params: self.params,
+        Found {
+            params: self.params.to_array(),
             mbc: [m, b, c],
             footprint: self.observer.footprint(),
-        };
-        self.found.insert(self.body, found);
-        self.body = contact.body;
-        let Found {
-            params,
-            mbc,
-            footprint,
-        } = self.found.get(&self.body).copied().unwrap_or(self.start);
-        self.params = params;
-        self.estimator = Estimator::new(&self.estimator_config.starting_at(mbc), self.coupling);
-        self.observer = PoseObserver::new(self.observer_config, contact.truth, footprint);
-        true
+        }
+    }
+
+    /// Goes on with what was found in an earlier session; `body` is the one that was touched last, at `pose`.
+    pub(super) fn remember(&mut self, found: &BTreeMap<usize, Found>, body: usize, pose: Pose) {
+        self.found.clone_from(found);
+        self.take_up(body, pose);
+    }
+
+    /// Takes up a body at `pose` with what was found of it. Parameters that the coupling of this session does not allow
+    /// are those of the start.
+    fn take_up(&mut self, body: usize, pose: Pose) {
+        let found = self.found.get(&body).copied().unwrap_or(self.start);
+        let [m, b, c, inertia, e] = found.params;
+        self.body = body;
+        self.params =
+            ModelParams::try_new(m, b, c, inertia, e, &self.coupling).unwrap_or(self.start_params);
+        let estimator = self.estimator_config.starting_at(found.mbc);
+        self.estimator = Estimator::new(&estimator, self.coupling);
+        self.observer = PoseObserver::new(self.observer_config, pose, found.footprint);
     }
 
     /// One tick. `held_back` says whether the limit of the tool's force keeps the tool from the HIP.

@@ -1,6 +1,7 @@
 //! The promises of `slave`.
 
 use crate::environment::BodyConfig;
+use crate::tool::force::TOOL_FORCE_MAX_N;
 use mmt_shared::model::sample::HipCounts;
 use mmt_shared::model::settings::Mode;
 use mmt_shared::time::TICK;
@@ -168,5 +169,65 @@ fn a_fixed_body_is_pushed_with_no_more_than_the_tools_limit_and_stays() {
                 .iter()
                 .all(|update| update.state.params().c().is_finite())
         );
+    }
+}
+
+/// Largest force (N) of a tool whose HIP stays at `hip` from the start, over a second, and where it is at last.
+fn pressed(hip: Vec2) -> (f64, Vec2) {
+    let coupling = Coupling::for_stiffness(1000.0);
+    let mut slave = Slave::try_new(&SlaveConfig::default(), coupling).unwrap();
+    slave.start_at(hip);
+    let mut peak_n = 0.0_f64;
+    for ms in 1..=1000 {
+        let now = Time::from_millis(ms);
+        let sample = HipSample {
+            stamp: now,
+            hip: HipCounts::nearest(hip),
+            ..HipSample::default()
+        };
+        slave.handle_sample(now, &sample, 0);
+        if let Some(tick) = slave.tick(now) {
+            peak_n = peak_n.max(tick.true_force.norm());
+        }
+    }
+    (peak_n, slave.tool_at())
+}
+
+#[test]
+fn a_hip_inside_of_a_body_at_the_start_presses_no_harder_than_the_tool_may() {
+    // 180 N when the tool began at the HIP
+    for x in [-0.178, -0.15, -0.02] {
+        let (peak_n, _) = pressed(Vec2::new(x, 0.01));
+        assert!(
+            (1.0..=TOOL_FORCE_MAX_N + 0.1).contains(&peak_n),
+            "{x} m: {peak_n} N"
+        );
+    }
+    let free = Vec2::new(-0.25, 0.01);
+    let (peak_n, at) = pressed(free);
+    assert!(
+        peak_n == 0.0 && (at - free).norm() < 1e-6,
+        "{peak_n} N at {at}"
+    );
+}
+
+#[test]
+fn what_a_session_leaves_is_where_the_next_one_begins() {
+    let bodies = vec![cube(0.0, 0.7, false), cube(1.0, 0.7, false)];
+    let mut driven = Driven::new(Mode::Recommended, bodies.clone());
+    driven.go((0.2, 0.0));
+    let (first, memory) = (&driven.slave, driven.slave.memory());
+    assert!(first.environment().pose().position.x > 0.1, "it was pushed");
+    let mut config = SlaveConfig::default();
+    config.scene.bodies = bodies;
+    for stiffness in [1000.0, 2500.0] {
+        let coupling = Coupling::for_stiffness(stiffness);
+        let next = Slave::remembering(&config, coupling, &memory).unwrap();
+        assert_eq!(next.environment().poses(), first.environment().poses());
+        assert_eq!(next.tool_at(), first.tool_at());
+        assert_eq!(next.estimate().c, first.estimate().c);
+        assert_ne!(next.estimate().c, config.start.friction_n, "it has learnt");
+        assert_eq!(next.state().pose(), next.environment().pose());
+        assert_eq!(next.memory(), memory, "nothing has happened since");
     }
 }

@@ -135,6 +135,11 @@ impl<S: Send, T> NetworkTask<S, T> {
         self.connected
     }
 
+    /// Whether the slave closed the connection because another operator has taken over.
+    pub fn is_taken_over(&self) -> bool {
+        self.connection.is_taken_over()
+    }
+
     /// Whether the read of the other side's farewell still waits.
     pub fn awaits_farewell(&self) -> bool {
         self.awaits_farewell

@@ -82,7 +82,7 @@ messages! {
         program: String,
         /// When the end began, by its own clock, ns.
         began_ns: u64,
-        /// What opened the session: at the slave the hello, its token zero; at the master the welcome. As on the wire.
+        /// What opened the session: at the slave the hello, at the master the welcome, as on the wire, their secrets zero.
         opening: Vec<u8>,
         /// What else the end was made of, JSON.
         setting: String,

@@ -26,6 +26,18 @@ pub enum Role {
     Operator,
 }
 
+/// What becomes of another operator that the slave has.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Claim {
+    /// It stays, and this master is refused.
+    #[default]
+    IfFree,
+    /// It goes: this master is the same one, which was started again. The secret is that of the welcome.
+    Resume(Token),
+    /// It goes, whoever it is.
+    TakeOver,
+}
+
 /// Which architecture the master's hand feels.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -65,6 +77,8 @@ pub struct Hello {
     pub token: Token,
     /// What the master wants to be.
     pub role: Role,
+    /// What becomes of another operator.
+    pub claim: Claim,
     /// k_p and k_d of the master's device profile.
     pub coupling: Coupling,
     /// New samples that the master puts in a command, 1 to [`SAMPLES_MAX`]; one while it feels the tool.
@@ -73,7 +87,7 @@ pub struct Hello {
     pub architecture: Architecture,
     /// Scenes that the master wants, 1/s: 0, none, to [`SCENE_HZ_MAX`].
     pub scene_hz: u8,
-    /// Where the HIP is at the start, m.
+    /// Where the HIP would like to start, m: a simulated tool that is nowhere yet is put there.
     pub hip: Vec2,
     /// Name and version of the program, for the other side's log.
     pub program: Label,
@@ -126,6 +140,10 @@ pub struct Welcome<S = ModelState> {
     pub settings: ModelSettings,
     /// The state that the local model starts from.
     pub state: S,
+    /// Where the tool is, m: the HIP starts there.
+    pub tool: Vec2,
+    /// With this the same master resumes the session after it was started again.
+    pub resume: Token,
     /// Name of the update scheme, for the screen.
     pub scheme: Label,
     /// Name and version of the program, for the other side's log.
@@ -156,6 +174,8 @@ impl<S> Welcome<S> {
         Welcome {
             settings: self.settings,
             state,
+            tool: self.tool,
+            resume: self.resume,
             scheme: self.scheme,
             program: self.program,
         }
@@ -181,6 +201,8 @@ impl Welcome<RawState> {
         if self.settings.coupling != *asked {
             return Err(WelcomeError::OtherCoupling { stiffness, damping });
         }
+        in_range("tool x", "m", self.tool.x, (-WORKSPACE_M, WORKSPACE_M))?;
+        in_range("tool y", "m", self.tool.y, (-WORKSPACE_M, WORKSPACE_M))?;
         Ok(self.with_state(self.state.accept(asked)?))
     }
 }
@@ -305,6 +327,7 @@ impl<'a> StreamMessage<'a> {
                     Smoothing::PerPacket { lambda } => finite("lambda", &[lambda])?,
                     Smoothing::InTime { tau_s } => finite("tau_s", &[tau_s])?,
                 }
+                finite("tool", welcome.tool.as_slice())?;
                 welcome.state.check()
             }
             Self::Refused(_) | Self::Farewell(_) => Ok(()),

@@ -58,6 +58,7 @@ fn hello() -> Hello {
     Hello {
         token: Token::new([7; 32]),
         role: Role::Operator,
+        claim: Claim::Resume(Token::new([9; 32])),
         coupling: COUPLING,
         samples_per_command: 10,
         architecture: Architecture::Tdpa,
@@ -71,6 +72,8 @@ fn welcome() -> Welcome {
     Welcome {
         settings: Mode::Recommended.model_settings(COUPLING),
         state: state(),
+        tool: Vec2::new(-0.45, 0.1),
+        resume: Token::new([9; 32]),
         scheme: Label::clipped("hybrid"),
         program: Label::clipped("mmt test"),
     }

@@ -81,6 +81,8 @@ pub(super) fn welcome_for(coupling: Coupling) -> Welcome {
     Welcome {
         settings: Mode::Recommended.model_settings(coupling),
         state: state(&coupling),
+        tool: Vec2::new(-0.45, 0.0),
+        resume: Token::new([0; 32]),
         scheme: Label::clipped("none"),
         program: Label::clipped("fake"),
     }

@@ -1,6 +1,9 @@
 //! The promises of `trace`.
 
 use super::*;
+use crate::operator::Operator;
+use crate::operator::scripted::View;
+use mmt_shared::model::geometry::{BoxFootprint, Pose};
 use proptest::prelude::*;
 
 const CSV: &str = "t_s,x_m,y_m\n1.0,0.0,0.0\n2.0,0.2,-0.4\r\n4.0,0.4,0.0\n\n";
@@ -96,5 +99,39 @@ proptest! {
             let middle = trace.at(trace.duration() / 2);
             prop_assert!(middle.x.is_finite() && middle.y.is_finite());
         }
+    }
+}
+
+#[test]
+fn a_path_is_led_to_from_the_tool_round_the_box_and_keeps_its_shape() {
+    let view = View {
+        pose: Pose::new(0.1, 0.0, 0.3),
+        footprint: BoxFootprint::square(0.4),
+        in_contact: false,
+    };
+    let trace = Trace::from_csv(CSV)
+        .unwrap()
+        .starting_at(Vec2::new(-0.3, 0.0));
+    let own = |elapsed| Operator::Trace(trace.clone()).led_from(trace.at(elapsed), &view);
+    let Operator::Trace(unled) = own(Duration::ZERO) else {
+        panic!("another operator")
+    };
+    assert_eq!(unled, trace, "the tool is there already");
+
+    let tool = Vec2::new(0.5, 0.1);
+    let Operator::Trace(led) = Operator::Trace(trace.clone()).led_from(tool, &view) else {
+        panic!("another operator")
+    };
+    assert!(close(led.at(Duration::ZERO), tool));
+    let lead = led.duration() - trace.duration();
+    for ms in 0..lead.as_millis() as u64 {
+        let at = |ms| led.at(Duration::from_millis(ms));
+        let distance = view.footprint.nearest(view.pose.point_to_object(at(ms))).1;
+        assert!(distance > 0.03, "{distance} m from the box");
+        assert!((at(ms + 1) - at(ms)).norm() < 2.1e-4, "0.2 m/s");
+    }
+    for ms in (0..3000).step_by(100) {
+        let elapsed = Duration::from_millis(ms);
+        assert!(close(led.at(lead + elapsed), trace.at(elapsed)));
     }
 }

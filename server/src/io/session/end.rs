@@ -25,6 +25,8 @@ pub(in crate::io) enum End {
     Stream(#[from] FarewellError),
     #[error(transparent)]
     Numbers(#[from] NumbersSpent),
+    #[error("another operator has taken over")]
+    TakenOver,
     #[error("the 1 kHz thread panicked")]
     Panicked,
 }

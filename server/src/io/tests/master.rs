@@ -19,7 +19,7 @@ use mmt_shared::pairing::{Pairing, Token};
 use mmt_shared::report::{MasterHalf, ReceivedUpdates, SlaveHalf};
 use mmt_shared::time::{TICK, Time};
 use mmt_shared::wire::{
-    Architecture, Command, DATAGRAM_MAX, Ending, Farewell, Hello, Label, Message, RawState,
+    Architecture, Claim, Command, DATAGRAM_MAX, Ending, Farewell, Hello, Label, Message, RawState,
     Refusal, Role, STREAM_MESSAGE_MAX, SampleBlock, Side, StreamMessage, Welcome,
 };
 use quinn::{Connection, Endpoint, RecvStream, SendStream};
@@ -40,6 +40,7 @@ pub(super) struct Master {
     pub(super) link: DatagramChannel,
     pub(super) updates: Vec<Update<RawState>>,
     pub(super) architecture: Architecture,
+    pub(super) claim: Claim,
     pub(super) scene_hz: u8,
     _endpoint: Endpoint,
     send: SendStream,
@@ -69,6 +70,7 @@ impl Master {
             updates: Vec::new(),
             architecture: Architecture::Mmt,
             scene_hz: 0,
+            claim: Claim::IfFree,
             _endpoint: endpoint,
             send,
             receive,
@@ -93,6 +95,7 @@ impl Master {
         let hello = Hello {
             token,
             role: Role::Operator,
+            claim: self.claim,
             coupling: Coupling::for_stiffness(k_p),
             samples_per_command: PACKED,
             architecture: self.architecture,

@@ -15,6 +15,8 @@ pub const CLOSE_FINISHED: VarInt = VarInt::from_u32(0);
 pub const CLOSE_NO_HELLO: VarInt = VarInt::from_u32(2);
 /// Close code: what came first is no hello; the reason names the fault.
 pub const CLOSE_NOT_A_HELLO: VarInt = VarInt::from_u32(3);
+/// Close code: another operator has taken over.
+pub const CLOSE_TAKEN_OVER: VarInt = VarInt::from_u32(4);
 /// Close code: one side sends its datagrams by QUIC, the other as raw UDP.
 pub(super) const CLOSE_OTHER_TRANSPORT: VarInt = VarInt::from_u32(1);
 
@@ -39,6 +41,14 @@ impl Connection {
     /// Who is at the other end.
     pub fn remote_address(&self) -> SocketAddr {
         self.quic.remote_address()
+    }
+
+    /// Whether the slave closed it because another operator has taken over.
+    pub fn is_taken_over(&self) -> bool {
+        matches!(
+            self.quic.close_reason(),
+            Some(ConnectionError::ApplicationClosed(close)) if close.error_code == CLOSE_TAKEN_OVER
+        )
     }
 
     /// Sends a datagram; does not wait. If there is no room an older one or this one is lost.

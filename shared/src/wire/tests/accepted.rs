@@ -87,6 +87,9 @@ fn what_the_other_side_would_refuse_is_not_written() {
     bad.hip.x = f64::NAN;
     refused(StreamMessage::Hello(bad).encode(&mut out));
     let mut bad = welcome();
+    bad.tool.y = f64::INFINITY;
+    refused(StreamMessage::Welcome((&bad).into()).encode(&mut out));
+    let mut bad = welcome();
     bad.settings.smoothing = Smoothing::InTime { tau_s: f64::NAN };
     refused(StreamMessage::Welcome((&bad).into()).encode(&mut out));
 }
@@ -116,6 +119,9 @@ fn a_hello_or_welcome_with_a_number_out_of_range_is_not_accepted() {
     let mut far = hello();
     far.hip.y = 5.1;
     assert!(far.accept().is_err());
+    let mut far = welcome();
+    far.tool.x = -5.1;
+    assert!(Welcome::<RawState>::from(&far).accept(&COUPLING).is_err());
     let bytes = on_stream(&stream_messages()[1]);
     let at = |value: f64| bytes.windows(8).position(|w| w == value.to_le_bytes());
     let place = at(0.1).unwrap();

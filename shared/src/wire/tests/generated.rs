@@ -140,6 +140,8 @@ proptest! {
             samples_per_command: samples,
             architecture: Architecture::ALL[usize::from(samples) % 2],
             hip: Vec2::new(x, -x),
+            claim: [Claim::IfFree, Claim::TakeOver, Claim::Resume(Token::new(token))]
+                [usize::from(samples) % 3],
             program: Label::clipped(&name),
             ..hello()
         };
