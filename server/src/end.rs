@@ -20,6 +20,9 @@ use crate::slave::{Memory, Slave, SlaveConfig, SlaveError, SlaveTick};
 mod half;
 
 const SECOND: Duration = Duration::from_secs(1);
+/// Without a new sample for this long the tool is disengaged: it stands, and only a new session moves it. The hand was
+/// released a second before.
+pub const DISENGAGE: Duration = Duration::from_secs(2);
 
 /// How the slave's end of a session works.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -47,6 +50,8 @@ pub struct SlaveCounts {
     pub updates_superseded: u64,
     /// HIP samples received, repeated ones included.
     pub samples: u64,
+    /// HIP samples that came after the tool was disengaged.
+    pub samples_disengaged: u64,
     /// Commands that acknowledge an update that never left.
     pub acknowledgements_implausible: u64,
     /// Updates that could not be sent: they break a rule of the wire, or the datagram numbers are used up.
@@ -69,6 +74,9 @@ pub struct SlaveEnd {
     channel: DatagramChannel,
     config: SlaveEndConfig,
     newest_acknowledged: u32,
+    /// Stamp of the newest sample, and when it came; none before the first.
+    commanded: Option<(Time, Time)>,
+    disengaged: bool,
     /// Sequence of the newest update that left.
     newest_sent: u32,
     /// To be sent.
@@ -91,6 +99,8 @@ impl SlaveEnd {
             channel: DatagramChannel::with_rate_control(Side::Slave, now, config.stretch_max),
             config,
             newest_acknowledged: 0,
+            commanded: None,
+            disengaged: false,
             newest_sent: 0,
             update: None,
             repeating: None,
@@ -159,6 +169,12 @@ impl SlaveEnd {
         self.config.architecture
     }
 
+    /// Whether the tool stands for good, because no sample came for [`DISENGAGE`].
+    #[must_use]
+    pub fn is_disengaged(&self) -> bool {
+        self.disengaged
+    }
+
     /// Takes in a datagram that arrived at `at`. The hand's port counts only where the hello has spoken of one and no
     /// newer datagram has been there: an older one knows nothing that counts.
     pub fn handle_datagram(&mut self, at: Time, bytes: &[u8]) {
@@ -190,6 +206,17 @@ impl SlaveEnd {
     /// A command's samples, oldest first, each with the newest update that the master had by then as far as the
     /// command says: none (0) of a sample that is repeated from an earlier command.
     fn handle_samples(&mut self, at: Time, command: &Command, newest_update: u32) {
+        self.consider_disengaging(at);
+        if self.disengaged {
+            self.counts.samples_disengaged += command.samples.len() as u64;
+            return;
+        }
+        if let Some(stamp) = command.samples.as_slice().last().map(|sample| sample.stamp) {
+            let newer = self.commanded.is_none_or(|(newest, _)| stamp > newest);
+            if newer {
+                self.commanded = Some((stamp, at));
+            }
+        }
         let new = usize::from(self.config.samples_per_command).max(1);
         let repeated = command.samples.len().saturating_sub(new);
         for (n, sample) in command.samples.as_slice().iter().enumerate() {
@@ -199,8 +226,14 @@ impl SlaveEnd {
         }
     }
 
+    fn consider_disengaging(&mut self, now: Time) {
+        let silent = |(_, at)| now.saturating_since(at) > DISENGAGE;
+        self.disengaged |= self.commanded.is_some_and(silent);
+    }
+
     /// One sample period; `now` is the tick's deadline. None before the first HIP sample is due.
     pub fn tick(&mut self, now: Time) -> Option<SlaveTick> {
+        self.consider_disengaging(now);
         let tick = self.slave.tick(now)?;
         self.counts.updates.tick(tick.in_contact);
         if let Some(update) = tick.update {

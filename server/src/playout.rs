@@ -49,7 +49,7 @@ impl PlayoutBuffer {
         Ok(Self {
             buffer: JitterBuffer::new(&config),
             interpolator: Interpolator::new(&config),
-            limiter: SpeedLimiter::new(config.speed_max_m_per_s),
+            limiter: SpeedLimiter::new(config.speed_max_m_per_s, config.reach_m),
             counts: PlayoutCounts::default(),
             delays: Histogram::default(),
         })

@@ -21,6 +21,7 @@ impl SlaveEnd {
         session.architecture = ArchitectureReport::new(self.config.architecture, None);
         let waiting = u64::from(self.update.is_some());
         session.add_drops([
+            ("samples_disengaged", counts.samples_disengaged),
             ("updates_superseded", counts.updates_superseded),
             ("updates_unsent", counts.updates_unsent + waiting),
             (

@@ -4,7 +4,8 @@ use super::*;
 use crate::slave::SlaveConfig;
 use mmt_shared::fixtures::square_at_rest;
 use mmt_shared::model::contact::Coupling;
-use mmt_shared::model::sample::HipSample;
+use mmt_shared::model::geometry::Vec2;
+use mmt_shared::model::sample::{HipCounts, HipSample};
 use mmt_shared::model::tool::HandPort;
 use mmt_shared::model::update::Cause;
 use mmt_shared::wire::{DATAGRAM_MAX, SampleBlock};
@@ -264,4 +265,54 @@ fn an_acknowledgement_of_what_never_left_silences_nothing_and_is_counted() {
     });
     assert_eq!(sent, [(5, 1), (15, 1), (35, 1)]);
     assert_eq!(end.counts().acknowledgements_implausible, 1);
+}
+
+/// The tool's place (m) after commands of a HIP that goes on at 0.1 m/s, which stop at 1 s for `gap` (ms).
+fn place_after_gap(gap: u64) -> (f64, SlaveEnd) {
+    let mut end = end("none", Architecture::Mmt, 0);
+    let mut master = DatagramChannel::new(Side::Master, Time::ZERO);
+    for ms in 1..=4000 {
+        let silent = (1001..=1000 + gap).contains(&ms);
+        if !silent {
+            let mut samples = SampleBlock::default();
+            let hip = HipCounts::nearest(Vec2::new(-1.0 + 1e-4 * ms as f64, 0.0));
+            let sample = HipSample {
+                stamp: AT(ms),
+                hip,
+                ..HipSample::default()
+            };
+            samples.push(sample).unwrap();
+            let command = Message::Command(Command {
+                newest_update: 0,
+                samples,
+                port: None,
+            });
+            let mut bytes = [0; DATAGRAM_MAX];
+            let length = master.encode(AT(ms), command, &mut bytes).unwrap().unwrap();
+            end.handle_datagram(AT(ms), &bytes[..length]);
+        }
+        end.tick(AT(ms));
+    }
+    (end.slave().tool_at().x, end)
+}
+
+#[test]
+fn samples_that_come_after_two_seconds_of_none_move_nothing() {
+    let (x, end) = place_after_gap(1999);
+    assert!((x - -0.602).abs() < 0.01, "it follows again: {x} m");
+    assert!(!end.is_disengaged());
+    // a tick more, and the tool stands where it stopped
+    let (x, end) = place_after_gap(2000);
+    assert!((x - -0.9).abs() < 0.01, "{x} m");
+    assert!(end.is_disengaged());
+    assert_eq!(end.counts().samples_disengaged, 1000);
+}
+
+#[test]
+fn before_the_first_sample_nothing_is_disengaged() {
+    let mut end = end("none", Architecture::Mmt, 0);
+    (1..=4000).for_each(|ms| {
+        end.tick(AT(ms));
+    });
+    assert!(!end.is_disengaged());
 }

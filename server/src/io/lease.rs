@@ -24,6 +24,12 @@ impl Lease {
         self.resume
     }
 
+    /// Keeps others out for so long after the session, so that its master finds the slave free when its link is back.
+    pub(super) async fn outlive(self, time: Duration) {
+        // it makes no difference which of the two ends it
+        let _ = timeout(time, self.taken_over()).await;
+    }
+
     /// Waits until another master's claim holds.
     pub(super) async fn taken_over(&self) {
         self.taken_over.notified().await;

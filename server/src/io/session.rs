@@ -31,7 +31,7 @@ use super::context::{Context, SlaveHostError};
 use super::lease::Lease;
 use super::slave_loop::{Finished, SlaveLoop, Snapshot};
 use super::{PROGRAM, SlaveLive, SlaveReport, record};
-use crate::end::{SlaveEnd, session_config};
+use crate::end::{DISENGAGE, SlaveEnd, session_config};
 use crate::slave::{Memory, Slave, SlaveConfig};
 
 use end::{End, SILENCE_MAX};
@@ -206,6 +206,7 @@ impl Session<'_> {
             .as_ref()
             .map(|finished| self.half(finished, duration_s));
         let taken_over = matches!(end, End::TakenOver);
+        let disengaged = matches!(end, End::Disengaged);
         let theirs = if taken_over {
             (self.connection).close(CLOSE_TAKEN_OVER, b"another operator has taken over");
             None
@@ -215,6 +216,9 @@ impl Session<'_> {
         let memory = finished
             .as_ref()
             .map(|finished| finished.end.slave().memory());
+        if disengaged {
+            tokio::spawn(self.lease.outlive(SILENCE_MAX.saturating_sub(DISENGAGE)));
+        }
         Ok(Served {
             report: SlaveReport {
                 seed: self.config.seed,
@@ -300,6 +304,8 @@ impl Session<'_> {
         let silent = |heard| now.saturating_since(heard) > SILENCE_MAX;
         if snapshot.numbers_spent {
             Some(End::Numbers(NumbersSpent))
+        } else if snapshot.disengaged {
+            Some(End::Disengaged)
         } else if snapshot.last_arrival.is_some_and(silent) {
             Some(End::Silence)
         } else {

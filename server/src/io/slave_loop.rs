@@ -26,6 +26,8 @@ pub(super) struct Snapshot {
     pub(super) last_arrival: Option<Time>,
     /// The session has used up its datagram numbers.
     pub(super) numbers_spent: bool,
+    /// The tool stands for good.
+    pub(super) disengaged: bool,
 }
 
 /// What the loop ends with.
@@ -172,6 +174,7 @@ impl SlaveLoop {
             live,
             last_arrival: Some(channel.last_arrival()),
             numbers_spent: self.numbers_spent,
+            disengaged: end.is_disengaged(),
         }
     }
 }

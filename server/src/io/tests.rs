@@ -449,3 +449,22 @@ async fn a_master_that_was_killed_resumes_at_once_and_finds_the_world_as_it_left
     // a session that was taken over is not the first that was over
     assert!(host.served().await.is_some());
 }
+
+#[tokio::test]
+async fn a_master_that_falls_silent_is_disengaged_and_resumes() {
+    let host = run(options());
+    let (mut silent, welcome) = patiently(Master::operate(&host.pairing)).await;
+    patiently(silent.push(100)).await;
+    let (ending, half) = patiently(silent.hear_farewell()).await;
+    assert_eq!(ending, Ending::Failed);
+    assert_eq!(half.session.drops.get("samples_disengaged"), Some(&0));
+    silent.connection.close(0u32.into(), b"");
+    let mut other = Master::connect(&host.pairing).await;
+    let refused = patiently(other.hello(host.pairing.token, 1000.0)).await;
+    assert_eq!(refused, Err(Refusal::Busy));
+    let mut again = Master::connect(&host.pairing).await;
+    again.claim = Claim::Resume(welcome.resume);
+    let resumed = patiently(again.hello(host.pairing.token, 1000.0)).await;
+    assert!(resumed.unwrap().tool.x > welcome.tool.x);
+    host.end().await;
+}

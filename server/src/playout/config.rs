@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use mmt_shared::model::params::WORKSPACE_M;
 use mmt_shared::range::{OutOfRange, all_in_range};
 use mmt_shared::wire::Architecture;
 use serde::{Deserialize, Serialize};
@@ -12,6 +13,8 @@ const DELAY_MS: (f64, f64) = (0.0, 250.0);
 const EXTRAPOLATION_MS: (f64, f64) = (0.0, 100.0);
 /// Accepted speed limit, m/s.
 const SPEED_M_PER_S: (f64, f64) = (0.01, 10.0);
+/// Accepted reach, m: to where the model accepts a pose.
+const REACH_M: (f64, f64) = (0.1, WORKSPACE_M);
 /// Accepted deceleration, m/s².
 const DECELERATION_M_PER_S2: (f64, f64) = (0.1, 1000.0);
 
@@ -31,6 +34,8 @@ pub struct PlayoutConfig {
     /// Greatest speed of the played HIP, m/s. Default 0.6: after an outage the HIP does not jump, and the
     /// scripted operator stays below 0.4.
     pub speed_max_m_per_s: f64,
+    /// The tool's workspace: it stays within this distance from the origin, m. Default 2, an arm on a stand.
+    pub reach_m: f64,
     /// Deceleration after the extrapolation, m/s². Default 10: from 0.4 m/s it stops within 8 mm.
     pub deceleration_m_per_s2: f64,
 }
@@ -52,6 +57,7 @@ impl PlayoutConfig {
             delay_max_ms: 100.0,
             extrapolation_ms: 30.0,
             speed_max_m_per_s: 0.6,
+            reach_m: 2.0,
             deceleration_m_per_s2: 10.0,
         }
     }
@@ -83,6 +89,7 @@ impl PlayoutConfig {
             ("play-out: longest delay", "ms", self.delay_max_ms, DELAY_MS),
             ("play-out: extrapolation", "ms", self.extrapolation_ms, EXTRAPOLATION_MS),
             ("play-out: speed limit", "m/s", self.speed_max_m_per_s, SPEED_M_PER_S),
+            ("play-out: reach", "m", self.reach_m, REACH_M),
             ("play-out: deceleration", "m/s^2", deceleration, DECELERATION_M_PER_S2),
         ];
         all_in_range(checks)

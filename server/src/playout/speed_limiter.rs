@@ -1,4 +1,5 @@
-//! The speed limit on the played HIP: after an outage the hand is elsewhere, and the tool must not jump there.
+//! The limits on the played HIP: after an outage the hand is elsewhere, and the tool must not jump there; and wherever
+//! the hand is, the tool stays within its reach.
 
 use std::time::Duration;
 
@@ -14,14 +15,15 @@ pub(super) struct Step {
     pub(super) hip: Vec2,
     /// Over this tick, m/s.
     pub(super) velocity: Vec2,
-    /// Whether the limit holds the HIP back.
+    /// Whether a limit holds the HIP back.
     pub(super) limited: bool,
 }
 
-/// Follows the HIP that is aimed at, no faster than the limit.
+/// Follows the HIP that is aimed at, no faster than the limit and no farther than the reach.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct SpeedLimiter {
     speed_max_m_per_s: f64,
+    reach_m: f64,
     /// Where the HIP is, m; none before it is known.
     hip: Option<Vec2>,
     /// When it was played; none before the first tick.
@@ -29,9 +31,10 @@ pub(super) struct SpeedLimiter {
 }
 
 impl SpeedLimiter {
-    pub(super) fn new(speed_max_m_per_s: f64) -> Self {
+    pub(super) fn new(speed_max_m_per_s: f64, reach_m: f64) -> Self {
         Self {
             speed_max_m_per_s,
+            reach_m,
             hip: None,
             played: None,
         }
@@ -59,6 +62,12 @@ impl SpeedLimiter {
     pub(super) fn step(&mut self, now: Time, elapsed: Duration, aim: Vec2) -> Step {
         let period = elapsed.as_secs_f64();
         let move_max = self.speed_max_m_per_s * period;
+        let beyond = aim.norm() > self.reach_m;
+        let aim = if beyond {
+            aim * (self.reach_m / aim.norm())
+        } else {
+            aim
+        };
         let wanted = self.hip.map_or_else(Vec2::zeros, |from| aim - from);
         let distance = wanted.norm();
         // a hair of room, so that a motion at the limit is not held back by rounding
@@ -75,7 +84,7 @@ impl SpeedLimiter {
         Step {
             hip,
             velocity: if still { Vec2::zeros() } else { moved / period },
-            limited,
+            limited: limited || beyond,
         }
     }
 }

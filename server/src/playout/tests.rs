@@ -361,3 +361,29 @@ fn a_wrong_configuration_is_named() {
     let slowest = PlayoutConfig::for_packing_and_jitter(255, Duration::from_secs(9));
     assert!(PlayoutBuffer::try_new(slowest).is_ok());
 }
+
+#[test]
+fn a_hip_that_is_far_away_takes_the_tool_no_farther_than_its_reach() {
+    let config = PlayoutConfig {
+        reach_m: 0.5,
+        ..PlayoutConfig::default()
+    };
+    let mut buffer = PlayoutBuffer::try_new(config).unwrap();
+    buffer.start_at(Vec2::zeros());
+    let mut most = 0.0_f64;
+    for k in 0..3000 {
+        let now = Time::from_millis(k);
+        let hip = HipCounts::nearest(Vec2::new(160.0, -120.0));
+        buffer.push(now, &HipSample { hip, ..sample(k) });
+        let Some(played) = buffer.advance(now) else {
+            continue;
+        };
+        most = most.max(played.hip.norm());
+        assert!(played.velocity.norm() <= 0.6 + 1e-9);
+        assert!(
+            played.limited && played.force.is_none(),
+            "it is not the hand's place"
+        );
+    }
+    assert!((most - 0.5).abs() < 1e-9, "{most} m");
+}

@@ -7,6 +7,8 @@ use mmt_shared::io::farewell::{FarewellError, ReceivedFarewell};
 use mmt_shared::io::transport::ConnectionError;
 use mmt_shared::report::MasterHalf;
 
+use crate::end::DISENGAGE;
+
 /// A master from which nothing arrived for this long has lost its lease (docs/protocol.md, section 2).
 pub(super) const SILENCE_MAX: Duration = Duration::from_secs(10);
 
@@ -17,6 +19,8 @@ pub(in crate::io) enum End {
     Asked,
     #[error("the master ended ({:?})", .0.ending)]
     Farewell(Box<ReceivedFarewell<MasterHalf>>),
+    #[error("no command came for {DISENGAGE:?}: the tool stands until somebody engages it anew")]
+    Disengaged,
     #[error("nothing came from the master for {SILENCE_MAX:?}")]
     Silence,
     #[error("the connection was lost: {0}")]
