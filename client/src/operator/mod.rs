@@ -27,15 +27,21 @@ pub enum Operator {
 
 impl Operator {
     /// The same, beginning where the tool is (m, world): it goes round the box in `view` to its own start.
-    pub fn led_from(self, tool: Vec2, view: &View) -> Self {
-        match self {
-            Self::Scripted(scripted) => Self::Scripted(Box::new(scripted.starting_at(tool))),
+    #[must_use]
+    pub fn led_from(mut self, tool: Vec2, view: &View) -> Self {
+        if self.start() == tool {
+            return self;
+        }
+        match &mut self {
+            Self::Scripted(scripted) => scripted.go_on_from(tool),
+            Self::Person(person) => person.go_on_from(tool),
             Self::Trace(trace) => {
                 let start = trace.at(Duration::ZERO);
                 let way = route::way(&view.footprint, &view.pose, tool, start);
-                Self::Trace(trace.led_along(tool, &way))
+                *trace = trace.led_along(tool, &way);
             }
         }
+        self
     }
 
     /// Where the HIP is before the first tick, m, world.

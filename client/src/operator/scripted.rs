@@ -98,15 +98,6 @@ impl Scripted {
         })
     }
 
-    /// The same with the hand at rest at `hip` (m, world frame).
-    pub(super) fn starting_at(self, hip: Vec2) -> Self {
-        Self {
-            hand: Hand::new(self.config.hand, self.config.seed, hip),
-            wanted: hip,
-            ..self
-        }
-    }
-
     /// Where the HIP is now, m, world frame.
     pub fn hip(&self) -> Vec2 {
         self.hand.hip()

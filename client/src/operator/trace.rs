@@ -184,7 +184,7 @@ impl Trace {
 
     /// This path after a straight way (world, m) from `from` over `points`, the last of which is where it begins.
     #[must_use]
-    pub(super) fn led_along(self, from: Vec2, points: &[Vec2]) -> Self {
+    pub(super) fn led_along(&self, from: Vec2, points: &[Vec2]) -> Self {
         let mut way = vec![(0.0, from)];
         let (mut at, mut led_s) = (from, 0.0);
         for point in points {

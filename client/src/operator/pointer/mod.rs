@@ -107,6 +107,13 @@ impl Person {
         }
     }
 
+    /// Goes on from a HIP (m, world), at rest there.
+    pub(super) fn go_on_from(&mut self, hip: Vec2) {
+        self.scripted.go_on_from(hip);
+        self.filter = Filter::at_rest(hip);
+        self.hip = hip;
+    }
+
     /// Where the HIP is, m, world.
     pub fn hip(&self) -> Vec2 {
         self.hip
