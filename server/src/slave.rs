@@ -88,41 +88,6 @@ impl Slave {
         Self::with_settings(config, config.mode.model_settings(coupling))
     }
 
-    /// A slave that goes on where an earlier session ended.
-    ///
-    /// # Errors
-    /// As [`Slave::try_new`].
-    pub fn remembering(
-        config: &SlaveConfig,
-        coupling: Coupling,
-        memory: &Memory,
-    ) -> Result<Self, SlaveError> {
-        let mut slave = Self::try_new(config, coupling)?;
-        let environment = slave.contact.environment_mut();
-        environment.place(&memory.bodies);
-        environment.select(memory.touched);
-        let pose = environment.pose();
-        slave.object.remember(&memory.found, memory.touched, pose);
-        slave.contact.begin_with(memory.touched);
-        let params = slave.object.params;
-        let footprint = slave.object.observer.footprint();
-        slave.start = ModelState::nearest(params, footprint, pose, Twist::default(), &coupling)?;
-        slave.shadow = Shadow::new(slave.settings, slave.start);
-        slave.place_tool(memory.tool);
-        Ok(slave)
-    }
-
-    /// What the next session goes on with.
-    #[must_use]
-    pub fn memory(&self) -> Memory {
-        Memory {
-            bodies: self.environment().poses(),
-            touched: self.object.body(),
-            found: self.object.found(),
-            tool: self.tool_at,
-        }
-    }
-
     /// A slave whose local model is run by other settings than its mode's.
     ///
     /// # Errors
@@ -291,23 +256,6 @@ impl Slave {
             tool: tick.tool,
             force: tick.f_s,
         }
-    }
-
-    /// Puts a simulated tool, which is nowhere yet, to `hip` (m), or, if that is inside of a body, in front of it.
-    pub fn start_at(&mut self, hip: Vec2) {
-        let place = self.contact.environment_mut().free_place(hip);
-        self.place_tool(place);
-    }
-
-    /// Where the tool is, m, world frame.
-    #[must_use]
-    pub fn tool_at(&self) -> Vec2 {
-        self.tool_at
-    }
-
-    fn place_tool(&mut self, place: Vec2) {
-        self.tool_at = place;
-        self.playout.start_at(place);
     }
 
     /// One sample period. None before the first HIP sample is due.

@@ -2,10 +2,14 @@
 
 use std::collections::BTreeMap;
 
-use mmt_shared::model::geometry::{Pose, Vec2};
+use mmt_shared::model::contact::Coupling;
+use mmt_shared::model::geometry::{Pose, Twist, Vec2};
+use mmt_shared::model::params::ModelState;
 use serde::{Deserialize, Serialize};
 
 use super::object::Found;
+use super::{Slave, SlaveConfig, SlaveError};
+use crate::shadow::Shadow;
 
 /// What a slave leaves for the next session.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -19,4 +23,58 @@ pub struct Memory {
     pub(super) found: BTreeMap<usize, Found>,
     /// Where the tool is, m, world frame.
     pub(super) tool: Vec2,
+}
+
+impl Slave {
+    /// A slave that goes on where an earlier session ended.
+    ///
+    /// # Errors
+    /// As [`Slave::try_new`].
+    pub fn remembering(
+        config: &SlaveConfig,
+        coupling: Coupling,
+        memory: &Memory,
+    ) -> Result<Self, SlaveError> {
+        let mut slave = Self::try_new(config, coupling)?;
+        let environment = slave.contact.environment_mut();
+        environment.place(&memory.bodies);
+        environment.select(memory.touched);
+        let pose = environment.pose();
+        slave.object.remember(&memory.found, memory.touched, pose);
+        slave.contact.begin_with(memory.touched);
+        let params = slave.object.params;
+        let footprint = slave.object.observer.footprint();
+        slave.start = ModelState::nearest(params, footprint, pose, Twist::default(), &coupling)?;
+        slave.shadow = Shadow::new(slave.settings, slave.start);
+        slave.place_tool(memory.tool);
+        Ok(slave)
+    }
+
+    /// What the next session goes on with.
+    #[must_use]
+    pub fn memory(&self) -> Memory {
+        Memory {
+            bodies: self.environment().poses(),
+            touched: self.object.body(),
+            found: self.object.found(),
+            tool: self.tool_at,
+        }
+    }
+
+    /// Puts a simulated tool, which is nowhere yet, to `hip` (m), or, if that is inside of a body, in front of it.
+    pub fn start_at(&mut self, hip: Vec2) {
+        let place = self.contact.environment_mut().free_place(hip);
+        self.place_tool(place);
+    }
+
+    /// Where the tool is, m, world frame.
+    #[must_use]
+    pub fn tool_at(&self) -> Vec2 {
+        self.tool_at
+    }
+
+    fn place_tool(&mut self, place: Vec2) {
+        self.tool_at = place;
+        self.playout.start_at(place);
+    }
 }
