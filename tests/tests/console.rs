@@ -7,8 +7,10 @@
 use std::process::{Command, Stdio};
 use std::time::Duration;
 
-use crate::harness::process::{PROGRAM, Running, did_not_run};
-use crate::harness::{alone, root};
+use harness::process::{PROGRAM, Running, did_not_run};
+use harness::root;
+
+mod harness;
 
 /// It takes 15 s; the host may be busy.
 const GENEROUS: Duration = Duration::from_secs(240);
@@ -20,7 +22,6 @@ fn runs(command: &mut Command) -> bool {
 
 #[test]
 fn a_person_at_a_browser_pushes_the_box_and_changes_the_run() {
-    let _turn = alone();
     let own = root().join("target/python/bin/python");
     let pythons = [own.to_string_lossy().into_owned(), "python3".to_owned()];
     let mut pythons = pythons.into_iter();

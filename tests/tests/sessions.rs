@@ -1,6 +1,5 @@
 //! What is promised of sessions in real time: one at a time, because each wants two cores.
 
-mod console;
 mod harness;
 mod independent_client;
 mod live;
