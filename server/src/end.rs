@@ -236,7 +236,7 @@ impl SlaveEnd {
             self.silent += now.saturating_since(self.ticked).min(TICK_MAX);
         }
         self.ticked = now;
-        self.disengaged |= self.silent >= DISENGAGE;
+        self.disengaged |= self.silent > DISENGAGE;
     }
 
     /// One sample period; `now` is the tick's deadline. None before the first HIP sample is due.

@@ -42,7 +42,7 @@ NO_APPLICATION_PROTOCOL = 0x178  # TLS alert 120 as an error of QUIC (RFC 9001, 
 DATAGRAM_MAX, STREAM_MAX = 1024, 4096
 SAMPLES_PER_COMMAND, SAMPLES_MAX = 10, 32
 HEARTBEAT_NS = 50_000_000
-REST_TICKS = 400  # at the end, without commands
+REST_TICKS = 300  # the slave disengages after 2 s without samples
 WAIT_S = 10.0  # for each answer; generous, the host may be busy
 KINDS = {"command": "commands", "update": "updates", "scene": "scenes", "heartbeat": "heartbeats",
          "tool": "tools"}
