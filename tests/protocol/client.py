@@ -42,7 +42,7 @@ NO_APPLICATION_PROTOCOL = 0x178  # TLS alert 120 as an error of QUIC (RFC 9001, 
 DATAGRAM_MAX, STREAM_MAX = 1024, 4096
 SAMPLES_PER_COMMAND, SAMPLES_MAX = 10, 32
 HEARTBEAT_NS = 50_000_000
-REST_TICKS = 300  # the slave disengages after 2 s without samples
+REST_NS = 400_000_000  # at the end, without commands; after 2 s of that the slave disengages
 WAIT_S = 10.0  # for each answer; generous, the host may be busy
 KINDS = {"command": "commands", "update": "updates", "scene": "scenes", "heartbeat": "heartbeats",
          "tool": "tools"}
@@ -273,7 +273,8 @@ class Session:
             while len(unsent) >= SAMPLES_PER_COMMAND or (unsent and self.push.over):
                 block, unsent = unsent[:SAMPLES_MAX], unsent[SAMPLES_MAX:]
                 self.send("commands", messages.command(self.envelope(), self.sequence, block))
-        for _ in range(REST_TICKS):
+        rested = self.now() + REST_NS
+        while self.now() < rested:
             await asyncio.sleep(0.001)
             if self.now() - self.last_sent >= HEARTBEAT_NS:
                 self.send("heartbeats", messages.heartbeat(self.envelope()))
