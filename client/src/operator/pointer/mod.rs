@@ -2,7 +2,7 @@
 //!
 //! The pointer moves the HIP as a hand on a table moves a cursor: a press engages where the HIP is, the way of the
 //! pointer from there is the way of the HIP. Its readings carry the page's stamps. They are mapped to the loop's clock
-//! ([`clock_map`]), read at 1 kHz a fixed play-out later ([`resampler`]) and filtered ([`filter`]). A hand that lets go
+//! (`clock_map`), read at 1 kHz a fixed play-out later (`resampler`) and filtered (`filter`). A hand that lets go
 //! or falls silent is released: the HIP stays, and no force is left on the hand.
 //!
 //! Pure and without allocation in a tick; a reading that is not finite is not taken.
