@@ -1,6 +1,7 @@
-//! The drivers in real time: [`socket`] wraps a QUIC socket, [`relay`] stands between two hosts.
+//! The drivers in real time: [`socket`] wraps a QUIC socket, [`relay`] stands between two hosts, [`tunnel`] between
+//! two network interfaces.
 //!
-//! Both let the pure [`crate::Link`] decide and only keep its times ([`driver`]), each on one thread of its
+//! All let the pure [`crate::Link`] decide and only keep its times ([`driver`]), each on one thread of its
 //! own that waits for absolute deadlines. How late it was is measured ([`lateness`]) and never fed back.
 
 #![allow(
@@ -16,6 +17,7 @@ pub mod lateness;
 pub mod record_file;
 pub mod relay;
 pub mod socket;
+pub mod tunnel;
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 

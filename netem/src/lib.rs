@@ -1,8 +1,9 @@
-//! The emulated link of mmt: one pure state machine and the three ways to drive it.
+//! The emulated link of mmt: one pure state machine and the ways to drive it.
 //!
 //! [`link::Link`] takes packets in and hands them out when they leave or are dropped; it never sleeps, reads
 //! no clock and touches no socket. The drivers: *sim* is a link stepped in virtual time; *wrap* decorates a
-//! QUIC socket and *relay* stands between two hosts, both in `io` behind the feature of that name.
+//! QUIC socket, *relay* stands between two hosts and *tunnel* between two network interfaces, all in `io` behind the
+//! feature of that name.
 
 pub mod capture;
 pub mod config;

@@ -24,10 +24,13 @@ use mmt_server::repeats::Repeats;
 use mmt_server::trigger::Scheme;
 use mmt_shared::channel::rate_control::StretchMax;
 use mmt_shared::model::settings::Mode;
-use mmt_shared::pairing::{Address, Host};
+use mmt_shared::pairing::Host;
 use mmt_shared::wire::Architecture;
 
-pub(crate) use self::netem::EmulationArguments;
+pub(crate) use self::netem::{
+    EmulationArguments, NetemArguments, NetemCommand, NetemReportArguments, NetemShellArguments,
+    NetemTraceArguments,
+};
 pub(crate) use bench::{BenchArguments, BenchSubject, TransportBenchArguments};
 pub(crate) use console::ConsoleArguments;
 pub(crate) use records::{ExportArguments, ReplayArguments, ReportArguments};
@@ -249,93 +252,6 @@ pub(crate) struct MasterArguments {
     #[command(flatten)]
     pub(crate) console: ConsoleArguments,
     /// Print the report as one JSON document
-    #[arg(long)]
-    pub(crate) json: bool,
-}
-
-/// Arguments of `mmt netem`.
-#[derive(Debug, Args)]
-#[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
-pub(crate) struct NetemArguments {
-    #[command(subcommand)]
-    pub(crate) command: Option<NetemCommand>,
-    /// Address and UDP port to listen on for masters; port 0 lets the system choose
-    #[arg(long, value_name = "ADDR:PORT", value_parser = values::listen, required = true)]
-    pub(crate) listen: Option<SocketAddr>,
-    /// The slave: host and UDP port
-    #[arg(long, value_name = "HOST:PORT", value_parser = values::address, required = true)]
-    pub(crate) to: Option<Address>,
-    /// Network from master to slave
-    #[arg(long, value_name = "WORDS", default_value = "none", value_parser = values::netem)]
-    pub(crate) up: LinkConfig,
-    /// Network from slave to master
-    #[arg(long, value_name = "WORDS", default_value = "none", value_parser = values::netem)]
-    pub(crate) down: LinkConfig,
-    /// Seed of both
-    #[arg(long, value_name = "N", default_value_t = 1)]
-    pub(crate) seed: u64,
-    /// Packets per second for which the effect of the networks is printed at the start
-    #[arg(long, value_name = "N", default_value_t = 100.0)]
-    pub(crate) rate: f64,
-    /// Length of these packets, bytes of UDP payload
-    #[arg(long, value_name = "N", default_value_t = mmt_netem::effect::BYTES)]
-    pub(crate) bytes: usize,
-    /// Masters at one time; datagrams of one more are dropped and counted
-    #[arg(long, value_name = "N", default_value_t = mmt_netem::io::relay::CLIENTS)]
-    pub(crate) clients: usize,
-    /// Record every packet in this file: CSV if its name ends in .csv, else a compact form
-    #[arg(long, value_name = "FILE")]
-    pub(crate) record: Option<PathBuf>,
-    /// Write every packet, as it comes and as it leaves, to this file (pcapng), with its fate as a comment
-    #[arg(long, value_name = "FILE")]
-    pub(crate) pcap: Option<PathBuf>,
-    /// Give every master a new port toward the slave this often, as a NAT that forgets
-    #[arg(long, value_name = "TIME", value_parser = values::duration)]
-    pub(crate) rebind: Option<Duration>,
-    /// Take commands from stdin while running, one a line: up WORDS, down WORDS, rebind
-    #[arg(long)]
-    pub(crate) control: bool,
-    /// How long [default: until Ctrl-C]
-    #[arg(long, value_name = "TIME", value_parser = values::duration)]
-    pub(crate) duration: Option<Duration>,
-    /// Print the counters as JSON, after the address
-    #[arg(long)]
-    pub(crate) json: bool,
-}
-
-/// What else `mmt netem` does.
-#[derive(Debug, Subcommand)]
-pub(crate) enum NetemCommand {
-    /// Compare a record with the settings it was made with
-    Report(NetemReportArguments),
-    /// Make a record of a real path from captures at both its ends
-    Trace(NetemTraceArguments),
-}
-
-/// Arguments of `mmt netem trace`.
-#[derive(Debug, Args)]
-pub(crate) struct NetemTraceArguments {
-    /// Capture at one end (pcap or pcapng): up is from there
-    #[arg(value_name = "FROM")]
-    pub(crate) from: PathBuf,
-    /// Capture of the same time at the other end
-    #[arg(value_name = "TO")]
-    pub(crate) to: PathBuf,
-    /// Where the record goes, CSV [default: stdout]
-    #[arg(long, value_name = "FILE")]
-    pub(crate) out: Option<PathBuf>,
-    /// Believe the clocks: both captures were made by one clock, or by two that agree
-    #[arg(long)]
-    pub(crate) same_clock: bool,
-}
-
-/// Arguments of `mmt netem report`.
-#[derive(Debug, Args)]
-pub(crate) struct NetemReportArguments {
-    /// A record made with --record
-    #[arg(value_name = "FILE")]
-    pub(crate) file: PathBuf,
-    /// Print everything as one JSON document: the numbers, delay histogram, loss bursts, queue
     #[arg(long)]
     pub(crate) json: bool,
 }

@@ -1,7 +1,6 @@
 //! `mmt netem`: a UDP relay that emulates a network between two hosts.
 
 use std::net::{SocketAddr, ToSocketAddrs};
-use std::path::Path;
 use std::sync::mpsc::{Receiver, channel};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
@@ -22,13 +21,16 @@ use crate::output::{note, print, print_json};
 use crate::stop::Stop;
 
 pub(super) mod control;
+mod files;
 mod gauge;
 mod report;
+mod shell;
 mod table;
 mod trace;
 pub(super) mod wrap;
 
 use control::Command;
+use files::{capture_file, record_file, written};
 use gauge::{Caption, Gauge};
 
 /// How often the state of the relay is checked.
@@ -73,6 +75,7 @@ pub(crate) fn run(arguments: &NetemArguments, messages: &Messages) -> Result<(),
     match &arguments.command {
         Some(NetemCommand::Report(arguments)) => return report::run(arguments),
         Some(NetemCommand::Trace(arguments)) => return trace::run(arguments),
+        Some(NetemCommand::Shell(arguments)) => return shell::run(arguments, messages),
         None => {}
     }
     let (Some(listen), Some(to)) = (arguments.listen, &arguments.to) else {
@@ -101,7 +104,15 @@ pub(crate) fn run(arguments: &NetemArguments, messages: &Messages) -> Result<(),
     // the keys are the commands' where there are commands
     let live = !arguments.json && !arguments.control;
     let gauge = live.then(|| Gauge::take(caption(arguments, local, to), messages));
-    let effects = announce(arguments, to, messages);
+    let (rate, bytes) = (arguments.rate, arguments.bytes);
+    let names = [format!("up   (to {to})"), "down (to masters)".to_owned()];
+    let effects = announce(
+        [&arguments.up, &arguments.down],
+        rate,
+        bytes,
+        names,
+        messages,
+    );
     let commands = arguments.control.then(lines_of_stdin);
     wait(
         &relay,
@@ -124,10 +135,8 @@ pub(crate) fn run(arguments: &NetemArguments, messages: &Messages) -> Result<(),
     let effects =
         effects.map_err(|_| Failure::failed("the effect of the networks is not known"))?;
     let (effect_up, effect_down) = effects.map_err(Failure::usage)?;
-    let written = record.map(RecordFile::finish).transpose();
-    written.map_err(|error| Failure::failed(format!("the record: {error}")))?;
-    let written = capture.map(CaptureFile::finish).transpose();
-    written.map_err(|error| Failure::failed(format!("the capture: {error}")))?;
+    written("record", record.map(RecordFile::finish))?;
+    written("capture", capture.map(CaptureFile::finish))?;
     let report = NetemReport {
         version: env!("CARGO_PKG_VERSION"),
         command: "netem",
@@ -153,20 +162,21 @@ pub(crate) fn run(arguments: &NetemArguments, messages: &Messages) -> Result<(),
     }
 }
 
-/// What the networks will do, worked out and printed while the relay is at work already.
+/// What the networks up and down will do, worked out and printed while they are at work already.
 fn announce(
-    arguments: &NetemArguments,
-    to: SocketAddr,
+    links: [&LinkConfig; 2],
+    rate: f64,
+    bytes: usize,
+    names: [String; 2],
     messages: &Messages,
 ) -> JoinHandle<Result<(Effect, Effect), ConfigError>> {
-    let (up, down) = (arguments.up.clone(), arguments.down.clone());
-    let (rate, bytes) = (arguments.rate, arguments.bytes);
+    let ([up, down], [of_up, of_down]) = (links.map(LinkConfig::clone), names);
     let messages = messages.clone();
     std::thread::spawn(move || {
         let effect_up = up.expected(rate, bytes)?;
-        messages.show(&format!("up   (to {to}): {effect_up}"));
+        messages.show(&format!("{of_up}: {effect_up}"));
         let effect_down = down.expected(rate, bytes)?;
-        messages.show(&format!("down (to masters): {effect_down}"));
+        messages.show(&format!("{of_down}: {effect_down}"));
         Ok((effect_up, effect_down))
     })
 }
@@ -177,28 +187,6 @@ fn heading(arguments: &NetemArguments) -> Heading {
         up: arguments.up.to_string(),
         down: arguments.down.to_string(),
     }
-}
-
-/// A record to be written.
-///
-/// # Errors
-/// It cannot be.
-fn record_file(path: &Path, heading: &Heading) -> Result<RecordFile, Failure> {
-    RecordFile::create(path, heading).map_err(|error| {
-        let what = format!("cannot write the record {}: {error}", path.display());
-        Failure::usage(what).remedy("give a path that can be written")
-    })
-}
-
-/// A capture to be written.
-///
-/// # Errors
-/// It cannot be.
-fn capture_file(path: &Path, heading: &Heading) -> Result<CaptureFile, Failure> {
-    CaptureFile::create(path, heading).map_err(|error| {
-        let what = format!("cannot write the capture {}: {error}", path.display());
-        Failure::usage(what).remedy("give a path that can be written")
-    })
 }
 
 /// The lines of stdin as they come, until it ends.

@@ -13,10 +13,11 @@ use std::time::Duration;
 
 use mmt_shared::io::alarm::Alarm;
 use mmt_shared::stats::histogram::Quantiles;
+use mmt_shared::time::Time;
 use serde::Serialize;
 
 use super::capture_file::CaptureWriter;
-use super::driver::{DirectionCounters, Driver};
+use super::driver::{DirectionCounters, Driver, SidesOf};
 use super::lateness::{Lateness, Recorder};
 use super::record_file::RecordWriter;
 use super::{lock, now};
@@ -122,8 +123,8 @@ pub struct Extras {
 
 /// What the handle asks of the thread.
 #[derive(Debug, Default)]
-struct Commands {
-    links: Option<(LinkConfig, LinkConfig)>,
+pub(super) struct Commands {
+    pub(super) links: Option<(LinkConfig, LinkConfig)>,
     rebind: bool,
 }
 
@@ -145,16 +146,8 @@ impl Relay {
         seed: u64,
         extras: Extras,
     ) -> Result<RelayHandle, RelayError> {
-        let (origin, lateness) = (now(), Arc::new(Recorder::default()));
-        let delays = [(); 2].map(|()| Arc::new(Recorder::default()));
-        let driver = |config, id| {
-            let (record, lateness) = (extras.record.clone(), Arc::clone(&lateness));
-            let driver = Driver::try_new(config, seed, id, origin, record, lateness)?;
-            Ok::<_, ConfigError>(driver.captured(extras.capture.clone(), Origin::sides))
-        };
-        let [of_up, of_down] = &delays;
-        let up = driver(up, LinkId::UP)?.timed(Arc::clone(of_up));
-        let down = driver(down, LinkId::DOWN)?.timed(Arc::clone(of_down));
+        let (origin, shared) = (now(), Shared::try_new()?);
+        let [up, down] = drivers([up, down], seed, origin, &shared, &extras, Origin::sides)?;
         if to.port() == 0 || to.ip().is_unspecified() {
             return Err(RelayError::Target { to });
         }
@@ -168,29 +161,35 @@ impl Relay {
         if local == to {
             return Err(RelayError::Loop { to });
         }
-        let shared = Arc::new(Shared {
-            alarm: Alarm::try_new().map_err(RelayError::Thread)?,
-            stopping: AtomicBool::new(false),
-            commands: Mutex::new(Commands::default()),
-            board: Mutex::new(RelaySnapshot::default()),
-            lateness,
-            delays,
-        });
         let clients = Clients::try_new(to, extras.clients.unwrap_or(CLIENTS));
         let clients = clients.map_err(RelayError::Thread)?;
         let mut worker = Worker::new((port, local), clients, up, down, shared.clone());
         worker.rebind_every(extras.rebind_every, origin);
         worker.writes_to(extras.record, extras.capture);
-        let thread = std::thread::Builder::new()
-            .name("netem-relay".to_owned())
-            .spawn(move || worker.run())
-            .map_err(RelayError::Thread)?;
-        Ok(RelayHandle {
-            local,
-            shared,
-            thread: Some(thread),
-        })
+        RelayHandle::start("netem-relay", Some(local), shared, move || worker.run())
     }
+}
+
+/// The links up and down of a driver; times count from `origin`.
+pub(super) fn drivers<A: Clone>(
+    [up, down]: [LinkConfig; 2],
+    seed: u64,
+    origin: Time,
+    shared: &Shared,
+    extras: &Extras,
+    sides: SidesOf<A>,
+) -> Result<[Driver<A>; 2], ConfigError> {
+    let driver = |config, id, delays: &Arc<Recorder>| {
+        let (record, lateness) = (extras.record.clone(), Arc::clone(&shared.lateness));
+        let driver = Driver::try_new(config, seed, id, origin, record, lateness)?;
+        let driver = driver.timed(Arc::clone(delays));
+        Ok(driver.captured(extras.capture.clone(), sides))
+    };
+    let [of_up, of_down] = &shared.delays;
+    Ok([
+        driver(up, LinkId::UP, of_up)?,
+        driver(down, LinkId::DOWN, of_down)?,
+    ])
 }
 
 fn listen_on(listen: SocketAddr) -> io::Result<(Port, SocketAddr)> {
@@ -199,32 +198,63 @@ fn listen_on(listen: SocketAddr) -> io::Result<(Port, SocketAddr)> {
     Ok((Port::try_new(socket)?, local))
 }
 
-/// A running relay. Dropping it stops it; packets in flight are lost.
+/// A running relay or tunnel. Dropping it stops it; packets in flight are lost.
 #[derive(Debug)]
 pub struct RelayHandle {
-    local: SocketAddr,
+    /// None: it listens on no address.
+    local: Option<SocketAddr>,
     shared: Arc<Shared>,
     thread: Option<JoinHandle<io::Result<()>>>,
 }
 
 /// What the relay's thread and its handle share.
 #[derive(Debug)]
-struct Shared {
-    alarm: Alarm,
-    stopping: AtomicBool,
-    commands: Mutex<Commands>,
+pub(super) struct Shared {
+    pub(super) alarm: Alarm,
+    pub(super) stopping: AtomicBool,
+    pub(super) commands: Mutex<Commands>,
     /// The counts as of the thread's last round, without the lateness.
-    board: Mutex<RelaySnapshot>,
+    pub(super) board: Mutex<RelaySnapshot>,
     lateness: Arc<Recorder>,
     /// Delays up and down since somebody last asked.
     delays: [Arc<Recorder>; 2],
 }
 
+impl Shared {
+    pub(super) fn try_new() -> Result<Arc<Self>, RelayError> {
+        Ok(Arc::new(Self {
+            alarm: Alarm::try_new().map_err(RelayError::Thread)?,
+            stopping: AtomicBool::new(false),
+            commands: Mutex::default(),
+            board: Mutex::default(),
+            lateness: Arc::default(),
+            delays: Default::default(),
+        }))
+    }
+}
+
 impl RelayHandle {
-    /// The address that the relay listens on, with the port that the system chose if none was given.
+    /// Starts the thread.
+    pub(super) fn start(
+        name: &str,
+        local: Option<SocketAddr>,
+        shared: Arc<Shared>,
+        run: impl FnOnce() -> io::Result<()> + Send + 'static,
+    ) -> Result<Self, RelayError> {
+        let thread = std::thread::Builder::new().name(name.to_owned()).spawn(run);
+        Ok(Self {
+            local,
+            shared,
+            thread: Some(thread.map_err(RelayError::Thread)?),
+        })
+    }
+
+    /// The address that the relay listens on, with the port that the system chose if none was given; 0.0.0.0:0 of a
+    /// tunnel.
     #[must_use]
     pub fn local_addr(&self) -> SocketAddr {
-        self.local
+        let none = SocketAddr::from(([0; 4], 0));
+        self.local.unwrap_or(none)
     }
 
     /// What the relay did so far.

@@ -20,6 +20,7 @@ mod netem;
 mod raw_udp;
 mod reproduce;
 mod runs;
+mod shell;
 mod sweep;
 mod wrong_input;
 

@@ -290,7 +290,7 @@ fn a_record_is_compared_with_the_settings_it_was_made_with() {
 }
 
 /// A column of what tshark shows of a capture, a line a packet; none without tshark, which is not allowed in CI.
-fn columns(capture: &std::path::Path, names: &[&str]) -> Option<Vec<Vec<String>>> {
+pub(super) fn columns(capture: &std::path::Path, names: &[&str]) -> Option<Vec<Vec<String>>> {
     let names = names.iter().flat_map(|name| ["-e", name]);
     let options: Vec<String> = ["-T", "fields"]
         .into_iter()
@@ -299,7 +299,7 @@ fn columns(capture: &std::path::Path, names: &[&str]) -> Option<Vec<Vec<String>>
         .collect();
     match tshark(capture, &options) {
         Err(TsharkError::Missing(error)) => {
-            did_not_run("a capture of the relay in tshark", &error.to_string());
+            did_not_run("a capture of emulated links in tshark", &error.to_string());
             None
         }
         shown => {

@@ -1,0 +1,231 @@
+//! A program with all its traffic through emulated links: TCP there and back, in namespaces that the test makes.
+//!
+//! Needs namespaces and `python3`, and `tshark` for the capture: where the host forbids them the message is held to be right, the test
+//! prints that it did not run, and with `CI` set it fails.
+
+use std::path::Path;
+use std::process::{Command, Output};
+
+use serde_json::Value;
+
+use super::mmt;
+use super::netem::columns;
+use crate::harness::process::{PROGRAM, did_not_run};
+
+/// Sends back what comes, once.
+const ECHO: &str = r#"
+import socket, sys
+listen = socket.create_server(("0.0.0.0", 5000))
+peer, address = listen.accept()
+while data := peer.recv(65536):
+    peer.sendall(data)
+open(sys.argv[1], "w").write(address[0])
+"#;
+
+/// Prints a round trip, ms, and how many bytes came back of 100 000.
+const CLIENT: &str = r#"
+import os, socket, sys, time
+to = sys.argv[1] if len(sys.argv) > 1 else os.environ["MMT_FAR"]
+for attempt in range(600):
+    try:
+        peer = socket.create_connection((to, 5000), 5)
+        break
+    except OSError:
+        time.sleep(0.05)
+began = time.monotonic()
+peer.sendall(b"x")
+peer.recv(1)
+print((time.monotonic() - began) * 1e3)
+peer.sendall(b"y" * 100000)
+peer.shutdown(socket.SHUT_WR)
+back = 0
+while data := peer.recv(65536):
+    back += len(data)
+print(back)
+"#;
+
+const LINKS: [&str; 10] = [
+    "netem",
+    "shell",
+    "--up",
+    "delay 20ms",
+    "--down",
+    "delay 10ms loss list 3",
+    "--report",
+    "report.json",
+    "--pcap",
+    "run.pcapng",
+];
+
+fn home() -> tempfile::TempDir {
+    let home = tempfile::tempdir().unwrap();
+    std::fs::write(home.path().join("echo.py"), ECHO).unwrap();
+    std::fs::write(home.path().join("client.py"), CLIENT).unwrap();
+    home
+}
+
+/// Whether the host allowed it; if not, that is what it must have been.
+fn ran(output: &Output) -> bool {
+    if output.status.success() {
+        return true;
+    }
+    let printed = String::from_utf8_lossy(&output.stderr);
+    let words = ["this host forbids", "no way to the host's network"];
+    assert!(
+        words.iter().any(|words| printed.contains(words)) && printed.contains("what to do"),
+        "{printed}"
+    );
+    did_not_run("a shell behind emulated links", &printed);
+    false
+}
+
+/// What the client printed, and the report.
+fn the_links_did_their_part(output: &Output, home: &Path) {
+    let printed = String::from_utf8_lossy(&output.stdout).into_owned();
+    let lines: Vec<f64> = printed.lines().map(|line| line.parse().unwrap()).collect();
+    assert!(lines[0] >= 30.0, "{printed}");
+    assert_eq!(lines[1], 100_000.0);
+    let report = std::fs::read(home.join("report.json")).unwrap();
+    let report: Value = serde_json::from_slice(&report).unwrap();
+    let counters = &report["counters"];
+    assert_eq!(counters["down"]["link"]["dropped"]["loss"]["packets"], 1);
+    for way in ["up", "down"] {
+        let count = |path: &str| counters[way].pointer(path).and_then(Value::as_u64).unwrap();
+        // 100 000 bytes and their headers
+        assert!(count("/link/offered/bytes") > 100_000, "{counters}");
+        let gone = [
+            "/sent/packets",
+            "/link/dropped/loss/packets",
+            "/in_flight",
+            "/blocked/packets",
+            "/failed/packets",
+        ];
+        assert_eq!(
+            count("/link/offered/packets"),
+            gone.map(count).iter().sum::<u64>(),
+            "{counters}"
+        );
+    }
+    assert_eq!(report["exit_code"], 0);
+    assert_eq!(counters["uncaptured"], 0);
+    the_capture_shows_both_sides(&home.join("run.pcapng"), counters);
+}
+
+/// Each packet as it came and as it left, and what became of it, as tshark reads it.
+fn the_capture_shows_both_sides(capture: &Path, counters: &Value) {
+    let names = [
+        "frame.interface_name",
+        "frame.comment",
+        "tcp.port",
+        "ip.src",
+        "ip.dst",
+    ];
+    let Some(packets) = columns(capture, &names) else {
+        return;
+    };
+    let on = |side: &str| packets.iter().filter(|packet| packet[0] == side).count() as u64;
+    for way in ["up", "down"] {
+        let count = |path: &str| counters[way].pointer(path).and_then(Value::as_u64).unwrap();
+        let decided = count("/link/offered/packets") - count("/in_flight");
+        assert_eq!(on(&format!("{way} in")), decided, "{counters}");
+        assert_eq!(on(&format!("{way} out")), count("/sent/packets"));
+    }
+    let lost = |packet: &&Vec<String>| packet[1] == "down 3: lost (loss)";
+    assert_eq!(packets.iter().filter(lost).count(), 1);
+    assert!(packets.iter().any(|packet| packet[2].contains("5000")));
+}
+
+#[test]
+fn two_own_namespaces_are_a_path_for_any_program() {
+    let home = home();
+    let mut arguments = LINKS.to_vec();
+    arguments.extend([
+        "--beside",
+        "python3 echo.py peer",
+        "--",
+        "python3",
+        "client.py",
+    ]);
+    let output = mmt(&home, &arguments).output().unwrap();
+    if !ran(&output) {
+        return;
+    }
+    the_links_did_their_part(&output, home.path());
+    // the command's exit code is that of the run
+    let arguments = [
+        "netem", "shell", "--beside", "true", "--", "sh", "-c", "exit 7",
+    ];
+    assert_eq!(mmt(&home, &arguments).status().unwrap().code(), Some(7));
+}
+
+/// Runs `ip`; whether it could.
+fn ip(words: &str) -> bool {
+    let output = Command::new("ip").args(words.split(' ')).output();
+    output.is_ok_and(|output| output.status.success())
+}
+
+/// Two hosts on a cable; gone when dropped.
+struct Cable([String; 2]);
+
+impl Cable {
+    fn make() -> Option<Self> {
+        let names = ["here", "there"].map(|host| format!("mmt-{}-{host}", std::process::id()));
+        let cable = Self(names);
+        let [here, there] = &cable.0;
+        let words = [
+            format!("netns add {here}"),
+            format!("netns add {there}"),
+            format!("-n {here} link add cable type veth peer name cable netns {there}"),
+            format!("-n {here} address add 10.92.0.1/24 dev cable"),
+            format!("-n {there} address add 10.92.0.2/24 dev cable"),
+            format!("-n {here} link set cable up"),
+            format!("-n {there} link set cable up"),
+        ];
+        words.iter().all(|words| ip(words)).then_some(cable)
+    }
+}
+
+impl Drop for Cable {
+    fn drop(&mut self) {
+        for host in &self.0 {
+            ip(&format!("netns del {host}"));
+        }
+    }
+}
+
+#[test]
+fn as_root_the_way_leads_to_the_network_of_the_host_under_its_address() {
+    let home = home();
+    let Some(cable) = Cable::make() else {
+        return did_not_run("a shell on the host's network", "it needs root and `ip`");
+    };
+    let on = |host: &String, program: &str| {
+        let mut command = Command::new("ip");
+        command
+            .args(["netns", "exec", host, program])
+            .current_dir(home.path());
+        command
+    };
+    let [here, there] = &cable.0;
+    let mut echo = on(there, "python3")
+        .args(["echo.py", "peer"])
+        .spawn()
+        .unwrap();
+    let mut shell = on(here, PROGRAM);
+    let output = shell
+        .args(LINKS)
+        .args(["--", "python3", "client.py", "10.92.0.2"])
+        .output()
+        .unwrap();
+    if !ran(&output) {
+        echo.kill().unwrap();
+        echo.wait().unwrap();
+        return;
+    }
+    echo.wait().unwrap();
+    the_links_did_their_part(&output, home.path());
+    let peer = std::fs::read_to_string(home.path().join("peer")).unwrap();
+    assert_eq!(peer, "10.92.0.1");
+    let left = on(here, "nft").args(["list", "tables"]).output().unwrap();
+    assert!(left.stdout.is_empty(), "{left:?}");
+}
