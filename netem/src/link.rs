@@ -118,6 +118,16 @@ impl<T: Clone> Link<T> {
         own.into_iter().chain(next).min()
     }
 
+    /// Nothing that is offered from `now` on leaves before this, as far as the settings and the order tell. A bound: it may
+    /// well leave later.
+    #[must_use]
+    pub fn earliest_of_later(&self, now: Time) -> Time {
+        let own = self.stages.earliest_of_later(&self.timeline, now);
+        self.next
+            .as_ref()
+            .map_or(own, |next| next.earliest_of_later(own))
+    }
+
     /// Takes new settings from `now` on. What waits before the bottleneck is sent at the new rate and then
     /// takes the new delay; what has passed the bottleneck keeps its time. Counters and random streams go on,
     /// and under [`crate::Order::Fifo`] no packet overtakes an earlier one, not even one of the old settings.

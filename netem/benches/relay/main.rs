@@ -1,5 +1,5 @@
 //! What a relay adds to a delay, against bare loopback in the same run, what it carries, and the CPU time that it takes for
-//! a packet against a plain forwarder's.
+//! a packet against that of a plain forwarder in C (needs `cc`).
 //!
 //! Not criterion's kind of measurement: packets leave at fixed times and each is timed.
 
@@ -17,18 +17,22 @@ use std::time::{Duration, Instant};
 use mmt_netem::LinkConfig;
 use mmt_netem::io::relay::{Extras, Relay, RelayHandle};
 
+mod cpu;
+
 const LOCAL: (Ipv4Addr, u16) = (Ipv4Addr::LOCALHOST, 0);
 const TICK: Duration = Duration::from_millis(1);
 const PINGS: u32 = 5000;
 /// What the relay may add each way at the median, us.
 const ADDED_US: f64 = 100.0;
 const DELAY: Duration = Duration::from_millis(5);
-/// What the relay may take of a plain forwarder's CPU time.
-const CPU_RATIO: f64 = 1.2;
 const PACKETS_PER_TICK: u32 = 20;
 const TICKS: u32 = 5000;
 
 fn main() -> Result<(), Box<dyn Error>> {
+    // alone: cargo bench -p mmt-netem --bench relay -- cpu
+    if std::env::args().any(|word| word == "cpu") {
+        return cpu::compare();
+    }
     let (bare, _) = echo()?;
     let control = round_trips(bare)?;
     let (target, _) = echo()?;
@@ -49,10 +53,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         if late.degraded() { " (degraded)" } else { "" }
     );
     carry()?;
-    for packets in [1, 20] {
-        compare_cpu(packets)?;
-    }
-    Ok(())
+    cpu::compare()
 }
 
 /// A socket that sends back what it gets.
@@ -138,88 +139,6 @@ fn show(what: &str, sorted: &[Duration], less: Duration) {
         at(0.99),
         at(0.999)
     );
-}
-
-/// A thread that sends on what it receives, a call of each for a packet, as a forwarder does that knows nothing else.
-fn plain_forwarder(to: SocketAddr) -> Result<SocketAddr, Box<dyn Error>> {
-    let (near, far) = (UdpSocket::bind(LOCAL)?, UdpSocket::bind(LOCAL)?);
-    let address = near.local_addr()?;
-    far.connect(to)?;
-    let forward = move || {
-        let mut buffer = [0; 65_536];
-        while let Ok((length, _)) = near.recv_from(&mut buffer) {
-            let _ = far.send(buffer.get(..length).unwrap_or_default());
-        }
-    };
-    std::thread::Builder::new()
-        .name(PLAIN.to_owned())
-        .spawn(forward)?;
-    Ok(address)
-}
-
-/// The names of the threads that are compared.
-const PLAIN: &str = "plain";
-const RELAY: &str = "netem-relay";
-
-/// CPU time that the threads of a name took so far, from the kernel's own counts.
-fn cpu_time(name: &str) -> Result<Duration, Box<dyn Error>> {
-    let mut taken = 0;
-    for task in std::fs::read_dir("/proc/self/task")? {
-        let task = task?.path();
-        let this = std::fs::read_to_string(task.join("comm")).unwrap_or_default();
-        if this.trim_end() == name {
-            let counts = std::fs::read_to_string(task.join("schedstat"))?;
-            taken += counts.split(' ').next().unwrap_or("0").parse::<u64>()?;
-        }
-    }
-    Ok(Duration::from_nanos(taken))
-}
-
-/// Sends so many packets a millisecond to `forwarder` for a while; the CPU time of the threads of a name for each that
-/// arrived.
-fn cpu_a_packet(
-    name: &str,
-    forwarder: SocketAddr,
-    sink: &UdpSocket,
-    packets: u32,
-) -> Result<f64, Box<dyn Error>> {
-    let source = UdpSocket::bind(LOCAL)?;
-    let sink = sink.try_clone()?;
-    let counting = std::thread::spawn(move || {
-        let (mut buffer, mut arrived) = ([0; 100], 0_u32);
-        while sink.recv(&mut buffer).is_ok() {
-            arrived += 1;
-        }
-        arrived
-    });
-    let before = cpu_time(name)?;
-    let start = Instant::now();
-    for tick in 0..TICKS {
-        std::thread::sleep((TICK * tick).saturating_sub(start.elapsed()));
-        for _ in 0..packets {
-            source.send_to(&[0; 100], forwarder)?;
-        }
-    }
-    let arrived = counting.join().map_err(|_| "the receiver panicked")?;
-    let taken = cpu_time(name)?.saturating_sub(before);
-    Ok(us(taken) / f64::from(arrived.max(1)))
-}
-
-/// CPU time for a packet: a relay with a link in each direction that does nothing, and a plain forwarder.
-fn compare_cpu(packets: u32) -> Result<(), Box<dyn Error>> {
-    let sink = UdpSocket::bind(LOCAL)?;
-    sink.set_read_timeout(Some(Duration::from_secs(1)))?;
-    let to = sink.local_addr()?;
-    let plain = cpu_a_packet(PLAIN, plain_forwarder(to)?, &sink, packets)?;
-    let relay = relay(to, "none")?;
-    let relayed = cpu_a_packet(RELAY, relay.local_addr(), &sink, packets)?;
-    println!(
-        "CPU a packet at {} packets/s in groups of {packets}: relay {relayed:.2} us, plain forwarder {plain:.2} us, \
-         ratio {:.2} (target: at most {CPU_RATIO})",
-        packets * 1000,
-        relayed / plain
-    );
-    Ok(())
 }
 
 /// 20 000 packets a second for 5 s, one way.

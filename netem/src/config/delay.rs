@@ -88,6 +88,15 @@ impl Delay {
         Duration::from_nanos((nanos + 0.5) as u64)
     }
 
+    /// What no packet's delay is below; zero where that takes more than a subtraction to know.
+    pub(crate) fn least(&self) -> Duration {
+        match self.shape {
+            Shape::Constant => self.mean,
+            Shape::Uniform => self.mean.saturating_sub(self.jitter),
+            _ => Duration::ZERO,
+        }
+    }
+
     /// The mean, or the median of a measured distribution.
     #[must_use]
     pub fn middle(&self) -> Duration {

@@ -164,6 +164,11 @@ impl<A: Clone> Driver<A> {
         self.link.poll_timeout()
     }
 
+    /// Nothing that is offered from `now` on leaves before this.
+    pub(super) fn earliest_of_later(&self, now: Time) -> Time {
+        self.link.earliest_of_later(now)
+    }
+
     /// Takes note of what became of a packet that was polled, whose sending began at `moment`.
     pub(super) fn finish(
         &mut self,

@@ -26,14 +26,18 @@ use crate::counters::Tally;
 use crate::direction::LinkId;
 
 mod clients;
+mod origin;
+mod pace;
 mod port;
+mod sockets;
 #[cfg(test)]
 mod tests;
 mod worker;
 
 use clients::Clients;
+use origin::Origin;
 use port::Port;
-use worker::{Origin, Worker};
+use worker::Worker;
 
 /// Clients at one time unless [`Extras::clients`] sets another number; datagrams of one more are dropped and
 /// counted. Each holds one descriptor.

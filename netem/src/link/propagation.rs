@@ -83,6 +83,21 @@ impl Propagation {
         }
     }
 
+    /// Before when nothing leaves that comes from `now` on.
+    pub(super) fn earliest(&self, config: &LinkConfig, now: Duration) -> Duration {
+        if config.reorder.is_some() {
+            return now;
+        }
+        let own = match config.replay {
+            Some(_) => now,
+            None => now.saturating_add(config.delay.least()),
+        };
+        match config.order {
+            Order::Fifo => self.latest.max(own),
+            Order::Free => own,
+        }
+    }
+
     fn in_order(&mut self, order: Order, own: Duration) -> Duration {
         // the clock of the drivers ends where nanoseconds no longer fit
         let own = Duration::from_nanos(duration_nanos(own));

@@ -286,6 +286,15 @@ impl<T> Stages<T> {
         Some(next.departure.due).filter(|due| *due <= now)
     }
 
+    /// Nothing that is taken in from `now` on leaves before this.
+    pub(super) fn earliest_of_later(&self, timeline: &Timeline, now: Time) -> Time {
+        let elapsed = timeline.elapsed(now);
+        let leaves = self.propagation.earliest(timeline.at(elapsed), elapsed);
+        // what the settings after these do is another matter
+        let change = timeline.next_change(elapsed);
+        timeline.time(change.map_or(leaves, |change| change.min(leaves)))
+    }
+
     pub(super) fn poll(&mut self, timeline: &Timeline, now: Time) -> Option<ByTime<T>> {
         self.next_due(timeline, now)?;
         let Reverse(next) = self.out.pop()?;

@@ -4,7 +4,7 @@
 //! one, and end it at once. Nothing here spins.
 
 use std::io;
-use std::os::fd::{AsFd, AsRawFd, OwnedFd, RawFd};
+use std::os::fd::{AsFd, AsRawFd, BorrowedFd, OwnedFd, RawFd};
 use std::sync::Arc;
 use std::task::Wake;
 
@@ -67,6 +67,12 @@ impl Alarm {
         wait(&mut [self.as_poll_fd()], until)?;
         self.silence();
         Ok(())
+    }
+}
+
+impl AsFd for Alarm {
+    fn as_fd(&self) -> BorrowedFd<'_> {
+        self.0.as_fd()
     }
 }
 

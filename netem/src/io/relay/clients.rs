@@ -4,19 +4,15 @@
 use std::collections::BTreeMap;
 use std::io;
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr, UdpSocket};
-use std::os::fd::{AsFd, OwnedFd};
 
 use mmt_shared::time::Time;
-use rustix::buffer::spare_capacity;
-use rustix::event::{PollFd, PollFlags, Timespec, epoll};
 use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
 
 use super::CLIENT_IDLE;
 use super::port::{Port, Received};
+use super::sockets::Sockets;
 use crate::capture::Sides;
 
-/// Clients whose sockets are read before the times are looked at again.
-const READY_MAX: usize = 64;
 /// Descriptors besides one for each client: the program's own.
 const OTHER_DESCRIPTORS: u64 = 64;
 
@@ -57,8 +53,8 @@ pub(super) struct Clients {
     met: u64,
     /// How many there can be at one time.
     most: usize,
-    /// All their sockets, so that a wait is one for all of them.
-    sockets: OwnedFd,
+    /// All their sockets and those of the relay, so that a wait is one for all of them.
+    pub(super) sockets: Sockets,
 }
 
 impl Clients {
@@ -74,32 +70,14 @@ impl Clients {
             by_addr: BTreeMap::new(),
             met: 0,
             most,
-            sockets: epoll::create(epoll::CreateFlags::CLOEXEC)?,
+            sockets: Sockets::try_new()?,
         })
-    }
-
-    /// Ready when a client's socket has something to read.
-    pub(super) fn as_poll_fd(&self) -> PollFd<'_> {
-        PollFd::from_borrowed_fd(self.sockets.as_fd(), PollFlags::IN)
-    }
-
-    /// The clients whose sockets have something to read, or an error; of many some, the next time others.
-    ///
-    /// # Errors
-    /// Those of epoll.
-    pub(super) fn ready(&self) -> io::Result<Vec<u64>> {
-        let mut events = Vec::with_capacity(READY_MAX);
-        let at_once = Timespec::default();
-        epoll::wait(&self.sockets, spare_capacity(&mut events), Some(&at_once))?;
-        let number = |event: &epoll::Event| event.data.u64();
-        Ok(events.iter().map(number).collect())
     }
 
     /// A socket toward the target whose datagrams are for client `number`.
     fn port_for(&self, number: u64) -> io::Result<(Port, SocketAddr)> {
         let (port, addr) = port_toward(self.to)?;
-        let (data, flags) = (epoll::EventData::new_u64(number), epoll::EventFlags::IN);
-        epoll::add(&self.sockets, &port, data, flags)?;
+        self.sockets.add(&port, number)?;
         Ok((port, addr))
     }
 
@@ -127,7 +105,8 @@ impl Clients {
 
     /// The number of the client that sent `datagram`, met now if need be; `None` if there is no room for
     /// it or no socket to be had.
-    pub(super) fn meet(&mut self, datagram: &Received<'_>, now: Time) -> Option<u64> {
+    pub(super) fn meet(&mut self, datagram: &Received<'_>) -> Option<u64> {
+        let now = datagram.arrived;
         if let Some(number) = self.by_addr.get(&datagram.from) {
             let client = self.by_number.get_mut(number)?;
             client.local_ip = datagram.local_ip;
@@ -219,12 +198,12 @@ mod tests {
         Clients::try_new((Ipv4Addr::LOCALHOST, 9).into(), 64).unwrap()
     }
 
-    fn from(port: u16) -> Received<'static> {
+    fn from(port: u16, arrived: Time) -> Received<'static> {
         Received {
             from: (Ipv4Addr::LOCALHOST, port).into(),
             local_ip: None,
             class: 0,
-            arrived: Time::ZERO,
+            arrived,
             contents: &[],
         }
     }
@@ -233,24 +212,24 @@ mod tests {
     fn a_client_keeps_its_number_while_it_is_heard_and_gets_another_after_a_silence() {
         let mut clients = clients();
         let soon = Time::ZERO + CLIENT_IDLE - Duration::from_nanos(1);
-        assert_eq!(clients.meet(&from(1), Time::ZERO), Some(0));
-        assert_eq!(clients.meet(&from(2), Time::ZERO), Some(1));
-        assert_eq!(clients.meet(&from(1), soon), Some(0));
+        assert_eq!(clients.meet(&from(1, Time::ZERO)), Some(0));
+        assert_eq!(clients.meet(&from(2, Time::ZERO)), Some(1));
+        assert_eq!(clients.meet(&from(1, soon)), Some(0));
         clients.expire(soon);
         assert_eq!(clients.len(), 2);
         assert_eq!(clients.next_expiry(), Some(Time::ZERO + CLIENT_IDLE));
         clients.expire(Time::ZERO + CLIENT_IDLE);
         assert_eq!(clients.len(), 1);
-        assert_eq!(clients.meet(&from(2), soon), Some(2));
+        assert_eq!(clients.meet(&from(2, soon)), Some(2));
     }
 
     #[test]
     fn one_client_too_many_is_turned_away_and_an_old_one_is_not() {
         let mut clients = clients();
         for port in 0..64 {
-            assert!(clients.meet(&from(port + 1), Time::ZERO).is_some());
+            assert!(clients.meet(&from(port + 1, Time::ZERO)).is_some());
         }
-        assert_eq!(clients.meet(&from(1000), Time::ZERO), None);
-        assert_eq!(clients.meet(&from(1), Time::ZERO), Some(0));
+        assert_eq!(clients.meet(&from(1000, Time::ZERO)), None);
+        assert_eq!(clients.meet(&from(1, Time::ZERO)), Some(0));
     }
 }

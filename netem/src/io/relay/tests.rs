@@ -406,3 +406,29 @@ fn a_thousand_clients_have_a_port_each_and_are_answered_each() {
     let end = until(&relay, |seen| seen.refused.packets == 1);
     assert_eq!((end.clients, end.clients_met), (1000, 1000));
 }
+
+/// Each client's answers are in a socket of their own; the link is that of all.
+#[test]
+fn what_comes_for_several_clients_at_once_reaches_each_whole_and_in_order() {
+    let server = socket(LOCAL);
+    let relay = relay(LOCAL, server.local_addr().unwrap(), "none", "delay 3ms");
+    let clients = [socket(LOCAL), socket(LOCAL)];
+    let ports = clients.each_ref().map(|client| {
+        client.send_to(b"hello", relay.local_addr()).unwrap();
+        receive(&server).1
+    });
+    // a burst to either in turn, of which the relay reads much at once
+    for number in 0..50_u8 {
+        for port in &ports {
+            server.send_to(&[number], port).unwrap();
+        }
+    }
+    for client in &clients {
+        for number in 0..50_u8 {
+            assert_eq!(receive(client).0, [number]);
+        }
+    }
+    let end = until(&relay, |seen| seen.down.sent.packets == 100);
+    offered_is_accounted_for(&end.down);
+    assert_eq!(relay.stop().unwrap().down.link.offered.packets, 100);
+}

@@ -6,17 +6,16 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
 
-use quinn::udp::EcnCodepoint;
-use rustix::event::PollFlags;
-
 use mmt_shared::io::alarm::wait;
 use mmt_shared::io::realtime;
 use mmt_shared::time::Time;
 
 use super::clients::Clients;
+use super::origin::{Origin, datagram};
+use super::pace::Pace;
 use super::port::{Port, Received, Receiver, Sending};
+use super::sockets::{ALARM, LISTEN, Ready};
 use super::{RelaySnapshot, Shared};
-use crate::capture::Sides;
 use crate::counters::Tally;
 use crate::direction::Direction;
 use crate::io::capture_file::CaptureWriter;
@@ -26,8 +25,8 @@ use crate::io::record_file::RecordWriter;
 use crate::io::{lock, now};
 use crate::packet::Departure;
 
-/// Batches taken from one socket before the times are looked at again.
-const BATCHES: usize = 16;
+/// How often the counts are copied for others at most.
+const PUBLISH_EVERY: Duration = Duration::from_millis(5);
 
 /// Everything the thread owns.
 pub(super) struct Worker {
@@ -36,6 +35,9 @@ pub(super) struct Worker {
     local: SocketAddr,
     clients: Clients,
     receiver: Receiver,
+    /// What the target sent to several clients, to be put in order.
+    answers: Vec<(Time, Datagram<Origin>)>,
+    pace: Pace,
     /// The links, whose datagrams know their client.
     up: Driver<Origin>,
     down: Driver<Origin>,
@@ -54,28 +56,10 @@ pub(super) struct Worker {
     expiry: Option<Time>,
     /// How often to rebind, and when next.
     rebind: Option<(Duration, Time)>,
+    /// When the counts were copied last, and when that is to be done next.
+    published: Time,
+    unpublished: Option<Time>,
     shared: Arc<Shared>,
-}
-
-/// Whose datagram it is, and its DSCP in the place that it has in the traffic class.
-#[derive(Clone, Debug)]
-pub(super) struct Origin {
-    number: u64,
-    dscp: u8,
-    /// Where it was sent and goes; kept for a capture only.
-    sides: Option<Box<Sides>>,
-}
-
-impl Origin {
-    pub(super) fn sides(&self) -> Option<Sides> {
-        self.sides.as_deref().copied()
-    }
-}
-
-/// The sockets with something to read.
-struct Ready {
-    listen: bool,
-    clients: Vec<u64>,
 }
 
 impl Worker {
@@ -87,10 +71,14 @@ impl Worker {
         shared: Arc<Shared>,
     ) -> Self {
         Self {
+            pace: Pace::new(listen.room()),
+            published: Time::ZERO,
+            unpublished: None,
             listen,
             local,
             clients,
             receiver: Receiver::new(),
+            answers: Vec::new(),
             up,
             down,
             record: None,
@@ -148,52 +136,52 @@ impl Worker {
     pub(super) fn run(mut self) -> io::Result<()> {
         // what the host does not grant, the lateness shows
         let _ = realtime::request();
+        self.clients.sockets.add(&self.shared.alarm, ALARM)?;
+        self.clients.sockets.add(&self.listen, LISTEN)?;
+        let mut ready = Ready::default();
         while !self.shared.stopping.load(Ordering::Acquire) {
-            self.release_due();
-            self.apply_commands();
-            self.expire();
-            self.publish();
-            let ready = self.wait()?;
+            let moment = self.release_due();
+            if ready.alarm || self.rebind.is_some() {
+                self.apply_commands();
+            }
+            self.expire(moment);
+            self.publish(moment);
+            self.wait(moment, &mut ready)?;
             if ready.listen {
                 self.receive_up();
             }
-            for number in ready.clients {
-                self.receive_down(number);
-            }
+            self.receive_down(&ready.clients);
         }
-        self.publish();
+        self.publish(Time::MAX);
         Ok(())
     }
 
-    fn wait(&self) -> io::Result<Ready> {
-        let until = [
-            self.up.poll_timeout(),
-            self.down.poll_timeout(),
+    fn wait(&mut self, moment: Time, ready: &mut Ready) -> io::Result<()> {
+        let due = [self.up.poll_timeout(), self.down.poll_timeout()];
+        let due = due.into_iter().flatten().min();
+        let [up, down] = [&self.up, &self.down].map(|link| link.earliest_of_later(moment));
+        let rest = self.pace.rest(moment, due, up.min(down));
+        if rest.is_some() {
+            wait(&mut [self.shared.alarm.as_poll_fd()], rest)?;
+        }
+        let due = due.filter(|due| rest.is_none_or(|rest| rest < *due));
+        let others = [
             self.expiry,
             self.rebind.map(|(_, next)| next),
+            self.unpublished,
+            rest,
         ];
-        let mut fds = [
-            self.shared.alarm.as_poll_fd(),
-            self.listen.as_poll_fd(),
-            self.clients.as_poll_fd(),
-        ];
-        wait(&mut fds, until.into_iter().flatten().min())?;
-        // an error is a reason to read, too: reading returns and clears it
-        let [alarm, listen, clients] = fds.map(|fd| fd.revents() != PollFlags::empty());
-        if alarm {
+        let about = others.into_iter().flatten().min();
+        self.clients.sockets.wait(due, about, ready)?;
+        self.pace.wakes(now());
+        if ready.alarm {
             self.shared.alarm.silence();
         }
-        let clients = if clients {
-            self.clients.ready()?
-        } else {
-            Vec::new()
-        };
-        Ok(Ready { listen, clients })
+        Ok(())
     }
 
     /// Forgets who was idle for too long, once somebody may have been.
-    fn expire(&mut self) {
-        let now = now();
+    fn expire(&mut self, now: Time) {
         if self.expiry.is_none_or(|at| at <= now) {
             self.clients.expire(now);
             self.expiry = self.clients.next_expiry();
@@ -213,7 +201,7 @@ impl Worker {
             capture,
             ..
         } = self;
-        let mut take = |received: Received<'_>| match clients.meet(&received, now()) {
+        let mut take = |received: Received<'_>| match clients.meet(&received) {
             Some(number) => {
                 *offered_up = received.arrived.max(*offered_up);
                 let mut datagram = datagram(number, &received);
@@ -225,59 +213,71 @@ impl Worker {
             }
             None => refused.count(received.contents.len()),
         };
-        let mut batches = (0..BATCHES).map(|_| receiver.receive(listen, &mut take));
-        let error = batches.find_map(Result::err);
+        let taken = receiver.receive(listen, &mut take);
         let overflows = self.listen.new_overflows();
         self.overflows_up = self.overflows_up.saturating_add(overflows);
-        if let Some(error) = error {
-            self.receive_error(&error);
+        self.note_error(taken);
+    }
+
+    /// Takes what the target sent to clients and puts it on the link down, as it came.
+    fn receive_down(&mut self, numbers: &[u64]) {
+        for number in numbers {
+            self.take_answers(*number);
+        }
+        if numbers.len() > 1 {
+            self.answers.sort_by_key(|(arrived, _)| *arrived);
+        }
+        for (arrived, datagram) in self.answers.drain(..) {
+            self.offered_down = arrived.max(self.offered_down);
+            self.down.offer(self.offered_down, datagram);
         }
     }
 
-    /// Takes what the target sent to a client and puts it on the link down.
-    fn receive_down(&mut self, number: u64) {
+    fn take_answers(&mut self, number: u64) {
         let Some(client) = self.clients.get_mut(number) else {
             return;
         };
         let (local, captures) = (self.local, self.capture.is_some());
-        for _ in 0..BATCHES {
-            let (down, offered) = (&mut self.down, &mut self.offered_down);
-            let received = self.receiver.receive(&client.port, |received| {
-                *offered = received.arrived.max(*offered);
-                let mut datagram = datagram(number, &received);
-                let turned = || client.sides(local, received.from, received.class).turned();
-                datagram.address.sides = captures.then(|| Box::new(turned()));
-                down.offer(*offered, datagram);
-            });
-            let overflows = client.port.new_overflows();
-            self.overflows_down = self.overflows_down.saturating_add(overflows);
-            match received {
-                Ok(()) => client.seen(now()),
-                Err(error) => return self.receive_error(&error),
-            }
-        }
+        let (receiver, answers) = (&mut self.receiver, &mut self.answers);
+        let mut last = None;
+        let taken = receiver.receive(&client.port, |received| {
+            let mut datagram = datagram(number, &received);
+            let turned = || client.sides(local, received.from, received.class).turned();
+            datagram.address.sides = captures.then(|| Box::new(turned()));
+            answers.push((received.arrived, datagram));
+            last = Some(received.arrived);
+        });
+        last.into_iter().for_each(|arrived| client.seen(arrived));
+        let overflows = client.port.new_overflows();
+        self.overflows_down = self.overflows_down.saturating_add(overflows);
+        self.note_error(taken);
     }
 
-    fn receive_error(&mut self, error: &io::Error) {
+    fn note_error(&mut self, taken: io::Result<()>) {
+        let Err(error) = taken else {
+            return;
+        };
         let counter = match error.kind() {
-            io::ErrorKind::WouldBlock | io::ErrorKind::Interrupted => return,
             io::ErrorKind::ConnectionRefused => &mut self.unreachable,
             _ => &mut self.receive_errors,
         };
         *counter = counter.saturating_add(1);
     }
 
-    fn release_due(&mut self) {
-        while let Some(mut packet) = self.up.poll(now()) {
-            let moment = now();
+    /// Sends what is due, and returns the time.
+    fn release_due(&mut self) -> Time {
+        let mut moment = now();
+        while let Some(mut packet) = self.up.poll(moment) {
             let outcome = self.send(Direction::Up, &mut packet);
             self.up.finish(&packet, outcome, moment);
+            moment = now();
         }
-        while let Some(mut packet) = self.down.poll(now()) {
-            let moment = now();
+        while let Some(mut packet) = self.down.poll(moment) {
             let outcome = self.send(Direction::Down, &mut packet);
             self.down.finish(&packet, outcome, moment);
+            moment = now();
         }
+        moment
     }
 
     /// Sends to the target from the client's own port, or to the client from the address that it knows.
@@ -302,7 +302,13 @@ impl Worker {
         port.send(sending, &packet.payload.contents, &mut self.unreachable)
     }
 
-    fn publish(&self) {
+    fn publish(&mut self, now: Time) {
+        let next = self.published + PUBLISH_EVERY;
+        if now < next {
+            self.unpublished = Some(next);
+            return;
+        }
+        (self.published, self.unpublished) = (now, None);
         *lock(&self.shared.board) = RelaySnapshot {
             up: self.up.counters(),
             down: self.down.counters(),
@@ -319,17 +325,5 @@ impl Worker {
             // the handle reads the histogram itself
             lateness: Lateness::default(),
         };
-    }
-}
-
-fn datagram(number: u64, received: &Received<'_>) -> Datagram<Origin> {
-    Datagram {
-        address: Origin {
-            number,
-            dscp: received.class & !3,
-            sides: None,
-        },
-        ecn: EcnCodepoint::from_bits(received.class & 3),
-        contents: received.contents.to_owned(),
     }
 }
