@@ -4,6 +4,7 @@ use std::fmt::Display;
 use std::io::{self, ErrorKind, Write};
 use std::time::Duration;
 
+use mmt_shared::report::{Brief, RunReport};
 use serde::Serialize;
 
 use crate::failure::Failure;
@@ -29,6 +30,24 @@ pub(crate) fn print(data: impl Display) -> Result<(), Failure> {
 pub(crate) fn print_json(document: &impl Serialize) -> Result<(), Failure> {
     let text = serde_json::to_string_pretty(document);
     print(text.map_err(|error| Failure::failed(format!("the report is no JSON: {error}")))?)
+}
+
+/// Writes a report to stdout: as JSON, whole, or in a sentence and ten lines.
+///
+/// # Errors
+/// As [`print`].
+pub(crate) fn print_report<C: Serialize>(
+    report: &RunReport<C>,
+    json: bool,
+    full: bool,
+) -> Result<(), Failure> {
+    if json {
+        print_json(report)
+    } else if full {
+        print(report)
+    } else {
+        print(Brief(report))
+    }
 }
 
 fn print_to(out: &mut impl Write, data: impl Display) -> Result<(), Failure> {

@@ -1,8 +1,10 @@
-//! How a run is asked to end: Ctrl-C, SIGTERM, SIGHUP or a key. The second time ends the process at once.
+//! How a run is asked to end: Ctrl-C, SIGTERM, SIGHUP or a key; the second time ends the process at once. And its emergency
+//! stop: SIGUSR1 sets it, SIGUSR2 clears it.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use mmt_shared::io::emergency::EmergencyStop;
 use tokio::signal::unix::{SignalKind, signal};
 use tokio::sync::watch;
 
@@ -14,6 +16,7 @@ use crate::view::restore_terminal;
 pub(crate) struct Stop {
     wanted: Arc<watch::Sender<bool>>,
     asked: Arc<AtomicBool>,
+    emergency: EmergencyStop,
 }
 
 impl Stop {
@@ -22,10 +25,12 @@ impl Stop {
         Self {
             wanted: Arc::new(watch::Sender::new(false)),
             asked: Arc::default(),
+            emergency: EmergencyStop::default(),
         }
     }
 
-    /// A wish that SIGINT, SIGTERM and SIGHUP wake from now on; SIGHUP only where it is not ignored (`nohup`).
+    /// A wish that SIGINT, SIGTERM and SIGHUP wake from now on, SIGHUP only where it is not ignored (`nohup`); with an
+    /// emergency stop that SIGUSR1 sets and SIGUSR2 clears.
     ///
     /// # Errors
     /// The system gives no thread or no signals.
@@ -37,7 +42,7 @@ impl Stop {
             .build()
             .map_err(no_signals)?;
         // Registered before the thread starts: from here on no signal is missed.
-        let (mut interrupt, mut terminate, mut hang_up) = {
+        let (mut interrupt, mut terminate, mut hang_up, mut set, mut clear) = {
             let _inside = runtime.enter();
             let register = |kind| signal(kind).map_err(no_signals);
             (
@@ -46,6 +51,8 @@ impl Stop {
                 (!ignores_hang_up())
                     .then(|| register(SignalKind::hangup()))
                     .transpose()?,
+                register(SignalKind::user_defined1())?,
+                register(SignalKind::user_defined2())?,
             )
         };
         let wait = async move {
@@ -60,6 +67,8 @@ impl Stop {
                     _ = hung_up => on_signal.ask(),
                     _ = interrupt.recv() => on_signal.ask(),
                     _ = terminate.recv() => on_signal.ask(),
+                    _ = set.recv() => on_signal.emergency.set(true),
+                    _ = clear.recv() => on_signal.emergency.set(false),
                 }
             }
         };
@@ -82,6 +91,11 @@ impl Stop {
         }
         self.wanted.send_replace(true);
         tracing::info!("ending; once more to quit at once");
+    }
+
+    /// The emergency stop of this side.
+    pub(crate) fn emergency(&self) -> &EmergencyStop {
+        &self.emergency
     }
 
     /// Ends the run without counting as asked by a person.

@@ -6,14 +6,11 @@
 use mmt_shared::model::geometry::Vec2;
 use mmt_shared::pairing::{SECRET_BYTES, Token};
 use mmt_shared::range::OutOfRange;
-use mmt_shared::record::PROGRAM;
+use mmt_shared::record::again::{EndAgain, TickInput};
 use mmt_shared::record::digest::RunDigest;
-use mmt_shared::record::messages::{Arrival, MasterTick, Session, Stamp};
+use mmt_shared::record::messages::{Arrival, MasterTick, Session};
 use mmt_shared::time::Time;
-use mmt_shared::wire::{
-    Architecture, DATAGRAM_MAX, DecodeError, STREAM_MESSAGE_MAX, Side, StreamMessage, Welcome,
-    WelcomeError,
-};
+use mmt_shared::wire::{Architecture, DecodeError, Side, StreamMessage, Welcome, WelcomeError};
 use serde::{Deserialize, Serialize};
 
 use crate::commands::CommandConfig;
@@ -82,27 +79,16 @@ impl MasterSetting {
             resume: Token::new([0; SECRET_BYTES]),
             ..self.welcome
         };
-        let mut opening = [0; STREAM_MESSAGE_MAX];
-        // an accepted welcome can be written; without it the record cannot run again, which is seen then
-        let length = StreamMessage::Welcome((&welcome).into()).encode(&mut opening);
-        let opening = opening.get(..length.unwrap_or(0)).unwrap_or_default();
         let numbers = Numbers {
             architecture: self.architecture,
             limits: self.limits,
             commands: self.commands,
         };
-        Session {
-            stamp: Stamp::default(),
-            session: 0,
-            program: PROGRAM.to_owned(),
-            began_ns: self.began.as_nanos(),
-            opening: opening.to_vec(),
-            setting: serde_json::to_string(&numbers).unwrap_or_default(),
-            configuration: serde_json::to_string(configuration).unwrap_or_default(),
-        }
+        let opening = StreamMessage::Welcome((&welcome).into());
+        Session::of_end(self.began, &opening, &numbers, configuration)
     }
 
-    /// What a record says.
+    /// The setting that a record has.
     ///
     /// # Errors
     /// A part of it cannot be read or is not accepted.
@@ -130,42 +116,50 @@ pub struct MasterAgain {
 }
 
 impl MasterAgain {
-    /// The session at its beginning.
-    ///
-    /// # Errors
-    /// The record does not say all that it is made of.
-    pub fn try_new(session: &Session) -> Result<Self, MasterAgainError> {
+    /// The end as it is now.
+    pub fn end(&self) -> &MasterEnd {
+        &self.end
+    }
+}
+
+impl EndAgain for MasterAgain {
+    const SIDE: &'static str = "master";
+    type Tick = MasterTick;
+    type Error = MasterAgainError;
+
+    fn try_new(session: &Session) -> Result<Self, MasterAgainError> {
         Ok(Self {
             end: MasterSetting::of_session(session)?.end()?,
             digest: RunDigest::default(),
         })
     }
 
-    /// The end as it is now.
-    pub fn end(&self) -> &MasterEnd {
-        &self.end
-    }
-
-    /// A datagram that arrived.
-    pub fn arrival(&mut self, arrival: &Arrival) {
+    fn arrival(&mut self, arrival: &Arrival) {
         let at = Time::from_nanos(arrival.at_ns);
         self.end.handle_datagram(at, &arrival.datagram);
     }
 
-    /// A tick; returns the digest of all that was given before its datagrams, which is to be the recorded one.
-    pub fn tick(&mut self, tick: &MasterTick) -> u64 {
+    fn tick(&mut self, tick: &MasterTick) -> u64 {
         if tick.releases {
             self.end.release();
         }
+        self.end.stop(tick.stops);
         self.end.hold(tick.engaged);
         let reading = Vec2::new(tick.reading_x_m, tick.reading_y_m);
         let done = self.end.tick(Time::from_nanos(tick.deadline_ns), reading);
         self.digest.tick(&done);
         let value = self.digest.value();
-        let (sent, mut out) = (Time::from_nanos(tick.sent_ns), [0; DATAGRAM_MAX]);
-        while let Ok(Some(length)) = self.end.poll_transmit(sent, &mut out) {
-            self.digest.datagram(out.get(..length).unwrap_or_default());
-        }
+        let (end, sent) = (&mut self.end, Time::from_nanos(tick.sent_ns));
+        self.digest
+            .datagrams(|out| end.poll_transmit(sent, out).ok().flatten());
         value
+    }
+
+    fn input(tick: &MasterTick) -> TickInput {
+        TickInput {
+            session: tick.session,
+            index: tick.index,
+            digest: tick.digest,
+        }
     }
 }

@@ -56,6 +56,19 @@ pub struct MasterCounts {
     pub updates_superseded: u64,
 }
 
+/// What a tick of the master's end is given besides its deadline.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MasterGiven {
+    /// The device's HIP, m, world.
+    pub reading: Vec2,
+    /// Whether a hand holds the device.
+    pub engaged: bool,
+    /// Whether the hand is to be released from this tick on.
+    pub releases: bool,
+    /// Whether the master's emergency stop is set.
+    pub stops: bool,
+}
+
 /// The master's end.
 #[derive(Clone, Debug)]
 pub struct MasterEnd {
@@ -169,7 +182,18 @@ impl MasterEnd {
 
     /// Whether a hand holds the device from now on ([`Master::hold`]).
     pub fn hold(&mut self, engaged: bool) {
-        self.master.hold(engaged);
+        self.master.hold(engaged && self.stopped_by().is_none());
+    }
+
+    /// Sets or clears the master's emergency stop. While either side's is set there is no force on the hand; afterwards it
+    /// is engaged by [`MasterEnd::hold`].
+    pub fn stop(&mut self, stopped: bool) {
+        self.channel.stop(stopped);
+    }
+
+    /// Whose emergency stop is set; none if neither's.
+    pub fn stopped_by(&self) -> Option<Side> {
+        self.channel.stopped_by()
     }
 
     /// Takes in a datagram that arrived at `at`.
@@ -243,6 +267,7 @@ impl MasterEnd {
             self.counts.age.push(now, answers);
         }
         let silence = self.channel.silence(now);
+        self.master.stop(self.stopped_by().is_some());
         let tick = self.master.tick(now, reading, silence);
         self.counts.on_hand.push(tick.hand_force);
         self.counts.breaks.push(self.master.view().in_contact);

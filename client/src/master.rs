@@ -48,6 +48,8 @@ pub struct Master {
     link: LinkState,
     /// The session ends: the hand is not engaged again.
     ended: bool,
+    /// An emergency stop is set.
+    stopped: bool,
     port: PortObserver,
     hip: HipCounts,
     bad_readings: u64,
@@ -74,6 +76,7 @@ impl Master {
             limiter,
             link: LinkState::Fresh,
             ended: false,
+            stopped: false,
             port: PortObserver::default(),
             hip: HipCounts::default(),
             bad_readings: 0,
@@ -150,6 +153,15 @@ impl Master {
         }
     }
 
+    /// Whether there is to be no force on the hand from the next tick on: it falls as fast as the device's limits allow.
+    /// Afterwards the hand has to be engaged anew.
+    pub fn stop(&mut self, stopped: bool) {
+        self.stopped = stopped;
+        if stopped {
+            self.limiter.release();
+        }
+    }
+
     /// Applies an accepted update, unless the hand has been released; returns whether it did.
     pub fn apply(&mut self, update: &Update) -> bool {
         let alive = self.link < LinkState::Released;
@@ -197,7 +209,8 @@ impl Master {
             hip: self.hip,
             force,
         };
-        let hand_force = self.limiter.limit(-felt);
+        let wanted = if self.stopped { Vec2::zeros() } else { -felt };
+        let hand_force = self.limiter.limit(wanted);
         if let Some(tdpa) = &mut self.tdpa {
             tdpa.displayed(hand_force);
         }
@@ -222,127 +235,4 @@ impl Master {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::failsafe::RELEASE;
-    use crate::limiter::Limits;
-    use mmt_shared::model::contact::Coupling;
-    use mmt_shared::model::geometry::{BoxFootprint, Pose, Twist};
-    use mmt_shared::model::params::{ModelParams, ModelState};
-    use mmt_shared::model::settings::Mode;
-    use mmt_shared::model::update::Cause;
-    use mmt_shared::pairing::Token;
-    use mmt_shared::wire::Label;
-
-    fn welcome() -> Welcome {
-        let coupling = Coupling::for_stiffness(1000.0);
-        let params = ModelParams::of_square(0.7, 3.0, 2.06, 0.4, &coupling).unwrap();
-        let (footprint, pose) = (BoxFootprint::square(0.4), Pose::default());
-        Welcome {
-            settings: Mode::Recommended.model_settings(coupling),
-            state: ModelState::try_new(params, footprint, pose, Twist::default(), &coupling)
-                .unwrap(),
-            tool: Vec2::new(-0.45, 0.0),
-            resume: Token::new([0; 32]),
-            scheme: Label::clipped("timer 150ms"),
-            program: Label::clipped("test"),
-        }
-    }
-
-    fn master() -> Master {
-        Master::new(
-            &welcome(),
-            ForceLimiter::try_new(Limits::default()).unwrap(),
-        )
-    }
-
-    /// Pushes the west face at 0.1 m/s from 1 cm away.
-    fn push(
-        master: &mut Master,
-        ticks: std::ops::RangeInclusive<u64>,
-        silence: Duration,
-    ) -> MasterTick {
-        ticks
-            .map(|n| {
-                let hip = Vec2::new(-0.21 + 1e-4 * n as f64, 0.0);
-                master.tick(Time::from_millis(n), hip, silence)
-            })
-            .last()
-            .unwrap()
-    }
-
-    fn update() -> Update {
-        let state = welcome().state;
-        Update {
-            sequence: 1,
-            cause: Cause::Timer,
-            answers: Time::from_millis(1),
-            slave_in_contact: true,
-            state,
-        }
-    }
-
-    #[test]
-    fn the_hand_gets_the_opposite_of_what_the_object_gets() {
-        let tick = push(&mut master(), 1..=2000, Duration::ZERO);
-        assert!((tick.rendered.force.x - 2.36).abs() < 1e-3);
-        assert!((tick.hand_force + tick.rendered.force).norm() < 1e-12);
-        let sent = tick.sample.force.newtons();
-        assert!(
-            (sent - tick.rendered.force).norm() <= 1e-4,
-            "sent on the wire's grid"
-        );
-    }
-
-    #[test]
-    fn a_reading_that_is_no_number_is_replaced_by_the_one_before() {
-        let mut master = master();
-        let before = push(&mut master, 1..=500, Duration::ZERO);
-        let tick = master.tick(
-            Time::from_millis(501),
-            Vec2::new(f64::NAN, 0.0),
-            Duration::ZERO,
-        );
-        assert_eq!(tick.sample.hip, before.sample.hip);
-        assert!(tick.hand_force.x.is_finite());
-        assert_eq!(master.bad_readings(), 1);
-    }
-
-    #[test]
-    fn a_silent_link_releases_the_hand_for_good() {
-        let mut master = master();
-        let just_before = RELEASE - Duration::from_nanos(1);
-        let held = push(&mut master, 1..=1000, just_before);
-        assert!(
-            held.hand_force.norm() > 2.0,
-            "the frozen model is rendered on"
-        );
-        let mut last = push(&mut master, 1001..=1001, RELEASE).hand_force.norm();
-        for n in 1002..=1300 {
-            // the link is back, the hand is not
-            let now = push(&mut master, n..=n, Duration::ZERO).hand_force.norm();
-            assert!(now <= last + 1e-12);
-            last = now;
-        }
-        assert_eq!(last, 0.0);
-    }
-
-    #[test]
-    fn an_update_after_the_release_is_counted_and_not_applied() {
-        let mut master = master();
-        master.apply(&update());
-        push(&mut master, 1..=1, RELEASE);
-        master.apply(&update());
-        assert_eq!((master.applied(), master.frozen()), (1, 1));
-    }
-
-    #[test]
-    fn both_sides_compute_with_the_rounded_hip() {
-        let mut master = master();
-        let hip = Vec2::new(-0.190_000_049_9, 0.0);
-        master.tick(Time::from_millis(1), hip, Duration::ZERO);
-        let met = master.model().history().newest().unwrap().hip;
-        assert_eq!(met, HipCounts::nearest(hip).metres());
-        assert_ne!(met, hip);
-    }
-}
+mod tests;

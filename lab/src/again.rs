@@ -8,8 +8,9 @@ use mmt_client::again::{MasterAgain, MasterAgainError};
 use mmt_server::again::{SlaveAgain, SlaveAgainError};
 use mmt_shared::clean::clean;
 use mmt_shared::record::PROGRAM;
+use mmt_shared::record::again::EndAgain;
 use mmt_shared::record::cdr::CdrError;
-use mmt_shared::record::messages::{Arrival, MasterTick, Message, Session, SlaveTick};
+use mmt_shared::record::messages::{Arrival, Message, Session};
 
 /// Why a record did not run again.
 #[derive(Debug, thiserror::Error)]
@@ -77,66 +78,6 @@ impl RanAgain {
     }
 }
 
-/// An end that runs again.
-trait End: Sized {
-    /// Its name, and the first part of its topics.
-    const SIDE: &'static str;
-    /// A tick of it.
-    type Tick: Message;
-
-    fn begin(session: &Session) -> Result<Self, AgainError>;
-
-    fn arrival(&mut self, arrival: &Arrival);
-
-    /// Session and number of the input.
-    fn place(tick: &Self::Tick) -> (u32, u64);
-
-    /// Digest of what it gives now, and of what it gave.
-    fn tick(&mut self, tick: &Self::Tick) -> (u64, u64);
-}
-
-impl End for MasterAgain {
-    const SIDE: &'static str = "master";
-    type Tick = MasterTick;
-
-    fn begin(session: &Session) -> Result<Self, AgainError> {
-        Ok(Self::try_new(session)?)
-    }
-
-    fn arrival(&mut self, arrival: &Arrival) {
-        self.arrival(arrival);
-    }
-
-    fn place(tick: &MasterTick) -> (u32, u64) {
-        (tick.session, tick.index)
-    }
-
-    fn tick(&mut self, tick: &MasterTick) -> (u64, u64) {
-        (self.tick(tick), tick.digest)
-    }
-}
-
-impl End for SlaveAgain {
-    const SIDE: &'static str = "slave";
-    type Tick = SlaveTick;
-
-    fn begin(session: &Session) -> Result<Self, AgainError> {
-        Ok(Self::try_new(session)?)
-    }
-
-    fn arrival(&mut self, arrival: &Arrival) {
-        self.arrival(arrival);
-    }
-
-    fn place(tick: &SlaveTick) -> (u32, u64) {
-        (tick.session, tick.index)
-    }
-
-    fn tick(&mut self, tick: &SlaveTick) -> (u64, u64) {
-        (self.tick(tick), tick.digest)
-    }
-}
-
 /// The sessions of one end.
 struct Sessions<E>(BTreeMap<u32, (E, RanAgain)>);
 
@@ -146,13 +87,16 @@ impl<E> Default for Sessions<E> {
     }
 }
 
-impl<E: End> Sessions<E> {
+impl<E: EndAgain<Error: Into<AgainError>>> Sessions<E> {
     /// `what`: the rest of the topic.
     fn take(&mut self, what: &str, topic: &str, message: &[u8]) -> Result<(), AgainError> {
         match what {
             "session" => {
                 let session = beginning(topic, message)?;
-                let began = (E::begin(&session)?, RanAgain::default());
+                let began = (
+                    E::try_new(&session).map_err(Into::into)?,
+                    RanAgain::default(),
+                );
                 self.0.insert(session.session, began);
             }
             "arrivals" => {
@@ -164,18 +108,18 @@ impl<E: End> Sessions<E> {
             }
             "ticks" => {
                 let tick: E::Tick = parse(topic, message)?;
-                let (session, index) = E::place(&tick);
-                let (end, ran) = self.session(session)?;
-                if ran.is_next(index) {
-                    let (gives, gave) = end.tick(&tick);
-                    if gives != gave {
+                let input = E::input(&tick);
+                let (end, ran) = self.session(input.session)?;
+                if ran.is_next(input.index) {
+                    let digest = end.tick(&tick);
+                    if digest != input.digest {
                         return Err(AgainError::Difference {
                             side: E::SIDE,
-                            session,
+                            session: input.session,
                             tick: ran.ticks,
                         });
                     }
-                    (ran.ticks, ran.digest) = (ran.ticks + 1, gives);
+                    (ran.ticks, ran.digest) = (ran.ticks + 1, digest);
                 }
             }
             _ => {}

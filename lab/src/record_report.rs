@@ -1,7 +1,7 @@
-//! What a record tells of its run: forces over time, packets and what became of them, delays, the loops.
+//! The report of a record: forces over time, packets and what became of them, delays, the loops.
 //!
 //! Pure: whoever reads the files hands over message by message. The ends of a run may lie in one file or in two; what only
-//! both together tell, such as losses and one-way delays, is absent where only one is there.
+//! both together show, such as losses and one-way delays, is absent where only one is there.
 
 mod delays;
 mod packets;
@@ -127,7 +127,7 @@ impl RecordReport {
         });
     }
 
-    /// All that it tells.
+    /// Its tables and figures.
     #[must_use]
     pub fn findings(&self, title: &str) -> Findings {
         let matched = self.packets.matched();

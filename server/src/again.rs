@@ -4,13 +4,11 @@
 //! it was on the wire, but for its token, which is zero, and its claim: no record holds a secret.
 
 use mmt_shared::pairing::{SECRET_BYTES, Token};
-use mmt_shared::record::PROGRAM;
+use mmt_shared::record::again::{EndAgain, TickInput};
 use mmt_shared::record::digest::RunDigest;
-use mmt_shared::record::messages::{Arrival, Session, SlaveTick, Stamp};
+use mmt_shared::record::messages::{Arrival, Session, SlaveTick};
 use mmt_shared::time::Time;
-use mmt_shared::wire::{
-    Claim, DATAGRAM_MAX, DecodeError, Hello, HelloError, STREAM_MESSAGE_MAX, Side, StreamMessage,
-};
+use mmt_shared::wire::{Claim, DecodeError, Hello, HelloError, Side, StreamMessage};
 use serde::{Deserialize, Serialize};
 
 use crate::end::SlaveEnd;
@@ -60,23 +58,11 @@ pub fn session(
         claim: Claim::IfFree,
         ..*hello
     };
-    let mut opening = [0; STREAM_MESSAGE_MAX];
-    // an accepted hello can be written; without it the record cannot run again, which is seen then
-    let length = StreamMessage::Hello(hello).encode(&mut opening);
-    let opening = opening.get(..length.unwrap_or(0)).unwrap_or_default();
     let setting = Setting {
         slave: config.clone(),
         earlier: earlier.cloned(),
     };
-    Session {
-        stamp: Stamp::default(),
-        session: 0,
-        program: PROGRAM.to_owned(),
-        began_ns: began.as_nanos(),
-        opening: opening.to_vec(),
-        setting: serde_json::to_string(&setting).unwrap_or_default(),
-        configuration: serde_json::to_string(configuration).unwrap_or_default(),
-    }
+    Session::of_end(began, &StreamMessage::Hello(hello), &setting, configuration)
 }
 
 /// A recorded session at work again.
@@ -86,11 +72,19 @@ pub struct SlaveAgain {
 }
 
 impl SlaveAgain {
-    /// The session at its beginning.
-    ///
-    /// # Errors
-    /// The record does not say all that it is made of.
-    pub fn try_new(session: &Session) -> Result<Self, SlaveAgainError> {
+    /// The end as it is now.
+    #[must_use]
+    pub fn end(&self) -> &SlaveEnd {
+        &self.end
+    }
+}
+
+impl EndAgain for SlaveAgain {
+    const SIDE: &'static str = "slave";
+    type Tick = SlaveTick;
+    type Error = SlaveAgainError;
+
+    fn try_new(session: &Session) -> Result<Self, SlaveAgainError> {
         let StreamMessage::Hello(hello) = StreamMessage::decode(&session.opening, Side::Master)?
         else {
             return Err(SlaveAgainError::NoHello);
@@ -103,28 +97,28 @@ impl SlaveAgain {
         })
     }
 
-    /// The end as it is now.
-    #[must_use]
-    pub fn end(&self) -> &SlaveEnd {
-        &self.end
-    }
-
-    /// A datagram that arrived.
-    pub fn arrival(&mut self, arrival: &Arrival) {
+    fn arrival(&mut self, arrival: &Arrival) {
         let at = Time::from_nanos(arrival.at_ns);
         self.end.handle_datagram(at, &arrival.datagram);
     }
 
-    /// A tick; returns the digest of all that was given before its datagrams, which is to be the recorded one.
-    pub fn tick(&mut self, tick: &SlaveTick) -> u64 {
+    fn tick(&mut self, tick: &SlaveTick) -> u64 {
+        self.end.stop(tick.stops);
         let done = self.end.tick(Time::from_nanos(tick.deadline_ns));
         self.digest.tick(&done);
         let value = self.digest.value();
-        let (sent, mut out) = (Time::from_nanos(tick.sent_ns), [0; DATAGRAM_MAX]);
-        while let Ok(Some(length)) = self.end.poll_transmit(sent, &mut out) {
-            self.digest.datagram(out.get(..length).unwrap_or_default());
-        }
+        let (end, sent) = (&mut self.end, Time::from_nanos(tick.sent_ns));
+        self.digest
+            .datagrams(|out| end.poll_transmit(sent, out).ok().flatten());
         value
+    }
+
+    fn input(tick: &SlaveTick) -> TickInput {
+        TickInput {
+            session: tick.session,
+            index: tick.index,
+            digest: tick.digest,
+        }
     }
 }
 

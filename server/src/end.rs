@@ -6,7 +6,6 @@
 use std::time::Duration;
 
 use mmt_shared::channel::datagram_channel::DatagramChannel;
-use mmt_shared::channel::peer::NumbersSpent;
 use mmt_shared::channel::rate_control::StretchMax;
 use mmt_shared::metrics::UpdateCounts;
 use mmt_shared::model::tool::{Scene, Tool};
@@ -18,8 +17,8 @@ use crate::repeats::{Repeating, Repeats};
 use crate::slave::{Memory, Slave, SlaveConfig, SlaveError, SlaveTick};
 
 mod half;
+mod transmit;
 
-const SECOND: Duration = Duration::from_secs(1);
 /// Without a new sample for this long the tool is disengaged: it stands, and only a new session moves it. The hand was
 /// released a second before.
 pub const DISENGAGE: Duration = Duration::from_secs(2);
@@ -41,6 +40,13 @@ pub struct SlaveEndConfig {
 
 /// A tick counts as at most this long.
 const TICK_MAX: Duration = Duration::from_millis(10);
+
+/// What a tick of the slave's end is given besides its deadline.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SlaveGiven {
+    /// Whether the slave's emergency stop is set.
+    pub stops: bool,
+}
 
 /// What the slave's end counts.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -177,6 +183,17 @@ impl SlaveEnd {
         self.config.architecture
     }
 
+    /// Sets or clears the slave's emergency stop. While either side's is set the tool stands where it is.
+    pub fn stop(&mut self, stopped: bool) {
+        self.channel.stop(stopped);
+    }
+
+    /// Whose emergency stop is set; none if neither's.
+    #[must_use]
+    pub fn stopped_by(&self) -> Option<Side> {
+        self.channel.stopped_by()
+    }
+
     /// Whether the tool stands for good, because no sample came for [`DISENGAGE`].
     #[must_use]
     pub fn is_disengaged(&self) -> bool {
@@ -242,6 +259,7 @@ impl SlaveEnd {
     /// One sample period; `now` is the tick's deadline. None before the first HIP sample is due.
     pub fn tick(&mut self, now: Time) -> Option<SlaveTick> {
         self.consider_disengaging(now);
+        self.slave.hold_tool(self.stopped_by().is_some());
         let tick = self.slave.tick(now)?;
         self.counts.updates.tick(tick.in_contact);
         if let Some(update) = tick.update {
@@ -252,95 +270,6 @@ impl SlaveEnd {
         let looks = self.config.scene_hz > 0;
         self.scene = looks.then(|| self.slave.scene(&tick));
         Some(tick)
-    }
-
-    /// Writes the next datagram that is to be sent at `now` to `out` and returns its length; none if there is nothing
-    /// to send. To be called until there is none.
-    ///
-    /// # Errors
-    /// The session has used up its datagram numbers.
-    pub fn poll_transmit(
-        &mut self,
-        now: Time,
-        out: &mut [u8],
-    ) -> Result<Option<usize>, NumbersSpent> {
-        if let Some(update) = self.update.take() {
-            return self.send_update(now, &update, out);
-        }
-        if let Some(tool) = self.tool.take() {
-            return self.channel.encode(now, Message::Tool(tool), out);
-        }
-        if let Some(scene) = self.take_due_scene(now) {
-            return self.channel.encode(now, Message::Scene(scene), out);
-        }
-        if let Some(update) = self.take_due_repeat(now) {
-            let message = Message::Update((&update).into());
-            let sent = self.channel.encode(now, message, out);
-            if let Ok(Some(_)) = sent {
-                self.counts.repeated.sent(update.cause);
-            }
-            return sent;
-        }
-        if self.channel.heartbeat_due() <= now {
-            return self.channel.encode(now, Message::Heartbeat, out);
-        }
-        Ok(None)
-    }
-
-    /// When something must go out if no tick gives a reason before: a scene, a repeat or a heartbeat.
-    #[must_use]
-    pub fn poll_timeout(&self) -> Time {
-        let others = [self.repeat_due(), self.scene_due()];
-        let heartbeat = self.channel.heartbeat_due();
-        others.into_iter().flatten().fold(heartbeat, Time::min)
-    }
-
-    /// Sends a new update. Its repeats are due from now on, and those of the update before no more.
-    fn send_update(
-        &mut self,
-        now: Time,
-        update: &Update,
-        out: &mut [u8],
-    ) -> Result<Option<usize>, NumbersSpent> {
-        self.repeating = Some(Repeating::new(now, *update));
-        let sent = self
-            .channel
-            .encode(now, Message::Update(update.into()), out);
-        if let Ok(Some(_)) = sent {
-            self.counts.updates.sent(update.cause);
-            self.newest_sent = self.newest_sent.max(update.sequence);
-        } else {
-            self.counts.updates_unsent += 1;
-        }
-        sent
-    }
-
-    /// When the next repeat is due: never while the path is congested, nor once the master has the update.
-    fn repeat_due(&self) -> Option<Time> {
-        let repeating = self.repeating.as_ref()?;
-        let wanted = repeating.update.sequence > self.newest_acknowledged;
-        let due = repeating.due(&self.config.repeats)?;
-        (wanted && self.channel.stretch() <= 1.0).then_some(due)
-    }
-
-    fn take_due_repeat(&mut self, now: Time) -> Option<Update> {
-        self.repeat_due().filter(|due| *due <= now)?;
-        let repeating = self.repeating.as_mut()?;
-        let due = repeating.take_due(now, &self.config.repeats);
-        due.then_some(repeating.update)
-    }
-
-    /// When the next scene is due, seldomer under congestion; never where nobody wants scenes.
-    fn scene_due(&self) -> Option<Time> {
-        let hz = self.config.scene_hz;
-        let period = SECOND.checked_div(hz.into())?;
-        Some(self.scene_sent + period.mul_f64(self.channel.stretch()))
-    }
-
-    fn take_due_scene(&mut self, now: Time) -> Option<Scene> {
-        self.scene_due().filter(|due| *due <= now)?;
-        self.scene_sent = now;
-        self.scene
     }
 }
 

@@ -29,6 +29,10 @@ use interpolator::{Aim, Interpolator, around};
 use jitter_buffer::JitterBuffer;
 use speed_limiter::SpeedLimiter;
 
+/// Once it is no longer held, the tool follows again when the HIP comes this near, m: a hand that went elsewhere meanwhile has
+/// to come for it.
+const ENGAGE_M: f64 = 0.02;
+
 /// The three stages. Allocates when made, never afterwards.
 #[derive(Clone, Debug)]
 pub struct PlayoutBuffer {
@@ -37,6 +41,10 @@ pub struct PlayoutBuffer {
     limiter: SpeedLimiter,
     counts: PlayoutCounts,
     delays: Histogram,
+    /// The tool is to stand.
+    held: bool,
+    /// It stands.
+    stands: bool,
 }
 
 impl PlayoutBuffer {
@@ -52,12 +60,20 @@ impl PlayoutBuffer {
             limiter: SpeedLimiter::new(config.speed_max_m_per_s, config.reach_m),
             counts: PlayoutCounts::default(),
             delays: Histogram::default(),
+            held: false,
+            stands: false,
         })
     }
 
     /// Sets where the tool is before the first sample, m: the speed limit holds from there on.
     pub fn start_at(&mut self, hip: Vec2) {
         self.limiter.start_at(hip);
+    }
+
+    /// Holds the tool where it is, from the next tick on; or no longer: then it follows again once the HIP comes within
+    /// 2 cm of it.
+    pub fn hold(&mut self, held: bool) {
+        self.held = held;
     }
 
     /// Takes in a sample that arrived at `arrived` by the slave's clock, in any order.
@@ -72,18 +88,27 @@ impl PlayoutBuffer {
         let elapsed = self.limiter.elapsed(now);
         let stamp = self.buffer.due(now, elapsed)?;
         let aim = self.aim(stamp)?;
-        let step = self.limiter.step(now, elapsed, aim.hip);
+        let stood = self.standing_at(aim.hip);
+        let step = self.limiter.step(now, elapsed, stood.unwrap_or(aim.hip));
+        let limited = step.limited || stood.is_some();
         let played = Played {
             stamp: self.buffer.play(stamp),
             hip: step.hip,
             velocity: step.velocity,
-            force: aim.force.filter(|_| !step.limited),
+            force: aim.force.filter(|_| !limited),
             status: aim.status,
-            limited: step.limited,
+            limited,
         };
         self.counts.note(&played);
         self.delays.record(self.delay());
         Some(played)
+    }
+
+    /// Where the tool stands while it is held, and until the HIP at `aim` has come for it; none while it follows.
+    fn standing_at(&mut self, aim: Vec2) -> Option<Vec2> {
+        let place = self.limiter.place()?;
+        self.stands = self.held || (self.stands && (aim - place).norm() > ENGAGE_M);
+        self.stands.then_some(place)
     }
 
     /// Where the HIP was at a stamp, m: the sample of that stamp, or what stands in for it when it is lost

@@ -199,6 +199,11 @@ impl Slave {
         &self.force
     }
 
+    /// Holds the tool where it is, or no longer ([`PlayoutBuffer::hold`]).
+    pub fn hold_tool(&mut self, held: bool) {
+        self.playout.hold(held);
+    }
+
     /// Takes in a HIP sample that arrived at `now`, and the newest update that the master had when it
     /// sent the sample.
     pub fn handle_sample(&mut self, now: Time, sample: &HipSample, newest_update: u32) {

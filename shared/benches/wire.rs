@@ -65,6 +65,7 @@ fn update() -> Option<Update> {
 fn wire(criterion: &mut Criterion) {
     let mut out = [0; DATAGRAM_MAX];
     let datagram = |message| Datagram {
+        stopped: false,
         envelope: ENVELOPE,
         message,
     };

@@ -4,6 +4,7 @@
 //! schemas. It holds every input of an end, so that a session runs again, and what its ticks gave, so that this can be
 //! checked. Pure: files and threads are the business of `io::record`. No secret is ever in a message.
 
+pub mod again;
 pub mod cdr;
 pub mod digest;
 mod field;

@@ -6,6 +6,7 @@
 //! Each end of a session counts in its own half, [`MasterHalf`] and [`SlaveHalf`]: the half goes with the farewell, and a
 //! report is printed from the halves that are known. No number is counted in both.
 
+mod brief;
 mod master;
 mod number;
 mod session;
@@ -17,6 +18,7 @@ use serde::Serialize;
 use crate::metrics::ForceSummary;
 use crate::wire::Ending;
 
+pub use brief::Brief;
 pub use master::{
     HandForce, MasterHalf, PassivityReport, PoseReport, PushesReport, ReceivedUpdates,
 };

@@ -180,8 +180,17 @@ def check_controls(tab):
 def check_stop(tab):
     tab.until("the script at work", lambda: tab.master["engaged"] and tab.master["elapsed_s"] > 0.5)
     tab.page.keyboard.press("Escape")
+    tab.until("the emergency stop on both sides", lambda: tab.master["stopped_by"] == tab.frame["slave"]["stopped_by"] == "master")
+    tab.until("no force", lambda: tab.master["hand_force"] == [0, 0])
+    stood = tab.master["hip"]
+    time.sleep(0.5)
+    holds("an emergency stop takes the force and holds the hand", tab.master["hip"] == stood and tab.master["hand_force"] == [0, 0])
+    tab.page.locator("#banner button").click()
+    tab.until("the script at work again", lambda: tab.master["stopped_by"] is None and tab.master["hip"] != stood)
+    holds("and is cleared where it was set", True)
+    tab.page.locator("#end").click()
     tab.until("the end", lambda: tab.about["state"] == "ended")
-    holds("the stop ends the session without force", tab.master["hand_force"] == [0, 0], tab.master["hand_force"])
+    holds("the end leaves no force", tab.master["hand_force"] == [0, 0], tab.master["hand_force"])
     tab.page.locator("#banner button").click()
     tab.until("a third session", lambda: tab.about["session"] == 3 and tab.about["state"] == "running")
     holds("and a person may start again", True)

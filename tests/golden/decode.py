@@ -230,13 +230,15 @@ def decode(data, channel, sender):
     demand(version == VERSION,
            f"the other side speaks version {version}, this side version {VERSION}", "version")
     demand(number in KINDS, "unknown type", "type")
-    demand(flags == 0, "unknown flags", "flags")
     kind = KINDS[number]
+    demand(flags <= (kind in DATAGRAM_TYPES), "unknown flags", "flags")
     demand((kind in DATAGRAM_TYPES) == (channel == "datagram"), "wrong road", "road")
     demand(sender in SENDERS[kind], "wrong side", "side")
     reader = Reader(data[8:])
     fields = BODIES[kind](reader)
     demand(reader.at == len(reader.data), "bytes left after the body", "trailing")
+    if flags:
+        fields["stopped"] = True
     return kind, fields
 
 

@@ -25,7 +25,7 @@ const CORES: [&str; 5] = ["shared", "netem", "server", "client", "lab"];
 const UNSAFE_FILES: [&str; 3] = [
     "shared/src/io/realtime.rs",
     "cli/src/commands/netem/shell/tun.rs",
-    "tests/tests/no_allocation.rs",
+    "tests/tests/counting_allocator.rs",
 ];
 /// The one place that names the physics engine.
 const ENGINE_HOME: &str = "server/src/environment";

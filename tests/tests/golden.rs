@@ -142,6 +142,9 @@ fn of_datagram(read: &Datagram) -> Decoded {
     let mut fields = serde_json::to_value(read.envelope).unwrap();
     let both = fields.as_object_mut().unwrap();
     both.extend(of_message.as_object().unwrap().clone());
+    if read.stopped {
+        both.insert("stopped".into(), true.into());
+    }
     Decoded {
         kind: read.message.kind(),
         fields,

@@ -27,6 +27,7 @@ use mmt_netem::LinkConfig;
 use mmt_netem::io::socket::SocketExtras;
 use mmt_server::io::{SlaveHost, SlaveLive, SlaveOptions};
 use mmt_server::slave::SlaveConfig;
+use mmt_shared::io::emergency::EmergencyStop;
 use mmt_shared::io::identity::Identity;
 use mmt_shared::io::record::{Ended, RecordError, RecordOutcome, Recorder, read};
 use mmt_shared::io::transport::Transport;
@@ -54,10 +55,12 @@ async fn session(architecture: Architecture, path: &Path) {
         once: true,
         truth: None,
         record: Some(recorder.clone()),
+        emergency: EmergencyStop::default(),
     });
     let host = host.unwrap();
     let pairing = host.pairing(None);
     let token = pairing.token.reveal().to_string();
+    let emergency = EmergencyStop::default();
     let options = MasterOptions {
         pairing,
         transport: Transport::Quic,
@@ -76,7 +79,14 @@ async fn session(architecture: Architecture, path: &Path) {
         resume: None,
         record: Some(recorder.clone()),
         truth: None,
+        emergency: emergency.clone(),
     };
+    tokio::spawn(async move {
+        tokio::time::sleep(DURATION / 2).await;
+        emergency.set(true);
+        tokio::time::sleep(DURATION / 8).await;
+        emergency.set(false);
+    });
     let (_stop, stopped) = watch::channel(false);
     let (live, _shown) = watch::channel(MasterLive::default());
     let served =

@@ -135,6 +135,9 @@ pub(crate) struct DemoArguments {
     /// The console; on a terminal there is one unless it is switched off.
     #[command(flatten)]
     pub(crate) console: ConsoleArguments,
+    /// Print every number of the report; without it a sentence and ten lines
+    #[arg(long, conflicts_with = "json")]
+    pub(crate) full: bool,
     /// Print the report as one JSON document; plain lines instead of the live view
     #[arg(long)]
     pub(crate) json: bool,
@@ -186,6 +189,9 @@ pub(crate) struct SlaveArguments {
     /// End after the first session
     #[arg(long)]
     pub(crate) once: bool,
+    /// Print every number of the report; without it a sentence and ten lines
+    #[arg(long, conflicts_with = "json")]
+    pub(crate) full: bool,
     /// Print the report of the last session as JSON, after the pairing string
     #[arg(long)]
     pub(crate) json: bool,
@@ -251,6 +257,9 @@ pub(crate) struct MasterArguments {
     /// The console.
     #[command(flatten)]
     pub(crate) console: ConsoleArguments,
+    /// Print every number of the report; without it a sentence and ten lines
+    #[arg(long, conflicts_with = "json")]
+    pub(crate) full: bool,
     /// Print the report as one JSON document
     #[arg(long)]
     pub(crate) json: bool,

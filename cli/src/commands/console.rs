@@ -7,6 +7,7 @@ use mmt_netem::Direction;
 use mmt_netem::LinkConfig;
 use mmt_netem::presets::PRESETS;
 use mmt_server::io::SlaveLive;
+use mmt_shared::io::emergency::EmergencyStop;
 use mmt_shared::model::update::Cause;
 use rtrb::Consumer;
 use serde::Serialize;
@@ -43,11 +44,12 @@ impl Desk {
     pub(super) fn start(
         arguments: &ConsoleArguments,
         wanted: bool,
+        emergency: &EmergencyStop,
     ) -> Result<Option<Self>, Failure> {
         let Some(options) = arguments.options(wanted)? else {
             return Ok(None);
         };
-        let console = Console::start(options).map_err(Failure::failed)?;
+        let console = Console::start(options, emergency.clone()).map_err(Failure::failed)?;
         note(format_args!("console: {}", console.address()));
         let causes: Vec<&str> = Cause::ALL.into_iter().map(Cause::name).collect();
         let presets: Vec<Value> = PRESETS

@@ -13,6 +13,7 @@ use mmt_client::operator::scripted::ScriptedConfig;
 use mmt_netem::Direction;
 use mmt_server::io::{SlaveConfiguration, SlaveOptions};
 use mmt_server::slave::SlaveConfig;
+use mmt_shared::io::emergency::EmergencyStop;
 use mmt_shared::io::identity::Identity;
 use mmt_shared::io::transport::Transport;
 use mmt_shared::io::truth::{self, TruthReceiver, TruthSender};
@@ -29,9 +30,9 @@ use super::{master, slave};
 use crate::args::DemoArguments;
 use crate::failure::Failure;
 use crate::log::Messages;
-use crate::output::{note, print, print_json};
+use crate::output::{note, print_report};
 use crate::stop::Stop;
-use crate::view::{Caption, Screen, Snapshot};
+use crate::view::{Caption, Screen};
 
 mod setting;
 use setting::{Setting, down, up};
@@ -55,7 +56,11 @@ pub(crate) fn run(arguments: &DemoArguments, messages: &Messages) -> Result<(), 
     let record = Record::start(arguments.record.as_deref())?;
     let stop = Stop::on_signals()?;
     let dashboard = !arguments.json && !arguments.emulation.netem_control;
-    let mut desk = Desk::start(&arguments.console, dashboard && Screen::is_there())?;
+    let mut desk = Desk::start(
+        &arguments.console,
+        dashboard && Screen::is_there(),
+        stop.emergency(),
+    )?;
     let controlled = desk.is_some();
     let emulation = &arguments.emulation;
     let emulation = Emulation::start(emulation, controlled, arguments.seed, Some(up), Some(down))?;
@@ -85,11 +90,7 @@ pub(crate) fn run(arguments: &DemoArguments, messages: &Messages) -> Result<(), 
     let Some((report, end)) = ended? else {
         return Ok(());
     };
-    if arguments.json {
-        print_json(&report)?
-    } else {
-        print(&report)?
-    }
+    print_report(&report, arguments.json, arguments.full)?;
     record.finish()?;
     master::judge(end)
 }
@@ -139,6 +140,7 @@ impl Round<'_> {
         );
         options.commands.stretch_max = stretch_max;
         options.record = self.record.recorder();
+        options.emergency = self.stop.emergency().clone();
         options.scene_hz = Viewer::scene_hz(self.dashboard);
         if let Some(desk) = &self.desk {
             operated_at(desk, &mut options);
@@ -156,10 +158,10 @@ impl Round<'_> {
         while master.is_running() || slave.is_running() {
             // copied first: a borrow that lives through the viewer's wait would stop the hosts' tasks
             let (slave_now, master_now) = (*started.live.borrow(), *master_live.borrow());
-            self.viewer.look(Snapshot {
-                slave: Some(slave_now).filter(|slave| slave.connected),
-                master: Some(master_now),
-            });
+            self.viewer.look(
+                Some(slave_now).filter(|slave| slave.connected),
+                Some(master_now),
+            );
             self.attend(&stop);
             if self.stop.asked() || self.again.is_some() {
                 stop.end();
@@ -198,7 +200,7 @@ impl Round<'_> {
             if !self.desk.as_ref().is_some_and(|desk| desk.is_watched()) {
                 return;
             }
-            self.viewer.look(Snapshot::default());
+            self.viewer.look(None, None);
             self.attend(&Stop::new());
         }
     }
@@ -210,7 +212,7 @@ impl Round<'_> {
         };
         while let Some(order) = desk.next_order() {
             match order {
-                Order::Stop => stop.end(),
+                Order::End => stop.end(),
                 Order::Network(wish) => {
                     let networks = self.setting.networks();
                     desk.change_networks(&wish, self.emulation, networks.map(Some));
@@ -282,6 +284,7 @@ fn slave_options(
         once: true,
         truth: Some(truth),
         record: None,
+        emergency: EmergencyStop::default(),
     })
 }
 
@@ -315,6 +318,7 @@ fn master_options(
         path: None,
         take_over: false,
         resume: None,
+        emergency: EmergencyStop::default(),
         truth: Some(truth),
         record: None,
     }

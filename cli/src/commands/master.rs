@@ -18,6 +18,7 @@ use mmt_netem::io::socket::SocketExtras;
 use mmt_netem::trace::mmt::path_text;
 use mmt_shared::clean::clean;
 use mmt_shared::io::connect::ConnectError;
+use mmt_shared::io::emergency::EmergencyStop;
 use mmt_shared::io::identity_file::default_directory;
 use mmt_shared::model::geometry::Vec2;
 use mmt_shared::pairing::Pairing;
@@ -34,9 +35,9 @@ use crate::args::{MasterArguments, OperatorWords, PairingWords};
 use crate::failure::{Exit, Failure};
 use crate::input::read_text;
 use crate::log::Messages;
-use crate::output::{note, print, print_json};
+use crate::output::{note, print_report};
 use crate::stop::Stop;
-use crate::view::{Caption, Snapshot};
+use crate::view::Caption;
 
 /// Where a recorded path is carried to start, m: 5 cm before the west face of the model at its start, which
 /// is 20 cm from the origin.
@@ -53,7 +54,9 @@ pub(crate) fn run(arguments: MasterArguments, messages: &Messages) -> Result<(),
     // not before the pairing has been read from stdin: the orders come after it
     let (netem, seed) = (Some(&arguments.netem), arguments.seed);
     let wanted = matches!(arguments.operator, OperatorWords::Pointer);
-    let mut desk = Desk::start(&arguments.console, wanted)?;
+    let stop = Stop::on_signals()?;
+    options.emergency = stop.emergency().clone();
+    let mut desk = Desk::start(&arguments.console, wanted, stop.emergency())?;
     let controlled = desk.is_some();
     let emulation = Emulation::start(&arguments.emulation, controlled, seed, netem, None)?;
     options.netem_extras = emulation.extras(Direction::Up);
@@ -73,7 +76,6 @@ pub(crate) fn run(arguments: MasterArguments, messages: &Messages) -> Result<(),
         truth: None,
     };
     arguments.transport.warning().into_iter().for_each(note);
-    let stop = Stop::on_signals()?;
     let path = options.path.clone();
     let (host, live) = start(options, stop.receiver())?;
     let mut link = arguments.netem.clone();
@@ -86,13 +88,10 @@ pub(crate) fn run(arguments: MasterArguments, messages: &Messages) -> Result<(),
     let mut viewer = Viewer::new(caption, dashboard, messages, &stop);
     while host.is_running() {
         let master = Some(*live.borrow());
-        viewer.look(Snapshot {
-            slave: None,
-            master,
-        });
+        viewer.look(None, master);
         while let Some(order) = desk.as_mut().and_then(Desk::next_order) {
             match order {
-                Order::Stop => stop.end(),
+                Order::End => stop.end(),
                 Order::Network(wish) => {
                     let Some(desk) = &mut desk else { continue };
                     desk.change_networks(&wish, &emulation, [Some(&mut link), None]);
@@ -109,11 +108,7 @@ pub(crate) fn run(arguments: MasterArguments, messages: &Messages) -> Result<(),
     if let (Some(file), Some(path)) = (&arguments.record_path, &path) {
         keep_path(file, path)?;
     }
-    if arguments.json {
-        print_json(&report)?
-    } else {
-        print(&report)?
-    }
+    print_report(&report, arguments.json, arguments.full)?;
     record.finish()?;
     judge(live.borrow().ended)
 }
@@ -175,6 +170,7 @@ fn options(arguments: &MasterArguments) -> Result<MasterOptions, Failure> {
         truth: None,
         take_over: arguments.take_over,
         resume: resume_file(&pairing),
+        emergency: EmergencyStop::default(),
         pairing,
     })
 }

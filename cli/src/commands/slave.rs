@@ -10,6 +10,7 @@ use mmt_server::io::{
 };
 use mmt_server::slave::SlaveConfig;
 use mmt_shared::clean::clean;
+use mmt_shared::io::emergency::EmergencyStop;
 use mmt_shared::io::identity_file::{default_directory, load_or_create};
 use mmt_shared::pairing::{Host as HostName, Pairing};
 use mmt_shared::report::RunReport;
@@ -25,9 +26,9 @@ use crate::args::SlaveArguments;
 use crate::config::{scene, slave_config};
 use crate::failure::{Exit, Failure};
 use crate::log::Messages;
-use crate::output::{note, print, print_json};
+use crate::output::{note, print, print_report};
 use crate::stop::Stop;
-use crate::view::{Caption, Snapshot};
+use crate::view::Caption;
 
 /// Runs `mmt slave`.
 ///
@@ -46,20 +47,35 @@ pub(crate) fn run(arguments: SlaveArguments, messages: &Messages) -> Result<(), 
     let unserved = unserved(&options);
     arguments.transport.warning().into_iter().for_each(note);
     let stop = Stop::on_signals()?;
+    options.emergency = stop.emergency().clone();
+    let everywhere = arguments.listen.ip().is_unspecified();
     let (host, started) = start(options, arguments.advertise, stop.receiver())?;
     // If it could not start the reason is in the host.
     if let Ok(started) = started.recv() {
         print(&started.pairing)?;
+        note(waiting(&started.pairing, everywhere));
         watch_sessions(&host, &started.live, messages, &stop);
     }
     let report = host.join()?.map(RunReport::from);
     emulation.finish()?;
-    match (arguments.json, report) {
-        (true, report) => print_json(&report.unwrap_or(unserved))?,
-        (false, Some(report)) => print(report)?,
-        (false, None) => {}
+    // without a session there is nothing to read
+    if let Some(report) = report.or(arguments.json.then_some(unserved)) {
+        print_report(&report, arguments.json, arguments.full)?;
     }
     record.finish()
+}
+
+/// What to do on the other host; the secret stands on stdout only. `everywhere`: it listens at every address of this host.
+fn waiting(pairing: &Pairing, everywhere: bool) -> String {
+    let address = &pairing.address;
+    let hint = "on its host: mmt master 'mmt://…', which is the line above";
+    let lost = matches!(&address.host, HostName::V4(v4) if v4.is_loopback());
+    let remedy = if everywhere && lost {
+        "\nthis host has no route to others, so the line names 127.0.0.1: give --advertise ADDRESS, one that the master's host reaches"
+    } else {
+        ""
+    };
+    format!("waiting for a master at {address}; {hint}{remedy}")
 }
 
 /// Plain lines while a master is connected.
@@ -72,10 +88,7 @@ fn watch_sessions(
     let mut viewer = Viewer::new(Caption::default(), false, messages, stop);
     while host.is_running() {
         let slave = Some(*live.borrow()).filter(|slave| slave.connected);
-        viewer.look(Snapshot {
-            slave,
-            master: None,
-        });
+        viewer.look(slave, None);
     }
 }
 
@@ -99,7 +112,7 @@ pub(super) fn start(
     advertise: Option<HostName>,
     stop: watch::Receiver<bool>,
 ) -> Result<Started, Failure> {
-    let (tell, told) = mpsc::channel();
+    let (sender, receiver) = mpsc::channel();
     let work = move |runtime: &Runtime| {
         let _inside = runtime.enter();
         let host = SlaveHost::bind(options).map_err(|error| host_failure(&error))?;
@@ -109,11 +122,11 @@ pub(super) fn start(
             live: Arc::clone(&live),
         };
         // Whoever started it waits for this.
-        let _ = tell.send(listening);
+        let _ = sender.send(listening);
         let served = runtime.block_on(host.run(stop, live));
         served.map_err(|error| host_failure(&error))
     };
-    Ok((spawn("slave", work)?, told))
+    Ok((spawn("slave", work)?, receiver))
 }
 
 fn options(arguments: &SlaveArguments) -> Result<SlaveOptions, Failure> {
@@ -146,6 +159,7 @@ fn options(arguments: &SlaveArguments) -> Result<SlaveOptions, Failure> {
         once: arguments.once,
         truth: None,
         record: None,
+        emergency: EmergencyStop::default(),
     })
 }
 
@@ -251,5 +265,23 @@ mod tests {
         let report = unserved(&options_of(&["--once"]));
         assert_eq!(report.ending, Some("interrupted"));
         assert_eq!(report.seed, Some(1));
+    }
+
+    #[test]
+    fn a_slave_that_no_other_host_reaches_says_so_and_never_shows_the_secret() {
+        let pairing = |host: &str| {
+            let text = format!("mmt://{host}:4433?pin={0}&token={0}", "5a".repeat(32));
+            text.parse::<Pairing>().unwrap()
+        };
+        let lost = waiting(&pairing("127.0.0.1"), true);
+        assert!(lost.contains("--advertise"), "{lost}");
+        for (host, everywhere) in [("127.0.0.1", false), ("192.0.2.7", true), ("robot", true)] {
+            let text = waiting(&pairing(host), everywhere);
+            assert!(
+                !text.contains("--advertise") && !text.contains("5a5a"),
+                "{text}"
+            );
+            assert!(text.contains(&format!("{host}:4433")), "{text}");
+        }
     }
 }

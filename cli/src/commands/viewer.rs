@@ -2,10 +2,13 @@
 
 use std::time::{Duration, Instant};
 
+use mmt_client::io::MasterLive;
+use mmt_server::io::SlaveLive;
+
 use crate::log::Messages;
 use crate::output::note;
 use crate::stop::Stop;
-use crate::view::{Caption, History, Screen, Snapshot, line, render};
+use crate::view::{Caption, History, Screen, Snapshot, Wish, line, render};
 
 /// Time between two frames: 20 a second are as much as an eye can use.
 const LOOK: Duration = Duration::from_millis(50);
@@ -19,6 +22,8 @@ pub(super) struct Viewer {
     caption: Caption,
     history: History,
     screen: Option<Screen>,
+    /// When the run began to connect.
+    began: Instant,
     next_line: Instant,
     stop: Stop,
 }
@@ -30,6 +35,7 @@ impl Viewer {
             caption,
             history: History::default(),
             screen: dashboard.then(|| Screen::take(messages)).flatten(),
+            began: Instant::now(),
             next_line: Instant::now() + LINE,
             stop: stop.clone(),
         }
@@ -38,6 +44,7 @@ impl Viewer {
     /// The same run goes on with other settings.
     pub(super) fn caption(&mut self, caption: Caption) {
         self.caption = caption;
+        self.began = Instant::now();
     }
 
     /// How many scenes a second are looked at, with a dashboard or without one.
@@ -49,9 +56,10 @@ impl Viewer {
         }
     }
 
-    /// Shows the snapshot, reads the keys, and returns when it is time for the next frame.
-    pub(super) fn look(&mut self, snapshot: Snapshot) {
-        self.history.push(snapshot);
+    /// Shows both sides, reads the keys, and returns when it is time for the next frame.
+    pub(super) fn look(&mut self, slave: Option<SlaveLive>, master: Option<MasterLive>) {
+        let tried_s = self.began.elapsed().as_secs_f64();
+        self.history.push(Snapshot::new(slave, master, tried_s));
         let Some(screen) = &mut self.screen else {
             std::thread::sleep(LOOK);
             self.line();
@@ -59,9 +67,11 @@ impl Viewer {
         };
         let (caption, history) = (&self.caption, &self.history);
         let drawn = screen.draw(|frame, messages| render(frame, caption, history, messages));
-        match drawn.and_then(|()| screen.wants_end(LOOK)) {
-            Ok(true) => self.stop.ask(),
-            Ok(false) => {}
+        match drawn.and_then(|()| screen.wish(LOOK)) {
+            Ok(Some(Wish::End)) => self.stop.ask(),
+            Ok(Some(Wish::Stop)) => self.stop.emergency().set(true),
+            Ok(Some(Wish::Clear)) => self.stop.emergency().set(false),
+            Ok(None) => {}
             Err(error) => {
                 self.screen = None;
                 tracing::warn!("the live view ends: {error}");

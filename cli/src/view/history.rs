@@ -72,10 +72,7 @@ mod tests {
             ..SlaveLive::default()
         };
         slave.updates[0] = deadband;
-        Snapshot {
-            slave: Some(slave),
-            master: None,
-        }
+        Snapshot::new(Some(slave), None, 0.0)
     }
 
     #[test]

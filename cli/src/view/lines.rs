@@ -9,6 +9,9 @@ use super::{History, Snapshot};
 /// What is known now; a number that is not known is left out.
 pub(crate) fn line(history: &History) -> String {
     let now = history.newest();
+    if let Some(tried_s) = now.connecting_s {
+        return format!("connecting, {tried_s:.0} s");
+    }
     let mut text = format!("{:6.1} s", now.elapsed_s());
     let mut add = |label: &str, value: Option<f64>, decimals: usize, unit: &str| {
         if let Some(value) = value {
@@ -47,6 +50,9 @@ pub(crate) fn line(history: &History) -> String {
         0,
         "",
     );
+    if let Some(stopped) = now.stopped() {
+        let _ = write!(text, "  {stopped}");
+    }
     let silent = now.master.map(|master| master.link);
     if let Some(state) = silent.filter(|state| *state != LinkState::Fresh) {
         let _ = write!(text, "  link {}", state.name());

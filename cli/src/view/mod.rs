@@ -15,7 +15,7 @@ use mmt_shared::channel::peer::Loss;
 pub(crate) use dashboard::render;
 pub(crate) use history::History;
 pub(crate) use lines::line;
-pub(crate) use screen::{Screen, restore_terminal};
+pub(crate) use screen::{Screen, Wish, restore_terminal};
 
 /// What does not change during a run.
 #[derive(Clone, Debug, Default)]
@@ -37,6 +37,8 @@ pub(crate) struct Snapshot {
     pub(crate) slave: Option<SlaveLive>,
     /// The master.
     pub(crate) master: Option<MasterLive>,
+    /// For how long the master has tried to connect, s; none once its session has begun.
+    pub(crate) connecting_s: Option<f64>,
 }
 
 /// What of a direction's datagrams does not arrive.
@@ -86,6 +88,23 @@ impl Snapshot {
     fn rtt_ms(&self) -> Option<f64> {
         let slave = self.slave.and_then(|slave| slave.rtt_ms);
         self.master.and_then(|master| master.rtt_ms).or(slave)
+    }
+
+    /// Both sides, of which the master began to connect `tried_s` (s) ago.
+    pub(crate) fn new(slave: Option<SlaveLive>, master: Option<MasterLive>, tried_s: f64) -> Self {
+        let connects = |master: MasterLive| master.footprint.is_none() && master.ended.is_none();
+        Self {
+            slave,
+            master,
+            connecting_s: master.filter(|master| connects(*master)).map(|_| tried_s),
+        }
+    }
+
+    /// Whose emergency stop is set, in words; none if neither's.
+    fn stopped(&self) -> Option<String> {
+        let master = self.master.and_then(|master| master.stopped_by);
+        let side = master.or(self.slave.and_then(|slave| slave.stopped_by));
+        side.map(|side| format!("EMERGENCY STOP ({})", side.name()))
     }
 
     /// What does not arrive, up and down.

@@ -69,9 +69,15 @@ pub(super) fn link_panel(now: &Snapshot) -> Paragraph<'static> {
     let [up, down] = now.missing();
     let percent = |way: &Missing| shown(way.share.map(|share| share * 100.0), 1, " %");
     let unsent = |way: &Missing| shown(way.unsent.map(|n| n as f64), 0, "");
-    let state = now.master.map_or("-", |master| master.link.name());
+    let state = match now.connecting_s {
+        Some(tried_s) => format!("link: connecting, {tried_s:.0} s"),
+        None => format!(
+            "link: {}",
+            now.master.map_or("-", |master| master.link.name())
+        ),
+    };
     panel(
-        format!("link: {state}"),
+        now.stopped().unwrap_or(state),
         vec![
             format!("round trip {}", shown(now.rtt_ms(), 1, " ms")),
             format!("{} up {}", up.name(), percent(&up)),

@@ -87,12 +87,12 @@ impl Screen {
         drawn.map(|_| ())
     }
 
-    /// Waits for a key, no longer than `patience`; whether it was one that ends the run.
+    /// Waits for a key, no longer than `patience`; returns what it asks for.
     ///
     /// # Errors
     /// The terminal cannot be read from, or is gone.
-    pub(crate) fn wants_end(&mut self, patience: Duration) -> io::Result<bool> {
-        self.keys.want_end(patience)
+    pub(crate) fn wish(&mut self, patience: Duration) -> io::Result<Option<Wish>> {
+        self.keys.wish(patience)
     }
 }
 
@@ -117,11 +117,11 @@ impl Keys {
         }))
     }
 
-    fn want_end(&self, patience: Duration) -> io::Result<bool> {
+    fn wish(&self, patience: Duration) -> io::Result<Option<Wish>> {
         let patience = Timespec::try_from(patience).unwrap_or_default();
         let mut polled = [PollFd::new(&self.0, PollFlags::IN)];
         match poll(&mut polled, Some(&patience)) {
-            Ok(0) | Err(Errno::INTR) => return Ok(false),
+            Ok(0) | Err(Errno::INTR) => return Ok(None),
             Ok(_) => {}
             Err(error) => return Err(error.into()),
         }
@@ -139,7 +139,35 @@ impl Keys {
                 "the terminal is gone",
             ));
         }
-        Ok(typed.get(..count).is_some_and(ends))
+        Ok(typed.get(..count).and_then(Wish::of))
+    }
+}
+
+/// What a key asks for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Wish {
+    /// The space bar: the emergency stop.
+    Stop,
+    /// c: no emergency stop any more.
+    Clear,
+    /// The end of the run.
+    End,
+}
+
+impl Wish {
+    /// The space bar before all others. Keys that begin with Esc are none.
+    fn of(typed: &[u8]) -> Option<Self> {
+        let pressed = |keys: &[u8]| {
+            let one = |key| keys.contains(key);
+            !typed.starts_with(b"\x1b") && typed.iter().any(one)
+        };
+        if pressed(b" ") {
+            Some(Self::Stop)
+        } else if ends(typed) {
+            Some(Self::End)
+        } else {
+            pressed(b"cC").then_some(Self::Clear)
+        }
     }
 }
 
@@ -156,12 +184,16 @@ mod tests {
     use super::*;
 
     #[test]
-    fn q_escape_and_control_c_end_and_other_keys_do_not() {
+    fn the_space_bar_stops_c_clears_and_q_escape_and_control_c_end() {
         for typed in [&b"q"[..], b"Q", b"\x1b", b"\x03", b"xq"] {
-            assert!(ends(typed), "{typed:?}");
+            assert_eq!(Wish::of(typed), Some(Wish::End), "{typed:?}");
         }
-        for typed in [&b"c"[..], b"\r", b"\x1b[A", b"\x1b[15~", b"\x1bOq"] {
-            assert!(!ends(typed), "{typed:?}");
+        for typed in [&b" "[..], b" q", b"c "] {
+            assert_eq!(Wish::of(typed), Some(Wish::Stop), "{typed:?}");
+        }
+        assert_eq!(Wish::of(b"c"), Some(Wish::Clear));
+        for typed in [&b"x"[..], b"\r", b"\x1b[A", b"\x1b[15~", b"\x1bOq"] {
+            assert_eq!(Wish::of(typed), None, "{typed:?}");
         }
     }
 
@@ -169,12 +201,12 @@ mod tests {
     fn a_terminal_that_vanishes_ends_the_view() {
         let (reader, mut writer) = io::pipe().unwrap();
         let keys = Keys(reader.into());
-        assert!(!keys.want_end(Duration::ZERO).unwrap(), "nothing is typed");
+        assert_eq!(keys.wish(Duration::ZERO).unwrap(), None, "nothing is typed");
         writer.write_all(b"x").unwrap();
-        assert!(!keys.want_end(Duration::ZERO).unwrap());
+        assert_eq!(keys.wish(Duration::ZERO).unwrap(), None);
         writer.write_all(b"q").unwrap();
-        assert!(keys.want_end(Duration::ZERO).unwrap());
+        assert_eq!(keys.wish(Duration::ZERO).unwrap(), Some(Wish::End));
         drop(writer);
-        assert!(keys.want_end(Duration::ZERO).is_err());
+        assert!(keys.wish(Duration::ZERO).is_err());
     }
 }

@@ -4,6 +4,7 @@ use mmt_client::failsafe::LinkState;
 use mmt_shared::model::geometry::{BoxFootprint, Pose, Vec2};
 use mmt_shared::model::tool::Scene;
 use mmt_shared::time::Time;
+use mmt_shared::wire::Side;
 use ratatui::Terminal;
 use ratatui::backend::TestBackend;
 use ratatui::style::Color;
@@ -53,10 +54,7 @@ fn snapshot(elapsed_s: f64) -> Snapshot {
         skipped: 4,
         ..MasterLive::default()
     };
-    Snapshot {
-        slave: Some(slave),
-        master: Some(master),
-    }
+    Snapshot::new(Some(slave), Some(master), 3.0)
 }
 
 fn caption() -> Caption {
@@ -87,7 +85,7 @@ fn the_dashboard_shows_every_label_and_number_on_a_small_terminal() {
         "of 20 s",
         "slave touches",
         "master free",
-        "q ends it",
+        "q ends, space stops",
         "recommended",
         "model now",
         "remote 210 ms ago",
@@ -157,6 +155,28 @@ fn the_plain_line_has_the_same_numbers_and_leaves_out_what_is_not_known() {
     }
     let text = line(&History::default());
     assert!(!text.contains("f_s") && !text.contains("link"), "{text}");
+}
+
+#[test]
+fn before_the_session_begins_no_link_is_called_fresh() {
+    let mut history = History::default();
+    history.push(Snapshot::new(None, Some(MasterLive::default()), 3.2));
+    assert_eq!(line(&history), "connecting, 3 s");
+    let shown = screen(100, 30, &history, &[]);
+    assert!(shown.contains("link: connecting, 3 s"), "{shown}");
+    assert!(!shown.contains("fresh"), "{shown}");
+}
+
+#[test]
+fn an_emergency_stop_takes_the_place_of_the_links_state() {
+    let mut history = History::default();
+    let mut stopped = snapshot(1.0);
+    let slave = stopped.slave.as_mut().unwrap();
+    slave.stopped_by = Some(Side::Slave);
+    history.push(stopped);
+    for text in [line(&history), screen(100, 30, &history, &[])] {
+        assert!(text.contains("EMERGENCY STOP (slave)"), "{text}");
+    }
 }
 
 #[test]

@@ -7,6 +7,7 @@ use std::ops::ControlFlow;
 use std::time::Duration;
 
 use mmt_shared::io::clock::Clock;
+use mmt_shared::io::emergency::EmergencyStop;
 use mmt_shared::io::loop_thread::LoopSide;
 use mmt_shared::io::record::Ticked;
 use mmt_shared::io::schedule::Tick;
@@ -18,9 +19,9 @@ use mmt_shared::model::tool::Scene;
 use mmt_shared::time::Time;
 use rtrb::Consumer;
 
-use super::record::{MasterShown, MasterSink};
+use super::record::{self, MasterSink};
 use super::{MasterLive, PersonLive, SessionEnd};
-use crate::end::MasterEnd;
+use crate::end::{MasterEnd, MasterGiven};
 use crate::failsafe::LinkState;
 use crate::master::MasterTick;
 use crate::operator::Operator;
@@ -36,22 +37,15 @@ const EVENTS_PER_TICK: usize = 64;
 /// True poses that a tick judges at most: it must not grow long when the slave catches up.
 const TRUTHS_PER_TICK: usize = 4;
 
-/// What a tick of the master's end is given besides its deadline.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct MasterGiven {
-    /// The device's HIP, m, world.
-    pub reading: Vec2,
-    /// Whether a hand holds the device.
-    pub engaged: bool,
-    /// Whether the hand is to be released from this tick on.
-    pub releases: bool,
-}
-
 /// The haptic loop. It belongs to one thread, which hands it back when it ends.
 #[derive(Debug)]
 pub struct HapticLoop {
     pub(super) end: MasterEnd,
     pub(super) operator: Operator,
+    /// The emergency stop of this side.
+    emergency: EmergencyStop,
+    /// Where the HIP was read last, m.
+    pub(super) reading: Vec2,
     /// What a person does, where one operates.
     events: Option<Consumer<HandEvent>>,
     /// How long; for ever if absent.
@@ -71,7 +65,7 @@ pub struct HapticLoop {
     releasing: bool,
     /// Why it ends; none if it was asked to.
     pub(super) why: Option<SessionEnd>,
-    hand_force: Vec2,
+    pub(super) hand_force: Vec2,
     /// Error of the model's pose; empty where the truth is not known.
     pub(super) pose: PoseError,
 }
@@ -81,7 +75,9 @@ impl HapticLoop {
     pub fn new(end: MasterEnd, operator: Operator, duration: Option<Duration>) -> Self {
         Self {
             end,
+            reading: operator.start(),
             operator,
+            emergency: EmergencyStop::default(),
             events: None,
             duration,
             truth: None,
@@ -110,6 +106,13 @@ impl HapticLoop {
     #[must_use]
     pub fn operated_through(mut self, events: Option<Consumer<HandEvent>>) -> Self {
         self.events = events;
+        self
+    }
+
+    /// The same with an emergency stop that others set.
+    #[must_use]
+    pub fn stopped_by(mut self, emergency: EmergencyStop) -> Self {
+        self.emergency = emergency;
         self
     }
 
@@ -147,14 +150,23 @@ impl HapticLoop {
     ) -> ControlFlow<()> {
         // the deadline and not the wake: all stamps lie on one grid of whole milliseconds
         let stamp = tick.deadline;
-        self.elapsed = stamp.saturating_since(*self.first.get_or_insert(stamp));
+        let elapsed = stamp.saturating_since(*self.first.get_or_insert(stamp));
+        let period = elapsed.saturating_sub(self.elapsed);
+        self.elapsed = elapsed;
         self.ticks = self.ticks.saturating_add(1);
         self.skipped = self.skipped.saturating_add(tick.skipped);
         self.receive(side);
         self.handle_events();
         let releases = self.consider_end(side.is_stopped());
         let view = self.end.update_model();
-        let reading = self.operator.step(self.elapsed, &view, self.hand_force);
+        let stops = self.emergency.is_set();
+        self.end.stop(stops);
+        if self.end.stopped_by().is_some() {
+            self.operator.stand(period);
+        } else {
+            self.reading = self.operator.step(self.elapsed, &view, self.hand_force);
+        }
+        let reading = self.reading;
         let engaged = self.operator.engaged();
         self.end.hold(engaged);
         let done = self.end.tick(stamp, reading);
@@ -172,6 +184,7 @@ impl HapticLoop {
                 reading,
                 engaged,
                 releases,
+                stops,
             };
             record.ticked(Ticked {
                 tick,
@@ -235,9 +248,9 @@ impl HapticLoop {
 
     fn show(&mut self, done: &MasterTick, now: Time, side: &mut LoopSide<MasterLive>) {
         let live = self.snapshot(done, now);
-        if let Some(record) = &mut self.record {
+        if let Some(sink) = &mut self.record {
             let twist = self.end.master().model().state().twist;
-            record.shown(now, MasterShown { live, twist });
+            sink.shown(now, record::shown(&live, twist));
         }
         side.publish(live);
     }
@@ -289,6 +302,7 @@ impl HapticLoop {
             in_contact: master.view().in_contact,
             proxy: done.rendered.touch.map(|touch| touch.proxy),
             engaged: master.limiter().engaged(),
+            stopped_by: self.end.stopped_by(),
             person: self.operator.person().map(PersonLive::from),
             change: self.end.change().copied(),
             updates_applied: u64::from(master.applied()),

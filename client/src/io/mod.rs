@@ -26,6 +26,7 @@ use std::time::Duration;
 use mmt_netem::LinkConfig;
 use mmt_netem::io::socket::SocketExtras;
 use mmt_shared::channel::peer::Loss;
+use mmt_shared::io::emergency::EmergencyStop;
 use mmt_shared::io::record::Recorder;
 use mmt_shared::io::transport::Transport;
 use mmt_shared::io::truth::TruthReceiver;
@@ -34,7 +35,7 @@ use mmt_shared::model::tool::Scene;
 use mmt_shared::pairing::Pairing;
 use mmt_shared::range::OutOfRange;
 use mmt_shared::report::MasterSession;
-use mmt_shared::wire::Architecture;
+use mmt_shared::wire::{Architecture, Side};
 use rtrb::Consumer;
 use serde::Serialize;
 
@@ -145,6 +146,8 @@ pub struct MasterOptions {
     pub take_over: bool,
     /// Where the secret is kept with which this master, started again, resumes at once.
     pub resume: Option<ResumeFile>,
+    /// The emergency stop of this side.
+    pub emergency: EmergencyStop,
 }
 
 /// A snapshot of a running master, for a screen.
@@ -174,6 +177,8 @@ pub struct MasterLive {
     pub proxy: Option<Vec2>,
     /// Whether force may act on the hand.
     pub engaged: bool,
+    /// Whose emergency stop is set.
+    pub stopped_by: Option<Side>,
     /// The person, where one operates.
     pub person: Option<PersonLive>,
     /// What the newest applied update found wrong in the model.

@@ -1,32 +1,22 @@
 //! What a record has of the master: from the entries of its loop to messages.
 
 use mmt_shared::io::clock::Clock;
-use mmt_shared::io::record::{RecordSink, RecordWriter, Recorder, TickAbout, Ticked, Topics, Wall};
+use mmt_shared::io::record::{
+    RecordSink, RecordWriter, Recorder, Shown, TickAbout, Ticked, Topics, Wall,
+};
 use mmt_shared::model::geometry::{Pose, Twist};
-use mmt_shared::record::messages::{Link, MasterTick as TickMessage, Parameters, Stamp};
-use mmt_shared::record::ros::{self, Marker};
+use mmt_shared::record::messages::{MasterTick as TickMessage, Stamp};
+use mmt_shared::record::ros::Standard;
 use mmt_shared::wire::Side;
 use serde::Serialize;
 
 use super::MasterLive;
-use super::haptic::MasterGiven;
 use crate::again::MasterSetting;
+use crate::end::MasterGiven;
 use crate::master::MasterTick;
 
-/// Standard messages of every so many ticks: 100 a second.
-const STANDARD_TICKS: u64 = 10;
-
-/// What a loop shows its record of the session, besides its ticks.
-#[derive(Clone, Copy, Debug)]
-pub struct MasterShown {
-    /// The snapshot for screens.
-    pub live: MasterLive,
-    /// Velocity of the local model.
-    pub twist: Twist,
-}
-
 /// Where a haptic loop leaves its record.
-pub type MasterSink = RecordSink<MasterGiven, MasterTick, MasterShown>;
+pub type MasterSink = RecordSink<MasterGiven, MasterTick>;
 
 /// Begins the record of a session whose end is made of `setting`.
 pub fn begin(
@@ -35,85 +25,48 @@ pub fn begin(
     setting: &MasterSetting,
     configuration: &impl Serialize,
 ) -> MasterSink {
-    recorder.begin(
-        Wall::now(clock),
-        setting.session(configuration),
-        MasterTopics::default(),
-    )
+    recorder.begin::<MasterTopics>(Wall::now(clock), setting.session(configuration))
+}
+
+/// What a record has of the snapshot for screens, and of the velocity of the local model.
+pub(super) fn shown(live: &MasterLive, twist: Twist) -> Shown {
+    Shown {
+        point: live.hip,
+        force: live.f_m,
+        body: live.model,
+        footprint: live.footprint,
+        twist,
+        params: live.params,
+        // it is not sent to the master
+        covariance: [f64::NAN; 9],
+        rtt_ms: live.rtt_ms,
+        up: live.up,
+        down: live.down,
+    }
 }
 
 /// The master's topics.
-#[derive(Debug, Default)]
-struct MasterTopics {
-    ticks: u64,
-}
+struct MasterTopics;
 
 impl Topics for MasterTopics {
     const SIDE: Side = Side::Master;
     type Given = MasterGiven;
     type Done = MasterTick;
-    type Shown = MasterShown;
 
-    fn ticked(
-        &mut self,
-        about: &TickAbout,
-        tick: &Ticked<MasterGiven, MasterTick>,
-        out: &mut RecordWriter,
-    ) {
-        let message = message(about, tick);
-        out.put("/master/ticks", about.stamp, &message);
-        if self.ticks.is_multiple_of(STANDARD_TICKS) {
-            let (stamp, done) = (about.stamp, &tick.done);
-            let hip = done.sample.hip.metres();
-            let hip = Pose::new(hip.x, hip.y, 0.0);
-            out.put_standard("/master/hip", stamp, ros::POSE, |cdr| {
-                ros::pose(cdr, stamp, &hip);
-            });
-            for (topic, force) in [
-                ("/master/force", done.felt),
-                ("/master/hand_force", done.hand_force),
-            ] {
-                out.put_standard(topic, stamp, ros::WRENCH, |cdr| {
-                    ros::force(cdr, stamp, force);
-                });
-            }
-        }
-        self.ticks += 1;
+    fn ticked(about: &TickAbout, tick: &Ticked<MasterGiven, MasterTick>, out: &mut RecordWriter) {
+        out.put("/master/ticks", about.stamp, &message(about, tick));
     }
 
-    fn shown(&mut self, stamp: Stamp, session: u32, shown: &MasterShown, out: &mut RecordWriter) {
-        let live = &shown.live;
-        let hip = Pose::new(live.hip.x, live.hip.y, 0.0);
-        let frames = [("master/hip", hip), ("master/model", live.model)];
-        out.put_standard("/tf", stamp, ros::FRAMES, |cdr| {
-            ros::frames(cdr, stamp, &frames);
-        });
-        out.put_standard("/master/model_twist", stamp, ros::TWIST, |cdr| {
-            ros::twist(cdr, stamp, &shown.twist);
-        });
-        out.put_standard("/master/markers", stamp, ros::MARKERS, |cdr| {
-            ros::markers(cdr, stamp, &markers(live, hip));
-        });
-        let [m, b, c] = live.params;
-        let parameters = Parameters {
+    fn standard(stamp: Stamp, done: &MasterTick, out: &mut RecordWriter) {
+        let hip = done.sample.hip.metres();
+        let hip = Standard::Pose(Pose::new(hip.x, hip.y, 0.0));
+        out.put_standard("/master/hip", stamp, hip);
+        out.put_standard("/master/force", stamp, Standard::Force(done.felt));
+        out.put_standard(
+            "/master/hand_force",
             stamp,
-            session,
-            m_kg: m,
-            b_ns_per_m: b,
-            c_n: c,
-            covariance: [f64::NAN; 9],
-        };
-        out.put("/master/parameters", stamp, &parameters);
-        let link = Link {
-            stamp,
-            session,
-            rtt_ms: live.rtt_ms.unwrap_or(f64::NAN),
-            up_expected: live.up.expected,
-            up_received: live.up.received,
-            down_expected: live.down.expected,
-            down_received: live.down.received,
-        };
-        out.put("/master/link", stamp, &link);
+            Standard::Force(done.hand_force),
+        );
     }
 }
 
@@ -131,6 +84,7 @@ fn message(about: &TickAbout, tick: &Ticked<MasterGiven, MasterTick>) -> TickMes
         reading_y_m: given.reading.y,
         engaged: given.engaged,
         releases: given.releases,
+        stops: given.stops,
         sent_ns: tick.sent.as_nanos(),
         hip_x_m: hip.x,
         hip_y_m: hip.y,
@@ -142,17 +96,4 @@ fn message(about: &TickAbout, tick: &Ticked<MasterGiven, MasterTick>) -> TickMes
         link: done.link.name().to_owned(),
         digest: about.digest,
     }
-}
-
-/// The model in blue, the HIP at it, and what is felt.
-fn markers(live: &MasterLive, hip: Pose) -> Vec<Marker> {
-    let blue = |opacity| [0.0, 0.45, 0.70, opacity];
-    let body = live.footprint.as_ref();
-    body.map(|faces| Marker::body("model", live.model, faces, blue(0.5)))
-        .into_iter()
-        .chain([
-            Marker::point("hip", hip),
-            Marker::force("f_m", hip, live.f_m, blue(1.0)),
-        ])
-        .collect()
 }

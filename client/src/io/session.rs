@@ -94,7 +94,8 @@ pub(super) async fn run_with(
     let path = options.path.is_some().then(PathRecorder::with_room);
     let mut haptic = HapticLoop::new(end, operator, options.duration)
         .observed_by(options.truth.take(), path)
-        .operated_through(options.events.get_mut().ok().and_then(Option::take));
+        .operated_through(options.events.get_mut().ok().and_then(Option::take))
+        .stopped_by(options.emergency.clone());
     if let Some(recorder) = &options.record {
         let sink = record::begin(
             recorder,

@@ -47,6 +47,7 @@ fn scripted(fake: &Fake) -> MasterOptions {
         path: None,
         take_over: false,
         resume: None,
+        emergency: EmergencyStop::default(),
         record: None,
         truth: None,
     }

@@ -65,6 +65,16 @@ impl Operator {
         }
     }
 
+    /// One sample period of an emergency stop, of length `period`: the HIP stays, and a person has to press anew.
+    pub fn stand(&mut self, period: Duration) {
+        match self {
+            // it counts its own steps
+            Self::Scripted(_) => {}
+            Self::Trace(trace) => trace.wait(period),
+            Self::Person(person) => person.let_go(),
+        }
+    }
+
     /// Takes in what a person did, which arrived at `elapsed`; other operators take nothing.
     pub fn handle(&mut self, elapsed: Duration, event: HandEvent) {
         if let Self::Person(person) = self {

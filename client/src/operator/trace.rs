@@ -100,9 +100,16 @@ pub enum TraceError {
 pub struct Trace {
     /// Time since the start (s, strictly increasing from 0) and tool point in the world (m); never empty.
     samples: Vec<(f64, Vec2)>,
+    /// How long it stood still.
+    waited: Duration,
 }
 
 impl Trace {
+    fn of(samples: Vec<(f64, Vec2)>) -> Self {
+        let waited = Duration::ZERO;
+        Self { samples, waited }
+    }
+
     /// Reads a path from CSV: the header `t_s,x_m,y_m`, then one sample a line, t strictly increasing.
     /// Time is counted from the first sample; blank lines at the end are ignored.
     ///
@@ -136,7 +143,7 @@ impl Trace {
             return Err(TraceError::Empty);
         };
         samples.iter_mut().for_each(|(t_s, _)| *t_s -= start_s);
-        Ok(Self { samples })
+        Ok(Self::of(samples))
     }
 
     /// The finger's path in a text of recorded pushes, as [`Trace::from_recording`].
@@ -169,7 +176,7 @@ impl Trace {
         let approached = (APPROACH_M / APPROACH_M_PER_S, Vec2::new(APPROACH_M, 0.0));
         let mut samples = vec![(0.0, Vec2::zeros()), approached];
         pushes.iter().for_each(|push| append(&mut samples, push));
-        Ok(Self { samples })
+        Ok(Self::of(samples))
     }
 
     /// This path carried, unturned and unscaled, to start at `start` (world, m).
@@ -199,12 +206,12 @@ impl Trace {
                 .iter()
                 .map(|(t_s, point)| (led_s + t_s, *point)),
         );
-        Self { samples: way }
+        Self::of(way)
     }
 
     /// The tool point (world, m) at a time since the start: linear between samples, held after the last.
     pub fn at(&self, elapsed: Duration) -> Vec2 {
-        let t_s = elapsed.as_secs_f64();
+        let t_s = elapsed.saturating_sub(self.waited).as_secs_f64();
         let next = self
             .samples
             .partition_point(|(sample_s, _)| *sample_s <= t_s);
@@ -220,10 +227,15 @@ impl Trace {
         }
     }
 
-    /// Time from the first to the last sample.
+    /// Stands still for so long, from wherever it is.
+    pub(super) fn wait(&mut self, period: Duration) {
+        self.waited += period;
+    }
+
+    /// Time from the first to the last sample, and for how long it stood still.
     pub fn duration(&self) -> Duration {
         let last_s = self.samples.last().map_or(0.0, |(t_s, _)| *t_s);
-        Duration::try_from_secs_f64(last_s).unwrap_or(Duration::ZERO)
+        Duration::try_from_secs_f64(last_s).unwrap_or(Duration::ZERO) + self.waited
     }
 
     /// The samples: time since the start (s, strictly increasing from 0) and tool point (world, m).

@@ -55,7 +55,7 @@ impl Packets {
         }
     }
 
-    /// Each with what the other end tells of it.
+    /// Each with what became of it at the other end.
     pub(super) fn matched(&self) -> Matched<'_> {
         let newest = |down| {
             let arrived = self.arrived.keys().filter(|key| key.0 == down);

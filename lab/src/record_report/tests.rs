@@ -1,4 +1,4 @@
-//! What one end alone tells of a run, and what both tell together.
+//! What the record of one end shows of a run, and what those of both show together.
 
 use super::*;
 use crate::table::Cell;

@@ -267,18 +267,21 @@ fn an_acknowledgement_of_what_never_left_silences_nothing_and_is_counted() {
     assert_eq!(end.counts().acknowledgements_implausible, 1);
 }
 
-/// The tool's place (m) after commands of a HIP that goes on at 0.1 m/s, which stop at 1 s for `gap` (ms).
-fn place_after_gap(gap: u64) -> (f64, SlaveEnd) {
+/// Four seconds of commands of a HIP that is at `hand` (x, m; at each ms) or sends nothing. Before each tick `also` is done
+/// with both ends; returns the slave's.
+fn four_seconds(
+    hand: impl Fn(u64) -> Option<f64>,
+    mut also: impl FnMut(u64, &mut SlaveEnd, &mut DatagramChannel),
+) -> SlaveEnd {
     let mut end = end("none", Architecture::Mmt, 0);
     let mut master = DatagramChannel::new(Side::Master, Time::ZERO);
     for ms in 1..=4000 {
-        let silent = (1001..=1000 + gap).contains(&ms);
-        if !silent {
+        also(ms, &mut end, &mut master);
+        if let Some(x) = hand(ms) {
             let mut samples = SampleBlock::default();
-            let hip = HipCounts::nearest(Vec2::new(-1.0 + 1e-4 * ms as f64, 0.0));
             let sample = HipSample {
                 stamp: AT(ms),
-                hip,
+                hip: HipCounts::nearest(Vec2::new(x, 0.0)),
                 ..HipSample::default()
             };
             samples.push(sample).unwrap();
@@ -293,7 +296,53 @@ fn place_after_gap(gap: u64) -> (f64, SlaveEnd) {
         }
         end.tick(AT(ms));
     }
+    end
+}
+
+/// A HIP that goes on at 0.1 m/s.
+fn going_on(ms: u64) -> f64 {
+    -1.0 + 1e-4 * ms as f64
+}
+
+/// The tool's place (m) after commands of a HIP that goes on and stop at 1 s for `gap` (ms).
+fn place_after_gap(gap: u64) -> (f64, SlaveEnd) {
+    let hand = |ms| (!(1001..=1000 + gap).contains(&ms)).then(|| going_on(ms));
+    let end = four_seconds(hand, |_, _, _| {});
     (end.slave().tool_at().x, end)
+}
+
+#[test]
+fn while_either_sides_emergency_stop_is_set_the_tool_stands() {
+    for side in [Side::Slave, Side::Master] {
+        let mut stood = Vec::new();
+        let hand = |ms| Some(going_on(ms));
+        let end = four_seconds(hand, |ms, slave, master| {
+            let stops = (1000..3000).contains(&ms);
+            match side {
+                Side::Slave => slave.stop(stops),
+                Side::Master => master.stop(stops),
+            }
+            if (1002..3000).contains(&ms) {
+                assert_eq!(slave.stopped_by(), Some(side));
+                stood.push(slave.slave().tool_at().x);
+            }
+        });
+        let first = stood[0];
+        assert!((first - -0.9).abs() < 0.01, "{first} m");
+        assert!(stood.iter().all(|x| *x == first), "it moves");
+        // the hand went on 20 cm meanwhile: it has to come for the tool
+        assert_eq!(end.stopped_by(), None);
+        assert_eq!(end.slave().tool_at().x, first);
+    }
+}
+
+#[test]
+fn after_an_emergency_stop_the_tool_follows_a_hand_that_comes_for_it() {
+    let back = |ms| if ms < 3500 { going_on(ms) } else { -0.9 };
+    let hand = |ms| Some(back(ms) + if ms < 3800 { 0.0 } else { 0.05 });
+    let end = four_seconds(hand, |ms, slave, _| slave.stop((1000..3000).contains(&ms)));
+    let x = end.slave().tool_at().x;
+    assert!((x - -0.85).abs() < 1e-3, "{x} m");
 }
 
 #[test]

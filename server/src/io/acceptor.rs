@@ -4,6 +4,7 @@
 //! counted; nobody waits for anybody else. No session begins here.
 
 use std::net::SocketAddr;
+use std::pin::pin;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
@@ -19,15 +20,15 @@ use tokio::sync::{mpsc, watch};
 use tokio::task::JoinSet;
 use tokio::time::timeout;
 
+use super::crowd::{Crowd, Place};
 use super::lease::{Lease, Leases};
 
 /// A hello may take this long after the handshake: two round trips of 2 s and the wait for a lost packet.
 const HELLO_WAIT: Duration = Duration::from_secs(8);
+/// Beyond the round trip it may take this long where many come.
+const DENSE_HELLO_WAIT: Duration = Duration::from_secs(2);
 /// How long a refusal may take to arrive before the connection is closed all the same.
 const REFUSAL_WAIT: Duration = Duration::from_secs(2);
-/// Who has finished the handshake and not yet sent a hello: more are turned away.
-const JUDGED_AT_ONCE: usize = 16;
-
 /// A master that may operate.
 pub(super) struct Admitted {
     pub(super) connection: Connection,
@@ -48,7 +49,7 @@ pub(super) struct Refusals {
     pub(super) handshake: AtomicU64,
     /// Connected, and then no hello that can be read.
     pub(super) no_hello: AtomicU64,
-    /// Too many at once.
+    /// Had to leave before a token was shown, for others who came.
     pub(super) crowded: AtomicU64,
 }
 
@@ -56,6 +57,7 @@ pub(super) struct Refusals {
 #[derive(Clone)]
 pub(super) struct Acceptor {
     token: Token,
+    crowd: Crowd,
     leases: Leases,
     refusals: Arc<Refusals>,
     stop: watch::Receiver<bool>,
@@ -67,8 +69,10 @@ pub(super) struct Acceptor {
 enum HandshakeError {
     #[error("it opened no stream: {0}")]
     NoStream(#[from] ConnectionError),
-    #[error("no hello came within {HELLO_WAIT:?}")]
-    Silent,
+    #[error("no hello came within {0:.1?}")]
+    Silent(Duration),
+    #[error("others came, and it had shown no token")]
+    Crowded,
     #[error("no hello could be read: {0}")]
     Unread(#[from] ReadFrameError),
     #[error("its hello is malformed: {0}")]
@@ -87,6 +91,7 @@ impl Acceptor {
         let (admitted, receiver) = mpsc::channel(1);
         let acceptor = Self {
             token,
+            crowd: Crowd::default(),
             leases: Leases::new(),
             refusals,
             stop,
@@ -100,17 +105,22 @@ impl Acceptor {
         let mut judged = JoinSet::new();
         while let Some(handshake) = listener.next().await {
             while judged.try_join_next().is_some() {}
-            if judged.len() < JUDGED_AT_ONCE {
-                judged.spawn(self.clone().judge(handshake));
-            } else {
-                count(&self.refusals.crowded);
-            }
+            let place = self.crowd.enter(&handshake.address());
+            judged.spawn(self.clone().judge(handshake, place));
         }
     }
 
-    async fn judge(self, handshake: Handshake) {
+    async fn judge(self, handshake: Handshake, place: Place) {
         let address = handshake.address();
-        let connection = match handshake.finish().await {
+        let finished = tokio::select! {
+            finished = handshake.finish() => finished,
+            () = place.lost() => {
+                count(&self.refusals.crowded);
+                tracing::warn!("{address} was not let in: {}", HandshakeError::Crowded);
+                return;
+            }
+        };
+        let connection = match finished {
             Ok(connection) => connection,
             Err(error) => {
                 count(&self.refusals.handshake);
@@ -118,22 +128,45 @@ impl Acceptor {
                 return;
             }
         };
-        match timeout(HELLO_WAIT, hello_of(&connection)).await {
-            Ok(Ok((send, receive, hello))) => {
-                self.answer(address, connection, send, receive, &hello)
-                    .await;
+        let hello = tokio::select! {
+            hello = self.hello_in_time(&connection) => hello,
+            () = place.lost() => Err(HandshakeError::Crowded),
+        };
+        match hello {
+            Ok((send, receive, hello)) => {
+                self.answer(place, connection, send, receive, &hello).await;
             }
-            Ok(Err(error)) => self.no_hello(address, &connection, &error),
-            Err(_) => self.no_hello(address, &connection, &HandshakeError::Silent),
+            Err(error) => self.no_hello(address, &connection, &error),
         }
     }
 
+    async fn hello_in_time(
+        &self,
+        connection: &Connection,
+    ) -> Result<(SendStream, RecvStream, Hello), HandshakeError> {
+        let dense = DENSE_HELLO_WAIT + connection.round_trip();
+        let mut hello = pin!(hello_of(connection));
+        if let Ok(hello) = timeout(dense, &mut hello).await {
+            return hello;
+        }
+        if self.crowd.is_dense() {
+            return Err(HandshakeError::Silent(dense));
+        }
+        let rest = HELLO_WAIT.saturating_sub(dense);
+        let hello = timeout(rest, hello).await;
+        hello.unwrap_or(Err(HandshakeError::Silent(HELLO_WAIT.max(dense))))
+    }
+
     fn no_hello(&self, address: SocketAddr, connection: &Connection, why: &HandshakeError) {
-        count(&self.refusals.no_hello);
+        count(match why {
+            HandshakeError::Crowded => &self.refusals.crowded,
+            _ => &self.refusals.no_hello,
+        });
         tracing::warn!("{address} was not let in: {why}");
         let code = match why {
             HandshakeError::NoStream(_)
-            | HandshakeError::Silent
+            | HandshakeError::Silent(_)
+            | HandshakeError::Crowded
             | HandshakeError::Unread(
                 ReadFrameError::Finished | ReadFrameError::Slow { .. } | ReadFrameError::Stream(_),
             ) => CLOSE_NO_HELLO,
@@ -146,12 +179,15 @@ impl Acceptor {
 
     async fn answer(
         self,
-        address: SocketAddr,
+        place: Place,
         connection: Connection,
         send: SendStream,
         receive: RecvStream,
         hello: &Hello,
     ) {
+        let address = connection.remote_address();
+        // whoever has the token is no stranger any more
+        let stranger = (hello.token != self.token).then_some(place);
         match self.verdict(address, hello).await {
             Ok((hello, lease)) => {
                 let admitted = Admitted {
@@ -172,7 +208,14 @@ impl Acceptor {
                     Refusal::BadHello => &self.refusals.bad_hello,
                     Refusal::Ending => &self.refusals.ending,
                 });
-                refuse(&connection, send, refusal).await;
+                let refused = refuse(&connection, send, refusal);
+                match stranger {
+                    Some(place) => tokio::select! {
+                        () = refused => {}
+                        () = place.lost() => {}
+                    },
+                    None => refused.await,
+                }
             }
         }
     }

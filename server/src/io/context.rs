@@ -7,6 +7,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use mmt_netem::io::socket::{SocketMeter, WrapError};
 use mmt_shared::io::clock::Clock;
+use mmt_shared::io::emergency::EmergencyStop;
 use mmt_shared::io::quic::EndpointError;
 use mmt_shared::io::record::Recorder;
 use mmt_shared::io::socket::BindError;
@@ -64,6 +65,7 @@ pub(super) struct Context {
     /// Until a session has taken it.
     pub(super) truth: Mutex<Option<TruthSender>>,
     pub(super) record: Option<Recorder>,
+    pub(super) emergency: EmergencyStop,
 }
 
 impl Context {
@@ -74,9 +76,9 @@ impl Context {
     }
 
     /// Who was turned away since the host was started, by name.
-    pub(super) fn refusals(&self) -> [(&'static str, u64); 9] {
+    pub(super) fn refusals(&self) -> [(&'static str, u64); 8] {
         let read = |counter: &AtomicU64| counter.load(Ordering::Relaxed);
-        let (refusals, away) = (&self.refusals, self.listener.turned_away());
+        let refusals = &self.refusals;
         [
             ("masters_busy", read(&refusals.busy)),
             ("masters_wrong_token", read(&refusals.wrong_token)),
@@ -85,8 +87,7 @@ impl Context {
             ("masters_no_hello", read(&refusals.no_hello)),
             ("masters_crowded", read(&refusals.crowded)),
             ("handshakes_failed", read(&refusals.handshake)),
-            ("handshakes_refused", away.refused),
-            ("handshakes_unreadable", away.unreadable),
+            ("handshakes_unreadable", self.listener.unreadable()),
         ]
     }
 

@@ -84,6 +84,7 @@ impl SlaveHost {
             refusals: Arc::new(Refusals::default()),
             truth: Mutex::new(options.truth),
             record: options.record,
+            emergency: options.emergency,
         };
         Ok(Self {
             endpoint,

@@ -10,6 +10,7 @@
 
 mod acceptor;
 mod context;
+mod crowd;
 mod host;
 mod lease;
 mod record;
@@ -23,6 +24,7 @@ use std::net::SocketAddr;
 use mmt_netem::LinkConfig;
 use mmt_netem::io::socket::SocketExtras;
 use mmt_shared::channel::peer::Loss;
+use mmt_shared::io::emergency::EmergencyStop;
 use mmt_shared::io::identity::Identity;
 use mmt_shared::io::record::Recorder;
 use mmt_shared::io::transport::Transport;
@@ -30,6 +32,7 @@ use mmt_shared::io::truth::TruthSender;
 use mmt_shared::model::geometry::{BoxFootprint, Pose, Vec2};
 use mmt_shared::model::update::Cause;
 use mmt_shared::report::SlaveSession;
+use mmt_shared::wire::Side;
 use serde::Serialize;
 
 use crate::slave::SlaveConfig;
@@ -63,6 +66,8 @@ pub struct SlaveOptions {
     pub truth: Option<TruthSender>,
     /// Where sessions are recorded, if anybody wants that.
     pub record: Option<Recorder>,
+    /// The emergency stop of this side; it outlives sessions.
+    pub emergency: EmergencyStop,
 }
 
 /// A snapshot of a running slave, for a screen.
@@ -86,6 +91,8 @@ pub struct SlaveLive {
     pub truth: Pose,
     /// The object's true footprint.
     pub footprint: Option<BoxFootprint>,
+    /// Whose emergency stop is set.
+    pub stopped_by: Option<Side>,
     /// Whether the slave is in contact.
     pub in_contact: bool,
     /// Median round trip, ms.

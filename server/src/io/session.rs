@@ -117,7 +117,7 @@ pub(super) async fn serve_with(
         return Ok(None);
     }
     announce(&connection, &hello);
-    let mut slave_loop = SlaveLoop::new(end, context.take_truth());
+    let mut slave_loop = SlaveLoop::new(end, context.take_truth(), context.emergency.clone());
     if let Some(recorder) = &context.record {
         slave_loop = slave_loop.recorded(record::begin(recorder, context, began, &hello, earlier));
     }

@@ -3,6 +3,7 @@
 //! It never waits for the network, locks nothing and logs nothing.
 
 use mmt_shared::io::clock::Clock;
+use mmt_shared::io::emergency::EmergencyStop;
 use mmt_shared::io::loop_thread::LoopSide;
 use mmt_shared::io::record::Ticked;
 use mmt_shared::io::schedule::Tick;
@@ -11,8 +12,8 @@ use mmt_shared::io::truth::TruthSender;
 use mmt_shared::time::Time;
 
 use super::SlaveLive;
-use super::record::{SlaveShown, SlaveSink};
-use crate::end::SlaveEnd;
+use super::record::{self, SlaveSink};
+use crate::end::{SlaveEnd, SlaveGiven};
 use crate::slave::SlaveTick;
 
 /// A snapshot for the network task every so many ticks: 62 a second.
@@ -47,16 +48,19 @@ pub(super) struct SlaveLoop {
     pub(super) newest: Option<SlaveTick>,
     /// Where the session is recorded, if anybody wants that.
     record: Option<SlaveSink>,
+    /// The emergency stop of this side.
+    emergency: EmergencyStop,
 }
 
 impl SlaveLoop {
-    pub(super) fn new(end: SlaveEnd, truth: Option<TruthSender>) -> Self {
+    pub(super) fn new(end: SlaveEnd, truth: Option<TruthSender>, emergency: EmergencyStop) -> Self {
         Self {
             end,
             truth,
             numbers_spent: false,
             newest: None,
             record: None,
+            emergency,
         }
     }
 
@@ -96,6 +100,8 @@ impl SlaveLoop {
         now: impl FnOnce() -> Time,
     ) {
         self.receive(side);
+        let stops = self.emergency.is_set();
+        self.end.stop(stops);
         let done = self.end.tick(tick.deadline);
         if let Some(tick) = done {
             if let Some(truth) = &mut self.truth {
@@ -107,7 +113,7 @@ impl SlaveLoop {
         if let Some(record) = &mut self.record {
             record.ticked(Ticked {
                 tick,
-                given: (),
+                given: SlaveGiven { stops },
                 sent,
                 done,
             });
@@ -129,8 +135,8 @@ impl SlaveLoop {
 
     fn show(&mut self, now: Time, side: &mut LoopSide<Snapshot>) {
         let snapshot = self.snapshot(now);
-        if let Some(record) = &mut self.record {
-            record.shown(now, SlaveShown::new(&self.end, snapshot.live));
+        if let Some(sink) = &mut self.record {
+            sink.shown(now, record::shown(&snapshot.live, &self.end));
         }
         side.publish(snapshot);
     }
@@ -153,6 +159,7 @@ impl SlaveLoop {
             elapsed_s: now.saturating_since(channel.began()).as_secs_f64(),
             rtt_ms: median.map(|rtt| rtt.as_secs_f64() * 1e3),
             up: channel.peer().incoming(),
+            stopped_by: end.stopped_by(),
             ..SlaveLive::default()
         };
         for (slot, (_, count)) in live.updates.iter_mut().zip(end.counts().updates.by_cause()) {

@@ -52,6 +52,11 @@ impl SpeedLimiter {
         self.hip.filter(|_| self.played.is_some())
     }
 
+    /// Where the tool is, m; none before that is known.
+    pub(super) fn place(&self) -> Option<Vec2> {
+        self.hip
+    }
+
     /// How long the tick that ends at `now` took, at most [`TICK_MAX`].
     pub(super) fn elapsed(&self, now: Time) -> Duration {
         self.played

@@ -33,6 +33,8 @@ pub struct DatagramChannel {
     began: Time,
     last_sent: Time,
     rate: RateController,
+    stopped: bool,
+    other_stopped: bool,
 }
 
 impl DatagramChannel {
@@ -50,16 +52,23 @@ impl DatagramChannel {
             began: now,
             last_sent: now,
             rate: RateController::new(stretch_max),
+            stopped: false,
+            other_stopped: false,
         }
     }
 
     /// Reads a datagram that arrived at `now`. None, and counted, if it does not decode, was received before
     /// or is too old to judge.
     pub fn handle(&mut self, now: Time, bytes: &[u8]) -> Option<Received> {
-        let Ok(Datagram { envelope, message }) = Datagram::decode(bytes, self.side.other()) else {
+        let Ok(datagram) = Datagram::decode(bytes, self.side.other()) else {
             self.counts.datagrams_malformed += 1;
             return None;
         };
+        let Datagram {
+            stopped,
+            envelope,
+            message,
+        } = datagram;
         let measured = self.peer.round_trip().histogram().total();
         let arrival = self.peer.handle(now, &envelope);
         match arrival {
@@ -69,6 +78,9 @@ impl DatagramChannel {
         }
         if self.peer.round_trip().histogram().total() > measured {
             self.control_rate(now);
+        }
+        if arrival == Arrival::Newest {
+            self.other_stopped = stopped;
         }
         matches!(arrival, Arrival::Newest | Arrival::Reordered).then_some(Received {
             message,
@@ -100,13 +112,29 @@ impl DatagramChannel {
         out: &mut [u8],
     ) -> Result<Option<usize>, NumbersSpent> {
         let envelope = self.peer.stamp(now)?;
-        let Ok(length) = Datagram { envelope, message }.encode(out) else {
+        let datagram = Datagram {
+            stopped: self.stopped,
+            envelope,
+            message,
+        };
+        let Ok(length) = datagram.encode(out) else {
             self.counts.messages_unsendable += 1;
             return Ok(None);
         };
         self.counts.sent.count(message.kind());
         self.last_sent = now;
         Ok(Some(length))
+    }
+
+    /// Sets or clears this side's emergency stop, which every datagram from now on carries.
+    pub fn stop(&mut self, stopped: bool) {
+        self.stopped = stopped;
+    }
+
+    /// Whose emergency stop is set, this side's before the other's, as far as its newest datagram shows; none if neither's.
+    pub fn stopped_by(&self) -> Option<Side> {
+        let other = self.other_stopped.then(|| self.side.other());
+        if self.stopped { Some(self.side) } else { other }
     }
 
     /// When a heartbeat must go out if nothing else does before.

@@ -14,6 +14,7 @@ pub mod alarm;
 pub mod clock;
 pub mod congestion;
 pub mod connect;
+pub mod emergency;
 pub mod farewell;
 pub mod identity;
 pub mod identity_file;

@@ -6,6 +6,7 @@
 
 mod file;
 mod read;
+mod shown;
 mod sink;
 mod source;
 #[cfg(test)]
@@ -26,6 +27,7 @@ use crate::wire::Side;
 
 pub use file::RecordWriter;
 pub use read::{Ended, RecordError, is_record, read};
+pub use shown::Shown;
 pub use sink::{RecordSink, Ticked};
 pub use source::{TickAbout, Topics};
 
@@ -128,14 +130,13 @@ impl Recorder {
         &self.path
     }
 
-    /// Begins a session: what its loop leaves in the sink is written as `topics` say. `session` describes all that its
+    /// Begins a session: what its loop leaves in the sink is written on the topics `T`. `session` describes all that its
     /// end was made of; its number and stamp are given here.
     pub fn begin<T: Topics>(
         &self,
         wall: Wall,
         mut session: Session,
-        topics: T,
-    ) -> RecordSink<T::Given, T::Done, T::Shown> {
+    ) -> RecordSink<T::Given, T::Done> {
         let [masters, slaves] = &*self.sessions;
         let sessions = match T::SIDE {
             Side::Master => masters,
@@ -144,7 +145,7 @@ impl Recorder {
         session.session = sessions.fetch_add(1, Ordering::Relaxed) + 1;
         session.stamp = wall.stamp(Time::from_nanos(session.began_ns));
         let (sink, entries) = RecordSink::with_room(ROOM, Arc::clone(&self.missed));
-        let source = Source::new(wall, session, topics, entries);
+        let source = Source::<T>::new(wall, session, entries);
         // the thread that has ended has left its outcome
         let _ = self.orders.send(Order::Begin(Box::new(source)));
         sink

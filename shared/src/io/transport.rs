@@ -15,7 +15,7 @@ pub use connection::{
     CLOSE_FINISHED, CLOSE_NO_HELLO, CLOSE_NOT_A_HELLO, CLOSE_TAKEN_OVER, Connection, DatagramCounts,
 };
 pub use endpoint::Endpoint;
-pub use listen::{AcceptError, Handshake, Listener, TurnedAway};
+pub use listen::{AcceptError, Handshake, Listener};
 pub use quinn::{
     ConnectionError, ReadError, RecvStream, SendDatagramError, SendStream, VarInt, WriteError,
 };

@@ -1,9 +1,11 @@
 //! The digest of a run: whether two runs gave the same bits.
 //!
 //! FNV-1a of 64 bits (Fowler, Noll, Vo 1991) over the text of each tick, in which every number reads back to the same bits,
-//! and over the bytes of each datagram that left. It tells a slip from none and is no proof against an adversary.
+//! and over the bytes of each datagram that left. It shows a slip and is no proof against an adversary.
 
 use std::fmt::{self, Debug, Write as _};
+
+use crate::wire::DATAGRAM_MAX;
 
 const OFFSET: u64 = 0xcbf2_9ce4_8422_2325;
 const PRIME: u64 = 0x0100_0000_01b3;
@@ -28,6 +30,14 @@ impl RunDigest {
     pub fn tick(&mut self, gave: &impl Debug) {
         // writing to it cannot fail
         let _ = write!(self, "{gave:?}");
+    }
+
+    /// Adds all datagrams that leave an end now: `poll` writes the next one and returns its length.
+    pub fn datagrams(&mut self, mut poll: impl FnMut(&mut [u8]) -> Option<usize>) {
+        let mut out = [0; DATAGRAM_MAX];
+        while let Some(length) = poll(&mut out) {
+            self.datagram(out.get(..length).unwrap_or_default());
+        }
     }
 
     /// Adds a datagram that left.

@@ -4,8 +4,13 @@
 
 use std::fmt::Write as _;
 
+use serde::Serialize;
+
+use super::PROGRAM;
 use super::cdr::{CdrError, CdrReader, CdrWriter};
 use super::field::Field;
+use crate::time::Time;
+use crate::wire::{STREAM_MESSAGE_MAX, StreamMessage};
 
 pub use super::field::Stamp;
 
@@ -124,6 +129,8 @@ messages! {
         engaged: bool,
         /// Whether the hand is to be released from here on.
         releases: bool,
+        /// Whether the master's emergency stop is set.
+        stops: bool,
         /// When what it sends leaves, by the master's clock, ns.
         sent_ns: u64,
         /// The HIP as it is used and sent, m.
@@ -159,6 +166,8 @@ messages! {
         lateness_ns: u64,
         /// Ticks that were skipped before it.
         skipped: u64,
+        /// Whether the slave's emergency stop is set.
+        stops: bool,
         /// When what it sends leaves, by the slave's clock, ns.
         sent_ns: u64,
         /// Whether a HIP sample was due; without one the rest is NaN.
@@ -269,6 +278,30 @@ messages! {
         lateness_max_us: f64,
         /// Inputs and events that found no room on their way to the record, so far.
         missed: u64,
+    }
+}
+
+impl Session {
+    /// The beginning of a session whose end began at `began` and is made of these; stamp and number come with the record.
+    pub fn of_end(
+        began: Time,
+        opening: &StreamMessage,
+        setting: &impl Serialize,
+        configuration: &impl Serialize,
+    ) -> Self {
+        let mut bytes = [0; STREAM_MESSAGE_MAX];
+        // what was accepted can be written; without it the record cannot run again, which is seen then
+        let length = opening.encode(&mut bytes).unwrap_or(0);
+        let json = |value: serde_json::Result<String>| value.unwrap_or_default();
+        Self {
+            stamp: Stamp::default(),
+            session: 0,
+            program: PROGRAM.to_owned(),
+            began_ns: began.as_nanos(),
+            opening: bytes.get(..length).unwrap_or_default().to_vec(),
+            setting: json(serde_json::to_string(setting)),
+            configuration: json(serde_json::to_string(configuration)),
+        }
     }
 }
 

@@ -104,6 +104,7 @@ mod tests {
 
     fn heartbeat(number: u32) -> Vec<u8> {
         let datagram = Datagram {
+            stopped: false,
             envelope: Envelope {
                 number,
                 sent: Time::from_millis(3),

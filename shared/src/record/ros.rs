@@ -13,40 +13,80 @@ const HEIGHT_M: f64 = 0.10;
 /// Length of a force's arrow, m/N: 8 N are 20 cm.
 const ARROW_M_PER_N: f64 = 0.025;
 
-/// A standard message: the name of its type and its schema.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Standard {
-    /// Name.
-    pub name: &'static str,
-    /// Schema, `ros2msg`.
-    pub schema: &'static str,
+/// A standard message, in the world frame.
+#[derive(Clone, Copy, Debug)]
+pub enum Standard<'a> {
+    /// Where something is.
+    Pose(Pose),
+    /// A force, N.
+    Force(Vec2),
+    /// A velocity, m/s and rad/s.
+    Twist(Twist),
+    /// Frames by name, each where it is.
+    Frames(&'a [(&'a str, Pose)]),
+    /// What is drawn. Each marker replaces the one of its name that was drawn before.
+    Markers(&'a [Marker]),
 }
 
-/// Where something is.
-pub const POSE: Standard = Standard {
-    name: "geometry_msgs/msg/PoseStamped",
-    schema: include_str!("ros/PoseStamped.msg"),
-};
-/// A force.
-pub const WRENCH: Standard = Standard {
-    name: "geometry_msgs/msg/WrenchStamped",
-    schema: include_str!("ros/WrenchStamped.msg"),
-};
-/// A velocity.
-pub const TWIST: Standard = Standard {
-    name: "geometry_msgs/msg/TwistStamped",
-    schema: include_str!("ros/TwistStamped.msg"),
-};
-/// Where the frames are.
-pub const FRAMES: Standard = Standard {
-    name: "tf2_msgs/msg/TFMessage",
-    schema: include_str!("ros/TFMessage.msg"),
-};
-/// What is to be drawn.
-pub const MARKERS: Standard = Standard {
-    name: "visualization_msgs/msg/MarkerArray",
-    schema: include_str!("ros/MarkerArray.msg"),
-};
+impl Standard<'_> {
+    /// Name and schema (`ros2msg`) of its type.
+    pub fn definition(&self) -> (&'static str, &'static str) {
+        match self {
+            Self::Pose(_) => (
+                "geometry_msgs/msg/PoseStamped",
+                include_str!("ros/PoseStamped.msg"),
+            ),
+            Self::Force(_) => (
+                "geometry_msgs/msg/WrenchStamped",
+                include_str!("ros/WrenchStamped.msg"),
+            ),
+            Self::Twist(_) => (
+                "geometry_msgs/msg/TwistStamped",
+                include_str!("ros/TwistStamped.msg"),
+            ),
+            Self::Frames(_) => ("tf2_msgs/msg/TFMessage", include_str!("ros/TFMessage.msg")),
+            Self::Markers(_) => (
+                "visualization_msgs/msg/MarkerArray",
+                include_str!("ros/MarkerArray.msg"),
+            ),
+        }
+    }
+
+    /// Writes its fields.
+    pub fn write(&self, out: &mut CdrWriter, stamp: Stamp) {
+        match self {
+            Self::Pose(pose) => {
+                header(out, stamp);
+                pose_of(out, pose);
+            }
+            Self::Force(force) => {
+                header(out, stamp);
+                vector(out, *force, 0.0);
+                vector(out, Vec2::zeros(), 0.0);
+            }
+            Self::Twist(twist) => {
+                header(out, stamp);
+                vector(out, twist.linear, 0.0);
+                vector(out, Vec2::zeros(), twist.angular);
+            }
+            Self::Frames(frames) => {
+                out.u32(frames.len() as u32);
+                for (name, pose) in *frames {
+                    header(out, stamp);
+                    out.text(name);
+                    pose_of(out, pose);
+                }
+            }
+            Self::Markers(markers) => {
+                out.u32(markers.len() as u32);
+                for marker in *markers {
+                    header(out, stamp);
+                    marker.write(out);
+                }
+            }
+        }
+    }
+}
 
 fn header(out: &mut CdrWriter, stamp: Stamp) {
     stamp.write(out);
@@ -67,36 +107,6 @@ fn turn(out: &mut CdrWriter, angle: f64) {
 fn pose_of(out: &mut CdrWriter, pose: &Pose) {
     vector(out, pose.position, 0.0);
     turn(out, pose.angle);
-}
-
-/// Writes a [`POSE`] in the world.
-pub fn pose(out: &mut CdrWriter, stamp: Stamp, pose: &Pose) {
-    header(out, stamp);
-    pose_of(out, pose);
-}
-
-/// Writes a [`WRENCH`]: a force in the world, N.
-pub fn force(out: &mut CdrWriter, stamp: Stamp, force: Vec2) {
-    header(out, stamp);
-    vector(out, force, 0.0);
-    vector(out, Vec2::zeros(), 0.0);
-}
-
-/// Writes a [`TWIST`] in the world, m/s and rad/s.
-pub fn twist(out: &mut CdrWriter, stamp: Stamp, twist: &Twist) {
-    header(out, stamp);
-    vector(out, twist.linear, 0.0);
-    vector(out, Vec2::zeros(), twist.angular);
-}
-
-/// Writes [`FRAMES`]: frames by name, each where it is in the world.
-pub fn frames(out: &mut CdrWriter, stamp: Stamp, frames: &[(&str, Pose)]) {
-    out.u32(frames.len() as u32);
-    for (name, pose) in frames {
-        header(out, stamp);
-        out.text(name);
-        pose_of(out, pose);
-    }
 }
 
 /// What is drawn.
@@ -121,15 +131,6 @@ pub struct Marker {
     pub shape: Shape,
     /// Red, green, blue and opacity, 0 to 1.
     pub colour: [f32; 4],
-}
-
-/// Writes [`MARKERS`]. Each replaces the one of its name that was drawn before.
-pub fn markers(out: &mut CdrWriter, stamp: Stamp, markers: &[Marker]) {
-    out.u32(markers.len() as u32);
-    for marker in markers {
-        header(out, stamp);
-        marker.write(out);
-    }
 }
 
 impl Marker {
@@ -222,7 +223,8 @@ mod tests {
     #[test]
     fn a_force_is_a_header_and_two_vectors() {
         let mut out = CdrWriter::default();
-        force(out.begin(), Stamp(1_000_000_002), Vec2::new(3.0, -4.0));
+        let force = Standard::Force(Vec2::new(3.0, -4.0));
+        force.write(out.begin(), Stamp(1_000_000_002));
         let bytes = out.message();
         // stamp, length and text of the frame, padding to 8, six doubles
         assert_eq!(bytes.len(), 4 + 8 + 4 + 6 + 6 + 48);
@@ -232,14 +234,22 @@ mod tests {
 
     #[test]
     fn every_schema_defines_what_it_uses() {
-        for standard in [POSE, WRENCH, TWIST, FRAMES, MARKERS] {
-            let used = standard.schema.lines().filter_map(|line| {
+        let all = [
+            Standard::Pose(Pose::default()),
+            Standard::Force(Vec2::zeros()),
+            Standard::Twist(Twist::default()),
+            Standard::Frames(&[]),
+            Standard::Markers(&[]),
+        ];
+        for standard in all {
+            let (name, schema) = standard.definition();
+            let used = schema.lines().filter_map(|line| {
                 let of = line.split(' ').next()?.trim_end_matches("[]");
                 of.contains('/').then_some(of)
             });
             for of in used {
-                let defined = standard.schema.contains(&format!("MSG: {of}\n"));
-                assert!(defined, "{}: {of}", standard.name);
+                let defined = schema.contains(&format!("MSG: {of}\n"));
+                assert!(defined, "{name}: {of}");
             }
         }
     }

@@ -13,30 +13,30 @@ const LABEL: usize = 26;
 const CELL: usize = 19;
 
 /// What stands in one place of a row; nothing if there is no number.
-type Cell = Option<String>;
+pub(super) type Cell = Option<String>;
 /// A label and its cells.
-type Row = (String, Vec<Cell>);
+pub(super) type Row = (String, Vec<Cell>);
 
-fn row(label: &str, cells: impl Into<Vec<Cell>>) -> Row {
+pub(super) fn row(label: &str, cells: impl Into<Vec<Cell>>) -> Row {
     (label.replace('_', " "), cells.into())
 }
 
-fn number(number: impl Into<Number>, decimals: usize, unit: &str) -> Cell {
+pub(super) fn number(number: impl Into<Number>, decimals: usize, unit: &str) -> Cell {
     let number: Number = number.into();
     number
         .get()
         .map(|value| format!("{value:.decimals$}{unit}"))
 }
 
-fn share(value: impl Into<Number>) -> Cell {
+pub(super) fn share(value: impl Into<Number>) -> Cell {
     number(value.into().times(100.0), 1, " %")
 }
 
-fn count(value: Option<u64>, of: &str) -> Cell {
+pub(super) fn count(value: Option<u64>, of: &str) -> Cell {
     value.map(|n| format!("{n}{of}"))
 }
 
-fn after(word: &str, cell: Cell) -> Cell {
+pub(super) fn after(word: &str, cell: Cell) -> Cell {
     cell.map(|text| format!("{word} {text}"))
 }
 
@@ -47,13 +47,13 @@ fn counts(word: &str, counts: Option<&Counts>) -> impl Iterator<Item = Row> {
 }
 
 /// The same without the names that never happened.
-fn happened(word: &str, of: Option<&Counts>) -> impl Iterator<Item = Row> {
+pub(super) fn happened(word: &str, of: Option<&Counts>) -> impl Iterator<Item = Row> {
     let never = [count(Some(0), "")];
     counts(word, of).filter(move |(_, cells)| *cells != never)
 }
 
 /// Rows under a title; no title without a row.
-fn section(out: &mut fmt::Formatter<'_>, title: &str, rows: Vec<Row>) -> fmt::Result {
+pub(super) fn section(out: &mut fmt::Formatter<'_>, title: &str, rows: Vec<Row>) -> fmt::Result {
     let mut title = Some(title);
     let known = |(_, cells): &Row| cells.iter().any(Option::is_some);
     for (label, cells) in rows.into_iter().filter(known) {
@@ -73,16 +73,7 @@ fn section(out: &mut fmt::Formatter<'_>, title: &str, rows: Vec<Row>) -> fmt::Re
 
 impl<C> fmt::Display for RunReport<C> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "mmt {} {}", self.command, self.version)?;
-        let parts = [
-            after("seed", count(self.seed, "")),
-            number(self.duration_s, 1, " s"),
-            self.ending.map(str::to_owned),
-        ];
-        for part in parts.into_iter().flatten() {
-            write!(f, ", {part}")?;
-        }
-        writeln!(f)?;
+        writeln!(f, "{}", self.head())?;
         section(f, "Pushes", self.pushes())?;
         section(f, "Felt", self.felt())?;
         section(f, "Updates", self.updates())?;
@@ -103,6 +94,17 @@ impl<C> fmt::Display for RunReport<C> {
 // A row a line, as in the table.
 #[rustfmt::skip]
 impl<C> RunReport<C> {
+    /// What ran, for how long, and how it ended.
+    pub(super) fn head(&self) -> String {
+        let parts = [
+            Some(format!("mmt {} {}", self.command, self.version)),
+            after("seed", count(self.seed, "")),
+            number(self.duration_s, 1, " s"),
+            self.ending.map(str::to_owned),
+        ];
+        parts.into_iter().flatten().collect::<Vec<_>>().join(", ")
+    }
+
     fn pushes(&self) -> Vec<Row> {
         vec![
             row("completed", [count(self.pushes.completed, "")]),
@@ -221,7 +223,7 @@ fn lateness(emulation: &EmulationReport) -> Vec<Cell> {
     cells
 }
 
-fn estimate(estimate: &EstimateReport, unit: &str) -> [Cell; 3] {
+pub(super) fn estimate(estimate: &EstimateReport, unit: &str) -> [Cell; 3] {
     [
         number(estimate.estimate, 3, unit),
         after("truth", number(estimate.truth, 3, unit)),

@@ -294,6 +294,35 @@ fn the_table_shows_what_is_known_and_leaves_out_what_is_not() {
 }
 
 #[test]
+fn the_brief_is_a_sentence_and_ten_lines_and_a_spoilt_run_says_so_first() {
+    let shown = Brief(&full()).to_string();
+    let lines: Vec<&str> = shown.lines().collect();
+    assert!(
+        lines[2].starts_with("The hand felt the object to "),
+        "{shown}"
+    );
+    let rows = lines.iter().filter(|line| line.starts_with("  ")).count();
+    assert_eq!(rows, 10, "{shown}");
+    assert!(
+        lines
+            .iter()
+            .all(|line| line.len() <= 110 && line.is_ascii()),
+        "{shown}"
+    );
+    let mut slow = full();
+    slow.slave_loop.skipped = slow.slave_loop.ticks;
+    let mut failed = slow.clone();
+    failed.ending = Some("failed");
+    for (report, verdict) in [
+        (&slow, "This host skipped 50 % of the ticks"),
+        (&failed, "The session failed"),
+    ] {
+        let shown = Brief(report).to_string();
+        assert!(shown.contains(verdict), "{shown}");
+    }
+}
+
+#[test]
 fn the_table_of_a_full_report_is_aligned_and_stays_within_100_columns() {
     let shown = full().to_string();
     let version = env!("CARGO_PKG_VERSION");

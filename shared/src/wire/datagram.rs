@@ -85,6 +85,8 @@ impl Message {
 /// A datagram: its envelope and its message.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Datagram {
+    /// Whether the sender's emergency stop is set: a flag of the header.
+    pub stopped: bool,
     /// Number, stamp and echo.
     pub envelope: Envelope,
     /// What it is about.
@@ -97,15 +99,15 @@ impl Datagram {
     /// # Errors
     /// Names the field that breaks a rule, or that `out` is too short; what is in `out` then must not be sent.
     pub fn encode(&self, out: &mut [u8]) -> Result<usize, EncodeError> {
-        let (kind, envelope) = (self.message.kind(), &self.envelope);
+        let (kind, stopped, envelope) = (self.message.kind(), self.stopped, &self.envelope);
         self.check()
             .map_err(|why| EncodeError::Field { kind, why })?;
         match &self.message {
-            Message::Command(command) => write(kind, &(envelope, command), out),
-            Message::Update(update) => write(kind, &(envelope, update), out),
-            Message::Scene(scene) => write(kind, &(envelope, scene), out),
-            Message::Tool(tool) => write(kind, &(envelope, tool), out),
-            Message::Heartbeat => write(kind, envelope, out),
+            Message::Command(command) => write(kind, stopped, &(envelope, command), out),
+            Message::Update(update) => write(kind, stopped, &(envelope, update), out),
+            Message::Scene(scene) => write(kind, stopped, &(envelope, scene), out),
+            Message::Tool(tool) => write(kind, stopped, &(envelope, tool), out),
+            Message::Heartbeat => write(kind, stopped, envelope, out),
         }
     }
 
@@ -114,7 +116,7 @@ impl Datagram {
     /// # Errors
     /// Why the bytes are not exactly one message that `from` may send in a datagram.
     pub fn decode(bytes: &[u8], from: Side) -> Result<Self, DecodeError> {
-        let (kind, body) = open(bytes, from, Channel::Datagram)?;
+        let (kind, stopped, body) = open(bytes, from, Channel::Datagram)?;
         let (envelope, message) = match kind {
             Kind::Command => with(Message::Command, read(kind, body)?),
             Kind::Update => with(Message::Update, read(kind, body)?),
@@ -125,7 +127,11 @@ impl Datagram {
                 return Err(DecodeError::WrongChannel { kind });
             }
         };
-        let datagram = Self { envelope, message };
+        let datagram = Self {
+            stopped,
+            envelope,
+            message,
+        };
         match datagram.check() {
             Ok(()) => Ok(datagram),
             Err(why) => Err(DecodeError::Field { kind, why }),

@@ -89,7 +89,7 @@ pub enum DecodeError {
         number: u8,
     },
     /// Flags are set that this version does not know.
-    #[error("a {} has the unknown flags {flags:#06x}: this version has none", kind.name())]
+    #[error("a {} has the unknown flags {flags:#06x}: this version has one, 1 in datagrams", kind.name())]
     Flags {
         /// The message.
         kind: Kind,

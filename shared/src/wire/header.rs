@@ -5,18 +5,24 @@
 use super::error::DecodeError;
 use super::kind::{Channel, HEADER_BYTES, Kind, MAGIC, PROTOCOL_VERSION, Side};
 
-/// The header of a message of this type. The flags are all zero in this version.
-pub(super) const fn header(kind: Kind) -> [u8; HEADER_BYTES] {
+/// The one flag: the sender's emergency stop is set. Datagrams alone have it.
+const STOPPED: u16 = 1;
+
+/// The header of a message of this type, from a sender whose emergency stop is set or not.
+pub(super) const fn header(kind: Kind, stopped: bool) -> [u8; HEADER_BYTES] {
     let [m, t, u, v] = MAGIC;
-    [m, t, u, v, PROTOCOL_VERSION, kind.number(), 0, 0]
+    let flags = if stopped { STOPPED } else { 0 };
+    let [low, high] = flags.to_le_bytes();
+    [m, t, u, v, PROTOCOL_VERSION, kind.number(), low, high]
 }
 
-/// Reads a header that came from `from` on `channel`; returns the type and the body.
+/// Reads a header that came from `from` on `channel`; returns the type, whether the sender's emergency stop is set, and the
+/// body.
 pub(super) fn open(
     message: &[u8],
     from: Side,
     channel: Channel,
-) -> Result<(Kind, &[u8]), DecodeError> {
+) -> Result<(Kind, bool, &[u8]), DecodeError> {
     let length = message.len();
     if length > channel.longest() {
         return Err(DecodeError::TooLong { length });
@@ -34,7 +40,8 @@ pub(super) fn open(
     }
     let kind = Kind::from_number(number).ok_or(DecodeError::UnknownType { number })?;
     let flags = u16::from_le_bytes([low, high]);
-    if flags != 0 {
+    let stopped = flags == STOPPED && kind.channel() == Channel::Datagram;
+    if flags != 0 && !stopped {
         return Err(DecodeError::Flags { kind, flags });
     }
     if kind.channel() != channel {
@@ -43,7 +50,7 @@ pub(super) fn open(
     if !kind.is_sent_by(from) {
         return Err(DecodeError::WrongDirection { kind, from });
     }
-    Ok((kind, body))
+    Ok((kind, stopped, body))
 }
 
 #[cfg(test)]
@@ -53,7 +60,7 @@ mod tests {
 
     #[test]
     fn header_is_readable_by_eye() {
-        assert_eq!(&header(Kind::Welcome), b"MMTP\x03\x11\x00\x00");
+        assert_eq!(&header(Kind::Welcome, false), b"MMTP\x03\x11\x00\x00");
         assert!(ALPN.ends_with(&PROTOCOL_VERSION.to_string()));
     }
 
@@ -75,7 +82,7 @@ mod tests {
     #[test]
     fn each_type_is_taken_on_its_own_road_and_in_its_own_direction_only() {
         for kind in Kind::ALL {
-            let bytes = header(kind);
+            let bytes = header(kind, false);
             for from in [Side::Master, Side::Slave] {
                 for channel in [Channel::Datagram, Channel::Stream] {
                     let opened = open(&bytes, from, channel);
@@ -102,5 +109,10 @@ mod tests {
             read(b"MMTP\x03\x01\0\x01"),
             DecodeError::Flags { kind, flags }
         );
+        let opened = open(b"MMTP\x03\x01\x01\0", Side::Master, Channel::Datagram);
+        assert_eq!(opened, Ok((kind, true, &[][..])));
+        let on_stream = open(b"MMTP\x03\x10\x01\0", Side::Master, Channel::Stream);
+        let (kind, flags) = (Kind::Hello, 1);
+        assert_eq!(on_stream, Err(DecodeError::Flags { kind, flags }));
     }
 }

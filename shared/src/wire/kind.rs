@@ -1,5 +1,7 @@
 //! The types of messages, which of them may travel where, and the bounds of their lengths.
 
+use serde::Serialize;
+
 /// The first four bytes of every message: ASCII `MMTP`.
 pub const MAGIC: [u8; 4] = *b"MMTP";
 
@@ -19,7 +21,8 @@ pub const DATAGRAM_MAX: usize = 1024;
 pub const STREAM_MESSAGE_MAX: usize = 4096;
 
 /// One of the two ends of a session.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Side {
     /// The operator's end: opens the connection and the stream. It sends "up".
     Master,

@@ -285,10 +285,10 @@ impl<'a> StreamMessage<'a> {
         self.check()
             .map_err(|why| EncodeError::Field { kind, why })?;
         match self {
-            Self::Hello(hello) => write(kind, hello, out),
-            Self::Welcome(welcome) => write(kind, welcome, out),
-            Self::Refused(refusal) => write(kind, refusal, out),
-            Self::Farewell(farewell) => write(kind, farewell, out),
+            Self::Hello(hello) => write(kind, false, hello, out),
+            Self::Welcome(welcome) => write(kind, false, welcome, out),
+            Self::Refused(refusal) => write(kind, false, refusal, out),
+            Self::Farewell(farewell) => write(kind, false, farewell, out),
         }
     }
 
@@ -298,7 +298,7 @@ impl<'a> StreamMessage<'a> {
     /// Why the bytes are not exactly one message that `from` may send on the stream. The stream must
     /// not be read any further then.
     pub fn decode(message: &'a [u8], from: Side) -> Result<Self, DecodeError> {
-        let (kind, body) = open(message, from, Channel::Stream)?;
+        let (kind, _, body) = open(message, from, Channel::Stream)?;
         let message = match kind {
             Kind::Hello => Self::Hello(read(kind, body)?),
             Kind::Welcome => Self::Welcome(read(kind, body)?),

@@ -94,7 +94,11 @@ fn written(encode: impl FnOnce(&mut [u8]) -> Encoded) -> Vec<u8> {
 }
 
 fn datagram(envelope: Envelope, message: Message) -> Vec<u8> {
-    let datagram = Datagram { envelope, message };
+    let datagram = Datagram {
+        stopped: false,
+        envelope,
+        message,
+    };
     written(|out| datagram.encode(out))
 }
 

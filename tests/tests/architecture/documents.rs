@@ -1,6 +1,6 @@
-//! That the documents name only files that exist: links, and paths in code spans.
+//! That the documents name only what exists: files in links and code spans, and tests.
 
-use super::{File, hold, listing};
+use super::{File, hold, listing, repository};
 
 /// What a path in a code span starts with when it means a file of this repository.
 const ROOTS: &str = "shared/ netem/ server/ client/ lab/ cli/ tests/ docs/ .ci/";
@@ -71,6 +71,42 @@ fn documents_name_only_files_that_exist() {
             ),
             ("docs/a.md", "`shared/src`, `mmt replay FILE`, `tests/*.rs`"),
             ("a.rs", "[a](b.md)"),
+        ],
+    );
+}
+
+/// The names of tests in the code spans of a line: words that no key has as many of.
+fn tests_named(line: &str) -> impl Iterator<Item = &str> {
+    let in_name = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_';
+    let spans = line.split('`').skip(1).step_by(2);
+    spans.filter(move |span| span.chars().all(in_name) && span.matches('_').count() >= 6)
+}
+
+#[test]
+fn documents_name_only_tests_that_exist() {
+    let sources: Vec<File> = repository().into_iter().filter(File::is_rust).collect();
+    let exists = |name: &str| {
+        let definition = format!("fn {name}(");
+        sources.iter().any(|file| file.text.contains(&definition))
+    };
+    let document = |file: &File| file.path.starts_with("docs/") && file.path.ends_with(".md");
+    let planted = format!(
+        "| `{}` |",
+        ["a_test", "that_nobody", "has_written_yet"].join("_")
+    );
+    hold(
+        |file| {
+            file.lines_that(document(file), |line| {
+                tests_named(line).any(|name| !exists(name))
+            })
+        },
+        [("docs/a.md", planted.as_str())],
+        [
+            (
+                "docs/a.md",
+                "`documents_name_only_tests_that_exist`, `samples_per_command`",
+            ),
+            ("README.md", planted.as_str()),
         ],
     );
 }

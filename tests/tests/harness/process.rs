@@ -140,6 +140,14 @@ impl Running {
         if let Some(line) = printed.into_iter().find(|line| wanted(line)) {
             return Ok(line.clone());
         }
+        self.wait_within(within, wanted)
+    }
+
+    fn wait_within(
+        &mut self,
+        within: Duration,
+        wanted: impl Fn(&str) -> bool,
+    ) -> Result<String, ProcessError> {
         let end = Instant::now() + within;
         loop {
             let left = end.saturating_duration_since(Instant::now());
@@ -150,6 +158,19 @@ impl Running {
                 return Ok(line);
             }
         }
+    }
+
+    /// Waits for a line like [`Self::wait_for_line`] does, but for one that is not printed yet.
+    ///
+    /// # Errors
+    /// It does not come in time, or the process ends before.
+    pub(crate) fn wait_for_next_line(
+        &mut self,
+        within: Duration,
+        wanted: impl Fn(&str) -> bool,
+    ) -> Result<String, ProcessError> {
+        while self.take_line(Duration::ZERO).is_ok() {}
+        self.wait_within(within, wanted)
     }
 
     /// Waits for the first line on standard output, and returns it.
@@ -184,10 +205,18 @@ impl Running {
     /// # Errors
     /// The process cannot be signalled.
     pub(crate) fn interrupt(&self) -> Result<(), ProcessError> {
+        self.signal(Signal::INT)
+    }
+
+    /// Sends it a signal.
+    ///
+    /// # Errors
+    /// The process cannot be signalled.
+    pub(crate) fn signal(&self, signal: Signal) -> Result<(), ProcessError> {
         let pid = i32::try_from(self.child.id()).ok().and_then(Pid::from_raw);
-        let sent = pid.map(|pid| kill_process(pid, Signal::INT));
+        let sent = pid.map(|pid| kill_process(pid, signal));
         sent.unwrap_or(Ok(()))
-            .map_err(|error| system(format!("interrupting {}", self.name), error.into()))
+            .map_err(|error| system(format!("signalling {}", self.name), error.into()))
     }
 
     /// Waits for its end.

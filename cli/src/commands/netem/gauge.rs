@@ -17,7 +17,7 @@ use ratatui::widgets::Paragraph;
 use super::DEGRADED;
 use super::table::{ALWAYS, ROWS};
 use crate::log::Messages;
-use crate::view::Screen;
+use crate::view::{Screen, Wish};
 
 /// The time that rates and delays are of.
 const WINDOW: Duration = Duration::from_secs(1);
@@ -91,7 +91,8 @@ impl Gauge {
             render(frame, caption, moments, messages);
         };
         self.screen.draw(draw)?;
-        self.screen.wants_end(patience)
+        let wish = self.screen.wish(patience)?;
+        Ok(wish == Some(Wish::End))
     }
 }
 

@@ -25,8 +25,12 @@ pub(super) enum FromPage {
     Take,
     /// It leaves the hand to others.
     Leave,
-    /// No force on the hand, and the session ends: anybody may.
+    /// The master's emergency stop: anybody may.
     Stop,
+    /// The master's emergency stop is cleared.
+    Clear,
+    /// The session ends.
+    End,
     /// New networks from now on.
     Network(NetworkWish),
     /// A new session.
@@ -62,8 +66,8 @@ pub struct SessionWish {
 /// What whoever runs the session has to do.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Order {
-    /// End the session at once.
-    Stop,
+    /// End the session.
+    End,
     /// Change the networks.
     Network(NetworkWish),
     /// Begin a new session.
@@ -85,10 +89,14 @@ impl FromPage {
             Self::Press(pressed) => (Some(HandEvent::Press(sample(*pressed))), &[][..]),
             Self::Move(samples) => (None, samples.as_slice()),
             Self::Release | Self::Leave => (Some(HandEvent::Release), &[][..]),
-            Self::Stop => (Some(HandEvent::Pause(true)), &[][..]),
             Self::Drive(driver) => (Some(HandEvent::Drive(*driver)), &[][..]),
             Self::Pause(paused) => (Some(HandEvent::Pause(*paused)), &[][..]),
-            Self::Take | Self::Network(_) | Self::Restart(_) => (None, &[][..]),
+            Self::Stop
+            | Self::Clear
+            | Self::End
+            | Self::Take
+            | Self::Network(_)
+            | Self::Restart(_) => (None, &[][..]),
         };
         let moves = more.iter().map(|moved| HandEvent::Move(sample(*moved)));
         one.into_iter().chain(moves)
@@ -97,7 +105,7 @@ impl FromPage {
     /// What it is to whoever runs the session.
     pub(super) fn order(self) -> Option<Order> {
         match self {
-            Self::Stop => Some(Order::Stop),
+            Self::End => Some(Order::End),
             Self::Network(wish) => Some(Order::Network(wish)),
             Self::Restart(wish) => Some(Order::Restart(wish)),
             _ => None,
@@ -142,8 +150,8 @@ mod tests {
     }
 
     #[test]
-    fn a_stop_takes_the_force_at_once_and_ends_the_session() {
-        assert!(FromPage::Stop.hand_events().eq([HandEvent::Pause(true)]));
-        assert_eq!(FromPage::Stop.order(), Some(Order::Stop));
+    fn an_end_is_an_order_and_a_stop_is_not() {
+        assert_eq!(FromPage::End.order(), Some(Order::End));
+        assert_eq!(FromPage::Stop.order(), None);
     }
 }

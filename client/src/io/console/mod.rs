@@ -22,6 +22,7 @@ use axum::http::{HeaderMap, StatusCode, Uri};
 use axum::response::{IntoResponse, Response};
 use axum::routing::get;
 use axum::serve::ListenerExt;
+use mmt_shared::io::emergency::EmergencyStop;
 use mmt_shared::io::secret::NoRandomness;
 use rtrb::{Consumer, Producer, RingBuffer};
 use tokio::sync::{mpsc, watch};
@@ -94,6 +95,8 @@ struct Shared {
     /// Who operates.
     operator: watch::Sender<Option<u64>>,
     orders: mpsc::UnboundedSender<Order>,
+    /// That of the sessions which are shown.
+    emergency: EmergencyStop,
 }
 
 /// A console at work; it ends with the process.
@@ -104,11 +107,11 @@ pub struct Console {
 }
 
 impl Console {
-    /// Starts to serve.
+    /// Starts to serve. Pages set and clear `emergency`, which is to be that of the sessions that are shown.
     ///
     /// # Errors
     /// See [`ConsoleError`].
-    pub fn start(options: ConsoleOptions) -> Result<Self, ConsoleError> {
+    pub fn start(options: ConsoleOptions, emergency: EmergencyStop) -> Result<Self, ConsoleError> {
         let ticket = Ticket::generate()?;
         let runtime = tokio::runtime::Builder::new_current_thread()
             .enable_all()
@@ -131,6 +134,7 @@ impl Console {
             about: watch::Sender::new(Utf8Bytes::from_static("{}")),
             operator: watch::Sender::new(None),
             orders: send,
+            emergency,
         });
         let served = Arc::clone(&shared);
         std::thread::Builder::new()

@@ -106,6 +106,11 @@ impl Viewer {
             if !may {
                 return;
             }
+            match message {
+                FromPage::Stop => self.shared.emergency.set(true),
+                FromPage::Clear => self.shared.emergency.set(false),
+                _ => {}
+            }
             for event in message.hand_events() {
                 stage.give(event);
             }

@@ -3,6 +3,7 @@
 use std::ops::ControlFlow;
 
 use mmt_shared::channel::datagram_channel::DatagramChannel;
+use mmt_shared::io::emergency::EmergencyStop;
 use mmt_shared::io::loop_thread::{self, LoopHandle, LoopSide};
 use mmt_shared::io::schedule::Tick;
 use mmt_shared::io::truth::{self, TruthReceiver};
@@ -176,6 +177,61 @@ async fn silence_of_one_second_releases_and_one_tick_less_does_not() {
         ticked.tick(index).is_break()
     });
     assert!(ticks.unwrap() <= 1000 + u64::from(RAMP_TICKS));
+}
+
+/// Ticks of an emergency stop that `set` sets and clears, of a hand that goes 10 mm/s into the box; then as many without.
+async fn stopped_for_half_a_second(set: impl Fn(&mut Ticked, &EmergencyStop, bool)) {
+    let mut ticked = along("0,-0.21,0\n2,-0.19,0\n9,-0.19,0\n", None, None);
+    let emergency = EmergencyStop::default();
+    ticked.haptic = ticked.haptic.stopped_by(emergency.clone());
+    let mut force = Vec2::zeros();
+    let mut tick = |ticked: &mut Ticked, index| {
+        ticked.hear(index, Message::Heartbeat);
+        while ticked.handle.next_departure().is_some() {}
+        assert!(ticked.tick(index).is_continue());
+        let (hip, now) = (ticked.haptic.reading, ticked.haptic.hand_force);
+        let step = (now - force).norm();
+        assert!(step <= 2.0 + 1e-9, "a step of {step} N");
+        force = now;
+        (hip.x, now.norm())
+    };
+    let before = (0..1500)
+        .map(|index| tick(&mut ticked, index))
+        .last()
+        .unwrap();
+    assert!(before.1 > 1.9, "{before:?}");
+    set(&mut ticked, &emergency, true);
+    for index in 1500..2000 {
+        let (x, force) = tick(&mut ticked, index);
+        // 2 N a tick, and a tick until a flag on the wire is read
+        assert!(force == 0.0 || index < 1503, "{force} N in tick {index}");
+        assert!((x - before.0).abs() < 2e-5, "the hand is led on");
+    }
+    set(&mut ticked, &emergency, false);
+    let after = (2000..2500)
+        .map(|index| tick(&mut ticked, index))
+        .last()
+        .unwrap();
+    // it goes on from where it stood
+    assert!(
+        (after.0 - before.0 - 5e-3).abs() < 2e-5,
+        "{before:?} {after:?}"
+    );
+    assert!(after.1 > 1.9, "{after:?}");
+}
+
+#[tokio::test]
+async fn the_own_emergency_stop_takes_the_force_in_milliseconds_and_the_hand_goes_on_from_there() {
+    stopped_for_half_a_second(|_, emergency, stopped| emergency.set(stopped)).await;
+}
+
+#[tokio::test]
+async fn the_slaves_emergency_stop_does_the_same_and_is_cleared_by_the_slave_alone() {
+    stopped_for_half_a_second(|ticked, emergency, stopped| {
+        emergency.set(false);
+        ticked.slave.stop(stopped);
+    })
+    .await;
 }
 
 #[tokio::test]

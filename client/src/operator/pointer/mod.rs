@@ -202,7 +202,7 @@ impl Person {
     }
 
     /// The HIP stays where it is.
-    fn let_go(&mut self) {
+    pub(super) fn let_go(&mut self) {
         self.grip = None;
         self.readings.clear();
         self.filter = Filter::at_rest(self.hip);

@@ -1,5 +1,6 @@
 //! A master of the tests: what the protocol's document demands, and no more.
 
+use std::error::Error;
 use std::time::Duration;
 
 use bytes::Bytes;
@@ -28,7 +29,7 @@ use tokio::time::{interval, timeout};
 /// Longer than any healthy test needs on any host.
 pub(super) const PATIENCE: Duration = Duration::from_secs(60);
 const PACKED: u8 = 10;
-const TRAFFIC: Traffic = Traffic {
+pub(super) const TRAFFIC: Traffic = Traffic {
     datagram_max: 400,
     rate_cap: RateCap {
         bytes_per_s: 300_000,
@@ -57,14 +58,19 @@ pub(super) async fn patiently<T>(future: impl Future<Output = T>) -> T {
 impl Master {
     /// Connects and opens the stream; sends nothing yet.
     pub(super) async fn connect(pairing: &Pairing) -> Self {
+        Self::try_connect(pairing).await.unwrap()
+    }
+
+    /// The same, if it is let in so far.
+    pub(super) async fn try_connect(pairing: &Pairing) -> Result<Self, Box<dyn Error>> {
         let address = pairing.address.to_string().parse().unwrap();
         let own = socket::bind("127.0.0.1:0".parse().unwrap()).unwrap();
         let endpoint = client_endpoint(socket::for_quic(own).unwrap()).unwrap();
         let connection = connect(&endpoint, address, pairing.pin, TRAFFIC, PATIENCE);
-        let connection = connection.await.unwrap();
-        let (send, receive) = connection.open_bi().await.unwrap();
+        let connection = connection.await?;
+        let (send, receive) = connection.open_bi().await?;
         let clock = Clock::start();
-        Self {
+        Ok(Self {
             connection,
             link: DatagramChannel::new(Side::Master, clock.now()),
             updates: Vec::new(),
@@ -77,7 +83,7 @@ impl Master {
             clock,
             stamp: Time::from_millis(1),
             hip: Vec2::new(-0.25, 0.02),
-        }
+        })
     }
 
     /// Connects and is welcomed.

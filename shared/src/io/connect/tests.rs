@@ -107,7 +107,7 @@ async fn another_version_or_protocol_is_refused_in_the_handshake_naming_ours() {
             text.contains(&format!("{ALPN:?}")) && text.contains("version"),
             "{text}"
         );
-        assert_eq!(slave.listener.turned_away().unreadable, 1);
+        assert_eq!(slave.listener.unreadable(), 1);
     }
 }
 

@@ -52,16 +52,13 @@ impl RecordWriter {
         self.write(topic, stamp, describe, |out| message.write(out));
     }
 
-    /// Writes a standard message; `body` writes its fields.
-    pub fn put_standard(
-        &mut self,
-        topic: &'static str,
-        stamp: Stamp,
-        standard: Standard,
-        body: impl FnOnce(&mut CdrWriter),
-    ) {
-        let describe = || (standard.name, standard.schema.to_owned());
-        self.write(topic, stamp, describe, body);
+    /// Writes a standard message.
+    pub fn put_standard(&mut self, topic: &'static str, stamp: Stamp, message: Standard<'_>) {
+        let describe = || {
+            let (name, schema) = message.definition();
+            (name, schema.to_owned())
+        };
+        self.write(topic, stamp, describe, |out| message.write(out, stamp));
     }
 
     fn write(

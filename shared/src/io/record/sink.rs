@@ -5,6 +5,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use rtrb::{Consumer, Producer, RingBuffer};
 
+use super::shown::Shown;
 use crate::io::loop_thread::Frame;
 use crate::io::schedule::Tick;
 use crate::time::Time;
@@ -27,27 +28,27 @@ pub struct Ticked<G, D> {
 
 /// What a loop left.
 #[derive(Clone, Copy, Debug)]
-pub(super) enum Entry<G, D, S> {
+pub(super) enum Entry<G, D> {
     Arrived { index: u64, frame: Frame },
     Ticked { index: u64, tick: Ticked<G, D> },
     Sent(Frame),
-    Shown { at: Time, shown: S },
+    Shown { at: Time, shown: Shown },
 }
 
 /// The loop's side of a record. It never waits or allocates; what finds no room is counted.
 #[derive(Debug)]
-pub struct RecordSink<G, D, S> {
-    entries: Producer<Entry<G, D, S>>,
+pub struct RecordSink<G, D> {
+    entries: Producer<Entry<G, D>>,
     missed: Arc<AtomicU64>,
     /// The number of the next input: inputs so far, and whatever found no room.
     inputs: u64,
 }
 
-impl<G, D, S> RecordSink<G, D, S> {
+impl<G, D> RecordSink<G, D> {
     pub(super) fn with_room(
         entries: usize,
         missed: Arc<AtomicU64>,
-    ) -> (Self, Consumer<Entry<G, D, S>>) {
+    ) -> (Self, Consumer<Entry<G, D>>) {
         let (entries, taken) = RingBuffer::new(entries);
         let sink = Self {
             entries,
@@ -75,7 +76,7 @@ impl<G, D, S> RecordSink<G, D, S> {
     }
 
     /// Keeps what is shown of the session at `at`.
-    pub fn shown(&mut self, at: Time, shown: S) {
+    pub fn shown(&mut self, at: Time, shown: Shown) {
         self.keep(Entry::Shown { at, shown });
     }
 
@@ -85,7 +86,7 @@ impl<G, D, S> RecordSink<G, D, S> {
         index
     }
 
-    fn keep(&mut self, entry: Entry<G, D, S>) {
+    fn keep(&mut self, entry: Entry<G, D>) {
         if self.entries.push(entry).is_err() {
             self.missed.fetch_add(1, Ordering::Relaxed);
             // whatever is missing, the numbers of the inputs show that something is

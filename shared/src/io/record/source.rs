@@ -5,6 +5,7 @@ use std::fmt::Debug;
 use rtrb::Consumer;
 
 use super::file::RecordWriter;
+use super::shown::Names;
 use super::sink::{Entry, Ticked};
 use super::{ROOM, Wall};
 use crate::io::loop_thread::Frame;
@@ -15,6 +16,8 @@ use crate::wire::Side;
 
 /// Ticks that a message about the loop sums up.
 const LOOP_TICKS: u64 = 1000;
+/// Standard messages of every so many ticks: 100 a second.
+const STANDARD_TICKS: u64 = 10;
 
 /// What every message about a tick has.
 #[derive(Clone, Copy, Debug)]
@@ -39,19 +42,12 @@ pub trait Topics: Send + 'static {
     type Given: Copy + Send + 'static;
     /// What a tick does; its text goes into the digest.
     type Done: Copy + Debug + Send + 'static;
-    /// What is shown of the session now and then.
-    type Shown: Copy + Send + 'static;
 
     /// Writes a tick.
-    fn ticked(
-        &mut self,
-        about: &TickAbout,
-        tick: &Ticked<Self::Given, Self::Done>,
-        out: &mut RecordWriter,
-    );
+    fn ticked(about: &TickAbout, tick: &Ticked<Self::Given, Self::Done>, out: &mut RecordWriter);
 
-    /// Writes what is shown.
-    fn shown(&mut self, stamp: Stamp, session: u32, shown: &Self::Shown, out: &mut RecordWriter);
+    /// Writes the standard messages of a tick, 100 times a second.
+    fn standard(stamp: Stamp, done: &Self::Done, out: &mut RecordWriter);
 }
 
 /// Something that is written while a session goes on.
@@ -60,42 +56,15 @@ pub(super) trait Drain: Send {
     fn drain(&mut self, missed: u64, out: &mut RecordWriter) -> bool;
 }
 
-/// The topics that both ends have.
-struct Names {
-    session: &'static str,
-    arrivals: &'static str,
-    packets: &'static str,
-    about_loop: &'static str,
-}
-
-impl Names {
-    const fn of(side: Side) -> Self {
-        match side {
-            Side::Master => Self {
-                session: "/master/session",
-                arrivals: "/master/arrivals",
-                packets: "/master/packets",
-                about_loop: "/master/loop",
-            },
-            Side::Slave => Self {
-                session: "/slave/session",
-                arrivals: "/slave/arrivals",
-                packets: "/slave/packets",
-                about_loop: "/slave/loop",
-            },
-        }
-    }
-}
-
-type Left<T> = Entry<<T as Topics>::Given, <T as Topics>::Done, <T as Topics>::Shown>;
+type Left<T> = Entry<<T as Topics>::Given, <T as Topics>::Done>;
 
 /// One session of one end.
 pub(super) struct Source<T: Topics> {
     wall: Wall,
     session: Session,
     begun: bool,
-    names: Names,
-    topics: T,
+    names: &'static Names,
+    ticks: u64,
     entries: Consumer<Left<T>>,
     digest: RunDigest,
     packets: PacketWatch,
@@ -112,14 +81,14 @@ struct Timing {
 }
 
 impl<T: Topics> Source<T> {
-    pub(super) fn new(wall: Wall, session: Session, topics: T, entries: Consumer<Left<T>>) -> Self {
+    pub(super) fn new(wall: Wall, session: Session, entries: Consumer<Left<T>>) -> Self {
         Self {
             wall,
             packets: PacketWatch::new(T::SIDE, session.session),
             session,
             begun: false,
             names: Names::of(T::SIDE),
-            topics,
+            ticks: 0,
             entries,
             digest: RunDigest::default(),
             timing: Timing::default(),
@@ -127,7 +96,6 @@ impl<T: Topics> Source<T> {
     }
 
     fn write(&mut self, entry: &Left<T>, missed: u64, out: &mut RecordWriter) {
-        let session = self.session.session;
         match entry {
             Entry::Arrived { index, frame } => self.arrived(*index, frame, out),
             Entry::Ticked { index, tick } => self.ticked(*index, tick, missed, out),
@@ -138,7 +106,8 @@ impl<T: Topics> Source<T> {
                 out.put(self.names.packets, stamp, &packet);
             }
             Entry::Shown { at, shown } => {
-                self.topics.shown(self.wall.stamp(*at), session, shown, out);
+                let stamp = self.wall.stamp(*at);
+                self.names.put(stamp, self.session.session, shown, out);
             }
         }
     }
@@ -173,7 +142,11 @@ impl<T: Topics> Source<T> {
             lateness_ns,
             digest: self.digest.value(),
         };
-        self.topics.ticked(&about, tick, out);
+        T::ticked(&about, tick, out);
+        if self.ticks.is_multiple_of(STANDARD_TICKS) {
+            T::standard(about.stamp, &tick.done, out);
+        }
+        self.ticks += 1;
         let timing = &mut self.timing;
         timing.ticks += 1;
         timing.skipped += tick.tick.skipped;

@@ -17,9 +17,8 @@ impl Topics for Counting {
     const SIDE: Side = Side::Slave;
     type Given = ();
     type Done = u64;
-    type Shown = ();
 
-    fn ticked(&mut self, about: &TickAbout, _: &Ticked<(), u64>, out: &mut RecordWriter) {
+    fn ticked(about: &TickAbout, _: &Ticked<(), u64>, out: &mut RecordWriter) {
         let message = Loop {
             stamp: about.stamp,
             session: about.session,
@@ -32,7 +31,7 @@ impl Topics for Counting {
         out.put("/slave/ticks", about.stamp, &message);
     }
 
-    fn shown(&mut self, _: Stamp, _: u32, (): &(), _: &mut RecordWriter) {}
+    fn standard(_: Stamp, _: &u64, _: &mut RecordWriter) {}
 }
 
 fn session() -> Session {
@@ -65,7 +64,7 @@ fn ticked(n: u64) -> Ticked<(), u64> {
 fn record(path: &Path, ticks: u64) -> RecordOutcome {
     let recorder = Recorder::create(path).unwrap();
     let wall = Wall::of(Stamp(1_000), Time::ZERO);
-    let mut sink = recorder.begin(wall, session(), Counting);
+    let mut sink = recorder.begin::<Counting>(wall, session());
     for n in 0..ticks {
         sink.arrived(&Frame::new(Time::from_millis(n), b"in"));
         sink.ticked(ticked(n));
@@ -168,7 +167,7 @@ fn a_disk_that_stands_costs_parts_of_the_record_and_no_time_of_the_loop() {
         .unwrap();
     let recorder = Recorder::create(&path).unwrap();
     let wall = Wall::of(Stamp(0), Time::ZERO);
-    let mut sink = recorder.begin(wall, session(), Counting);
+    let mut sink = recorder.begin::<Counting>(wall, session());
     let full = [7; 1000];
     let mut pushed = 0_u64;
     // until nothing more goes into the pipe, the chunk and the ring; no push ever waits
@@ -185,7 +184,7 @@ fn a_disk_that_stands_costs_parts_of_the_record_and_no_time_of_the_loop() {
 #[test]
 fn a_gap_is_seen_in_the_numbers_of_the_inputs() {
     let missed = Arc::new(AtomicU64::new(0));
-    let (mut sink, mut entries) = RecordSink::<(), u64, ()>::with_room(2, Arc::clone(&missed));
+    let (mut sink, mut entries) = RecordSink::<(), u64>::with_room(2, Arc::clone(&missed));
     sink.ticked(ticked(0));
     sink.ticked(ticked(1));
     // not an input, and yet the digest of the next tick has it

@@ -3,6 +3,7 @@
 use std::net::SocketAddr;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
+use std::time::Duration;
 
 use bytes::Bytes;
 use quinn::{ConnectionError, RecvStream, SendDatagramError, SendStream, VarInt};
@@ -41,6 +42,11 @@ impl Connection {
     /// Who is at the other end.
     pub fn remote_address(&self) -> SocketAddr {
         self.quic.remote_address()
+    }
+
+    /// The round trip as QUIC measures it; 100 ms before the first.
+    pub fn round_trip(&self) -> Duration {
+        self.quic.rtt()
     }
 
     /// Whether the slave closed it because another operator has taken over.

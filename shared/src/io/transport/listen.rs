@@ -1,25 +1,18 @@
 //! The slave's way from an endpoint to connections of masters, none of which is trusted yet.
 //!
-//! A flood must not cost the slave its ticks: handshakes are few at once, forged addresses cannot take all of
-//! them, and what is turned away is counted.
+//! Every address proves itself first (Retry, RFC 9000, section 8.1.2): who forges one gets nothing, and whoever it belongs
+//! to is sent fewer bytes than came in its name. How many are let in at once is the host's business.
 
 use std::net::SocketAddr;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
 use quinn::{Connecting, ConnectionError, Incoming};
-use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 use tokio::time::timeout;
 
 use super::connection::Connection;
 use super::endpoint::{Endpoint, Raw, join};
 
-/// Handshakes at once. More are refused: a slave has one master, and a flood must not cost it its ticks.
-const HANDSHAKES_MAX: usize = 8;
-/// With fewer places left than this, an address must prove itself first (Retry, RFC 9000, section 8.1.2), so
-/// that forged ones cannot take the rest.
-const UNPROVEN_PLACES: usize = 6;
 /// A handshake may take this long: three round trips of 2 s and the wait for a lost packet.
 const HANDSHAKE_MAX: Duration = Duration::from_secs(10);
 
@@ -52,47 +45,15 @@ pub enum AcceptError {
 #[derive(Debug)]
 pub struct Listener {
     endpoint: Endpoint,
-    places: Arc<Semaphore>,
-    refused: AtomicU64,
-    asked_to_prove: AtomicU64,
     unreadable: AtomicU64,
 }
 
-/// First packets that led to no handshake, by cause.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct TurnedAway {
-    /// All places were taken.
-    pub refused: u64,
-    /// The address had to prove itself; an honest one came back, and was counted as a handshake then.
-    pub asked_to_prove: u64,
-    /// Not a handshake that could be answered: garbage, or a protocol that is not ours.
-    pub unreadable: u64,
-}
-
-/// A handshake that was let in. Finish it in a task of its own, so that a slow one holds up nobody.
+/// A handshake with an address that has proven itself. Finish it in a task of its own, so that a slow one holds up nobody.
 #[derive(Debug)]
 pub struct Handshake {
     connecting: Connecting,
     address: SocketAddr,
     raw: Raw,
-    _place: OwnedSemaphorePermit,
-}
-
-#[derive(Debug, PartialEq, Eq)]
-enum Admission {
-    Enter,
-    ProveAddress,
-    Refuse,
-}
-
-fn admission(places_left: usize, address_proven: bool) -> Admission {
-    if places_left == 0 {
-        Admission::Refuse
-    } else if address_proven || places_left > HANDSHAKES_MAX - UNPROVEN_PLACES {
-        Admission::Enter
-    } else {
-        Admission::ProveAddress
-    }
 }
 
 impl Listener {
@@ -100,59 +61,35 @@ impl Listener {
     pub fn new(endpoint: impl Into<Endpoint>) -> Self {
         Self {
             endpoint: endpoint.into(),
-            places: Arc::new(Semaphore::new(HANDSHAKES_MAX)),
-            refused: AtomicU64::new(0),
-            asked_to_prove: AtomicU64::new(0),
             unreadable: AtomicU64::new(0),
         }
     }
 
-    /// What was turned away so far.
-    pub fn turned_away(&self) -> TurnedAway {
-        TurnedAway {
-            refused: self.refused.load(Ordering::Relaxed),
-            asked_to_prove: self.asked_to_prove.load(Ordering::Relaxed),
-            unreadable: self.unreadable.load(Ordering::Relaxed),
-        }
+    /// First packets so far that led to no handshake: garbage, or a protocol that is not ours.
+    pub fn unreadable(&self) -> u64 {
+        self.unreadable.load(Ordering::Relaxed)
     }
 
-    /// The next handshake that is let in; `None` once the endpoint is closed. Cancel-safe.
+    /// The next handshake; `None` once the endpoint is closed. Cancel-safe.
     pub async fn next(&self) -> Option<Handshake> {
         loop {
             let incoming = self.endpoint.quic.accept().await?;
-            if let Some(handshake) = self.admit(incoming) {
+            if !incoming.remote_address_validated() {
+                // an unproven address may always be asked to prove itself
+                let _ = incoming.retry();
+            } else if let Some(handshake) = self.accept(incoming) {
                 return Some(handshake);
             }
         }
     }
 
-    fn admit(&self, incoming: Incoming) -> Option<Handshake> {
-        let proven = incoming.remote_address_validated();
-        match admission(self.places.available_permits(), proven) {
-            Admission::Refuse => {
-                self.refused.fetch_add(1, Ordering::Relaxed);
-                incoming.refuse();
-                None
-            }
-            Admission::ProveAddress => {
-                self.asked_to_prove.fetch_add(1, Ordering::Relaxed);
-                // An unproven address may always be asked to prove itself.
-                let _ = incoming.retry();
-                None
-            }
-            Admission::Enter => self.enter(incoming),
-        }
-    }
-
-    fn enter(&self, incoming: Incoming) -> Option<Handshake> {
-        let place = Arc::clone(&self.places).try_acquire_owned().ok()?;
+    fn accept(&self, incoming: Incoming) -> Option<Handshake> {
         let address = incoming.remote_address();
         match incoming.accept() {
             Ok(connecting) => Some(Handshake {
                 connecting,
                 address,
                 raw: self.endpoint.raw.clone(),
-                _place: place,
             }),
             // quinn has answered with the reason
             Err(error) => {
@@ -181,20 +118,5 @@ impl Handshake {
             .map_err(|_| AcceptError::Slow { address })?
             .map_err(|source| AcceptError::Failed { address, source })?;
         join(quic, &self.raw).ok_or(AcceptError::OtherTransport { address })
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_crowd_must_prove_its_addresses_before_the_last_places_are_taken() {
-        assert_eq!(admission(HANDSHAKES_MAX, false), Admission::Enter);
-        assert_eq!(admission(3, false), Admission::Enter);
-        assert_eq!(admission(2, false), Admission::ProveAddress);
-        assert_eq!(admission(2, true), Admission::Enter);
-        assert_eq!(admission(0, true), Admission::Refuse);
-        assert_eq!(admission(0, false), Admission::Refuse);
     }
 }

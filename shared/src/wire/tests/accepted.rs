@@ -52,7 +52,14 @@ fn what_the_other_side_would_refuse_is_not_written() {
     let refused = |encoded: Encoded| assert!(matches!(encoded, Err(EncodeError::Field { .. })));
     let mut not_sent = |message: Message| {
         let envelope = ENVELOPE;
-        refused(Datagram { envelope, message }.encode(&mut out));
+        refused(
+            Datagram {
+                stopped: false,
+                envelope,
+                message,
+            }
+            .encode(&mut out),
+        );
     };
     let mut empty = command();
     empty.samples.clear();
@@ -80,7 +87,12 @@ fn what_the_other_side_would_refuse_is_not_written() {
         ..ENVELOPE
     }) {
         let message = Message::Heartbeat;
-        let encoded = Datagram { envelope, message }.encode(&mut out);
+        let encoded = Datagram {
+            stopped: false,
+            envelope,
+            message,
+        }
+        .encode(&mut out);
         assert_eq!(encoded.is_ok(), envelope.number == 1);
     }
     let mut bad = hello();

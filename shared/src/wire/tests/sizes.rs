@@ -6,7 +6,12 @@ use super::*;
 fn no_buffer_is_too_short_without_an_error() {
     let (envelope, message) = (ENVELOPE, messages()[0]);
     for length in 0..datagram(envelope, message).len() {
-        let encoded = Datagram { envelope, message }.encode(&mut vec![0; length]);
+        let encoded = Datagram {
+            stopped: false,
+            envelope,
+            message,
+        }
+        .encode(&mut vec![0; length]);
         assert!(matches!(encoded, Err(EncodeError::BufferTooSmall { .. })));
     }
     for message in stream_messages() {

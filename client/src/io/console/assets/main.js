@@ -161,9 +161,10 @@ function writeState(frame) {
     $(id).disabled = !link.operates || !person || !running;
   }
   $("stop").disabled = !running;
+  $("end").disabled = !running || !link.operates;
   $("scene").classList.toggle("watching", !link.operates || !running || !person);
   const hint = !running ? "" : !person ? "A script pushes; you watch." : !link.operates ? "Another page has the hand; you watch."
-    : person.paused ? "The hand rests. Press P to go on." : pointer.held ? "" : scripted ? "A script pushes. Drag anywhere to take the hand." : "Drag anywhere to push. The hand feels what the model feels.";
+    : frame.master.stopped_by ? "" : person.paused ? "The hand rests. Press P to go on." : pointer.held ? "" : scripted ? "A script pushes. Drag anywhere to take the hand." : "Drag anywhere to push. The hand feels what the model feels.";
   $("hint").textContent = hint;
   document.body.classList.toggle("no-truth", !frame?.slave);
   const touch = frame?.master.in_contact ? "touches the box" : "is free";
@@ -174,16 +175,21 @@ function banner() {
   const { about } = link;
   const lost = !link.open ? "No connection to mmt: it has ended, or this page's address has another token. Trying again …" : null;
   const ended = about.state === "ended" ? `The session ended: ${about.why}.` : null;
-  const text = lost ?? ended ?? about.note;
+  const stopped = { master: "Emergency stop: no force on the hand, and the tool stands.", slave: "The slave's emergency stop is set: it is cleared there." };
+  const text = lost ?? ended ?? stopped[link.frame?.master.stopped_by] ?? about.note;
+  if (text === banner.text && link.operates === banner.operates) return;
+  [banner.text, banner.operates] = [text, link.operates];
   $("banner").hidden = !text;
   $("banner").textContent = text ?? "";
-  if (!lost && ended && about.settings && link.operates) {
-    const again = document.createElement("button");
-    again.className = "primary";
-    again.textContent = "Start again";
-    again.onclick = () => controls.restart();
-    $("banner").append(again);
-  }
+  const offer = (words, act) => {
+    const button = document.createElement("button");
+    button.className = "primary";
+    button.textContent = words;
+    button.onclick = act;
+    $("banner").append(button);
+  };
+  if (link.operates && ended && about.settings) offer("Start again", () => controls.restart());
+  if (link.operates && text === stopped.master) offer("Clear the stop", () => link.send("clear"));
 }
 
 const toggle = {
@@ -194,6 +200,7 @@ const toggle = {
     pointer.release();
     link.send("stop");
   },
+  end: () => link.send("end"),
   take: () => link.send("take"),
   sound: async () => $("sound").setAttribute("aria-pressed", await feedback.toggle()),
 };
@@ -205,7 +212,10 @@ document.addEventListener("keydown", (event) => {
   if (id && !$(id).disabled) toggle[id]();
 });
 
-link.addEventListener("frame", () => remember(link.frame));
+link.addEventListener("frame", () => {
+  remember(link.frame);
+  banner();
+});
 let session = null;
 link.addEventListener("about", () => {
   if (session !== null && link.about.session !== session) forget();
