@@ -63,6 +63,7 @@ fn execute(command: Command) -> Result<(), Failure> {
         Command::Export(arguments) => commands::export::run(&arguments),
         Command::Reproduce(arguments) => commands::reproduce::run(&arguments),
         Command::Sweep(arguments) => commands::sweep::run(&arguments),
+        Command::Doctor(arguments) => commands::doctor::run(&arguments),
         Command::Bench(arguments) => commands::bench::run(&arguments),
     }
 }

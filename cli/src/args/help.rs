@@ -33,5 +33,8 @@ pub(super) const REPRODUCE: &str = include_str!("help/reproduce.txt").trim_ascii
 /// Examples of `mmt sweep`.
 pub(super) const SWEEP: &str = include_str!("help/sweep.txt").trim_ascii_end();
 
+/// Examples of `mmt doctor`.
+pub(super) const DOCTOR: &str = include_str!("help/doctor.txt").trim_ascii_end();
+
 /// Examples of `mmt bench`.
 pub(super) const BENCH: &str = include_str!("help/bench.txt").trim_ascii_end();

@@ -2,6 +2,7 @@
 
 mod bench;
 mod console;
+mod doctor;
 mod help;
 mod netem;
 mod records;
@@ -33,6 +34,7 @@ pub(crate) use self::netem::{
 };
 pub(crate) use bench::{BenchArguments, BenchSubject, TransportBenchArguments};
 pub(crate) use console::ConsoleArguments;
+pub(crate) use doctor::DoctorArguments;
 pub(crate) use records::{ExportArguments, ReplayArguments, ReportArguments};
 pub(crate) use reproduce::ReproduceArguments;
 pub(crate) use sweep::SweepArguments;
@@ -78,6 +80,9 @@ pub(crate) enum Command {
     /// Run any grid over configuration in virtual time: in shards, resumable, the same bytes
     #[command(after_help = help::SWEEP)]
     Sweep(SweepArguments),
+    /// Is this host fit for a 1 kHz loop, and does a slave answer?
+    #[command(after_help = help::DOCTOR)]
+    Doctor(DoctorArguments),
     /// Measure what things cost on this machine
     #[command(after_help = help::BENCH, subcommand_required = true, arg_required_else_help = true)]
     Bench(BenchArguments),

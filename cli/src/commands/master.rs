@@ -202,7 +202,7 @@ fn keep_path(file: &Path, path: &SharedPath) -> Result<(), Failure> {
         .map_err(|error| Failure::failed(format!("cannot write the path {shown}: {error}")))
 }
 
-fn pairing(words: &PairingWords) -> Result<Pairing, Failure> {
+pub(super) fn pairing(words: &PairingWords) -> Result<Pairing, Failure> {
     let mut line = String::new();
     let text = match words.reveal() {
         "-" => {

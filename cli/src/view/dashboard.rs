@@ -85,10 +85,7 @@ fn render_head(frame: &mut Frame<'_>, area: Rect, caption: &Caption, now: &Snaps
             now.master.map(|master| master.in_contact),
         )),
         Span::raw(contact("slave", now.slave.map(|slave| slave.in_contact))),
-        Span::styled(
-            "   q ends, space stops",
-            Style::new().fg(Color::DarkGray),
-        ),
+        Span::styled("   q ends, space stops", Style::new().fg(Color::DarkGray)),
     ]);
     let second = Line::from(caption.setting.as_str()).style(Style::new().fg(Color::DarkGray));
     frame.render_widget(Paragraph::new(vec![first, second]), area);

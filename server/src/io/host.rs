@@ -174,7 +174,7 @@ impl SlaveHost {
 fn host_of(address: IpAddr) -> Host {
     let address = address.to_canonical();
     match if address.is_unspecified() {
-        primary_address()
+        address_towards_the_world().unwrap_or(Ipv4Addr::LOCALHOST.into())
     } else {
         address
     } {
@@ -183,13 +183,13 @@ fn host_of(address: IpAddr) -> Host {
     }
 }
 
-/// The address that this machine would use towards the world; no packet is sent to find out.
-fn primary_address() -> IpAddr {
+/// The address that this machine would use towards the world, if it has a route there; no packet is sent to find out.
+pub fn address_towards_the_world() -> Option<IpAddr> {
     // Documentation addresses (RFC 5737, RFC 3849): routed like any other, and nobody's.
     let v4 = local_address_towards((Ipv4Addr::UNSPECIFIED, 0), (Ipv4Addr::new(192, 0, 2, 1), 9));
     let world = Ipv6Addr::new(0x2001, 0xdb8, 0, 0, 0, 0, 0, 1);
     let v6 = || local_address_towards((Ipv6Addr::UNSPECIFIED, 0), (world, 9));
-    v4.or_else(v6).unwrap_or(Ipv4Addr::LOCALHOST.into())
+    v4.or_else(v6)
 }
 
 fn local_address_towards(from: impl Into<SocketAddr>, to: impl Into<SocketAddr>) -> Option<IpAddr> {

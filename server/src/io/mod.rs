@@ -38,7 +38,7 @@ use serde::Serialize;
 use crate::slave::SlaveConfig;
 
 pub use context::SlaveHostError;
-pub use host::SlaveHost;
+pub use host::{SlaveHost, address_towards_the_world};
 
 /// Name and version of this program, as it gives them to the other side.
 const PROGRAM: &str = concat!("mmt ", env!("CARGO_PKG_VERSION"));

@@ -15,6 +15,7 @@ use serde_json::Value;
 use crate::harness::process::{PROGRAM, Running};
 
 mod bench;
+mod doctor;
 mod hostile;
 mod netem;
 mod raw_udp;
