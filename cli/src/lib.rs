@@ -64,6 +64,8 @@ fn execute(command: Command) -> Result<(), Failure> {
         Command::Reproduce(arguments) => commands::reproduce::run(&arguments),
         Command::Sweep(arguments) => commands::sweep::run(&arguments),
         Command::Doctor(arguments) => commands::doctor::run(&arguments),
+        Command::Completions { shell } => commands::manual::completions(shell),
+        Command::Man(arguments) => commands::manual::pages(&arguments),
         Command::Bench(arguments) => commands::bench::run(&arguments),
     }
 }

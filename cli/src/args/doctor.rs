@@ -1,4 +1,6 @@
-//! The arguments of `mmt doctor`.
+//! The arguments of the commands about this host and this program: `mmt doctor`, `mmt man`.
+
+use std::path::PathBuf;
 
 use clap::Args;
 
@@ -13,4 +15,12 @@ pub(crate) struct DoctorArguments {
     /// Print one JSON document instead of lines
     #[arg(long)]
     pub(crate) json: bool,
+}
+
+/// Arguments of `mmt man`.
+#[derive(Debug, Args)]
+pub(crate) struct ManArguments {
+    /// Folder for the pages; made if it is not there
+    #[arg(long, value_name = "DIR", default_value = "man")]
+    pub(crate) out: PathBuf,
 }

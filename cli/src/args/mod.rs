@@ -34,7 +34,7 @@ pub(crate) use self::netem::{
 };
 pub(crate) use bench::{BenchArguments, BenchSubject, TransportBenchArguments};
 pub(crate) use console::ConsoleArguments;
-pub(crate) use doctor::DoctorArguments;
+pub(crate) use doctor::{DoctorArguments, ManArguments};
 pub(crate) use records::{ExportArguments, ReplayArguments, ReportArguments};
 pub(crate) use reproduce::ReproduceArguments;
 pub(crate) use sweep::SweepArguments;
@@ -83,6 +83,14 @@ pub(crate) enum Command {
     /// Is this host fit for a 1 kHz loop, and does a slave answer?
     #[command(after_help = help::DOCTOR)]
     Doctor(DoctorArguments),
+    /// Print the completions of a shell
+    #[command(after_help = help::COMPLETIONS)]
+    Completions {
+        /// Which shell
+        shell: clap_complete::Shell,
+    },
+    /// Write the manual pages of all commands
+    Man(ManArguments),
     /// Measure what things cost on this machine
     #[command(after_help = help::BENCH, subcommand_required = true, arg_required_else_help = true)]
     Bench(BenchArguments),

@@ -6,6 +6,7 @@ pub(crate) mod demo;
 pub(crate) mod doctor;
 pub(crate) mod export;
 mod host;
+pub(crate) mod manual;
 pub(crate) mod master;
 pub(crate) mod netem;
 mod record;
