@@ -15,6 +15,7 @@ mod recovery;
 mod repeats;
 pub mod scenarios;
 mod schemes;
+mod sensing;
 mod traces;
 mod transport;
 mod tupdate;
@@ -22,7 +23,7 @@ mod tupdate;
 use crate::experiment::description::Experiment;
 
 /// Every experiment, in the order in which they run.
-pub const ALL: [&Experiment; 15] = [
+pub const ALL: [&Experiment; 16] = [
     &physics::PHYSICS,
     &fig5::FIG5,
     &traces::FIG6,
@@ -32,6 +33,7 @@ pub const ALL: [&Experiment; 15] = [
     &readings::EXPERIMENT,
     &schemes::SCHEMES,
     &scenarios::EXPERIMENT,
+    &sensing::EXPERIMENT,
     &tupdate::TUPDATE,
     &repeats::REPEATS,
     &congestion::CONGESTION,

@@ -14,6 +14,7 @@ use mmt_server::slave::SlaveTick;
 use mmt_shared::metrics::{ForceSummary, UpdateCounts};
 use mmt_shared::model::geometry::Vec2;
 use mmt_shared::model::update::Cause;
+use mmt_shared::report::TrueForce;
 use mmt_shared::time::TICK_S;
 use serde::{Deserialize, Serialize};
 
@@ -96,6 +97,8 @@ pub struct Measured {
     pub contact_s: f64,
     /// Force metrics of the whole run.
     pub force: ForceSummary,
+    /// The same against the true force.
+    pub true_force: TrueForce,
     /// Updates by cause.
     pub updates: UpdateCounts,
     /// Updates per second of contact in the first second of contact; none if contact was shorter.
@@ -236,6 +239,7 @@ impl Counters {
             duration_s: outcome.updates.duration_s(),
             contact_s: outcome.updates.contact_s(),
             force: world.force(),
+            true_force: world.slave().true_force(),
             updates: outcome.updates,
             opening_rate_hz: (later_s >= 0.0).then(|| self.opening_updates as f64 / OPENING_S),
             later_rate_hz: (later_s > 0.0).then(|| self.later_updates as f64 / later_s),

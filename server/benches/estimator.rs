@@ -35,6 +35,7 @@ fn push() -> Vec<Measured> {
         };
         let force = 0.7 * a + 3.0 * v + 2.06;
         measured.push(Measured {
+            force_noise_n: 0.0,
             tool: Vec2::new(position + force / 1000.0, 0.0),
             force: Vec2::new(force, 0.0),
             normal: Some(Vec2::new(1.0, 0.0)),
@@ -65,6 +66,7 @@ fn trigger(criterion: &mut Criterion) {
     let input = TriggerInput {
         f_s: Vec2::new(2.5, 0.1),
         f_m: Vec2::new(2.0, 0.1),
+        noise_n: 0.0,
         slave_in_contact: true,
         shadow_in_contact: true,
         sticking: false,

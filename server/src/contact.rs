@@ -5,19 +5,25 @@
 use mmt_shared::model::geometry::{Pose, Vec2};
 use mmt_shared::time::Time;
 
+use crate::conditioning::Conditioner;
 use crate::environment::Environment;
 use crate::sensing::{Sensing, VisionSample};
-use crate::trigger::ContactDetector;
 
 /// What is known of the contact in one tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Contact {
     /// Position of the tool as measured, m, world frame.
     pub tool: Vec2,
-    /// f_s as measured, N, world frame, on the object.
+    /// f_s as measured, less its bias where that is tared, N, world frame, on the object.
     pub force: Vec2,
+    /// The mean of the newest few of these where they are noisy, else the newest, N.
+    pub steady: Vec2,
+    /// Noise of `force` per axis as measured, N, where it is more than thresholds are made for; else 0.
+    pub noise_n: f64,
     /// Whether the tool touches the object, by the measured force.
     pub in_contact: bool,
+    /// Samples of the force that (12) is to be judged by, for their noise: 1 or more.
+    pub averaged: usize,
     /// The image that has come in this tick.
     pub vision: Option<VisionSample>,
     /// Contact force as it is, N: for reports.
@@ -32,18 +38,18 @@ pub struct Contact {
 pub struct ContactStage {
     environment: Environment,
     sensing: Sensing,
-    detector: ContactDetector,
+    conditioner: Conditioner,
     body: usize,
 }
 
 impl ContactStage {
     /// Not in contact.
     #[must_use]
-    pub fn new(environment: Environment, sensing: Sensing, detector: ContactDetector) -> Self {
+    pub fn new(environment: Environment, sensing: Sensing, conditioner: Conditioner) -> Self {
         Self {
             environment,
             sensing,
-            detector,
+            conditioner,
             body: 0,
         }
     }
@@ -59,9 +65,10 @@ impl ContactStage {
         &mut self.environment
     }
 
-    /// Begins with this body as the one that was touched last.
+    /// Begins with this body as the one that was touched last, and may be still.
     pub fn begin_with(&mut self, body: usize) {
         self.body = body;
+        self.conditioner.resume();
     }
 
     /// One tick with the tool at `tool` (m), moving at `velocity` (m/s).
@@ -72,10 +79,14 @@ impl ContactStage {
             self.sensing.drop_images();
         }
         let sensed = self.sensing.sense(now, tool, met.force, &met.pose);
+        let conditioned = self.conditioner.step(sensed.force, sensed.tool);
         Contact {
             tool: sensed.tool,
-            force: sensed.force,
-            in_contact: self.detector.step(sensed.force.norm()),
+            force: conditioned.force,
+            steady: conditioned.steady,
+            noise_n: conditioned.noise_n,
+            in_contact: conditioned.in_contact,
+            averaged: conditioned.averaged,
             vision: sensed.vision,
             true_force: met.force,
             truth: met.pose,

@@ -4,6 +4,7 @@
 //! name. Only `environment` names the physics engine.
 
 pub mod again;
+pub mod conditioning;
 pub mod contact;
 pub mod end;
 pub mod environment;

@@ -9,6 +9,7 @@ mod angle_filter;
 mod centre;
 mod contact_frame;
 mod face_map;
+mod felt;
 mod past;
 mod penetration;
 mod tangent_tracker;
@@ -33,9 +34,12 @@ use tracker::{BoxTracker, Tracker};
 use turning::Push;
 
 pub use contact_frame::ContactFrame;
+pub use felt::Felt;
 
 /// Force below which its direction is only noise, N: fifteen times the default sensor noise.
 const FORCE_MIN_N: f64 = 0.15;
+/// And no force below so many standard deviations of its noise has one.
+const DEVIATIONS: f64 = 5.0;
 /// Turning acceleration that the angle filter allows for while the box is pushed, rad/s²: all of it, and
 /// what remains of it where the moment of the push is reckoned with.
 const TURN_ACCELERATION: (f64, f64) = (20.0, 2.5);
@@ -160,18 +164,18 @@ impl PoseObserver {
         self.contact
     }
 
-    /// One tick: measured tool (m), force (N), whether the slave is in contact, and the parameters as
+    /// One tick: measured tool (m), force, whether the slave is in contact, and the parameters as
     /// estimated so far, by which a box that was let go coasts.
     pub fn step(
         &mut self,
         now: Time,
         tool: Vec2,
-        force: Vec2,
+        felt: impl Into<Felt>,
         in_contact: bool,
         params: &ModelParams,
     ) {
         if in_contact {
-            self.touch(tool, force, params);
+            self.touch(tool, &felt.into(), params);
         } else {
             self.let_go(params);
         }
@@ -183,15 +187,15 @@ impl PoseObserver {
         });
     }
 
-    fn touch(&mut self, tool: Vec2, force: Vec2, params: &ModelParams) {
+    fn touch(&mut self, tool: Vec2, felt: &Felt, params: &ModelParams) {
         self.faces.touched();
-        let size = force.norm();
+        let force = felt.force;
         let face = match self.contact {
             Some(contact) => contact.face,
-            None => self.begin_contact(tool, force),
+            None => self.begin_contact(tool, felt.steady),
         };
         let unknown = self.turn(force, params);
-        self.follow_angle(face, force, size, unknown);
+        self.follow_angle(face, felt, unknown);
         let inward = -rotate(self.motion.pose.angle, face.outward());
         self.penetration.follow(force.dot(&inward));
         let surface = tool - inward * self.penetration.depth;
@@ -274,9 +278,10 @@ impl PoseObserver {
     }
 
     /// theta by the direction of the force.
-    fn follow_angle(&mut self, face: Face, force: Vec2, size: f64, acceleration: f64) {
+    fn follow_angle(&mut self, face: Face, felt: &Felt, acceleration: f64) {
         self.angle.predict(&mut self.motion, acceleration);
-        if size < FORCE_MIN_N {
+        let (force, size) = (felt.force, felt.force.norm());
+        if size < FORCE_MIN_N.max(DEVIATIONS * felt.noise_n) {
             return;
         }
         let direction = libm::atan2(-force.y, -force.x) - face.outward_angle();
@@ -285,7 +290,7 @@ impl PoseObserver {
         if tangent && !self.tracker.is_settling() && innovation.abs() > JUMP_RAD {
             self.begin_tangent();
         }
-        let spread = self.config.force_noise_n / size;
+        let spread = self.config.force_noise_n.max(felt.noise_n) / size;
         let variance = spread * spread + DIRECTION_FLOOR_RAD.powi(2);
         self.angle.measure(&mut self.motion, innovation, variance);
     }

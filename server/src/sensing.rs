@@ -1,9 +1,11 @@
 //! Sensing: the tool's position, the contact force and the object's pose as the slave measures them.
 //!
-//! Adds seeded Gaussian noise to position and force at 1 kHz, and sees the object through "vision":
+//! Adds seeded Gaussian noise to position and force at 1 kHz and the force sensor's other errors, and sees the object through "vision":
 //! a slow, noisy, delayed camera. Every tick takes the same number of draws whatever the settings, and
 //! vision's image k has noise of its own number, so that changing one setting leaves every other noise
 //! alone. It must never use anything but its arguments.
+
+mod force;
 
 use std::collections::VecDeque;
 
@@ -13,12 +15,22 @@ use mmt_shared::rng::Substream;
 use mmt_shared::time::Time;
 use serde::{Deserialize, Serialize};
 
+use force::ForceSensor;
+
 /// Most images on their way at a time: a second of latency at 60 Hz.
 const IMAGES_MAX: usize = 64;
 /// Accepted position noise, m r.m.s.
 const POSITION_NOISE_M: (f64, f64) = (0.0, 0.1);
 /// Accepted force noise, N r.m.s.
 const FORCE_NOISE_N: (f64, f64) = (0.0, 10.0);
+/// Accepted bias of the force at the start, N.
+const FORCE_BIAS_N: (f64, f64) = (0.0, 10.0);
+/// Accepted drift of that bias, N/s.
+const FORCE_DRIFT_N_PER_S: (f64, f64) = (0.0, 1.0);
+/// Accepted lag of the force, ms.
+const FORCE_LAG_MS: (f64, f64) = (0.0, 100.0);
+/// Accepted measured force over true force.
+const FORCE_GAIN: (f64, f64) = (0.5, 2.0);
 /// Accepted angle noise, rad r.m.s.
 const ANGLE_NOISE_RAD: (f64, f64) = (0.0, 1.0);
 /// Accepted image rate, Hz; 0 is off.
@@ -34,6 +46,14 @@ pub struct SensingConfig {
     pub position_noise_m: f64,
     /// Noise of the force sensor, N r.m.s. per axis. Default 10 mN: a quarter of `F_min`.
     pub force_noise_n: f64,
+    /// Bias of the force sensor at the start, N; its direction comes from the seed. Default 0.
+    pub force_bias_n: f64,
+    /// How fast the bias drifts, N/s, in a direction of its own that comes from the seed. Default 0.
+    pub force_drift_n_per_s: f64,
+    /// Time constant by which the measured force follows the true one, ms. Default 0.
+    pub force_lag_ms: f64,
+    /// Measured force over true force. Default 1.
+    pub force_gain: f64,
     /// The camera that sees the object.
     pub vision: VisionConfig,
 }
@@ -57,6 +77,10 @@ impl Default for SensingConfig {
         Self {
             position_noise_m: 10e-6,
             force_noise_n: 10e-3,
+            force_bias_n: 0.0,
+            force_drift_n_per_s: 0.0,
+            force_lag_ms: 0.0,
+            force_gain: 1.0,
             vision: VisionConfig::default(),
         }
     }
@@ -118,7 +142,7 @@ pub struct VisionSample {
 pub struct Sensed {
     /// Position of the tool, world frame, m.
     pub tool: Vec2,
-    /// Contact force `f_s` on the object, world frame, N: the raw sample.
+    /// Contact force `f_s` on the object, world frame, N: the sensor's sample.
     pub force: Vec2,
     /// The newest image whose latency has passed, once.
     pub vision: Option<VisionSample>,
@@ -130,7 +154,7 @@ pub struct Sensing {
     config: SensingConfig,
     seed: u64,
     position_noise: Substream,
-    force_noise: Substream,
+    force: ForceSensor,
     period_ns: u64,
     latency_ns: i64,
     /// When the next image is taken; none before the first tick.
@@ -157,7 +181,7 @@ impl Sensing {
             config,
             seed,
             position_noise: Substream::new(seed, "slave/position-noise", 0),
-            force_noise: Substream::new(seed, "slave/force-noise", 0),
+            force: ForceSensor::new(&config, seed),
             period_ns,
             latency_ns: (vision.latency_ms * 1e6) as i64,
             next_image: None,
@@ -169,12 +193,10 @@ impl Sensing {
 
     /// Measures once, at 1 kHz: the true tool (m) and contact force (N) in the world, the true pose.
     pub fn sense(&mut self, now: Time, tool: Vec2, force: Vec2, object: &Pose) -> Sensed {
-        let config = self.config;
-        let tool = tool + pair(&mut self.position_noise) * config.position_noise_m;
-        let force = force + pair(&mut self.force_noise) * config.force_noise_n;
+        let tool = tool + pair(&mut self.position_noise) * self.config.position_noise_m;
         Sensed {
             tool,
-            force,
+            force: self.force.measure(force),
             vision: self.image_due(now, object),
         }
     }
@@ -242,6 +264,7 @@ impl SensingConfig {
             position_noise_m: 0.0,
             force_noise_n: 0.0,
             vision: VisionConfig::off(),
+            ..Self::default()
         }
     }
 
@@ -251,6 +274,10 @@ impl SensingConfig {
         let checks = [
             ("position noise", "m", self.position_noise_m, POSITION_NOISE_M),
             ("force noise", "N", self.force_noise_n, FORCE_NOISE_N),
+            ("force bias", "N", self.force_bias_n, FORCE_BIAS_N),
+            ("force drift", "N/s", self.force_drift_n_per_s, FORCE_DRIFT_N_PER_S),
+            ("force lag", "ms", self.force_lag_ms, FORCE_LAG_MS),
+            ("force gain", "", self.force_gain, FORCE_GAIN),
             ("vision rate", "Hz", v.rate_hz, RATE_HZ),
             ("vision position noise", "m", v.position_noise_m, POSITION_NOISE_M),
             ("vision angle noise", "rad", v.angle_noise_rad, ANGLE_NOISE_RAD),

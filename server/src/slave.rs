@@ -11,6 +11,7 @@ use mmt_shared::model::sample::{ForceCounts, HipSample};
 use mmt_shared::model::settings::ModelSettings;
 use mmt_shared::model::tool::{HandPort, Scene, Tool};
 use mmt_shared::model::update::{Cause, Update};
+use mmt_shared::report::TrueForce;
 use mmt_shared::time::Time;
 
 use crate::contact::{Contact, ContactStage};
@@ -23,9 +24,10 @@ use crate::shadow::Shadow;
 use crate::tool::ToolDrive;
 use crate::tool::force::ToolForce;
 use crate::tool::port::ToolPort;
-use crate::trigger::{ContactDetector, Scheme, Trigger};
+use crate::trigger::{Scheme, Trigger};
 
 mod config;
+mod force_errors;
 mod memory;
 mod object;
 mod reference;
@@ -34,6 +36,7 @@ mod update_builder;
 pub use config::{SlaveConfig, SlaveError, StartModel};
 pub use memory::Memory;
 
+use force_errors::ForceErrors;
 use object::ObjectEstimate;
 use reference::ForceReference;
 use update_builder::UpdateBuilder;
@@ -76,7 +79,7 @@ pub struct Slave {
     start: ModelState,
     /// Where the tool is, m.
     tool_at: Vec2,
-    force: ForceMetrics,
+    errors: ForceErrors,
 }
 
 impl Slave {
@@ -108,7 +111,6 @@ impl Slave {
         let start =
             ModelState::try_new(object.params, footprint, pose, Twist::default(), &coupling)?;
         let sensing = Sensing::try_new(config.sensing, config.seed)?;
-        let detector = ContactDetector::new(config.trigger.contact);
         let noise_n = config.sensing.force_noise_n;
         let limit = ToolForce::try_new(config.tool_force_max_n, coupling)?;
         let speed_max_m_per_s = (config.playout.speed_max_m_per_s).min(limit.approach_speed()?);
@@ -122,7 +124,7 @@ impl Slave {
             settings,
             playout: PlayoutBuffer::try_new(playout)?,
             tool: ToolDrive::new(port, limit),
-            contact: ContactStage::new(environment, sensing, detector),
+            contact: ContactStage::new(environment, sensing, config.conditioner(&coupling)),
             object,
             shadow: Shadow::new(settings, start),
             reference: ForceReference::new(config.trigger_reference),
@@ -130,7 +132,7 @@ impl Slave {
             updates: UpdateBuilder::new(settings.correction, timer_carries_pose),
             start,
             tool_at: Vec2::zeros(),
-            force: ForceMetrics::default(),
+            errors: ForceErrors::default(),
         })
     }
 
@@ -196,7 +198,13 @@ impl Slave {
     /// Force metrics over all samples whose f_m is known.
     #[must_use]
     pub fn force(&self) -> &ForceMetrics {
-        &self.force
+        &self.errors.measured
+    }
+
+    /// The same metrics with the true force in place of the measured one: for reports.
+    #[must_use]
+    pub fn true_force(&self) -> TrueForce {
+        self.errors.truth()
     }
 
     /// Holds the tool where it is, or no longer ([`PlayoutBuffer::hold`]).
@@ -279,9 +287,7 @@ impl Slave {
         self.object.step(now, &contact, held_back);
         self.follow_master(played.stamp);
         self.reference.take_echo(played.force);
-        if let Some(f_m) = played.force {
-            self.force.push(contact.force, f_m);
-        }
+        self.errors.push(&contact, played.force);
         let input = self
             .reference
             .input(&contact, &self.object, &self.shadow, held_back);

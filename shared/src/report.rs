@@ -27,7 +27,7 @@ pub use session::{
     ArchitectureReport, DelayReport, EmulationReport, LateReport, LoopReport, MessagesReport,
     QuantilesReport, SessionStats, WireReport,
 };
-pub use slave::{EstimateReport, ModelReport, SentUpdates, SlaveHalf, ToolReport};
+pub use slave::{EstimateReport, ModelReport, SentUpdates, SlaveHalf, ToolReport, TrueForce};
 
 /// What happened in a run. `C` is the configuration that it ran with.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -145,6 +145,7 @@ impl<C> RunReport<C> {
             wire: UpDown::default(),
             force: ForceReport {
                 errors: slave.force,
+                truth: slave.true_force,
                 hand: master.force,
             },
             model: slave.model,
@@ -307,12 +308,15 @@ pub struct UpdatesReport {
     pub received: ReceivedUpdates,
 }
 
-/// Forces: how near the model's is to the measured one, and what the hand felt.
+/// Forces: how near the model's is to the measured and to the true one, and what the hand felt.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct ForceReport {
     /// The slave's part.
     #[serde(flatten)]
     pub errors: ForceSummary,
+    /// The slave's part, where the object is simulated.
+    #[serde(flatten)]
+    pub truth: TrueForce,
     /// The master's part.
     #[serde(flatten)]
     pub hand: HandForce,

@@ -297,6 +297,7 @@ impl Parts {
         let input = TriggerInput {
             f_s: met.f_s,
             f_m: rendered.force,
+            noise_n: 0.0,
             slave_in_contact: met.in_contact,
             shadow_in_contact: rendered.in_contact(),
             sticking: estimate.sticking,
@@ -344,6 +345,7 @@ fn the_slaves_own_parts_never_allocate() {
             let measured = Measured {
                 tool: met.tool,
                 force: met.f_s,
+                force_noise_n: 0.0,
                 normal: observer.contact().map(|t| t.inward),
                 seen: Some(seen),
             };

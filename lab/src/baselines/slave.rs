@@ -18,7 +18,6 @@ use mmt_server::playout::{Played, PlayoutBuffer};
 use mmt_server::sensing::Sensing;
 use mmt_server::slave::{SlaveConfig, SlaveError};
 use mmt_server::tool::port::ToolPort;
-use mmt_server::trigger::ContactDetector;
 
 use super::Baseline;
 use super::arm::Arm;
@@ -81,12 +80,11 @@ impl BilateralSlave {
         };
         let environment = Environment::of_scene(environment, &config.scene)?;
         let sensing = Sensing::try_new(config.sensing, config.seed)?;
-        let detector = ContactDetector::new(config.trigger.contact);
         let speed_max_m_per_s = config.playout.speed_max_m_per_s;
         Ok(Self {
             baseline,
             playout,
-            contact: ContactStage::new(environment, sensing, detector),
+            contact: ContactStage::new(environment, sensing, config.conditioner(&coupling)),
             tool: hip,
             port: ToolPort::new(config.sensing.force_noise_n, speed_max_m_per_s),
             put_out_j: 0.0,

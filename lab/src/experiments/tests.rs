@@ -197,6 +197,31 @@ fn scenarios_with_a_wrong_side_place_the_model_worse() {
     }
 }
 
+/// The default sensor's forces pass as they are, and 0.1 N of noise is no contact where noise is reckoned with.
+#[test]
+fn sensing_judges_by_the_true_force_and_conditioning_changes_nothing_that_is_sound() {
+    let done = Done::of(&sensing::EXPERIMENT, 8000);
+    let of = |conditioned, sensor, key| {
+        let wanted = [
+            ("mode", "recommended"),
+            ("conditioned", conditioned),
+            ("sensor", sensor),
+        ];
+        done.number("sensing.csv", &wanted, key)
+    };
+    for key in ["packet_rate_hz", "pmse_true", "relative_error_true"] {
+        assert_eq!(
+            of("yes", "10 mN of noise", key),
+            of("no", "10 mN of noise", key)
+        );
+    }
+    for sensor in ["noise 0.1 N", "bias 0.2 N", "noise, bias, drift, lag"] {
+        assert!(of("yes", sensor, "relative_error_true") < 0.25, "{sensor}");
+        assert!(of("no", sensor, "relative_error_true") > 0.3, "{sensor}");
+    }
+    assert_eq!(done.rows("sensing.csv", &[]).len(), 33);
+}
+
 #[test]
 fn tupdate_sends_less_with_a_longer_period() {
     let done = Done::of(&tupdate::TUPDATE, 2500);

@@ -34,6 +34,7 @@ impl SlaveEnd {
             session,
             updates: SentUpdates::new(&counts.updates, &counts.repeated),
             force: slave.force().summary(),
+            true_force: slave.true_force(),
             model: model(slave),
             tool: ToolReport {
                 held_s: (slave.tool_force().held_ticks() as f64 * TICK_S).into(),

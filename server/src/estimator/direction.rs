@@ -8,6 +8,9 @@ use mmt_shared::model::geometry::{Vec2, wrap_angle};
 use mmt_shared::time::TICK_S;
 use serde::{Deserialize, Serialize};
 
+/// A force of so many standard deviations of its noise has a direction.
+const DEVIATIONS: f64 = 5.0;
+
 /// Settings of `ForceDirection`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct DirectionConfig {
@@ -58,13 +61,14 @@ impl ForceDirection {
         }
     }
 
-    /// Takes the force of one tick (N) and returns the angle, if there is one.
+    /// Takes the force of one tick and its noise per axis where that is more than the settings are made for (N), and
+    /// returns the angle, if there is one.
     ///
     /// While the force is too small the angle is held for one time constant, then forgotten: the next
     /// touch may be of another face.
-    pub(super) fn step(&mut self, force: Vec2) -> Option<f64> {
+    pub(super) fn step(&mut self, force: Vec2, noise: f64) -> Option<f64> {
         let size = force.norm();
-        if size > self.force_min && size.is_finite() {
+        if size > self.force_min.max(DEVIATIONS * noise) && size.is_finite() {
             let measured = libm::atan2(force.y, force.x);
             self.silent = 0;
             if self.known {
@@ -104,7 +108,7 @@ mod tests {
         let rate = 1.5;
         for k in 0..6000 {
             let truth = 2.5 + rate * TICK_S * f64::from(k);
-            let angle = direction.step(towards(truth, 2.0)).unwrap();
+            let angle = direction.step(towards(truth, 2.0), 0.0).unwrap();
             if k > 400 {
                 assert!(wrap_angle(angle - truth).abs() < 1e-6, "{k}");
                 assert!((direction.rate - rate).abs() < 1e-4);
@@ -120,7 +124,7 @@ mod tests {
         for k in 0..20_000 {
             let (x, y) = noise.normal_pair();
             let force = towards(3.1, 2.0) + Vec2::new(x, y) * 0.010;
-            let angle = direction.step(force).unwrap();
+            let angle = direction.step(force, 0.0).unwrap();
             if k > 200 {
                 sum += wrap_angle(angle - 3.1) * wrap_angle(angle - 3.1);
                 n += 1.0;
@@ -133,23 +137,23 @@ mod tests {
     #[test]
     fn a_small_force_has_no_direction_and_a_long_silence_forgets() {
         let mut direction = ForceDirection::new(&DirectionConfig::default());
-        assert_eq!(direction.step(towards(1.0, 0.15 - 1e-12)), None);
-        assert!(direction.step(towards(1.0, 1.0)).is_some());
+        assert_eq!(direction.step(towards(1.0, 0.15 - 1e-12), 0.0), None);
+        assert!(direction.step(towards(1.0, 1.0), 0.0).is_some());
         for _ in 0..20 {
-            let held = direction.step(towards(-2.0, 0.1)).unwrap();
+            let held = direction.step(towards(-2.0, 0.1), 0.0).unwrap();
             assert!((held - 1.0).abs() < 1e-12);
         }
-        assert_eq!(direction.step(Vec2::zeros()), None);
-        let next = direction.step(towards(-2.0, 1.0)).unwrap();
+        assert_eq!(direction.step(Vec2::zeros(), 0.0), None);
+        let next = direction.step(towards(-2.0, 1.0), 0.0).unwrap();
         assert!((next + 2.0).abs() < 1e-12, "the next face starts afresh");
     }
 
     #[test]
     fn a_force_that_is_not_a_number_changes_nothing() {
         let mut direction = ForceDirection::new(&DirectionConfig::default());
-        direction.step(towards(1.0, 1.0));
-        direction.step(Vec2::new(f64::NAN, 1.0));
-        direction.step(Vec2::new(f64::INFINITY, f64::INFINITY));
+        direction.step(towards(1.0, 1.0), 0.0);
+        direction.step(Vec2::new(f64::NAN, 1.0), 0.0);
+        direction.step(Vec2::new(f64::INFINITY, f64::INFINITY), 0.0);
         assert!((direction.angle - 1.0).abs() < 1e-12);
     }
 }

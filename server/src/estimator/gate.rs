@@ -5,6 +5,9 @@
 
 use serde::{Deserialize, Serialize};
 
+/// A force of so many standard deviations of its noise is a push.
+const DEVIATIONS: f64 = 5.0;
+
 /// Settings of `Gate`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct GateConfig {
@@ -58,14 +61,15 @@ impl Gate {
         }
     }
 
-    /// Takes force (N) and smoothed speed (m/s) along the normal.
+    /// Takes force (N) and smoothed speed (m/s) along the normal, and the noise of the force where that is more than the
+    /// settings are made for (N).
     ///
     /// A slow object slides if it is known to creep. A speed that changes sign begins anew: it has been
     /// through zero, where the object may stick.
-    pub(super) fn step(&mut self, force: f64, speed: f64, creeps: bool) -> GateState {
+    pub(super) fn step(&mut self, force: f64, speed: f64, creeps: bool, noise: f64) -> GateState {
         let slides = self.slides(speed) || creeps;
         let speed = if creeps { speed.abs() } else { speed };
-        let enough = force > self.config.force_min_n && slides;
+        let enough = force > self.config.force_min_n.max(DEVIATIONS * noise) && slides;
         let turned = self.age > 0 && self.backwards != (speed < 0.0);
         self.backwards = speed < 0.0;
         if !enough {
@@ -103,26 +107,26 @@ mod tests {
     fn pushed(ticks: u32) -> Gate {
         let mut gate = Gate::new(GateConfig::default());
         for _ in 0..ticks {
-            gate.step(2.0, 0.1, false);
+            gate.step(2.0, 0.1, false, 0.0);
         }
         gate
     }
 
     #[test]
     fn it_opens_after_42_ticks_of_sliding_and_not_before() {
-        assert_eq!(pushed(0).step(2.0, 0.1, false), GateState::Begins);
-        assert_eq!(pushed(1).step(2.0, 0.1, false), GateState::Young);
-        assert_eq!(pushed(41).step(2.0, 0.1, false), GateState::Young);
-        assert_eq!(pushed(42).step(2.0, 0.1, false), GateState::Open);
+        assert_eq!(pushed(0).step(2.0, 0.1, false, 0.0), GateState::Begins);
+        assert_eq!(pushed(1).step(2.0, 0.1, false, 0.0), GateState::Young);
+        assert_eq!(pushed(41).step(2.0, 0.1, false, 0.0), GateState::Young);
+        assert_eq!(pushed(42).step(2.0, 0.1, false, 0.0), GateState::Open);
     }
 
     #[test]
     fn sticking_a_light_touch_and_a_reversal_each_begin_anew() {
         for (force, speed) in [(2.0, 0.020), (0.15, 0.1), (f64::NAN, 0.1), (2.0, f64::NAN)] {
             let mut gate = pushed(100);
-            assert_eq!(gate.step(force, speed, false), GateState::Closed);
-            assert_eq!(gate.step(2.0, 0.1, false), GateState::Begins);
+            assert_eq!(gate.step(force, speed, false, 0.0), GateState::Closed);
+            assert_eq!(gate.step(2.0, 0.1, false, 0.0), GateState::Begins);
         }
-        assert_eq!(pushed(100).step(2.0, -0.1, false), GateState::Begins);
+        assert_eq!(pushed(100).step(2.0, -0.1, false, 0.0), GateState::Begins);
     }
 }

@@ -56,6 +56,8 @@ pub struct Measured {
     pub tool: Vec2,
     /// f_s, contact force on the object, world frame, N; positive when the tool pushes the object.
     pub force: Vec2,
+    /// Noise of the force per axis, N, where it is more than the settings are made for; else 0.
+    pub force_noise_n: f64,
     /// Inward unit normal of the touched face as the pose observer has it; none when not in contact. It
     /// serves until the direction of the force is known.
     pub normal: Option<Vec2>,

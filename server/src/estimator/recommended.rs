@@ -122,7 +122,7 @@ impl RecommendedEstimator {
         } else {
             Vec2::zeros()
         };
-        let angle = self.direction.step(force);
+        let angle = self.direction.step(force, measured.force_noise_n);
         match measured.normal.filter(|_| usable) {
             Some(normal) => self.touch(measured, angle, normal),
             None => self.release(),
@@ -142,9 +142,12 @@ impl RecommendedEstimator {
         self.estimate.speed += (v - self.estimate.speed) * self.speed_weight;
         let creeps = self.creep.step(v);
         self.estimate.sticking = !creeps && self.estimate.speed.abs() < STICK_SPEED;
-        let gate = self
-            .gate
-            .step(motion.row.force, self.estimate.speed, creeps);
+        let gate = self.gate.step(
+            motion.row.force,
+            self.estimate.speed,
+            creeps,
+            measured.force_noise_n,
+        );
         self.slide(gate, &self.row(&motion, normal, measured.seen.as_ref()));
         self.stand(motion.row.force, gate == GateState::Open);
     }

@@ -444,6 +444,7 @@ proptest! {
         for mut estimator in [recommended(|_| {}), paper(|config| config.window_s = 0.05)] {
             for &(x, y, fx, fy, touching) in &ticks {
                 let measured = Measured {
+                    force_noise_n: 0.0,
                     tool: Vec2::new(x, y),
                     force: Vec2::new(fx, fy),
                     normal: touching.then_some(Vec2::new(1.0, 0.0)),

@@ -153,6 +153,7 @@ mod tests {
             self.pose.position += self.twist.linear * TICK_S;
             self.pose.angle += self.twist.angular * TICK_S;
             Measured {
+                force_noise_n: 0.0,
                 tool,
                 force: push,
                 normal: Some(normal),

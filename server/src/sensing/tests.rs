@@ -53,6 +53,44 @@ fn noise_has_the_configured_size_on_every_axis() {
     within(rms(images.iter().map(|(_, i)| i.pose.angle - 1.0)), 5e-3);
 }
 
+/// The measured forces of sensors that are ideal but for the force, with a seed.
+fn forces(change: fn(&mut SensingConfig), seed: u64, ticks: u64) -> Vec<Vec2> {
+    let mut config = SensingConfig::ideal();
+    change(&mut config);
+    let mut sensing = Sensing::try_new(config, seed).unwrap();
+    let at = |tick| Time::from_millis(1000 + tick);
+    (0..ticks)
+        .map(|tick| sensing.sense(at(tick), TOOL, FORCE, &pose()).force)
+        .collect()
+}
+
+#[test]
+fn a_bias_has_its_size_and_a_direction_of_the_seed_and_drifts_in_another() {
+    let bias = |seed| forces(|config| config.force_bias_n = 0.2, seed, 2)[1] - FORCE;
+    assert!((bias(1).norm() - 0.2).abs() < 1e-12 && (bias(1) - bias(2)).norm() > 0.01);
+    let drifted = forces(|config| config.force_drift_n_per_s = 0.01, 1, 10_001);
+    assert_eq!(drifted[0], FORCE);
+    let way = drifted[10_000] - FORCE;
+    assert!((way.norm() - 0.1).abs() < 1e-9, "{way}");
+    assert!(
+        (way / 0.1 - bias(1) / 0.2).norm() > 0.01,
+        "its own direction"
+    );
+}
+
+#[test]
+fn the_force_lags_by_its_time_constant_and_has_its_gain() {
+    let lagging = forces(|config| config.force_lag_ms = 5.0, 1, 50);
+    // after five ticks 1 − 1/e of a step
+    let share = lagging[4].norm() / FORCE.norm();
+    assert!((share - (1.0 - libm::exp(-1.0))).abs() < 1e-12, "{share}");
+    assert!((lagging[49] - FORCE).norm() < 2e-4 * FORCE.norm());
+    assert_eq!(
+        forces(|config| config.force_gain = 1.1, 1, 1)[0],
+        FORCE * 1.1
+    );
+}
+
 #[test]
 fn ideal_sensors_tell_the_truth_to_the_bit() {
     let (_, sensed) = run(SensingConfig::ideal(), 100);

@@ -1,11 +1,13 @@
 //! What a slave is made of, and why it could not be.
 
 use mmt_shared::channel::rate_control::StretchMax;
+use mmt_shared::model::contact::Coupling;
 use mmt_shared::model::params::ParamsError;
 use mmt_shared::model::settings::Mode;
 use mmt_shared::range::OutOfRange;
 use serde::{Deserialize, Serialize};
 
+use crate::conditioning::{Conditioner, ConditioningConfig};
 use crate::environment::{EnvironmentConfig, EnvironmentError, SceneConfig};
 use crate::estimator::EstimatorConfig;
 use crate::playout::PlayoutConfig;
@@ -55,6 +57,8 @@ pub struct SlaveConfig {
     pub scene: SceneConfig,
     /// Noise, vision.
     pub sensing: SensingConfig,
+    /// What is made of the measured force before it is judged.
+    pub conditioning: ConditioningConfig,
     /// Buffer for the master's samples.
     pub playout: PlayoutConfig,
     /// The tool presses with no more than this on what it touches, N. Default 15: the hand's device gives 8.
@@ -95,6 +99,7 @@ impl SlaveConfig {
                 vision,
                 ..SensingConfig::default()
             },
+            conditioning: ConditioningConfig::of_mode(mode),
             playout: PlayoutConfig::default(),
             tool_force_max_n: TOOL_FORCE_MAX_N,
             estimator: None,
@@ -104,6 +109,18 @@ impl SlaveConfig {
             repeats_ms,
             stretch_max,
         }
+    }
+}
+
+/// A real contact is no softer than this share of k_p of the coupling.
+const SOFTEST: f64 = 0.25;
+
+impl SlaveConfig {
+    /// What conditions the measured force of a tool with this coupling.
+    #[must_use]
+    pub fn conditioner(&self, coupling: &Coupling) -> Conditioner {
+        let softest = SOFTEST * coupling.stiffness_n_per_m;
+        Conditioner::new(self.conditioning, self.trigger.contact, softest)
     }
 }
 

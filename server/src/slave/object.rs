@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 use super::config::{SlaveConfig, SlaveError};
 use crate::contact::Contact;
 use crate::estimator::{Estimate, Estimator, EstimatorConfig, Measured, OBSTACLE_N, Seen};
-use crate::pose_observer::{ObserverConfig, PoseObserver};
+use crate::pose_observer::{Felt, ObserverConfig, PoseObserver};
 
 /// The pose observer and the estimator, which need each other.
 pub(super) struct ObjectEstimate {
@@ -148,7 +148,11 @@ impl ObjectEstimate {
         observer.step(
             now,
             contact.tool,
-            contact.force,
+            Felt {
+                force: contact.force,
+                steady: contact.steady,
+                noise_n: contact.noise_n,
+            },
             contact.in_contact,
             &self.params,
         );
@@ -160,6 +164,7 @@ impl ObjectEstimate {
         let estimate = self.estimator.step(&Measured {
             tool: contact.tool,
             force: contact.force,
+            force_noise_n: contact.noise_n,
             normal: observer.contact().map(|frame| frame.inward),
             seen: Some(Seen {
                 centre: observer.pose().position,

@@ -1,21 +1,26 @@
 //! What the trigger compares the measured force with, and all that it is given in a tick.
 
+use std::collections::VecDeque;
+
 use mmt_shared::model::geometry::{Vec2, wrap_angle};
 use mmt_shared::model::local_model::LocalModel;
 
 use super::object::ObjectEstimate;
+use crate::conditioning::JUDGED_MAX;
 use crate::contact::Contact;
 use crate::shadow::{Shadow, TriggerReference};
 use crate::trigger::TriggerInput;
 
 /// One of the three references.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct ForceReference {
     kind: TriggerReference,
     /// f_m of the newest sample that was played, N.
     echo: Vec2,
     /// f_s at the last update, N.
     at_update: Vec2,
+    /// f_s and f_m of the newest ticks, N.
+    recent: VecDeque<[Vec2; 2]>,
 }
 
 impl ForceReference {
@@ -24,6 +29,7 @@ impl ForceReference {
             kind,
             echo: Vec2::zeros(),
             at_update: Vec2::zeros(),
+            recent: VecDeque::with_capacity(JUDGED_MAX),
         }
     }
 
@@ -47,18 +53,20 @@ impl ForceReference {
 
     /// The trigger's input. `held_back` says whether the limit of the tool's force keeps the tool from the HIP.
     pub(super) fn input(
-        &self,
+        &mut self,
         contact: &Contact,
         object: &ObjectEstimate,
         shadow: &Shadow,
         held_back: bool,
     ) -> TriggerInput {
         let (f_m, shadow_in_contact) = self.model_force(contact, shadow, held_back);
+        let [f_s, f_m] = self.average([contact.force, f_m], contact.averaged);
         let estimate = object.estimator.estimate();
         let (pose, model) = (object.observer.pose(), shadow.ahead().state());
         TriggerInput {
-            f_s: contact.force,
+            f_s,
             f_m,
+            noise_n: contact.noise_n / (contact.averaged as f64).sqrt(),
             slave_in_contact: contact.in_contact,
             shadow_in_contact,
             // a model that does not stand where the object does is a mismatch although the object sticks
@@ -71,6 +79,24 @@ impl ForceReference {
             shift: pose.position - model.pose.position,
             turn: wrap_angle(pose.angle - model.pose.angle),
         }
+    }
+
+    /// Both forces (N) over the newest `n` ticks: the same average of both, so that neither is late.
+    fn average(&mut self, forces: [Vec2; 2], n: usize) -> [Vec2; 2] {
+        if self.recent.len() >= JUDGED_MAX {
+            self.recent.pop_front();
+        }
+        self.recent.push_back(forces);
+        if n == 1 {
+            return forces;
+        }
+        let newest = self.recent.iter().rev().take(n);
+        let all = newest.len() as f64;
+        newest
+            .fold([Vec2::zeros(); 2], |sum, tick| {
+                [sum[0] + tick[0], sum[1] + tick[1]]
+            })
+            .map(|sum| sum / all)
     }
 
     /// f_m (N), and whether the model is in contact.

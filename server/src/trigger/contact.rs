@@ -2,6 +2,9 @@
 
 use serde::{Deserialize, Serialize};
 
+/// Contact begins and ends at no less than so many standard deviations of the force.
+const DEVIATIONS: (f64, f64) = (5.0, 3.0);
+
 /// Thresholds of contact.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -43,12 +46,14 @@ impl ContactDetector {
         }
     }
 
-    /// One sample of |f_s| (N); returns whether the slave is in contact.
-    pub fn step(&mut self, force: f64) -> bool {
+    /// One sample of |f_s| (N), whose standard deviation per axis is `deviation` (N) where the thresholds are not made
+    /// for it, else 0; returns whether the slave is in contact.
+    pub fn step(&mut self, force: f64, deviation: f64) -> bool {
+        let (on, off) = DEVIATIONS;
         let touches = if self.in_contact {
-            force >= self.config.off_n
+            force >= self.config.off_n.max(off * deviation)
         } else {
-            force >= self.config.on_n
+            force >= self.config.on_n.max(on * deviation)
         };
         self.against = if touches == self.in_contact {
             0
@@ -61,6 +66,17 @@ impl ContactDetector {
         }
         self.in_contact
     }
+
+    /// The thresholds at which contact begins and ends.
+    #[must_use]
+    pub fn config(&self) -> &ContactConfig {
+        &self.config
+    }
+
+    /// Ends a contact that is none.
+    pub fn release(&mut self) {
+        (self.in_contact, self.against) = (false, 0);
+    }
 }
 
 #[cfg(test)]
@@ -70,12 +86,27 @@ mod tests {
     #[test]
     fn contact_begins_and_ends_at_its_thresholds_after_the_debounce() {
         let mut detector = ContactDetector::new(ContactConfig::default());
-        let mut run = |force: f64, n: u32| (0..n).map(|_| detector.step(force)).last().unwrap();
+        let mut run =
+            |force: f64, n: u32| (0..n).map(|_| detector.step(force, 0.0)).last().unwrap();
         assert!(!run(0.0999, 100));
         assert!(!run(0.10, 2));
         assert!(run(0.10, 1));
         assert!(run(0.05, 100), "hysteresis");
         assert!(run(0.0499, 2));
         assert!(!run(0.0499, 1));
+    }
+
+    #[test]
+    fn thresholds_rise_to_five_and_three_deviations_where_that_is_more() {
+        let begins = |force, deviation| {
+            let mut detector = ContactDetector::new(ContactConfig::default());
+            (0..3).map(|_| detector.step(force, deviation)).last()
+        };
+        assert_eq!(begins(0.10, 0.02), Some(true));
+        assert_eq!(begins(0.199, 0.04), Some(false));
+        let mut detector = ContactDetector::new(ContactConfig::default());
+        let mut run = |force| (0..3).map(|_| detector.step(force, 0.04)).last();
+        assert_eq!(run(0.201), Some(true));
+        assert_eq!((run(0.121), run(0.119)), (Some(true), Some(false)));
     }
 }

@@ -6,16 +6,17 @@
 //! once. Every update, whatever its cause, resets the timer.
 
 mod contact;
+mod input;
 mod metric;
 mod scheme;
 
 pub use contact::{ContactConfig, ContactDetector};
+pub use input::TriggerInput;
 pub use metric::MismatchMetric;
 pub use scheme::{Scheme, SchemeError};
 
 use std::time::Duration;
 
-use mmt_shared::model::geometry::Vec2;
 use mmt_shared::model::params::ModelParams;
 use mmt_shared::model::settings::Mode;
 use mmt_shared::model::update::Cause;
@@ -30,6 +31,15 @@ const USEFUL_SHARE: f64 = 0.01;
 const USEFUL_FLOOR_N: f64 = 0.3;
 /// A change of the face's direction above this is felt, rad (`useful`).
 const USEFUL_TURN_RAD: f64 = 0.010;
+
+/// An error of fewer standard deviations of the force per axis may be noise.
+const NOISE_DEVIATIONS: f64 = 3.5;
+
+/// With a noisy sensor a change of fewer standard deviations of the predicted force may be its noise: the rows of the
+/// estimator share a filter, so that the deviation is too small by a factor of five.
+const ESTIMATE_DEVIATIONS: f64 = 5.0;
+/// And so may a turn of fewer standard deviations of the force's direction.
+const TURN_DEVIATIONS: f64 = 2.0;
 
 /// The trigger's settings.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -84,44 +94,6 @@ impl TriggerConfig {
 impl Default for TriggerConfig {
     fn default() -> Self {
         Self::of_mode(Mode::Recommended)
-    }
-}
-
-/// The trigger's input in a sample period.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct TriggerInput {
-    /// f_s as measured, raw, N.
-    pub f_s: Vec2,
-    /// The shadow's force, N.
-    pub f_m: Vec2,
-    /// Whether the slave's tool touches the object.
-    pub slave_in_contact: bool,
-    /// Whether the HIP touches the shadow.
-    pub shadow_in_contact: bool,
-    /// Whether the object does not move although it is pushed.
-    pub sticking: bool,
-    /// Speed of the object along the push, m/s.
-    pub speed: f64,
-    /// Acceleration of the object along the push, m/s².
-    pub acceleration: f64,
-    /// Standard deviation of the force that the estimate predicts in the present motion, N.
-    pub force_deviation: f64,
-    /// The parameters that an update would carry now.
-    pub params: ModelParams,
-    /// By how much it would shift the shadow, m.
-    pub shift: Vec2,
-    /// By how much it would turn the shadow, rad.
-    pub turn: f64,
-}
-
-impl TriggerInput {
-    fn both_in_contact(&self) -> bool {
-        self.slave_in_contact && self.shadow_in_contact
-    }
-
-    /// |f_s − f_m|, N.
-    fn force_error(&self) -> f64 {
-        (self.f_s - self.f_m).norm()
     }
 }
 
@@ -278,9 +250,10 @@ impl Trigger {
         input.both_in_contact() && (self.config.judge_sticking || !input.sticking)
     }
 
-    /// (12), multiplied out.
+    /// (12), multiplied out, and more than the noise of the force.
     fn is_beyond(&self, input: &TriggerInput, delta: f64) -> bool {
-        input.force_error() > delta * input.f_s.norm().max(self.config.force_floor_n)
+        let felt = delta * input.f_s.norm().max(self.config.force_floor_n);
+        input.force_error() > felt.max(NOISE_DEVIATIONS * input.noise_n)
     }
 
     fn violated(&self, input: &TriggerInput, delta: f64) -> Option<Cause> {
@@ -326,9 +299,13 @@ impl Trigger {
             return false;
         }
         let change = force_change(input, &sent);
-        change > USEFUL_SHARE * input.f_s.norm().max(USEFUL_FLOOR_N)
-            || input.turn.abs() > USEFUL_TURN_RAD
-            || self.is_held_wrongly(input, delta)
+        let mut felt_n = USEFUL_SHARE * input.f_s.norm().max(USEFUL_FLOOR_N);
+        let mut felt_rad = USEFUL_TURN_RAD;
+        if input.noise_n > 0.0 {
+            felt_n = felt_n.max(ESTIMATE_DEVIATIONS * input.force_deviation);
+            felt_rad = felt_rad.max(TURN_DEVIATIONS * input.noise_n / input.f_s.norm());
+        }
+        change > felt_n || input.turn.abs() > felt_rad || self.is_held_wrongly(input, delta)
     }
 
     /// What friction holds is pushed back by the depth of the HIP alone: a force that is off by more than Delta

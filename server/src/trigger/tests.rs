@@ -1,5 +1,7 @@
 //! What the trigger promises.
 
+use mmt_shared::model::geometry::Vec2;
+
 use super::*;
 use mmt_shared::model::contact::Coupling;
 use mmt_shared::rng::Substream;
@@ -13,6 +15,7 @@ fn input(f_s: f64, f_m: f64) -> TriggerInput {
     TriggerInput {
         f_s: Vec2::new(f_s, 0.0),
         f_m: Vec2::new(f_m, 0.0),
+        noise_n: 0.0,
         slave_in_contact: true,
         shadow_in_contact: true,
         sticking: false,

@@ -16,6 +16,8 @@ pub struct SlaveHalf {
     pub updates: SentUpdates,
     /// The model's force against the measured one.
     pub force: ForceSummary,
+    /// The model's force against the true one.
+    pub true_force: TrueForce,
     /// What the estimator found.
     pub model: ModelReport,
     /// The tool.
@@ -58,6 +60,19 @@ impl SentUpdates {
             repeated_by_cause: by_cause(repeated),
         }
     }
+}
+
+/// How near the model's force is to the true one, which only a simulation knows: as [`ForceSummary`] has it of the measured
+/// one, with the true force in its place.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct TrueForce {
+    /// PMSE (15).
+    pub pmse_true: Number,
+    /// Relative vector error.
+    pub relative_error_true: Number,
+    /// How long the tool pressed with more than F_min, s.
+    pub contact_true_s: Number,
 }
 
 /// What the estimator found, beside the truth where it is known.

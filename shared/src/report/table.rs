@@ -147,12 +147,18 @@ impl<C> RunReport<C> {
         let rms = after("r.m.s.", number(of.error_rms_n, 3, " N"));
         let (x, y) = (after("x", number(of.pmse_x, 4, "")), after("y", number(of.pmse_y, 4, "")));
         let jnd = [after("7 %:", share(of.jnd7_share)), after("10 %:", share(of.jnd10_share))];
+        let truth = &self.force.truth;
+        let against = [
+            after("relative", number(truth.relative_error_true, 4, "")),
+            after("PMSE", number(truth.pmse_true, 4, "")),
+        ];
         let step = number(hand.largest_step_n, 2, " N in a tick");
         vec![
             row("relative error", [number(of.relative_error, 4, ""), rms]),
             row("PMSE", [number(of.pmse, 4, ""), x, y]),
             row("PMSE of |f|", [number(of.pmse_magnitude, 4, "")]),
             row("contact outside the JND", jnd),
+            row("against the true force", against),
             row("largest on the hand", [number(hand.largest_n, 2, " N"), step]),
         ]
     }

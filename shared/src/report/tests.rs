@@ -71,6 +71,11 @@ fn full() -> RunReport<Value> {
     report.wire.down = WireReport::new(1100, 110_000, 28, 20.0);
     report.force = ForceReport {
         errors: force.summary(),
+        truth: TrueForce {
+            pmse_true: 0.012.into(),
+            relative_error_true: 0.09.into(),
+            contact_true_s: 9.5.into(),
+        },
         hand: (&peak).into(),
     };
     report.model.mass_kg = EstimateReport::new(0.707, 0.7);
@@ -161,7 +166,8 @@ const REQUIRED: &str = "version command seed duration_s ending configuration dro
     wire.down.header_bytes \
     force.samples force.contact_samples force.pmse force.pmse_x force.pmse_y \
     force.pmse_magnitude force.relative_error force.error_rms_n force.jnd7_share \
-    force.jnd10_share force.largest_n force.largest_step_n \
+    force.jnd10_share force.pmse_true force.relative_error_true force.contact_true_s \
+    force.largest_n force.largest_step_n \
     model.mass_kg.estimate model.mass_kg.truth \
     model.damping_ns_per_m.estimate model.damping_ns_per_m.truth \
     model.friction_n.estimate model.friction_n.truth \
@@ -333,6 +339,7 @@ fn the_table_of_a_full_report_is_aligned_and_stays_within_100_columns() {
         "  repeats, deadband         20",
         "  messages up               100.2 /s           2000 commands      3 heartbeats",
         "  round trip as felt        14.9 ms",
+        "  against the true force    relative 0.0900    PMSE 0.0120",
         "  mass m                    0.707 kg           truth 0.700 kg     error 1.0 %",
         "  loss                      up 1.0 %           down 1.2 %",
         "  unsent                    up 0               down 17",

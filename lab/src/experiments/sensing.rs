@@ -1,0 +1,198 @@
+//! What an ordinary force sensor costs: noise, bias, drift, lag and gain, with and without the conditioning of the force.
+//!
+//! Judged by the true force: 0.1 N of noise lies above F_min, so that a noisy sensor is no judge of itself.
+
+use mmt_server::conditioning::ConditioningConfig;
+use mmt_server::sensing::SensingConfig;
+
+use crate::experiment::prelude::*;
+
+/// The force sensors.
+pub(super) const EXPERIMENT: Experiment = Experiment::new(
+    "sensing",
+    "What noise, bias, drift, lag and gain of the force sensor cost, with and without conditioning",
+    10,
+    run,
+);
+
+/// A force sensor: its name and what makes it other than the default.
+type Sensor = (&'static str, fn(&mut SensingConfig));
+
+/// The default sensor, its errors one by one, and together.
+static SENSORS: [Sensor; 11] = [
+    ("10 mN of noise", |_| {}),
+    ("noise 0.05 N", |sensor| sensor.force_noise_n = 0.05),
+    ("noise 0.1 N", |sensor| sensor.force_noise_n = 0.1),
+    ("bias 0.2 N", |sensor| sensor.force_bias_n = 0.2),
+    ("drift 0.01 N/s", |sensor| sensor.force_drift_n_per_s = 0.01),
+    ("lag 5 ms", |sensor| sensor.force_lag_ms = 5.0),
+    ("gain 1.1", |sensor| sensor.force_gain = 1.1),
+    ("gain 0.9", |sensor| sensor.force_gain = 0.9),
+    ("noise, bias, drift, lag", ordinary),
+    ("all, gain 1.1", |sensor| {
+        ordinary(sensor);
+        sensor.force_gain = 1.1;
+    }),
+    ("all, gain 0.9", |sensor| {
+        ordinary(sensor);
+        sensor.force_gain = 0.9;
+    }),
+];
+
+fn ordinary(sensor: &mut SensingConfig) {
+    sensor.force_noise_n = 0.1;
+    sensor.force_bias_n = 0.2;
+    sensor.force_drift_n_per_s = 0.01;
+    sensor.force_lag_ms = 5.0;
+}
+
+/// Who uses the force, and whether it is conditioned.
+const USERS: [(Mode, Curve, bool); 3] = [
+    (Mode::Recommended, Curve::Useful(150), true),
+    (Mode::Recommended, Curve::Useful(150), false),
+    (Mode::Paper, Curve::Hybrid(150), false),
+];
+const DELTA: f64 = 0.10;
+
+struct Case {
+    sensor: &'static Sensor,
+    mode: Mode,
+    curve: Curve,
+    conditioned: bool,
+}
+
+type Group = grid::Group<Case, Measured>;
+
+fn cases() -> Vec<Case> {
+    let of_user = |(mode, curve, conditioned)| {
+        SENSORS.iter().map(move |sensor| Case {
+            sensor,
+            mode,
+            curve,
+            conditioned,
+        })
+    };
+    USERS.into_iter().flat_map(of_user).collect()
+}
+
+fn world(case: &Case) -> WorldConfig {
+    let mut world = paper_world(case.mode, case.curve.at(DELTA));
+    let (_, change) = case.sensor;
+    change(&mut world.slave.sensing);
+    world.slave.conditioning = ConditioningConfig {
+        tare: case.conditioned,
+        follow_noise: case.conditioned,
+    };
+    world
+}
+
+/// Keeps `sensing.csv` and `sensing.svg`.
+fn run(runner: &Runner, request: &Request) -> Result<Findings, ExperimentError> {
+    let extent = request.extent;
+    let groups = runner.trials("sensing", extent.seeds, cases(), |case| {
+        Trial::new(world(case), extent.duration)
+    })?;
+    let rows = rows(&groups);
+    let title = format!(
+        "Force sensors, {} seeds, against the true force (ratios: over the default sensor's)",
+        extent.seeds
+    );
+    let table = Table::of(title, &rows, &columns());
+    runner.keep_table("sensing.csv", &table)?;
+    runner.keep_figure("sensing.svg", &figure(&rows))?;
+    Ok(Findings {
+        digest: digest(&groups),
+        configuration: cases().iter().map(world).collect(),
+        tables: vec![table],
+    })
+}
+
+/// A sensor beside the default one of the same user.
+struct Row<'a> {
+    group: &'a Group,
+    usual: &'a Group,
+}
+
+impl Row<'_> {
+    fn packets(&self) -> Option<Interval> {
+        self.group.ratio(self.usual, |run| run.updates.rate_hz())
+    }
+
+    fn pmse(&self) -> Option<Interval> {
+        let of = |run: &Measured| run.true_force.pmse_true.get();
+        self.group.ratio(self.usual, of)
+    }
+
+    fn user(&self) -> String {
+        let Case {
+            mode, conditioned, ..
+        } = self.group.case;
+        let with = if conditioned { "with" } else { "without" };
+        format!("{}, {with} conditioning", mode_name(mode))
+    }
+}
+
+fn rows(groups: &[Group]) -> Vec<Row<'_>> {
+    let of_user = groups.chunks(SENSORS.len());
+    let rows = of_user.flat_map(|groups| {
+        let usual = groups.first();
+        groups.iter().filter_map(move |group| {
+            Some(Row {
+                group,
+                usual: usual?,
+            })
+        })
+    });
+    rows.collect()
+}
+
+#[rustfmt::skip]
+fn columns<'a>() -> Vec<Column<'a, Row<'a>>> {
+    let mut columns: Vec<Column<Row>> = vec![
+        column("mode", "", 0, |row| mode_name(row.group.case.mode)),
+        column("conditioned", "", 0, |row| if row.group.case.conditioned { "yes" } else { "no" }),
+        column("sensor", "", 0, |row| row.group.case.sensor.0),
+        column("packet_rate_hz", "Hz", 2, |row| row.group.mean(|run| run.updates.rate_hz())),
+        column("pmse_true", "", 4, |row| row.group.mean(|run| run.true_force.pmse_true.get())),
+        column("relative_error_true", "", 3, |row| row.group.mean(|run| run.true_force.relative_error_true.get())),
+    ];
+    columns.extend(interval(["packets_ratio", "packets_low", "packets_high"], "", 2, Row::packets));
+    columns.extend(interval(["pmse_ratio", "pmse_low", "pmse_high"], "", 2, Row::pmse));
+    columns.push(column("position_rms_mm", "mm", 1, |row| row.group.mean(|run| Some(run.position_rms_m? * 1e3))));
+    columns.push(column("breaks_per_push", "", 2, |row| row.group.mean(|run| run.breaks_per_push)));
+    columns
+}
+
+/// Packets and PMSE of every sensor over those of the default one.
+fn figure(rows: &[Row]) -> Figure {
+    let styles = [
+        (Colour::BLUE, Mark::Circle),
+        (Colour::VERMILION, Mark::Cross),
+        (Colour::GREY, Mark::Square),
+    ];
+    let of_user = rows.chunks(SENSORS.len()).zip(styles);
+    let series = of_user.filter_map(|(rows, (colour, mark))| {
+        let dots = rows.iter().filter_map(|row| {
+            let dot = Dot::of_intervals(row.packets()?, row.pmse()?);
+            let note = Some(row.group.case.sensor.0.to_owned());
+            Some(Dot {
+                note: note.filter(|_| row.group.case.conditioned),
+                ..dot
+            })
+        });
+        let label = rows.first()?.user();
+        let dots = dots.collect();
+        Some(
+            Series::line(&label, colour, dots)
+                .stroked(Stroke::Solid, 0)
+                .marked(mark),
+        )
+    });
+    let panel = Panel::new(
+        "Force sensors with errors, over the default one",
+        Axis::log("updates, ratio"),
+        Axis::log("PMSE against the true force, ratio"),
+        series,
+    );
+    Figure::of_alike([panel], Legend::LowerRight, 1, (720, 480))
+}

@@ -1,0 +1,240 @@
+//! What is made of the measured force before anything judges it: noise is measured, a bias is tared and followed.
+//!
+//! The default sensor's noise and a bias that nobody feels leave every force and every threshold as they are. Pure, of
+//! the measured force and the tool alone; it must never see the true force.
+
+mod noise;
+mod withdrawal;
+
+use std::collections::VecDeque;
+
+use mmt_shared::model::geometry::Vec2;
+use mmt_shared::model::settings::Mode;
+use mmt_shared::time::TICK_S;
+use serde::{Deserialize, Serialize};
+
+use crate::trigger::{ContactConfig, ContactDetector};
+use noise::{CONTACT_MAX, Noise};
+use withdrawal::Withdrawal;
+
+pub use noise::JUDGED_MAX;
+
+/// An averaged force of so many of its standard deviations is no noise.
+const DEVIATIONS: f64 = 5.0;
+/// Samples that the first bias and the first noise are measured by.
+const FIRST_SAMPLES: u32 = 100;
+/// A bias below this is left, N: half of F_min.
+const BIAS_LEFT_N: f64 = 0.02;
+/// No bias of an untouched tool is more, N: more is contact.
+const BIAS_MAX_N: f64 = 0.5;
+/// Time constant by which the bias is followed in free space, s.
+const FOLLOW_S: f64 = 0.25;
+/// A tool that reads no force may still touch where a drifting bias hides it: it is clear after this way, m.
+const CLEAR_M: f64 = 3e-3;
+/// A bias may have drifted by so much since it was last measured, N/s: three times a good sensor's 0.01.
+const DRIFT_N_PER_S: f64 = 0.03;
+
+/// Whether the force is conditioned.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct ConditioningConfig {
+    /// Whether the bias is tared in free space and followed. Default: in recommended mode.
+    pub tare: bool,
+    /// Whether the thresholds of contact, and the averages that contact and (12) are judged by, follow the measured
+    /// noise. Default: in recommended mode.
+    pub follow_noise: bool,
+}
+
+impl ConditioningConfig {
+    /// Paper mode takes the force as it is measured, as the paper does.
+    #[must_use]
+    pub fn of_mode(mode: Mode) -> Self {
+        let cured = mode == Mode::Recommended;
+        Self {
+            tare: cured,
+            follow_noise: cured,
+        }
+    }
+}
+
+impl Default for ConditioningConfig {
+    fn default() -> Self {
+        Self::of_mode(Mode::Recommended)
+    }
+}
+
+/// The force of a tick, conditioned.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Conditioned {
+    /// Without bias, N.
+    pub force: Vec2,
+    /// The same over as many samples as contact is judged by, N.
+    pub steady: Vec2,
+    /// Noise per axis as measured, N, where it is more than thresholds are made for; else 0.
+    pub noise_n: f64,
+    /// Whether the tool touches.
+    pub in_contact: bool,
+    /// Samples that (12) is to be judged by: 1 or more.
+    pub averaged: usize,
+}
+
+/// Measures noise and bias, and says whether the tool touches.
+#[derive(Clone, Debug)]
+pub struct Conditioner {
+    config: ConditioningConfig,
+    noise: Noise,
+    bias: Bias,
+    recent: VecDeque<Vec2>,
+    withdrawal: Withdrawal,
+    /// Where the last contact ended, m, until the tool is clear of that place.
+    left: Option<Vec2>,
+    detector: ContactDetector,
+    in_contact: bool,
+}
+
+impl Conditioner {
+    /// `softest_n_per_m` is the softest contact that is expected.
+    #[must_use]
+    pub fn new(config: ConditioningConfig, contact: ContactConfig, softest_n_per_m: f64) -> Self {
+        Self {
+            config,
+            noise: Noise::default(),
+            bias: Bias::default(),
+            recent: VecDeque::with_capacity(CONTACT_MAX),
+            withdrawal: Withdrawal::new(softest_n_per_m),
+            left: None,
+            detector: ContactDetector::new(contact),
+            in_contact: false,
+        }
+    }
+
+    /// The tool may touch from the beginning: the first samples are no bias.
+    pub fn resume(&mut self) {
+        self.bias.begin();
+    }
+
+    /// Takes the measured force (N) of a tick with the tool at `tool` (m).
+    pub fn step(&mut self, measured: Vec2, tool: Vec2) -> Conditioned {
+        if self.config.follow_noise {
+            self.noise.step(measured, !self.in_contact);
+        }
+        let (for_contact, for_trigger) = self.noise.averaged();
+        let steady = self.average(measured, for_contact) - self.bias.known();
+        let deviation = self.noise.of_average(for_contact);
+        let untouched = self.config.tare && self.bias.first && self.bias.value.norm() < BIAS_MAX_N;
+        self.in_contact = !untouched && self.detector.step(steady.norm(), deviation);
+        if self.config.tare {
+            self.tare(measured, steady, tool, deviation);
+        }
+        Conditioned {
+            force: measured - self.bias.known(),
+            steady,
+            noise_n: self.noise.beyond(),
+            in_contact: self.in_contact,
+            averaged: for_trigger,
+        }
+    }
+
+    /// Follows the bias in free space, and ends a contact that is none.
+    fn tare(&mut self, measured: Vec2, steady: Vec2, tool: Vec2, deviation: f64) {
+        if !self.in_contact {
+            self.withdrawal.reset();
+            let doubt = self.detector.config().off_n.max(DEVIATIONS * deviation);
+            let clear = self.left.is_none_or(|left| (tool - left).norm() > CLEAR_M);
+            if self.bias.first || (clear && steady.norm() < doubt) {
+                self.left = None;
+                self.bias.follow(measured);
+            }
+            return;
+        }
+        self.left = Some(tool);
+        if self.bias.first {
+            self.bias.begin();
+        }
+        self.bias.age_s += TICK_S;
+        let drifted =
+            self.detector.config().on_n + 3.0 * deviation + DRIFT_N_PER_S * self.bias.age_s;
+        let stays = self.withdrawal.step(steady, tool, 3.0 * deviation);
+        if let Some(stays) = stays.filter(|force| force.norm() < drifted) {
+            self.bias.set(self.bias.known() + stays);
+            self.detector.release();
+            self.in_contact = false;
+        }
+    }
+
+    /// The mean of the newest `n` measured forces, N.
+    fn average(&mut self, force: Vec2, n: usize) -> Vec2 {
+        while self.recent.len() >= CONTACT_MAX {
+            self.recent.pop_front();
+        }
+        self.recent.push_back(force);
+        if n == 1 {
+            return force;
+        }
+        let newest = self.recent.iter().rev().take(n);
+        let all = newest.len() as f64;
+        newest.fold(Vec2::zeros(), |sum, force| sum + force) / all
+    }
+}
+
+/// The bias of the force.
+#[derive(Clone, Copy, Debug)]
+struct Bias {
+    value: Vec2,
+    samples: u32,
+    /// Whether it is still being measured for the first time.
+    first: bool,
+    /// Whether it is large enough to be tared.
+    tared: bool,
+    /// Time since it was last measured, s.
+    age_s: f64,
+}
+
+impl Default for Bias {
+    fn default() -> Self {
+        Self {
+            value: Vec2::zeros(),
+            samples: 0,
+            first: true,
+            tared: false,
+            age_s: 0.0,
+        }
+    }
+}
+
+impl Bias {
+    /// What is to be taken off the measured force, N.
+    fn known(&self) -> Vec2 {
+        if self.tared && !self.first {
+            self.value
+        } else {
+            Vec2::zeros()
+        }
+    }
+
+    /// Nothing is known of it, and the tool may touch.
+    fn begin(&mut self) {
+        *self = Self {
+            samples: FIRST_SAMPLES,
+            first: false,
+            age_s: BIAS_MAX_N / DRIFT_N_PER_S,
+            ..Self::default()
+        };
+    }
+
+    fn follow(&mut self, measured: Vec2) {
+        self.samples = self.samples.saturating_add(1);
+        let weight = (1.0 / f64::from(self.samples)).max(TICK_S / FOLLOW_S);
+        self.first &= self.samples < FIRST_SAMPLES;
+        self.set(self.value + (measured - self.value) * weight);
+    }
+
+    fn set(&mut self, value: Vec2) {
+        self.value = value;
+        self.age_s = 0.0;
+        self.tared |= value.norm() > BIAS_LEFT_N && !self.first;
+    }
+}
+
+#[cfg(test)]
+mod tests;

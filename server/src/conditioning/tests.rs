@@ -1,0 +1,145 @@
+//! Promises of the conditioner, on a tool that presses on something that does not move.
+
+use mmt_shared::rng::Substream;
+
+use super::*;
+
+const K_P: f64 = 1000.0;
+
+/// A tool before a wall at x = 0, and its sensor.
+struct Press {
+    conditioner: Conditioner,
+    noise: Substream,
+    noise_n: f64,
+    bias: Vec2,
+    drift: Vec2,
+}
+
+impl Press {
+    fn new(noise_n: f64, bias: Vec2, drift_n_per_s: Vec2) -> Self {
+        let config = ConditioningConfig::default();
+        Self {
+            conditioner: Conditioner::new(config, ContactConfig::default(), K_P / 4.0),
+            noise: Substream::new(1, "test/noise", 0),
+            noise_n,
+            bias,
+            drift: drift_n_per_s * TICK_S,
+        }
+    }
+
+    /// One tick with the tool at `x` (m).
+    fn tick(&mut self, x: f64) -> Conditioned {
+        let (a, b) = self.noise.normal_pair();
+        let truth = Vec2::new((K_P * x).max(0.0), 0.0);
+        self.bias += self.drift;
+        let measured = truth + self.bias + Vec2::new(a, b) * self.noise_n;
+        self.conditioner.step(measured, Vec2::new(x, 0.0))
+    }
+
+    /// So many ticks at `x`; in how many there was contact.
+    fn stay(&mut self, x: f64, ticks: u32) -> u32 {
+        (0..ticks).map(|_| u32::from(self.tick(x).in_contact)).sum()
+    }
+
+    /// From one place to another at 0.1 m/s; the last tick.
+    fn go(&mut self, from: f64, to: f64) -> Conditioned {
+        let ticks = ((to - from).abs() / 1e-4).round();
+        let ways = (0..=ticks as u32).map(|n| from + (to - from) * f64::from(n) / ticks);
+        let ticks: Vec<Conditioned> = ways.map(|x| self.tick(x)).collect();
+        ticks[ticks.len() - 1]
+    }
+}
+
+const FREE: f64 = -0.01;
+
+#[test]
+fn the_default_sensor_s_forces_pass_bit_by_bit() {
+    let (mut press, none) = (
+        Press::new(0.01, Vec2::zeros(), Vec2::zeros()),
+        Vec2::zeros(),
+    );
+    let mut noise = press.noise.clone();
+    for n in 0..20_000 {
+        let (a, b) = noise.normal_pair();
+        // half a metre a second in, half a metre a second out
+        let into = f64::from((n % 4000 - 3000).min(3999 - n % 4000));
+        let x = (FREE + 5e-4 * into).clamp(FREE, 2e-3);
+        let truth = Vec2::new((K_P * x).max(0.0), 0.0);
+        let tick = press.tick(x);
+        assert_eq!(tick.force, truth + none + Vec2::new(a, b) * 0.01);
+        assert_eq!(tick.averaged, 1);
+        assert!(into < 30.0 || tick.in_contact);
+    }
+}
+
+#[test]
+fn a_noise_of_0_1_n_is_no_contact_and_half_a_newton_is() {
+    let mut press = Press::new(0.1, Vec2::zeros(), Vec2::zeros());
+    assert_eq!(press.stay(FREE, 60_000), 0, "a minute in free space");
+    press.go(FREE, 5e-4);
+    assert!(press.stay(5e-4, 5000) > 4980);
+    press.go(5e-4, FREE);
+    assert_eq!(press.stay(FREE, 1000), 0);
+    assert!(press.tick(FREE).averaged == JUDGED_MAX);
+}
+
+#[test]
+fn a_bias_is_tared_and_its_drift_followed() {
+    let mut press = Press::new(0.01, Vec2::new(0.0, 0.2), Vec2::new(-0.02, 0.0));
+    assert_eq!(press.stay(FREE, 10_000), 0);
+    let left = (0..1000).map(|_| press.tick(FREE).force);
+    let mean = left.fold(Vec2::zeros(), |sum, force| sum + force) / 1000.0;
+    // a follower of 0.25 s is 0.02 N/s * 0.25 s behind
+    assert!(mean.norm() < 0.007, "{mean}");
+}
+
+#[test]
+fn a_contact_in_which_the_bias_drifts_beyond_the_threshold_ends_and_is_tared_after() {
+    for angle in 0..8 {
+        let angle = f64::from(angle) * std::f64::consts::FRAC_PI_4;
+        let drift = Vec2::new(libm::cos(angle), libm::sin(angle)) * 0.01;
+        let mut press = Press::new(0.01, Vec2::zeros(), drift);
+        press.stay(FREE, 1000);
+        press.go(FREE, 2e-3);
+        assert!(press.stay(2e-3, 60_000) > 59_000, "a minute, 0.6 N");
+        press.go(2e-3, FREE);
+        assert_eq!(press.stay(FREE, 1000), 0, "ended");
+        assert!(press.tick(FREE).force.norm() < 0.06, "tared");
+        press.go(FREE, 1e-3);
+        assert!(press.stay(1e-3, 100) == 100, "and begins again");
+    }
+}
+
+#[test]
+fn a_session_that_begins_with_a_bias_it_takes_for_contact_finds_out_when_the_tool_goes_back() {
+    let mut press = Press::new(0.01, Vec2::new(0.2, 0.0), Vec2::zeros());
+    press.conditioner.resume();
+    assert!(press.stay(FREE, 100) > 90, "nobody can know");
+    press.go(FREE, FREE - 5e-3);
+    assert_eq!(press.stay(FREE - 5e-3, 1000), 0);
+}
+
+#[test]
+fn a_light_touch_that_stays_is_no_bias() {
+    let mut press = Press::new(0.01, Vec2::zeros(), Vec2::zeros());
+    press.stay(FREE, 1000);
+    press.go(FREE, 1.5e-4);
+    assert!(
+        press.stay(1.5e-4, 30_000) > 29_990,
+        "0.15 N for half a minute"
+    );
+    let force = press.tick(1.5e-4).force;
+    assert!((force.x - 0.15).abs() < 0.06, "{force}");
+}
+
+#[test]
+fn without_the_cures_every_force_passes() {
+    let config = ConditioningConfig::of_mode(Mode::Paper);
+    let mut conditioner = Conditioner::new(config, ContactConfig::default(), K_P / 4.0);
+    for n in 0..1000 {
+        let force = Vec2::new(0.2, f64::from(n % 7) * 0.1);
+        let tick = conditioner.step(force, Vec2::zeros());
+        assert_eq!((tick.force, tick.averaged), (force, 1));
+        assert_eq!(tick.in_contact, n >= 2);
+    }
+}

@@ -1,0 +1,24 @@
+//! The force as the observer takes it.
+
+use mmt_shared::model::geometry::Vec2;
+
+/// The force that the observer takes in a tick.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Felt {
+    /// As measured, N.
+    pub force: Vec2,
+    /// The mean of the newest few where they are noisy, N.
+    pub steady: Vec2,
+    /// Noise per axis as measured, N, where it is more than the default sensor's; else 0.
+    pub noise_n: f64,
+}
+
+impl From<Vec2> for Felt {
+    fn from(force: Vec2) -> Self {
+        Self {
+            force,
+            steady: force,
+            noise_n: 0.0,
+        }
+    }
+}

@@ -1,0 +1,57 @@
+//! The force sensor: what it makes of the true force.
+//!
+//! Lag and gain act on the force; bias, its drift and noise are added. Size and time are configured, the directions of
+//! bias and drift come from the seed, each from its own substream. Without errors it passes the force on bit by bit.
+
+use mmt_shared::model::geometry::{Vec2, rotate};
+use mmt_shared::rng::Substream;
+use mmt_shared::time::TICK_S;
+
+use super::{SensingConfig, pair};
+
+/// The sensor between tool and object.
+#[derive(Clone, Debug)]
+pub(super) struct ForceSensor {
+    noise_n: f64,
+    noise: Substream,
+    /// Bias now, N, and by how much it grows in a tick, N.
+    bias: Vec2,
+    drift: Vec2,
+    gain: f64,
+    /// Weight of the newest force in the lagging one; none without lag.
+    weight: Option<f64>,
+    lagging: Vec2,
+}
+
+impl ForceSensor {
+    pub(super) fn new(config: &SensingConfig, seed: u64) -> Self {
+        let lag_s = config.force_lag_ms * 1e-3;
+        Self {
+            noise_n: config.force_noise_n,
+            noise: Substream::new(seed, "slave/force-noise", 0),
+            bias: direction(seed, "slave/force-bias") * config.force_bias_n,
+            drift: direction(seed, "slave/force-drift") * (config.force_drift_n_per_s * TICK_S),
+            gain: config.force_gain,
+            weight: (lag_s > 0.0).then(|| 1.0 - libm::exp(-TICK_S / lag_s)),
+            lagging: Vec2::zeros(),
+        }
+    }
+
+    /// Measures the true force of one tick, N.
+    pub(super) fn measure(&mut self, force: Vec2) -> Vec2 {
+        let followed = match self.weight {
+            Some(weight) => self.lagging + (force - self.lagging) * weight,
+            None => force,
+        };
+        self.lagging = followed;
+        let measured = followed * self.gain + self.bias + pair(&mut self.noise) * self.noise_n;
+        self.bias += self.drift;
+        measured
+    }
+}
+
+/// A unit vector of a substream's own.
+fn direction(seed: u64, name: &str) -> Vec2 {
+    let angle = std::f64::consts::TAU * Substream::new(seed, name, 0).uniform();
+    rotate(angle, Vec2::new(1.0, 0.0))
+}

@@ -1,0 +1,44 @@
+//! What the trigger judges in a sample period.
+
+use mmt_shared::model::geometry::Vec2;
+use mmt_shared::model::params::ModelParams;
+
+/// The trigger's input in a sample period.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TriggerInput {
+    /// f_s as measured: the raw sample, or where that is noisy the mean of some ms, N.
+    pub f_s: Vec2,
+    /// The shadow's force of the same time, N.
+    pub f_m: Vec2,
+    /// Standard deviation of `f_s` per axis, N, where it is more than the default sensor's; else 0.
+    pub noise_n: f64,
+    /// Whether the slave's tool touches the object.
+    pub slave_in_contact: bool,
+    /// Whether the HIP touches the shadow.
+    pub shadow_in_contact: bool,
+    /// Whether the object does not move although it is pushed.
+    pub sticking: bool,
+    /// Speed of the object along the push, m/s.
+    pub speed: f64,
+    /// Acceleration of the object along the push, m/s².
+    pub acceleration: f64,
+    /// Standard deviation of the force that the estimate predicts in the present motion, N.
+    pub force_deviation: f64,
+    /// The parameters that an update would carry now.
+    pub params: ModelParams,
+    /// By how much it would shift the shadow, m.
+    pub shift: Vec2,
+    /// By how much it would turn the shadow, rad.
+    pub turn: f64,
+}
+
+impl TriggerInput {
+    pub(super) fn both_in_contact(&self) -> bool {
+        self.slave_in_contact && self.shadow_in_contact
+    }
+
+    /// |f_s − f_m|, N.
+    pub(super) fn force_error(&self) -> f64 {
+        (self.f_s - self.f_m).norm()
+    }
+}
