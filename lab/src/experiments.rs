@@ -16,6 +16,7 @@ mod repeats;
 pub mod scenarios;
 mod schemes;
 mod sensing;
+mod stiffness;
 mod traces;
 mod transport;
 mod tupdate;
@@ -23,7 +24,7 @@ mod tupdate;
 use crate::experiment::description::Experiment;
 
 /// Every experiment, in the order in which they run.
-pub const ALL: [&Experiment; 16] = [
+pub const ALL: [&Experiment; 17] = [
     &physics::PHYSICS,
     &fig5::FIG5,
     &traces::FIG6,
@@ -34,6 +35,7 @@ pub const ALL: [&Experiment; 16] = [
     &schemes::SCHEMES,
     &scenarios::EXPERIMENT,
     &sensing::EXPERIMENT,
+    &stiffness::EXPERIMENT,
     &tupdate::TUPDATE,
     &repeats::REPEATS,
     &congestion::CONGESTION,

@@ -22,6 +22,7 @@ use crate::pose_observer::PoseObserver;
 use crate::sensing::Sensing;
 use crate::shadow::Shadow;
 use crate::tool::ToolDrive;
+use crate::tool::compliance::Compliance;
 use crate::tool::force::ToolForce;
 use crate::tool::port::ToolPort;
 use crate::trigger::{Scheme, Trigger};
@@ -69,6 +70,7 @@ pub struct Slave {
     settings: ModelSettings,
     playout: PlayoutBuffer,
     tool: ToolDrive,
+    compliance: Compliance,
     contact: ContactStage,
     object: ObjectEstimate,
     shadow: Shadow,
@@ -124,6 +126,7 @@ impl Slave {
             settings,
             playout: PlayoutBuffer::try_new(playout)?,
             tool: ToolDrive::new(port, limit),
+            compliance: Compliance::try_new(config.tool_compliance)?,
             contact: ContactStage::new(environment, sensing, config.conditioner(&coupling)),
             object,
             shadow: Shadow::new(settings, start),
@@ -277,7 +280,11 @@ impl Slave {
         let played = self.playout.advance(now)?;
         let played = self.tool.step(before, played);
         self.tool_at = played.hip;
-        let contact = self.contact.step(now, played.hip, played.velocity);
+        let (back, rate) = self.compliance.step(self.tool.port().held());
+        let tool = played.hip - back;
+        let mut contact = self.contact.step(now, tool, played.velocity - rate);
+        // the spring of the tool is part of the contact that the model renders
+        contact.tool += back;
         self.tool.measured(contact.force);
         let held_back = self.tool.is_held_back();
         if self.object.follow_body(&contact) {
@@ -295,7 +302,7 @@ impl Slave {
         let f_shadow = self.shadow.rendered().force;
         Some(SlaveTick {
             stamp: played.stamp,
-            tool: played.hip,
+            tool,
             f_s: contact.force,
             true_force: contact.true_force,
             f_shadow,

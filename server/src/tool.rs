@@ -2,6 +2,7 @@
 //!
 //! It must never move the tool faster than the limit of play-out, and never pass on f_m of a HIP that the tool is not at.
 
+pub(crate) mod compliance;
 pub mod force;
 pub mod port;
 

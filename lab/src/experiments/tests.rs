@@ -223,6 +223,23 @@ fn sensing_judges_by_the_true_force_and_conditioning_changes_nothing_that_is_sou
 }
 
 #[test]
+fn stiffness_that_is_the_rendered_one_changes_nothing_and_a_compliant_tool_mends_a_stiffer_one() {
+    let done = Done::of(&stiffness::EXPERIMENT, 8000);
+    let of = |tool, times, key| {
+        done.number(
+            "stiffness.csv",
+            &[("tool", tool), ("times_k_p", times)],
+            key,
+        )
+    };
+    assert_eq!(of("stiff", "1", "pmse_ratio"), 1.0);
+    for times in ["5", "10"] {
+        let [stiff, compliant] = ["stiff", "compliant"].map(|tool| of(tool, times, "pmse_true"));
+        assert!(compliant < 0.8 * stiff, "{times}: {compliant} and {stiff}");
+    }
+}
+
+#[test]
 fn tupdate_sends_less_with_a_longer_period() {
     let done = Done::of(&tupdate::TUPDATE, 2500);
     for scheme in ["hybrid", "useful"] {

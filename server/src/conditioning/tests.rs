@@ -13,6 +13,9 @@ struct Press {
     noise_n: f64,
     bias: Vec2,
     drift: Vec2,
+    /// Weight of the newest force in the measured one: 1 without lag.
+    weight: f64,
+    lagging: Vec2,
 }
 
 impl Press {
@@ -24,6 +27,8 @@ impl Press {
             noise_n,
             bias,
             drift: drift_n_per_s * TICK_S,
+            weight: 1.0,
+            lagging: Vec2::zeros(),
         }
     }
 
@@ -31,8 +36,9 @@ impl Press {
     fn tick(&mut self, x: f64) -> Conditioned {
         let (a, b) = self.noise.normal_pair();
         let truth = Vec2::new((K_P * x).max(0.0), 0.0);
+        self.lagging += (truth - self.lagging) * self.weight;
         self.bias += self.drift;
-        let measured = truth + self.bias + Vec2::new(a, b) * self.noise_n;
+        let measured = self.lagging + self.bias + Vec2::new(a, b) * self.noise_n;
         self.conditioner.step(measured, Vec2::new(x, 0.0))
     }
 
@@ -142,4 +148,36 @@ fn without_the_cures_every_force_passes() {
         assert_eq!((tick.force, tick.averaged), (force, 1));
         assert_eq!(tick.in_contact, n >= 2);
     }
+}
+
+/// An object that does not move is pressed on and let go by half again and again, at 0.3 m/s: it is touched all the time,
+/// and what it takes of the force is no bias.
+fn pressed_and_eased(mut press: Press) {
+    press.stay(FREE, 1000);
+    press.go(FREE, 8e-3);
+    press.stay(8e-3, 100);
+    for n in 0..20_000_u32 {
+        // 8 to 2 mm and back within 40 ms
+        let phase = f64::from(n % 40);
+        let x = 8e-3 - 3e-4 * phase.min(40.0 - phase);
+        assert!(press.tick(x).in_contact, "{n}");
+    }
+    press.stay(2e-3, 100);
+    let forces = (0..1000).map(|_| press.tick(2e-3).force);
+    let mean = forces.fold(Vec2::zeros(), |sum, force| sum + force) / 1000.0;
+    assert!((mean - Vec2::new(2.0, 0.0)).norm() < 0.03, "{mean}");
+    press.go(2e-3, FREE);
+    assert_eq!(press.stay(FREE, 1000), 0);
+}
+
+#[test]
+fn an_object_that_does_not_move_is_touched_as_long_as_it_is_whatever_the_lag() {
+    let mut press = Press::new(0.01, Vec2::zeros(), Vec2::zeros());
+    press.weight = 1.0 - libm::exp(-TICK_S / 5e-3);
+    pressed_and_eased(press);
+}
+
+#[test]
+fn an_object_that_does_not_move_is_touched_as_long_as_it_is_whatever_the_noise() {
+    pressed_and_eased(Press::new(0.1, Vec2::zeros(), Vec2::zeros()));
 }

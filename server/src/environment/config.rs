@@ -66,6 +66,9 @@ pub struct EnvironmentConfig {
     pub pose: Pose,
     /// `k_p` and `k_d` of the real contact between tool and surface. Default 1000 N/m, 10 N s/m.
     pub coupling: Coupling,
+    /// `k_p` and `k_d` of the real contact where they are others than `coupling`, which is the session's and all that the
+    /// slave knows of it. Default: the same.
+    pub contact: Option<Coupling>,
 }
 
 impl Default for EnvironmentConfig {
@@ -85,6 +88,7 @@ impl Default for EnvironmentConfig {
             gravity_m_per_s2: GRAVITY,
             pose: Pose::default(),
             coupling: Coupling::for_stiffness(1000.0),
+            contact: None,
         }
     }
 }
@@ -139,6 +143,11 @@ impl EnvironmentConfig {
         }
     }
 
+    /// Stiffness and damping of the real contact.
+    pub(super) fn real_contact(&self) -> Coupling {
+        self.contact.unwrap_or(self.coupling)
+    }
+
     /// The friction coefficient over the ground.
     pub(super) fn terrain(&self) -> Terrain<'_> {
         Terrain {
@@ -175,10 +184,6 @@ impl EnvironmentConfig {
 
     pub(super) fn check(&self, outline: &Outline) -> Result<(), EnvironmentError> {
         let place = (-WORKSPACE_M, WORKSPACE_M);
-        let (k_p, k_d) = (
-            self.coupling.stiffness_n_per_m,
-            self.coupling.damping_ns_per_m,
-        );
         let mu = self.friction_coefficient;
         let b_r = self.rotational_damping(outline);
         let g = self.gravity_m_per_s2;
@@ -186,8 +191,11 @@ impl EnvironmentConfig {
         in_range("static ratio", "", self.static_ratio, STATIC_RATIO)?;
         in_range("rotational damping", "N m s", b_r, ROTATIONAL_DAMPING_NMS)?;
         in_range("gravity", "m/s^2", g, GRAVITY_M_PER_S2)?;
-        in_range("contact stiffness", "N/m", k_p, STIFFNESS_N_PER_M)?;
-        in_range("contact damping", "N s/m", k_d, CONTACT_DAMPING_NS_PER_M)?;
+        for coupling in [self.coupling, self.real_contact()] {
+            let (k_p, k_d) = (coupling.stiffness_n_per_m, coupling.damping_ns_per_m);
+            in_range("contact stiffness", "N/m", k_p, STIFFNESS_N_PER_M)?;
+            in_range("contact damping", "N s/m", k_d, CONTACT_DAMPING_NS_PER_M)?;
+        }
         in_range("position x", "m", self.pose.position.x, place)?;
         in_range("position y", "m", self.pose.position.y, place)?;
         in_range("angle", "rad", self.pose.angle, ANGLE_RAD)?;

@@ -151,8 +151,8 @@ impl Object {
     pub(super) fn touch(&mut self, tool: Vec2, tool_velocity: Vec2) -> Option<(Touch, Vec2)> {
         let (pose, twist) = (self.pose(), self.twist());
         let touch = self.surface.follow(&pose, tool)?;
-        let coupling = &self.config.coupling;
-        let force = contact_force(coupling, &touch, tool_velocity, &twist, pose.position);
+        let coupling = self.config.real_contact();
+        let force = contact_force(&coupling, &touch, tool_velocity, &twist, pose.position);
         Some((touch, force))
     }
 

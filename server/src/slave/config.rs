@@ -63,6 +63,9 @@ pub struct SlaveConfig {
     pub playout: PlayoutConfig,
     /// The tool presses with no more than this on what it touches, N. Default 15: the hand's device gives 8.
     pub tool_force_max_n: f64,
+    /// A spring that the tool gives by under the measured force, for contacts that are stiffer than the rendered one.
+    /// Default: none.
+    pub tool_compliance: Option<Coupling>,
     /// The estimator of m, b and c; the mode's own if absent. It starts from `start` in any case.
     pub estimator: Option<EstimatorConfig>,
     /// When updates are sent.
@@ -102,6 +105,7 @@ impl SlaveConfig {
             conditioning: ConditioningConfig::of_mode(mode),
             playout: PlayoutConfig::default(),
             tool_force_max_n: TOOL_FORCE_MAX_N,
+            tool_compliance: None,
             estimator: None,
             trigger: TriggerConfig::of_mode(mode),
             trigger_reference: TriggerReference::default(),

@@ -1,0 +1,132 @@
+//! A contact whose stiffness nobody knows: from a third to ten times the rendered one, with a stiff and a compliant tool.
+
+use mmt_shared::model::contact::Coupling;
+
+use crate::experiment::prelude::*;
+
+/// The stiffnesses.
+pub(super) const EXPERIMENT: Experiment = Experiment::new(
+    "stiffness",
+    "What a real contact that is stiffer or softer than the rendered one costs, and what a compliant tool mends",
+    10,
+    run,
+);
+
+/// Stiffness of the real contact over that of the device.
+const TIMES: [f64; 7] = [0.3, 0.5, 1.0, 2.0, 3.0, 5.0, 10.0];
+/// k_p and k_d of the device, and k_d of every real contact.
+const DEVICE: Coupling = Coupling {
+    stiffness_n_per_m: 1000.0,
+    damping_ns_per_m: 10.0,
+};
+/// The spring of the compliant tool.
+const SPRING: Coupling = Coupling {
+    stiffness_n_per_m: 1200.0,
+    damping_ns_per_m: 30.0,
+};
+const CURVE: Curve = Curve::Useful(150);
+const DELTA: f64 = 0.10;
+
+struct Case {
+    times: f64,
+    spring: Option<Coupling>,
+}
+
+type Group = grid::Group<Case, Measured>;
+
+impl Case {
+    fn tool(&self) -> &'static str {
+        if self.spring.is_some() {
+            "compliant"
+        } else {
+            "stiff"
+        }
+    }
+
+    fn world(&self) -> WorldConfig {
+        let mut world = paper_world(Mode::Recommended, CURVE.at(DELTA));
+        world.slave.environment.contact = Some(Coupling {
+            stiffness_n_per_m: self.times * DEVICE.stiffness_n_per_m,
+            ..DEVICE
+        });
+        world.slave.tool_compliance = self.spring;
+        world
+    }
+}
+
+fn cases() -> Vec<Case> {
+    let of_tool = |spring| TIMES.map(|times| Case { times, spring });
+    [None, Some(SPRING)].into_iter().flat_map(of_tool).collect()
+}
+
+/// Keeps `stiffness.csv` and `stiffness.svg`.
+fn run(runner: &Runner, request: &Request) -> Result<Findings, ExperimentError> {
+    let extent = request.extent;
+    let groups = runner.trials("stiffness", extent.seeds, cases(), |case| {
+        Trial::new(case.world(), extent.duration)
+    })?;
+    let usual = |group: &&Group| group.case.times == 1.0 && group.case.spring.is_none();
+    let usual = groups.iter().find(usual);
+    let title = format!(
+        "Stiffness of the real contact, {} seeds (ratio: over the rendered stiffness and a stiff tool)",
+        extent.seeds
+    );
+    let table = Table::of(title, &groups, &columns(usual));
+    runner.keep_table("stiffness.csv", &table)?;
+    runner.keep_figure("stiffness.svg", &figure(&groups))?;
+    Ok(Findings {
+        digest: digest(&groups),
+        configuration: cases().iter().map(Case::world).collect(),
+        tables: vec![table],
+    })
+}
+
+fn pmse(run: &Measured) -> Option<f64> {
+    run.true_force.pmse_true.get()
+}
+
+#[rustfmt::skip]
+fn columns<'a>(usual: Option<&'a Group>) -> Vec<Column<'a, Group>> {
+    let ratio = move |group: &Group, of: fn(&Interval) -> f64| {
+        group.ratio(usual?, pmse).as_ref().map(of)
+    };
+    vec![
+        column("tool", "", 0, |group: &Group| group.case.tool()),
+        column("times_k_p", "", 1, |group| group.case.times),
+        mean("packet_rate_hz", "Hz", 2, |run| run.updates.rate_hz()),
+        mean("pmse_true", "", 4, pmse),
+        Column::new("pmse_ratio", "", 2, move |group| ratio(group, |i| i.mean).into()),
+        Column::new("pmse_low", "", 2, move |group| ratio(group, |i| i.low).into()),
+        Column::new("pmse_high", "", 2, move |group| ratio(group, |i| i.high).into()),
+        mean("relative_error_true", "", 3, |run| run.true_force.relative_error_true.get()),
+        mean("position_rms_mm", "mm", 1, |run| Some(run.position_rms_m? * 1e3)),
+        mean("breaks_per_push", "", 2, |run| run.breaks_per_push),
+    ]
+}
+
+fn figure(groups: &[Group]) -> Figure {
+    let styles = [
+        (Colour::VERMILION, Mark::Cross),
+        (Colour::BLUE, Mark::Circle),
+    ];
+    let of_tool = groups.chunks(TIMES.len()).zip(styles);
+    let series = of_tool.filter_map(|(groups, (colour, mark))| {
+        let dots = groups.iter().filter_map(|group| {
+            let y = group.interval(pmse)?;
+            let y_interval = Some((y.low, y.high));
+            Some(Dot {
+                y_interval,
+                ..Dot::at(group.case.times, y.mean)
+            })
+        });
+        let label = format!("{} tool", groups.first()?.case.tool());
+        Some(Series::line(&label, colour, dots.collect()).marked(mark))
+    });
+    let panel = Panel::new(
+        "A contact that nobody knows",
+        Axis::log("stiffness of the real contact over that of the device"),
+        Axis::log("PMSE against the true force"),
+        series,
+    );
+    Figure::of_alike([panel], Legend::UpperLeft, 1, (560, 420))
+}
