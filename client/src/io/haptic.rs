@@ -135,7 +135,7 @@ impl HapticLoop {
             }
         }
         // what came before the end counts
-        self.receive(&mut side);
+        while self.receive(&mut side) > 0 {}
         self.timing = ticker.report();
         self
     }
@@ -223,8 +223,10 @@ impl HapticLoop {
         }
     }
 
-    fn receive(&mut self, side: &mut LoopSide<MasterLive>) {
-        while let Some(frame) = side.next_arrival() {
+    /// Handles what has arrived; returns how many datagrams that were.
+    fn receive(&mut self, side: &mut LoopSide<MasterLive>) -> usize {
+        let mut handled = 0;
+        for frame in side.arrivals() {
             self.end.handle_datagram(frame.at, frame.bytes());
             if let Some(record) = &mut self.record {
                 record.arrived(&frame);
@@ -232,7 +234,9 @@ impl HapticLoop {
             if let Some(path) = &mut self.path {
                 path.note(frame.at, self.end.channel().peer());
             }
+            handled += 1;
         }
+        handled
     }
 
     fn transmit(&mut self, side: &mut LoopSide<MasterLive>, now: Time) {

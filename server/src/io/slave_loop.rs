@@ -85,7 +85,7 @@ impl SlaveLoop {
             }
         }
         // what came before the end counts
-        self.receive(&mut side);
+        while self.receive(&mut side) > 0 {}
         Finished {
             end: self.end,
             ticker: ticker.report(),
@@ -141,13 +141,17 @@ impl SlaveLoop {
         side.publish(snapshot);
     }
 
-    fn receive(&mut self, side: &mut LoopSide<Snapshot>) {
-        while let Some(frame) = side.next_arrival() {
+    /// Handles what has arrived; returns how many datagrams that were.
+    fn receive(&mut self, side: &mut LoopSide<Snapshot>) -> usize {
+        let mut handled = 0;
+        for frame in side.arrivals() {
             self.end.handle_datagram(frame.at, frame.bytes());
             if let Some(record) = &mut self.record {
                 record.arrived(&frame);
             }
+            handled += 1;
         }
+        handled
     }
 
     fn snapshot(&self, now: Time) -> Snapshot {

@@ -21,6 +21,8 @@ use crate::wire::DATAGRAM_MAX;
 
 /// Frames that may wait for the loop: at 2000 a second, two seconds in which it stands.
 pub const ARRIVALS_MAX: usize = 4096;
+/// Frames that a tick takes: a peer that floods costs a loop so much of each tick, and no tick.
+pub const ARRIVALS_PER_TICK: usize = 64;
 /// Frames that may wait for the network task: at 2000 a second, half a second in which that stands.
 pub const DEPARTURES_MAX: usize = 1024;
 /// A frame keeps one byte more than a datagram may have: one that is too long is seen to be.
@@ -197,9 +199,9 @@ impl<S: Send, T> Drop for LoopHandle<S, T> {
 }
 
 impl<S: Send> LoopSide<S> {
-    /// The oldest frame that has arrived.
-    pub fn next_arrival(&mut self) -> Option<Frame> {
-        self.arrivals.pop().ok()
+    /// The frames that have arrived, oldest first, as many as a tick may take.
+    pub fn arrivals(&mut self) -> impl Iterator<Item = Frame> {
+        (0..ARRIVALS_PER_TICK).map_while(|_| self.arrivals.pop().ok())
     }
 
     /// Leaves what `next` writes, datagram by datagram until there is none, for the network task, and wakes it once. What
@@ -246,10 +248,10 @@ mod tests {
         }
         assert_eq!(handle.arrivals_dropped() + handle.departures_dropped(), 3);
         for n in 0..ARRIVALS_MAX as u64 {
-            let frame = side.next_arrival().unwrap();
+            let frame = side.arrivals().next().unwrap();
             assert_eq!((frame.at, frame.bytes()), (AT(n), &n.to_le_bytes()[..]));
         }
-        assert_eq!(side.next_arrival(), None);
+        assert_eq!(side.arrivals().next(), None);
         let mut left = DEPARTURES_MAX + 2;
         side.send(AT(7), |out| {
             out[..2].copy_from_slice(b"up");

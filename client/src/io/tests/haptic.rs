@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 
 use mmt_shared::channel::datagram_channel::DatagramChannel;
 use mmt_shared::io::emergency::EmergencyStop;
-use mmt_shared::io::loop_thread::{self, LoopHandle, LoopSide};
+use mmt_shared::io::loop_thread::{self, ARRIVALS_PER_TICK, LoopHandle, LoopSide};
 use mmt_shared::io::schedule::Tick;
 use mmt_shared::io::truth::{self, TruthReceiver};
 use mmt_shared::metrics::PoseError;
@@ -247,6 +247,17 @@ async fn only_the_newest_update_is_applied_and_the_overtaken_are_counted() {
     assert_eq!(end.master().applied(), 1);
     assert_eq!(end.update_drops().superseded, 2);
     assert!(end.counts().age.mean().is_some());
+}
+
+#[tokio::test]
+async fn a_flood_costs_each_tick_its_share_and_delays_nobody_for_long() {
+    let mut ticked = pressing(None);
+    (0..3 * ARRIVALS_PER_TICK).for_each(|_| ticked.hear(0, Message::Heartbeat));
+    for handled in 1..=3 {
+        assert!(ticked.tick(handled).is_continue());
+        let received = ticked.haptic.end().channel().counts().received;
+        assert_eq!(received.heartbeats, handled * ARRIVALS_PER_TICK as u64);
+    }
 }
 
 #[tokio::test]
