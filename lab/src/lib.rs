@@ -21,4 +21,5 @@ pub mod sweep;
 pub mod table;
 pub mod transport;
 pub mod trial;
+pub mod what_if;
 pub mod world;

@@ -9,6 +9,7 @@ pub use recovery::Recovery;
 
 use std::time::Duration;
 
+use mmt_client::operator::trace::Trace;
 use mmt_server::environment::{Environment, EnvironmentError};
 use mmt_server::slave::SlaveTick;
 use mmt_shared::metrics::{ForceSummary, UpdateCounts};
@@ -166,7 +167,18 @@ impl Trial {
     /// # Errors
     /// When a number of the configuration or of the change is not accepted.
     pub fn run(&self) -> Result<Measured, TrialError> {
-        let mut world = World::try_new(&self.config)?;
+        self.run_in(World::try_new(&self.config)?)
+    }
+
+    /// Runs it with a hand that goes this way, whatever it feels.
+    ///
+    /// # Errors
+    /// As [`Trial::run`].
+    pub fn run_along(&self, hand: &Trace) -> Result<Measured, TrialError> {
+        self.run_in(World::along(&self.config, hand.clone())?)
+    }
+
+    fn run_in(&self, mut world: World) -> Result<Measured, TrialError> {
         let mut run = Counters::default();
         for _ in 0..self.duration.as_millis() {
             let tick = world.step();

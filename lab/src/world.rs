@@ -12,6 +12,7 @@ use mmt_client::limiter::ForceLimiter;
 use mmt_client::master::{Master, MasterTick};
 use mmt_client::operator::Operator;
 use mmt_client::operator::scripted::{Picture, Scripted, View};
+use mmt_client::operator::trace::Trace;
 use mmt_netem::counters::Tally;
 use mmt_netem::link::LinkId;
 use mmt_netem::{Link, Packet};
@@ -102,6 +103,24 @@ impl World {
     /// # Errors
     /// When a number of the configuration is not accepted.
     pub fn try_new(config: &WorldConfig) -> Result<Self, WorldError> {
+        Self::operated(config, |view| {
+            let scripted = Scripted::try_new(config.operator, view)?;
+            Ok(Operator::Scripted(Box::new(scripted)))
+        })
+    }
+
+    /// A world at time zero whose hand goes this way, whatever it feels.
+    ///
+    /// # Errors
+    /// As [`World::try_new`].
+    pub fn along(config: &WorldConfig, hand: Trace) -> Result<Self, WorldError> {
+        Self::operated(config, |_| Ok(Operator::Trace(hand)))
+    }
+
+    fn operated(
+        config: &WorldConfig,
+        operator: impl FnOnce(View) -> Result<Operator, WorldError>,
+    ) -> Result<Self, WorldError> {
         let device = DeviceProfile::default().used_with(config.stiffness_n_per_m, None)?;
         let settings = config.model_settings(device.coupling());
         let mut slave = Slave::with_settings(&config.slave(), settings)?;
@@ -116,8 +135,7 @@ impl World {
         let limiter = ForceLimiter::try_new(device.limits())?;
         let master = Master::with_architecture(&welcome, limiter, config.architecture);
         let view = master.view();
-        let scripted = Scripted::try_new(config.operator, view)?;
-        let operator = Operator::Scripted(Box::new(scripted));
+        let operator = operator(view)?;
         slave.start_at(operator.start());
         let down_delay = config.down.delay.middle();
         Ok(Self {

@@ -65,6 +65,36 @@ pub fn session(
     Session::of_end(began, &StreamMessage::Hello(hello), &setting, configuration)
 }
 
+/// What the slave's end of a session is made of.
+#[derive(Clone, Debug)]
+pub struct SlaveSetting {
+    /// The slave.
+    pub config: SlaveConfig,
+    /// The master's hello, its token zero.
+    pub hello: Hello,
+    /// What an earlier session left; none at the first.
+    pub earlier: Option<Memory>,
+}
+
+impl SlaveSetting {
+    /// The setting that a record has.
+    ///
+    /// # Errors
+    /// A part of it cannot be read or is not accepted.
+    pub fn of_session(session: &Session) -> Result<Self, SlaveAgainError> {
+        let StreamMessage::Hello(hello) = StreamMessage::decode(&session.opening, Side::Master)?
+        else {
+            return Err(SlaveAgainError::NoHello);
+        };
+        let Setting { slave, earlier } = serde_json::from_str(&session.setting)?;
+        Ok(Self {
+            config: slave,
+            hello: hello.accept()?,
+            earlier,
+        })
+    }
+}
+
 /// A recorded session at work again.
 pub struct SlaveAgain {
     end: SlaveEnd,
@@ -85,14 +115,14 @@ impl EndAgain for SlaveAgain {
     type Error = SlaveAgainError;
 
     fn try_new(session: &Session) -> Result<Self, SlaveAgainError> {
-        let StreamMessage::Hello(hello) = StreamMessage::decode(&session.opening, Side::Master)?
-        else {
-            return Err(SlaveAgainError::NoHello);
-        };
-        let Setting { slave, earlier } = serde_json::from_str(&session.setting)?;
+        let SlaveSetting {
+            config,
+            hello,
+            earlier,
+        } = SlaveSetting::of_session(session)?;
         let began = Time::from_nanos(session.began_ns);
         Ok(Self {
-            end: SlaveEnd::of_session(began, &slave, &hello.accept()?, earlier.as_ref())?,
+            end: SlaveEnd::of_session(began, &config, &hello, earlier.as_ref())?,
             digest: RunDigest::default(),
         })
     }

@@ -67,7 +67,7 @@ pub(crate) enum Command {
     Netem(Box<NetemArguments>),
     /// Replay recorded pushes of a real object, or run recorded sessions again to the same bits
     #[command(after_help = help::REPLAY)]
-    Replay(ReplayArguments),
+    Replay(Box<ReplayArguments>),
     /// The table and the figures of a recorded run
     #[command(after_help = help::REPORT)]
     Report(ReportArguments),

@@ -4,6 +4,8 @@ use std::path::PathBuf;
 
 use clap::Args;
 use mmt_lab::replay::ReplayConfig;
+use mmt_netem::LinkConfig;
+use mmt_server::trigger::Scheme;
 
 use super::values::{self, Period};
 
@@ -19,6 +21,18 @@ pub(crate) struct ReplayArguments {
     /// Longest time without an update in contact; none for the pure deadband
     #[arg(long, value_name = "TIME", default_value = "150ms", value_parser = values::period)]
     pub(crate) t_update: Period,
+    /// Of records: what if updates were sent by this scheme
+    #[arg(long, value_name = "WORDS", value_parser = values::scheme)]
+    pub(crate) scheme: Option<Scheme>,
+    /// Of records: what if this were the network in each direction
+    #[arg(long, value_name = "WORDS", value_parser = values::netem)]
+    pub(crate) netem: Option<LinkConfig>,
+    /// Of records: what if this were the network from master to slave [default: --netem]
+    #[arg(long, value_name = "WORDS", value_parser = values::netem)]
+    pub(crate) netem_up: Option<LinkConfig>,
+    /// Of records: what if this were the network from slave to master [default: --netem]
+    #[arg(long, value_name = "WORDS", value_parser = values::netem)]
+    pub(crate) netem_down: Option<LinkConfig>,
     /// Random splits into fitted and held-out pushes
     #[arg(long, value_name = "N", default_value_t = ReplayConfig::default().repeats, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     pub(crate) splits: u32,

@@ -5,6 +5,7 @@
 use std::path::Path;
 
 use mmt_lab::replay::{ReplayConfig, replay};
+use mmt_lab::what_if::Otherwise;
 use mmt_shared::recording::Recording;
 
 use crate::args::ReplayArguments;
@@ -25,6 +26,13 @@ use document::{Document, Replayed};
 pub(crate) fn run(arguments: &ReplayArguments) -> Result<(), Failure> {
     if session::are_records(&arguments.files)? {
         return session::run(arguments);
+    }
+    if session::otherwise(arguments) != Otherwise::default() {
+        let what =
+            "--scheme and --netem are for records of sessions, and these are recorded pushes";
+        return Err(
+            Failure::usage(what).remedy("leave them out, or give a file made with --record")
+        );
     }
     let config = ReplayConfig {
         deadband: arguments.deadband,

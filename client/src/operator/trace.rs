@@ -105,6 +105,15 @@ pub struct Trace {
 }
 
 impl Trace {
+    /// The way of these samples: time since the start and tool point (world, m). None if there is none, or if time does
+    /// not increase.
+    pub fn of_samples(samples: impl IntoIterator<Item = (Duration, Vec2)>) -> Option<Self> {
+        let samples = samples.into_iter();
+        let samples: Vec<_> = samples.map(|(t, at)| (t.as_secs_f64(), at)).collect();
+        let increases = samples.is_sorted_by(|(before, _), (t_s, _)| before < t_s);
+        (increases && !samples.is_empty()).then(|| Self::of(samples))
+    }
+
     fn of(samples: Vec<(f64, Vec2)>) -> Self {
         let waited = Duration::ZERO;
         Self { samples, waited }

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use super::table::{Row, after, count, estimate, happened, number, row, section, share};
+use super::table::{Row, after, count, estimate, number, row, section, share};
 use super::{LoopReport, RunReport};
 
 /// The share of skipped ticks from which on the numbers are the host's as well.
@@ -16,15 +16,7 @@ impl<C> fmt::Display for Brief<'_, C> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let report = self.0;
         writeln!(f, "{}", report.head())?;
-        section(f, &report.verdict(), report.ten())?;
-        let drops: u64 = happened("", report.drops.as_ref()).count() as u64;
-        if drops > 0 {
-            write!(
-                f,
-                "\nSomething was dropped or refused, for {drops} reasons: --full names them."
-            )?;
-        }
-        Ok(())
+        section(f, &report.verdict(), report.ten())
     }
 }
 

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use mmt_lab::again::{AgainError, RanAgain, SessionsAgain};
+use mmt_lab::what_if::{Otherwise, RecordedRun, WhatIfError};
 use mmt_shared::io::record::{Ended, RecordError, is_record, read};
 use serde::Serialize;
 
@@ -44,6 +45,8 @@ enum Error {
     Record(#[from] RecordError),
     #[error(transparent)]
     Again(#[from] AgainError),
+    #[error(transparent)]
+    WhatIf(#[from] WhatIfError),
 }
 
 /// Whether the files are records of sessions and not recorded pushes.
@@ -68,6 +71,10 @@ pub(super) fn are_records(files: &[PathBuf]) -> Result<bool, Failure> {
 /// # Errors
 /// A record cannot be read, is of another version, or gave something else.
 pub(super) fn run(arguments: &ReplayArguments) -> Result<(), Failure> {
+    let otherwise = otherwise(arguments);
+    if otherwise != Otherwise::default() {
+        return what_if(arguments, &otherwise);
+    }
     let mut records = Vec::new();
     for path in &arguments.files {
         let record = again(path).map_err(|error| failure(path, &error))?;
@@ -84,6 +91,35 @@ pub(super) fn run(arguments: &ReplayArguments) -> Result<(), Failure> {
         })?;
     }
     Ok(())
+}
+
+/// What the arguments ask to be other than in the record.
+pub(super) fn otherwise(arguments: &ReplayArguments) -> Otherwise {
+    let both = &arguments.netem;
+    Otherwise {
+        scheme: arguments.scheme,
+        up: arguments.netem_up.clone().or_else(|| both.clone()),
+        down: arguments.netem_down.clone().or_else(|| both.clone()),
+    }
+}
+
+/// The recorded hand in virtual time, as it was and otherwise.
+fn what_if(arguments: &ReplayArguments, otherwise: &Otherwise) -> Result<(), Failure> {
+    let mut run = RecordedRun::default();
+    for path in &arguments.files {
+        let taken = read(path, |topic, message| -> Result<(), Error> {
+            Ok(run.take(topic, message)?)
+        });
+        taken.map_err(|error| failure(path, &error))?;
+    }
+    let answer = run.answer(otherwise).map_err(|error| {
+        Failure::usage(error).remedy("give the record of a demo, or those of both hosts of one run")
+    })?;
+    if arguments.json {
+        print_json(&answer)
+    } else {
+        print(answer)
+    }
 }
 
 fn again(path: &Path) -> Result<Record, Error> {
