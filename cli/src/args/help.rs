@@ -36,6 +36,9 @@ pub(super) const SWEEP: &str = include_str!("help/sweep.txt").trim_ascii_end();
 /// Examples of `mmt completions`.
 pub(super) const COMPLETIONS: &str = include_str!("help/completions.txt").trim_ascii_end();
 
+/// Examples of `mmt man`.
+pub(super) const MAN: &str = include_str!("help/man.txt").trim_ascii_end();
+
 /// Examples of `mmt doctor`.
 pub(super) const DOCTOR: &str = include_str!("help/doctor.txt").trim_ascii_end();
 

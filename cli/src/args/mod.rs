@@ -90,6 +90,7 @@ pub(crate) enum Command {
         shell: clap_complete::Shell,
     },
     /// Write the manual pages of all commands
+    #[command(after_help = help::MAN)]
     Man(ManArguments),
     /// Measure what things cost on this machine
     #[command(after_help = help::BENCH, subcommand_required = true, arg_required_else_help = true)]
