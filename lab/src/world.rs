@@ -29,13 +29,17 @@ use sha2::{Digest, Sha256};
 use crate::digest::hex;
 
 mod config;
+mod datagram;
 mod outcome;
 pub(crate) mod picture;
+mod slave_clock;
 
 pub use config::{WorldConfig, WorldError};
 pub use outcome::{Outcome, Traffic};
 
+use datagram::Datagram;
 use picture::{DelayedPicture, scene};
+use slave_clock::SlaveClock;
 
 /// By how much the slave's clock is ahead of the master's at the start: nothing may depend on it.
 const SLAVE_EPOCH: Duration = Duration::from_secs(3600);
@@ -68,33 +72,6 @@ pub struct World {
     staleness: Staleness,
     pose: PoseError,
     log: Sha256,
-}
-
-/// The slave's clock as a function of the master's, which is the world's.
-#[derive(Clone, Copy, Debug)]
-struct SlaveClock {
-    ahead: Duration,
-    /// How much it gains, ns per ms, which is ppm.
-    drift_ppm: u64,
-}
-
-impl SlaveClock {
-    fn at(&self, now: Time) -> Time {
-        let ms = now.as_nanos() / 1_000_000;
-        now + self.ahead + Duration::from_nanos(ms.saturating_mul(self.drift_ppm))
-    }
-}
-
-#[derive(Clone, Copy, Debug)]
-struct Datagram {
-    bytes: [u8; DATAGRAM_MAX],
-    length: usize,
-}
-
-impl Datagram {
-    fn bytes(&self) -> &[u8] {
-        self.bytes.get(..self.length).unwrap_or_default()
-    }
 }
 
 impl World {

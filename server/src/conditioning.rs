@@ -78,7 +78,7 @@ pub struct Conditioned {
     pub averaged: usize,
 }
 
-/// Measures noise and bias, and says whether the tool touches.
+/// Measures noise and bias, and decides whether the tool touches.
 #[derive(Clone, Debug)]
 pub struct Conditioner {
     config: ConditioningConfig,

@@ -37,7 +37,7 @@ async fn silent_ones(pairing: Pairing, from: impl Fn(u32) -> IpAddr) {
     }
 }
 
-/// The holder's attempt; none if it is not heard out.
+/// The holder's attempt; none if it is turned away.
 async fn welcome(pairing: &Pairing) -> Option<Master> {
     loop {
         let mut master = Master::try_connect(pairing).await.ok()?;
