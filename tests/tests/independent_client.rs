@@ -126,14 +126,16 @@ fn both_counted_the_same(client: &Value, slave: &Value) {
     assert_eq!(get(client, "/updates_dropped/rejected"), 0.0);
     let commands = get(client, "/sent/commands");
     assert!(commands > 100.0, "{commands}");
-    assert_eq!(
-        get(client, &format!("{theirs}/received/commands")),
-        commands
+    // a host that was starved drops some on its way to the loop; nobody makes one up
+    let received = get(client, &format!("{theirs}/received/commands"));
+    assert!(
+        0.0 < received && received <= commands,
+        "{received} of {commands}"
     );
-    assert_eq!(get(slave, "/messages/up/commands"), commands);
+    assert_eq!(get(slave, "/messages/up/commands"), received);
     assert!(get(client, "/sent/heartbeats") >= 1.0 && get(client, "/received/heartbeats") >= 1.0);
     let updates = get(client, "/received/updates");
-    assert_eq!(get(client, &format!("{theirs}/sent/updates")), updates);
+    assert!(updates <= get(client, &format!("{theirs}/sent/updates")));
 }
 
 /// The decrypted session in tshark: every message of the client and the slave, by type, and none malformed.
