@@ -54,7 +54,7 @@ async fn a_master_that_vanishes_without_a_word_loses_its_lease() {
     let host = run(options());
     let (mut master, _) = patiently(Master::operate(&host.pairing)).await;
     patiently(master.push(5)).await;
-    // it lives, and says nothing any more
+    // it lives, and sends nothing any more
     let next = patiently(eventually_welcome(&host.pairing)).await;
     patiently(next.farewell()).await;
     drop(master);
