@@ -340,7 +340,17 @@ fn while_either_sides_emergency_stop_is_set_the_tool_stands() {
 fn after_an_emergency_stop_the_tool_follows_a_hand_that_comes_for_it() {
     let back = |ms| if ms < 3500 { going_on(ms) } else { -0.9 };
     let hand = |ms| Some(back(ms) + if ms < 3800 { 0.0 } else { 0.05 });
-    let end = four_seconds(hand, |ms, slave, _| slave.stop((1000..3000).contains(&ms)));
+    let mut waited = 0.0;
+    let end = four_seconds(hand, |ms, slave, _| {
+        slave.stop((1000..3000).contains(&ms));
+        if ms == 3400 {
+            waited = slave.slave().tool_at().x;
+        }
+    });
+    assert!(
+        (waited - -0.9).abs() < 0.01,
+        "it went to the hand: {waited} m"
+    );
     let x = end.slave().tool_at().x;
     assert!((x - -0.85).abs() < 1e-3, "{x} m");
 }
