@@ -29,8 +29,8 @@ use mmt_shared::pairing::Host;
 use mmt_shared::wire::Architecture;
 
 pub(crate) use self::netem::{
-    EmulationArguments, NetemArguments, NetemCommand, NetemReportArguments, NetemShellArguments,
-    NetemTraceArguments,
+    EmulationArguments, NetemArguments, NetemCommand, NetemFileArguments, NetemReportArguments,
+    NetemShellArguments, NetemTraceArguments,
 };
 pub(crate) use bench::{BenchArguments, BenchSubject, TransportBenchArguments};
 pub(crate) use console::ConsoleArguments;

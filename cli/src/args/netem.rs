@@ -52,12 +52,8 @@ pub(crate) struct NetemArguments {
     /// Masters at one time; datagrams of one more are dropped and counted
     #[arg(long, value_name = "N", default_value_t = mmt_netem::io::relay::CLIENTS)]
     pub(crate) clients: usize,
-    /// Record every packet in this file: CSV if its name ends in .csv, else a compact form
-    #[arg(long, value_name = "FILE")]
-    pub(crate) record: Option<PathBuf>,
-    /// Write every packet, as it comes and as it leaves, to this file (pcapng), with its fate as a comment
-    #[arg(long, value_name = "FILE")]
-    pub(crate) pcap: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) files: NetemFileArguments,
     /// Give every master a new port toward the slave this often, as a NAT that forgets
     #[arg(long, value_name = "TIME", value_parser = values::duration)]
     pub(crate) rebind: Option<Duration>,
@@ -70,6 +66,17 @@ pub(crate) struct NetemArguments {
     /// Print the counters as JSON, after the address
     #[arg(long)]
     pub(crate) json: bool,
+}
+
+/// The files that packets are written to.
+#[derive(Debug, Args)]
+pub(crate) struct NetemFileArguments {
+    /// Record every packet in this file: CSV if its name ends in .csv, else a compact form
+    #[arg(long, value_name = "FILE")]
+    pub(crate) record: Option<PathBuf>,
+    /// Write every packet, as it comes and as it leaves, to this file (pcapng), with its fate as a comment
+    #[arg(long, value_name = "FILE")]
+    pub(crate) pcap: Option<PathBuf>,
 }
 
 /// What else `mmt netem` does.
@@ -99,12 +106,8 @@ pub(crate) struct NetemShellArguments {
     /// no root
     #[arg(long, value_name = "COMMAND")]
     pub(crate) beside: Option<String>,
-    /// Record every packet in this file: CSV if its name ends in .csv, else a compact form
-    #[arg(long, value_name = "FILE")]
-    pub(crate) record: Option<PathBuf>,
-    /// Write every packet, as it comes and as it leaves, to this file (pcapng), with its fate as a comment
-    #[arg(long, value_name = "FILE")]
-    pub(crate) pcap: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) files: NetemFileArguments,
     /// Write the counters as JSON to this file at the end
     #[arg(long, value_name = "FILE")]
     pub(crate) report: Option<PathBuf>,

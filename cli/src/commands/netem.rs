@@ -6,8 +6,6 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use mmt_netem::config::ConfigError;
-use mmt_netem::io::capture_file::CaptureFile;
-use mmt_netem::io::record_file::RecordFile;
 use mmt_netem::io::relay::{Extras, Relay, RelayError, RelayHandle, RelaySnapshot};
 use mmt_netem::record::Heading;
 use mmt_netem::{Direction, Effect, LinkConfig};
@@ -30,7 +28,7 @@ mod trace;
 pub(super) mod wrap;
 
 use control::Command;
-use files::{capture_file, record_file, written};
+use files::{Files, record_file};
 use gauge::{Caption, Gauge};
 
 /// How often the state of the relay is checked.
@@ -84,17 +82,11 @@ pub(crate) fn run(arguments: &NetemArguments, messages: &Messages) -> Result<(),
     let to = resolve(to)?;
     let stop = Stop::on_signals()?;
     let (up, down) = (arguments.up.clone(), arguments.down.clone());
-    let record = arguments.record.as_ref();
-    let record = record.map(|path| record_file(path, &heading(arguments)));
-    let record = record.transpose()?;
-    let capture = arguments.pcap.as_ref();
-    let capture = capture.map(|path| capture_file(path, &heading(arguments)));
-    let capture = capture.transpose()?;
+    let files = Files::begin(&arguments.files, &heading(arguments))?;
     let extras = Extras {
-        record: record.as_ref().map(RecordFile::writer),
-        capture: capture.as_ref().map(CaptureFile::writer),
         rebind_every: arguments.rebind,
         clients: Some(arguments.clients),
+        ..files.extras()
     };
     let relay = Relay::bind(listen, to, up, down, arguments.seed, extras);
     let relay = relay.map_err(start_error)?;
@@ -135,8 +127,7 @@ pub(crate) fn run(arguments: &NetemArguments, messages: &Messages) -> Result<(),
     let effects =
         effects.map_err(|_| Failure::failed("the effect of the networks is not known"))?;
     let (effect_up, effect_down) = effects.map_err(Failure::usage)?;
-    written("record", record.map(RecordFile::finish))?;
-    written("capture", capture.map(CaptureFile::finish))?;
+    files.finish()?;
     let report = NetemReport {
         version: env!("CARGO_PKG_VERSION"),
         command: "netem",

@@ -1,42 +1,72 @@
-//! The files that a relay writes while it runs: begun, and ended with what went wrong.
+//! The files that packets are written to while a relay or a shell runs: begun before it, and ended with what went wrong.
 
-use std::io;
+use std::fmt::Display;
 use std::path::Path;
 
 use mmt_netem::io::capture_file::CaptureFile;
 use mmt_netem::io::record_file::RecordFile;
+use mmt_netem::io::relay::Extras;
 use mmt_netem::record::Heading;
 
+use crate::args::NetemFileArguments;
 use crate::failure::Failure;
+
+/// A record and a capture, where they are wanted.
+pub(super) struct Files {
+    record: Option<RecordFile>,
+    capture: Option<CaptureFile>,
+}
+
+impl Files {
+    /// Begins those that are asked for.
+    ///
+    /// # Errors
+    /// One cannot be written.
+    pub(super) fn begin(wanted: &NetemFileArguments, heading: &Heading) -> Result<Self, Failure> {
+        let record = wanted.record.as_ref();
+        let record = record.map(|path| record_file(path, heading));
+        let capture = wanted.pcap.as_ref().map(|path| {
+            let begun = CaptureFile::create(path, heading);
+            begun.map_err(|error| cannot_write("capture", path, error))
+        });
+        Ok(Self {
+            record: record.transpose()?,
+            capture: capture.transpose()?,
+        })
+    }
+
+    /// Where a relay or a tunnel writes what it sees.
+    pub(super) fn extras(&self) -> Extras {
+        Extras {
+            record: self.record.as_ref().map(RecordFile::writer),
+            capture: self.capture.as_ref().map(CaptureFile::writer),
+            ..Extras::default()
+        }
+    }
+
+    /// Ends them.
+    ///
+    /// # Errors
+    /// One does not hold all that it should.
+    pub(super) fn finish(self) -> Result<(), Failure> {
+        let record = self.record.map(RecordFile::finish).transpose();
+        let capture = self.capture.map(CaptureFile::finish).transpose();
+        record.map_err(|error| Failure::failed(format!("the record: {error}")))?;
+        capture.map_err(|error| Failure::failed(format!("the capture: {error}")))?;
+        Ok(())
+    }
+}
 
 /// A record to be written.
 ///
 /// # Errors
 /// It cannot be.
 pub(super) fn record_file(path: &Path, heading: &Heading) -> Result<RecordFile, Failure> {
-    RecordFile::create(path, heading).map_err(|error| {
-        let what = format!("cannot write the record {}: {error}", path.display());
-        Failure::usage(what).remedy("give a path that can be written")
-    })
+    let begun = RecordFile::create(path, heading);
+    begun.map_err(|error| cannot_write("record", path, error))
 }
 
-/// A capture to be written.
-///
-/// # Errors
-/// It cannot be.
-pub(super) fn capture_file(path: &Path, heading: &Heading) -> Result<CaptureFile, Failure> {
-    CaptureFile::create(path, heading).map_err(|error| {
-        let what = format!("cannot write the capture {}: {error}", path.display());
-        Failure::usage(what).remedy("give a path that can be written")
-    })
-}
-
-/// Whether what this file should hold was written, if there was one.
-///
-/// # Errors
-/// It was not.
-pub(super) fn written(what: &str, finished: Option<io::Result<u64>>) -> Result<(), Failure> {
-    let finished = finished.transpose();
-    let failed = |error| Failure::failed(format!("the {what}: {error}"));
-    finished.map(|_| ()).map_err(failed)
+fn cannot_write(what: &str, path: &Path, error: impl Display) -> Failure {
+    let what = format!("cannot write the {what} {}: {error}", path.display());
+    Failure::usage(what).remedy("give a path that can be written")
 }

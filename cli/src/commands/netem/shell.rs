@@ -8,9 +8,7 @@ use std::process::{Child, Command, ExitStatus};
 use std::time::{Duration, Instant};
 
 use mmt_netem::effect::BYTES;
-use mmt_netem::io::capture_file::CaptureFile;
-use mmt_netem::io::record_file::RecordFile;
-use mmt_netem::io::relay::{Extras, RelaySnapshot};
+use mmt_netem::io::relay::RelaySnapshot;
 use mmt_netem::io::tunnel::Tunnel;
 use mmt_netem::record::Heading;
 use rustix::process::{Pid, Signal as Kill, kill_process, kill_process_group};
@@ -18,7 +16,7 @@ use serde::Serialize;
 use tokio::runtime::{Builder, Runtime};
 use tokio::signal::unix::{Signal, SignalKind, signal};
 
-use super::{CHECK_EVERY, DEGRADED, announce, capture_file, record_file, start_error, written};
+use super::{CHECK_EVERY, DEGRADED, Files, announce, start_error};
 use crate::args::NetemShellArguments;
 use crate::failure::Failure;
 use crate::log::Messages;
@@ -74,17 +72,8 @@ pub(super) fn run(arguments: &NetemShellArguments, messages: &Messages) -> Resul
         up: up.to_string(),
         down: down.to_string(),
     };
-    let record = arguments.record.as_ref();
-    let record = record.map(|path| record_file(path, &heading)).transpose()?;
-    let capture = arguments.pcap.as_ref();
-    let capture = capture
-        .map(|path| capture_file(path, &heading))
-        .transpose()?;
-    let extras = Extras {
-        record: record.as_ref().map(RecordFile::writer),
-        capture: capture.as_ref().map(CaptureFile::writer),
-        ..Extras::default()
-    };
+    let files = Files::begin(&arguments.files, &heading)?;
+    let extras = files.extras();
     let [near, far] = ends.interfaces().map_err(Failure::failed)?;
     let names = ["up  ", "down"].map(str::to_owned);
     let effects = announce([&up, &down], RATE_HZ, BYTES, names, messages);
@@ -94,8 +83,7 @@ pub(super) fn run(arguments: &NetemShellArguments, messages: &Messages) -> Resul
     let duration_s = began.elapsed().as_secs_f64();
     let counters = tunnel.stop().map_err(Failure::failed)?;
     let _ = effects.join();
-    written("record", record.map(RecordFile::finish))?;
-    written("capture", capture.map(CaptureFile::finish))?;
+    files.finish()?;
     let degraded = counters.lateness.degraded();
     if degraded {
         note(DEGRADED);
