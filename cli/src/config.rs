@@ -4,6 +4,7 @@
 
 use std::path::Path;
 
+use mmt_client::device::link::DeviceLinkConfig;
 use mmt_lab::overlay::laid_over;
 use mmt_server::environment::SceneConfig;
 use mmt_server::slave::SlaveConfig;
@@ -25,6 +26,18 @@ pub(crate) fn slave_config(
     };
     read(path, "the configuration", "docs/commands.md", |text| {
         parse(text, mode)
+    })
+}
+
+/// The device of a file that is to be plugged in, if there is one.
+///
+/// # Errors
+/// The file cannot be read, is no TOML, or is no device.
+pub(crate) fn device_config(path: Option<&Path>) -> Result<DeviceLinkConfig, Failure> {
+    path.map_or(Ok(DeviceLinkConfig::default()), |path| {
+        read(path, "the device", "docs/plugs.md", |text| {
+            toml::from_str(text)
+        })
     })
 }
 

@@ -1,13 +1,17 @@
 //! Device profiles: what a haptic device can do and how its room maps to the world.
 //!
 //! k_p is per world metre. With a scale s (x_world = s x_device) the hand feels s k_p, and a device's
-//! stiffness limit applies to that. No profile may exceed its device's limits.
+//! stiffness limit applies to that. No profile may exceed its device's limits. A device of somebody else's is plugged in
+//! through `link`.
+
+pub mod link;
 
 use mmt_shared::model::contact::Coupling;
 use mmt_shared::range::{OutOfRange, in_range};
 use serde::Serialize;
 
-use crate::limiter::Limits;
+use crate::limiter::{Limits, STEP_MAX_N};
+use link::DeviceLinkConfig;
 
 /// Least accepted k_p, N/m: softer than a pillow, nothing can be pushed.
 const STIFFNESS_MIN_N_PER_M: f64 = 50.0;
@@ -21,6 +25,7 @@ pub struct DeviceProfile {
     stiffness_n_per_m: f64,
     stiffness_max_n_per_m: f64,
     force_max_n: f64,
+    step_max_n: f64,
     workspace_m: f64,
     scale: f64,
 }
@@ -34,6 +39,7 @@ const PROFILES: [DeviceProfile; 2] = [
         stiffness_n_per_m: 1000.0,
         stiffness_max_n_per_m: 3000.0,
         force_max_n: 8.0,
+        step_max_n: STEP_MAX_N,
         workspace_m: 10.0,
         scale: 1.0,
     },
@@ -43,6 +49,7 @@ const PROFILES: [DeviceProfile; 2] = [
         stiffness_n_per_m: 3000.0,
         stiffness_max_n_per_m: 3000.0,
         force_max_n: 8.0,
+        step_max_n: STEP_MAX_N,
         workspace_m: 0.10,
         scale: 1.0,
     },
@@ -104,6 +111,23 @@ impl DeviceProfile {
         })
     }
 
+    /// The profile of a device that is plugged in with these numbers.
+    ///
+    /// # Errors
+    /// As [`Self::used_with`].
+    pub fn plugged_in(config: &DeviceLinkConfig) -> Result<Self, DeviceError> {
+        let profile = Self {
+            name: "link",
+            stiffness_n_per_m: config.stiffness_n_per_m,
+            stiffness_max_n_per_m: config.stiffness_max_n_per_m,
+            force_max_n: config.force_max_n,
+            step_max_n: config.step_max_n,
+            workspace_m: config.workspace_m,
+            scale: config.scale,
+        };
+        profile.used_with(None, None)
+    }
+
     /// This device used with another k_p (N/m, world metres) and scale s; `None` keeps the profile's.
     ///
     /// # Errors
@@ -152,7 +176,7 @@ impl DeviceProfile {
     pub fn limits(&self) -> Limits {
         Limits {
             force_max_n: self.force_max_n,
-            ..Limits::default()
+            step_max_n: self.step_max_n,
         }
     }
 }

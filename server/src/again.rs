@@ -4,6 +4,7 @@
 //! it was on the wire, but for its token, which is zero, and its claim: no record holds a secret.
 
 use mmt_shared::pairing::{SECRET_BYTES, Token};
+use mmt_shared::plug::{PlugHead, PlugToken};
 use mmt_shared::record::again::{EndAgain, TickInput};
 use mmt_shared::record::digest::RunDigest;
 use mmt_shared::record::messages::{Arrival, Session, SlaveTick};
@@ -12,6 +13,7 @@ use mmt_shared::wire::{Claim, DecodeError, Hello, HelloError, Side, StreamMessag
 use serde::{Deserialize, Serialize};
 
 use crate::end::SlaveEnd;
+use crate::plant::PlantAnswer;
 use crate::slave::{Memory, SlaveConfig, SlaveError};
 
 /// Why a recorded session cannot be run again.
@@ -63,6 +65,15 @@ pub fn session(
         earlier: earlier.cloned(),
     };
     Session::of_end(began, &StreamMessage::Hello(hello), &setting, configuration)
+}
+
+/// No record holds a secret.
+const NO_TOKEN: PlugToken = PlugToken::new([0; 16]);
+
+/// What a record has of a plant's answer.
+#[must_use]
+pub fn plant_bytes(answer: &PlantAnswer) -> Vec<u8> {
+    answer.packet(&NO_TOKEN, &PlugHead::default()).to_vec()
 }
 
 /// What the slave's end of a session is made of.
@@ -133,8 +144,13 @@ impl EndAgain for SlaveAgain {
     }
 
     fn tick(&mut self, tick: &SlaveTick) -> u64 {
+        let now = Time::from_nanos(tick.deadline_ns);
+        if let Ok((_, Some(answer))) = PlantAnswer::read(&NO_TOKEN, &tick.plant) {
+            let anew = tick.plant_anew;
+            self.end.handle_plant(now, &PlantAnswer { anew, ..answer });
+        }
         self.end.stop(tick.stops);
-        let done = self.end.tick(Time::from_nanos(tick.deadline_ns));
+        let done = self.end.tick(now);
         self.digest.tick(&done);
         let value = self.digest.value();
         let (end, sent) = (&mut self.end, Time::from_nanos(tick.sent_ns));

@@ -1,4 +1,4 @@
-//! The tool at the object: it meets the environment, and the sensors measure what comes of that.
+//! The tool at the object: it meets a plant, and what is measured of that is made fit to be judged.
 //!
 //! It must never give the truth to anything but reports.
 
@@ -7,6 +7,7 @@ use mmt_shared::time::Time;
 
 use crate::conditioning::Conditioner;
 use crate::environment::Environment;
+use crate::plant::Plant;
 use crate::sensing::{Sensing, VisionSample};
 
 /// What is known of the contact in one tick.
@@ -34,35 +35,49 @@ pub struct Contact {
     pub body: usize,
 }
 
-/// The object, its ground and the slave's sensors.
+/// What the tool meets, and what is made of the measured force.
 pub struct ContactStage {
-    environment: Environment,
-    sensing: Sensing,
+    plant: Plant,
     conditioner: Conditioner,
     body: usize,
 }
 
 impl ContactStage {
-    /// Not in contact.
+    /// Not in contact with the simulated world.
     #[must_use]
     pub fn new(environment: Environment, sensing: Sensing, conditioner: Conditioner) -> Self {
+        let plant = Plant::World {
+            environment: Box::new(environment),
+            sensing: Box::new(sensing),
+        };
+        Self::at(plant, conditioner)
+    }
+
+    /// The simulated world: the truth.
+    #[must_use]
+    pub fn environment(&self) -> &Environment {
+        self.plant.environment()
+    }
+
+    /// Not in contact with a plant.
+    #[must_use]
+    pub(crate) fn at(plant: Plant, conditioner: Conditioner) -> Self {
         Self {
-            environment,
-            sensing,
+            plant,
             conditioner,
             body: 0,
         }
     }
 
-    /// The real object: the truth.
+    /// What the tool meets.
     #[must_use]
-    pub fn environment(&self) -> &Environment {
-        &self.environment
+    pub(crate) fn plant(&self) -> &Plant {
+        &self.plant
     }
 
-    /// The real object, to be changed in mid-run: scenarios do, sessions never.
-    pub fn environment_mut(&mut self) -> &mut Environment {
-        &mut self.environment
+    /// The same, to be changed.
+    pub(crate) fn plant_mut(&mut self) -> &mut Plant {
+        &mut self.plant
     }
 
     /// Begins with this body as the one that was touched last, and may be still.
@@ -73,12 +88,9 @@ impl ContactStage {
 
     /// One tick with the tool at `tool` (m), moving at `velocity` (m/s).
     pub fn step(&mut self, now: Time, tool: Vec2, velocity: Vec2) -> Contact {
-        let met = self.environment.step(tool, velocity);
-        if met.body != self.body {
-            self.body = met.body;
-            self.sensing.drop_images();
-        }
-        let sensed = self.sensing.sense(now, tool, met.force, &met.pose);
+        let met = self.plant.meet(now, tool, velocity, self.body);
+        self.body = met.body;
+        let sensed = met.sensed;
         let conditioned = self.conditioner.step(sensed.force, sensed.tool);
         Contact {
             tool: sensed.tool,

@@ -13,6 +13,7 @@ use mmt_shared::model::update::Update;
 use mmt_shared::time::Time;
 use mmt_shared::wire::{Architecture, Command, Hello, Message, Side};
 
+use crate::plant::{PlantAnswer, PlantCommand};
 use crate::repeats::{Repeating, Repeats};
 use crate::slave::{Memory, Slave, SlaveConfig, SlaveError, SlaveTick};
 
@@ -42,10 +43,12 @@ pub struct SlaveEndConfig {
 const TICK_MAX: Duration = Duration::from_millis(10);
 
 /// What a tick of the slave's end is given besides its deadline.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SlaveGiven {
-    /// Whether the slave's emergency stop is set.
+    /// Whether the slave's emergency stop is set, or the plant that is plugged in is silent.
     pub stops: bool,
+    /// What the plant that is plugged in measured, if it has since the tick before.
+    pub plant: Option<PlantAnswer>,
 }
 
 /// What the slave's end counts.
@@ -246,6 +249,21 @@ impl SlaveEnd {
             self.slave.handle_sample(at, sample, newest_update);
             self.counts.samples += 1;
         }
+    }
+
+    /// Takes in what the plant that is plugged in measured; it came at `now`.
+    pub fn handle_plant(&mut self, now: Time, answer: &PlantAnswer) {
+        self.slave.handle_plant(now, answer);
+    }
+
+    /// Where that plant has to move the tool after the newest tick; none in the simulated world.
+    #[must_use]
+    pub fn plant_command(&self) -> Option<PlantCommand> {
+        self.slave.plant_command().map(|command| PlantCommand {
+            begins: self.newest_sample.is_none(),
+            held: self.stopped_by().is_some(),
+            ..command
+        })
     }
 
     fn consider_disengaging(&mut self, now: Time) {

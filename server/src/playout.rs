@@ -70,6 +70,12 @@ impl PlayoutBuffer {
         self.limiter.start_at(hip);
     }
 
+    /// The tool is there (m), wherever it was: it stands until the HIP comes for it.
+    pub fn move_to(&mut self, place: Vec2) {
+        self.limiter.move_to(place);
+        self.stands = true;
+    }
+
     /// Holds the tool where it is, from the next tick on; or no longer: then it follows again once the HIP comes within
     /// 2 cm of it.
     pub fn hold(&mut self, held: bool) {

@@ -19,7 +19,6 @@ use crate::environment::{Environment, EnvironmentConfig};
 use crate::estimator::Estimate;
 use crate::playout::{Played, PlayoutBuffer, PlayoutConfig};
 use crate::pose_observer::PoseObserver;
-use crate::sensing::Sensing;
 use crate::shadow::Shadow;
 use crate::tool::ToolDrive;
 use crate::tool::compliance::Compliance;
@@ -31,6 +30,7 @@ mod config;
 mod force_errors;
 mod memory;
 mod object;
+mod plant;
 mod reference;
 mod update_builder;
 
@@ -112,7 +112,6 @@ impl Slave {
         let footprint = BoxFootprint::square(config.start.side_m);
         let start =
             ModelState::try_new(object.params, footprint, pose, Twist::default(), &coupling)?;
-        let sensing = Sensing::try_new(config.sensing, config.seed)?;
         let noise_n = config.sensing.force_noise_n;
         let limit = ToolForce::try_new(config.tool_force_max_n, coupling)?;
         let speed_max_m_per_s = (config.playout.speed_max_m_per_s).min(limit.approach_speed()?);
@@ -121,13 +120,14 @@ impl Slave {
             ..config.playout
         };
         let port = ToolPort::new(noise_n, speed_max_m_per_s);
+        let plant = plant::of_config(config, environment, coupling, speed_max_m_per_s)?;
         let timer_carries_pose = config.trigger.timer_carries_pose;
         Ok(Self {
             settings,
             playout: PlayoutBuffer::try_new(playout)?,
             tool: ToolDrive::new(port, limit),
             compliance: Compliance::try_new(config.tool_compliance)?,
-            contact: ContactStage::new(environment, sensing, config.conditioner(&coupling)),
+            contact: ContactStage::at(plant, config.conditioner(&coupling)),
             object,
             shadow: Shadow::new(settings, start),
             reference: ForceReference::new(config.trigger_reference),
@@ -151,7 +151,8 @@ impl Slave {
         &self.start
     }
 
-    /// The real object: the truth, for reports, never for the estimate.
+    /// The real object: the truth, for reports, never for the estimate. With a plant that is plugged in the configured
+    /// object, where the plant saw its own last.
     #[must_use]
     pub fn environment(&self) -> &Environment {
         self.contact.environment()
@@ -159,7 +160,7 @@ impl Slave {
 
     /// The real object, to be changed in mid-run: scenarios do, sessions never.
     pub fn environment_mut(&mut self) -> &mut Environment {
-        self.contact.environment_mut()
+        self.contact.plant_mut().environment_mut()
     }
 
     /// What the estimator found so far.

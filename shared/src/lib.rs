@@ -14,6 +14,7 @@ pub mod metrics;
 pub mod model;
 pub mod pairing;
 pub mod passivity;
+pub mod plug;
 pub mod range;
 pub mod record;
 pub mod recording;

@@ -22,7 +22,7 @@ use mmt_client::io::MasterLive;
 use mmt_client::io::haptic::HapticLoop;
 use mmt_client::io::record;
 use mmt_client::operator::Operator;
-use mmt_client::operator::pointer::{Driver, HandEvent, Person, PointerSample};
+use mmt_client::operator::pointer::{Driver, HandEvent, HandTuning, Person, PointerSample};
 use mmt_client::operator::scripted::{Scripted, ScriptedConfig};
 use mmt_client::path::PathRecorder;
 use mmt_server::end::{SlaveEnd, SlaveEndConfig};
@@ -92,7 +92,7 @@ impl Loop {
     fn held_by_a_person() -> (Producer<HandEvent>, Self) {
         let (events, to_loop) = RingBuffer::new(64);
         let person = |scripted| {
-            let person = Person::new(scripted, Driver::Pointer);
+            let person = Person::new(scripted, Driver::Pointer, HandTuning::POINTER);
             Operator::Person(Box::new(person))
         };
         let (mode, architecture) = (Mode::Recommended, Architecture::Mmt);

@@ -5,3 +5,4 @@ mod command;
 mod dissector;
 mod golden;
 mod harness;
+mod plug_layout;

@@ -56,6 +56,7 @@ async fn session(architecture: Architecture, path: &Path) {
         truth: None,
         record: Some(recorder.clone()),
         emergency: EmergencyStop::default(),
+        plant: None,
     });
     let host = host.unwrap();
     let pairing = host.pairing(None);
@@ -67,6 +68,7 @@ async fn session(architecture: Architecture, path: &Path) {
         device: DeviceProfile::default(),
         operator: OperatorChoice::Scripted(ScriptedConfig::default()),
         events: std::sync::Mutex::default(),
+        device_port: std::sync::Mutex::default(),
         duration: Some(DURATION),
         architecture,
         scene_hz: 40,

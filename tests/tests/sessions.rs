@@ -3,6 +3,7 @@
 mod harness;
 mod independent_client;
 mod live;
+mod plugs;
 mod records;
 mod run_again;
 mod two_hosts;

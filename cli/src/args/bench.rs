@@ -1,12 +1,16 @@
 //! The arguments of `mmt bench`.
 
+use std::path::PathBuf;
 use std::time::Duration;
 
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, Subcommand};
 use mmt_lab::io::transport_bench::{BYTES_MAX, BYTES_MIN, Cores, RATE_MAX};
 
-use super::values;
+use mmt_netem::LinkConfig;
+use mmt_server::trigger::Scheme;
+
+use super::{PlantArguments, values};
 
 /// Arguments of `mmt bench`.
 #[derive(Debug, Args)]
@@ -21,6 +25,34 @@ pub(crate) struct BenchArguments {
 pub(crate) enum BenchSubject {
     /// Latency, CPU time, packets and bytes of a message over raw UDP and QUIC, on loopback
     Transport(TransportBenchArguments),
+    /// How well an object is felt in virtual time: the simulated one, or a plant of your own in lock-step
+    Plant(Box<PlantBenchArguments>),
+}
+
+/// Arguments of `mmt bench plant`.
+#[derive(Clone, Debug, Args)]
+pub(crate) struct PlantBenchArguments {
+    /// What the tool meets.
+    #[command(flatten)]
+    pub(crate) plant: PlantArguments,
+    /// How long the scripted operator pushes, in virtual time
+    #[arg(long, value_name = "TIME", default_value = "60s", value_parser = values::duration)]
+    pub(crate) duration: Duration,
+    /// Emulated network in each direction
+    #[arg(long, value_name = "WORDS", default_value = "delay 50ms 5ms loss 1%", value_parser = values::netem)]
+    pub(crate) netem: LinkConfig,
+    /// Configuration of the slave, TOML
+    #[arg(long, value_name = "FILE")]
+    pub(crate) config: Option<PathBuf>,
+    /// When updates are sent [default: the file's, else the mode's]
+    #[arg(long, value_name = "WORDS", value_parser = values::scheme)]
+    pub(crate) scheme: Option<Scheme>,
+    /// Seed of operator, sensors and network
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub(crate) seed: u64,
+    /// Print one JSON document instead of a table
+    #[arg(long)]
+    pub(crate) json: bool,
 }
 
 /// Arguments of `mmt bench transport`.

@@ -2,9 +2,11 @@
 
 mod bench;
 mod console;
+mod device;
 mod doctor;
 mod help;
 mod netem;
+mod plant;
 mod records;
 mod reproduce;
 mod sweep;
@@ -19,7 +21,6 @@ use std::time::Duration;
 
 use clap::{Args, Parser, Subcommand};
 use mmt_client::commands::CommandConfig;
-use mmt_client::device::DeviceProfile;
 use mmt_netem::LinkConfig;
 use mmt_server::repeats::Repeats;
 use mmt_server::trigger::Scheme;
@@ -32,9 +33,13 @@ pub(crate) use self::netem::{
     EmulationArguments, NetemArguments, NetemCommand, NetemFileArguments, NetemReportArguments,
     NetemShellArguments, NetemTraceArguments,
 };
-pub(crate) use bench::{BenchArguments, BenchSubject, TransportBenchArguments};
+pub(crate) use bench::{
+    BenchArguments, BenchSubject, PlantBenchArguments, TransportBenchArguments,
+};
 pub(crate) use console::ConsoleArguments;
+pub(crate) use device::{DeviceArguments, DeviceWords};
 pub(crate) use doctor::{DoctorArguments, ManArguments};
+pub(crate) use plant::PlantArguments;
 pub(crate) use records::{ExportArguments, ReplayArguments, ReportArguments};
 pub(crate) use reproduce::ReproduceArguments;
 pub(crate) use sweep::SweepArguments;
@@ -146,6 +151,9 @@ pub(crate) struct DemoArguments {
     /// [default: the mode's]
     #[arg(long, value_name = "FACTOR")]
     pub(crate) stretch_max: Option<StretchMax>,
+    /// The haptic device.
+    #[command(flatten)]
+    pub(crate) device: DeviceArguments,
     /// The console; on a terminal there is one unless it is switched off.
     #[command(flatten)]
     pub(crate) console: ConsoleArguments,
@@ -182,6 +190,9 @@ pub(crate) struct SlaveArguments {
     /// Bodies and walls, TOML [default: the configuration's, else one cube]
     #[arg(long, value_name = "FILE")]
     pub(crate) scene: Option<PathBuf>,
+    /// What the tool meets.
+    #[command(flatten)]
+    pub(crate) plant: PlantArguments,
     /// Emulated network on what the slave sends
     #[arg(long, value_name = "WORDS", default_value = "none", value_parser = values::netem)]
     pub(crate) netem: LinkConfig,
@@ -229,9 +240,9 @@ pub(crate) struct MasterArguments {
     /// How long [default: until the operator has finished, or Ctrl-C]
     #[arg(long, value_name = "TIME", value_parser = values::duration)]
     pub(crate) duration: Option<Duration>,
-    /// The haptic device: default or falcon
-    #[arg(long, value_name = "NAME", default_value = "default", value_parser = values::device)]
-    pub(crate) device: DeviceProfile,
+    /// The haptic device.
+    #[command(flatten)]
+    pub(crate) device: DeviceArguments,
     /// Virtual stiffness k_p, N/m [default: the device's]
     #[arg(long, value_name = "N_PER_M")]
     pub(crate) stiffness: Option<f64>,

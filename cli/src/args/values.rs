@@ -15,6 +15,8 @@ use mmt_shared::model::settings::Mode;
 use mmt_shared::pairing::{Address, AddressError, Host};
 use mmt_shared::wire::{Architecture, SAMPLES_MAX};
 
+use super::device::DeviceWords;
+
 /// The longest duration accepted: a week.
 const DURATION_MAX: Duration = Duration::from_secs(7 * 24 * 3600);
 /// The shortest duration accepted: a tick.
@@ -169,9 +171,21 @@ pub(super) fn operator(text: &str) -> Result<OperatorWords, String> {
     }
 }
 
-/// A device profile by its name.
-pub(super) fn device(name: &str) -> Result<DeviceProfile, String> {
-    DeviceProfile::by_name(name).map_err(|error| error.to_string())
+/// A device by its name.
+pub(super) fn device(name: &str) -> Result<DeviceWords, String> {
+    if name == "link" {
+        return Ok(DeviceWords::Link);
+    }
+    let known = DeviceProfile::by_name(name).map(DeviceWords::Known);
+    known.map_err(|error| format!("{error}, link"))
+}
+
+/// Whether a plant is plugged in.
+pub(super) fn plant() -> impl TypedValueParser<Value = bool> {
+    one_of(&[
+        ("world", "The simulated world", false),
+        ("link", "A plant of your own", true),
+    ])
 }
 
 /// The bundle of choices.

@@ -1,4 +1,4 @@
-//! `mmt bench`: what things cost on this machine, in real time.
+//! `mmt bench`: what things cost on this machine, and how well an object is felt.
 
 use mmt_lab::io::transport_bench::{self, BenchConfig, BenchReport};
 use serde::Serialize;
@@ -8,6 +8,8 @@ use crate::failure::Failure;
 use crate::output::{note, print, print_json};
 use crate::stop::Stop;
 
+mod plant;
+
 /// Runs `mmt bench`.
 ///
 /// # Errors
@@ -15,6 +17,7 @@ use crate::stop::Stop;
 pub(crate) fn run(arguments: &BenchArguments) -> Result<(), Failure> {
     match &arguments.subject {
         BenchSubject::Transport(arguments) => transport(arguments),
+        BenchSubject::Plant(arguments) => plant::run(arguments),
     }
 }
 

@@ -23,6 +23,7 @@ use mmt_shared::report::{Both, RunReport};
 use mmt_shared::wire::Architecture;
 
 use super::console::{self, Desk};
+use super::device::Device;
 use super::netem::wrap::{Emulation, effect};
 use super::record::Record;
 use super::viewer::Viewer;
@@ -53,6 +54,7 @@ pub(crate) fn run(arguments: &DemoArguments, messages: &Messages) -> Result<(), 
     note(effect(Direction::Up, up)?);
     note(effect(Direction::Down, down)?);
     arguments.transport.warning().into_iter().for_each(note);
+    let device = Device::start(&arguments.device, None)?;
     let record = Record::start(arguments.record.as_deref())?;
     let stop = Stop::on_signals()?;
     let dashboard = !arguments.json && !arguments.emulation.netem_control;
@@ -70,6 +72,7 @@ pub(crate) fn run(arguments: &DemoArguments, messages: &Messages) -> Result<(), 
             setting: &mut setting,
             emulation: &emulation,
             record: &record,
+            device: &device,
             stop: &stop,
             dashboard,
             viewer: &mut viewer,
@@ -100,6 +103,7 @@ struct Round<'a> {
     setting: &'a mut Setting,
     emulation: &'a Emulation,
     record: &'a Record,
+    device: &'a Device,
     stop: &'a Stop,
     dashboard: bool,
     viewer: &'a mut Viewer,
@@ -145,6 +149,7 @@ impl Round<'_> {
         if let Some(desk) = &self.desk {
             operated_at(desk, &mut options);
         }
+        self.device.give(&mut options);
         let (master, master_live) = master::start(options, stop.receiver())?;
         if let Some(desk) = &mut self.desk {
             let (slave, master) = (Arc::clone(&started.live), master_live.clone());
@@ -236,6 +241,7 @@ fn operated_at(desk: &Desk, options: &mut MasterOptions) {
         options.operator = OperatorChoice::Person {
             scripted,
             driver: Driver::Scripted,
+            device: None,
         };
     }
 }
@@ -285,6 +291,7 @@ fn slave_options(
         truth: Some(truth),
         record: None,
         emergency: EmergencyStop::default(),
+        plant: None,
     })
 }
 
@@ -304,6 +311,7 @@ fn master_options(
             ..ScriptedConfig::default()
         }),
         events: std::sync::Mutex::default(),
+        device_port: std::sync::Mutex::default(),
         duration: Some(arguments.duration),
         architecture: arguments.architecture,
         scene_hz: 0,

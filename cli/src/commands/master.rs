@@ -27,11 +27,12 @@ use serde_json::json;
 use tokio::sync::watch;
 
 use super::console::{self, Desk};
+use super::device::{self, Device};
 use super::host::{Host, spawn};
 use super::netem::wrap::{Emulation, effect};
 use super::record::Record;
 use super::viewer::Viewer;
-use crate::args::{MasterArguments, OperatorWords, PairingWords};
+use crate::args::{DeviceWords, MasterArguments, OperatorWords, PairingWords};
 use crate::failure::{Exit, Failure};
 use crate::input::read_text;
 use crate::log::Messages;
@@ -49,6 +50,8 @@ const TRACE_START_M: (f64, f64) = (-0.25, 0.0);
 /// Wrong input, no session, or a session that broke.
 pub(crate) fn run(arguments: MasterArguments, messages: &Messages) -> Result<(), Failure> {
     let mut options = options(&arguments)?;
+    let device = Device::start(&arguments.device, arguments.stiffness)?;
+    device.give(&mut options);
     let record = Record::start(arguments.record.as_deref())?;
     options.record = record.recorder();
     // not before the pairing has been read from stdin: the orders come after it
@@ -147,13 +150,13 @@ pub(super) fn judge(end: Option<SessionEnd>) -> Result<(), Failure> {
 }
 
 fn options(arguments: &MasterArguments) -> Result<MasterOptions, Failure> {
-    let device = arguments.device.used_with(arguments.stiffness, None);
     let pairing = pairing(&arguments.pairing)?;
     Ok(MasterOptions {
         transport: arguments.transport.choose()?,
-        device: device.map_err(|error| Failure::usage(format!("--stiffness: {error}")))?,
+        device: device::profile(&arguments.device, arguments.stiffness)?,
         operator: operator(arguments)?,
         events: std::sync::Mutex::default(),
+        device_port: std::sync::Mutex::default(),
         duration: arguments.duration,
         architecture: arguments.architecture,
         scene_hz: 0,
@@ -222,8 +225,18 @@ fn operator(arguments: &MasterArguments) -> Result<OperatorChoice, Failure> {
         seed: arguments.seed,
         ..ScriptedConfig::default()
     };
-    let person = |driver| OperatorChoice::Person { scripted, driver };
+    let person = |driver| OperatorChoice::Person {
+        scripted,
+        driver,
+        device: None,
+    };
     match &arguments.operator {
+        OperatorWords::Trace(_) | OperatorWords::Pointer
+            if arguments.device.device == DeviceWords::Link =>
+        {
+            let what = "--device link is the hand itself: no other operator goes with it";
+            Err(Failure::usage(what).remedy("leave --operator out"))
+        }
         OperatorWords::Trace(path) => Ok(OperatorChoice::Trace {
             trace: trace(path, arguments.push)?,
             name: format!("trace:{}", path.display()),

@@ -3,6 +3,7 @@
 pub(crate) mod bench;
 mod console;
 pub(crate) mod demo;
+mod device;
 pub(crate) mod doctor;
 pub(crate) mod export;
 mod host;

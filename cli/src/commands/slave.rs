@@ -1,10 +1,13 @@
 //! `mmt slave`: the host with the object.
 
+use std::net::SocketAddr;
 use std::sync::Arc;
 use std::sync::mpsc;
+use std::time::Duration;
 
 use mmt_netem::Direction;
 use mmt_netem::io::socket::SocketExtras;
+use mmt_server::io::plant_link::{PlantHost, PlantHostError};
 use mmt_server::io::{
     SlaveConfiguration, SlaveHost, SlaveHostError, SlaveLive, SlaveOptions, SlaveReport,
 };
@@ -30,6 +33,9 @@ use crate::output::{note, print, print_report};
 use crate::stop::Stop;
 use crate::view::Caption;
 
+/// Between two looks at whether somebody ends the command while it waits for a plant.
+const PLANT_WAIT: Duration = Duration::from_millis(100);
+
 /// Runs `mmt slave`.
 ///
 /// # Errors
@@ -48,6 +54,13 @@ pub(crate) fn run(arguments: SlaveArguments, messages: &Messages) -> Result<(), 
     arguments.transport.warning().into_iter().for_each(note);
     let stop = Stop::on_signals()?;
     options.emergency = stop.emergency().clone();
+    if options.config.plant.link {
+        let plant = plugged_in(arguments.plant.listen()?, &stop)?;
+        if plant.is_none() {
+            return Ok(());
+        }
+        options.plant = plant;
+    }
     let everywhere = arguments.listen.ip().is_unspecified();
     let (host, started) = start(options, arguments.advertise, stop.receiver())?;
     // If it could not start the reason is in the host.
@@ -63,6 +76,23 @@ pub(crate) fn run(arguments: SlaveArguments, messages: &Messages) -> Result<(), 
         print_report(&report, arguments.json, arguments.full)?;
     }
     record.finish()
+}
+
+/// A plug for a plant, once one is plugged in; none if somebody ends the command before.
+fn plugged_in(listen: SocketAddr, stop: &Stop) -> Result<Option<PlantHost>, Failure> {
+    let plant = PlantHost::start(listen).map_err(|error| match error {
+        PlantHostError::Listen { .. } => Failure::new(Exit::Address, error)
+            .remedy("give another --plant-listen address, or port 0 for any free port"),
+        PlantHostError::Token(_) | PlantHostError::Thread(_) => Failure::failed(error),
+    })?;
+    let address = plant.address().map_err(Failure::failed)?;
+    note(format_args!("plant: {address}"));
+    while !plant.wait(PLANT_WAIT) {
+        if stop.asked() {
+            return Ok(None);
+        }
+    }
+    Ok(Some(plant))
 }
 
 /// What to do on the other host; the secret stands on stdout only. `everywhere`: it listens at every address of this host.
@@ -141,6 +171,7 @@ fn options(arguments: &SlaveArguments) -> Result<SlaveOptions, Failure> {
     config.repeats_ms = arguments.repeats.unwrap_or(config.repeats_ms);
     config.stretch_max = arguments.stretch_max.unwrap_or(config.stretch_max);
     config.seed = arguments.seed.unwrap_or(config.seed);
+    config.plant.link = arguments.plant.is_linked(config.plant.link);
     let directory = match &arguments.identity {
         Some(directory) => directory.clone(),
         None => default_directory().map_err(Failure::usage)?,
@@ -160,6 +191,7 @@ fn options(arguments: &SlaveArguments) -> Result<SlaveOptions, Failure> {
         truth: None,
         record: None,
         emergency: EmergencyStop::default(),
+        plant: None,
     })
 }
 

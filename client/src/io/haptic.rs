@@ -15,18 +15,21 @@ use mmt_shared::io::ticker::{Ticker, TickerReport};
 use mmt_shared::io::truth::TruthReceiver;
 use mmt_shared::metrics::PoseError;
 use mmt_shared::model::geometry::Vec2;
-use mmt_shared::model::tool::Scene;
 use mmt_shared::time::Time;
 use rtrb::Consumer;
 
+use super::device_link::DevicePort;
 use super::record::{self, MasterSink};
-use super::{MasterLive, PersonLive, SessionEnd};
+use super::{MasterLive, SessionEnd};
+use crate::device::link::HandOutput;
 use crate::end::{MasterEnd, MasterGiven};
 use crate::failsafe::LinkState;
 use crate::master::MasterTick;
 use crate::operator::Operator;
 use crate::operator::pointer::HandEvent;
 use crate::path::PathRecorder;
+
+mod snapshot;
 
 /// A snapshot for a screen every so many ticks: 62 a second.
 const SNAPSHOT_TICKS: u64 = 16;
@@ -48,6 +51,8 @@ pub struct HapticLoop {
     pub(super) reading: Vec2,
     /// What a person does, where one operates.
     events: Option<Consumer<HandEvent>>,
+    /// The device that is plugged in, where one is.
+    pub(super) device: Option<DevicePort>,
     /// How long; for ever if absent.
     duration: Option<Duration>,
     /// The true pose, where the slave lives in this process: for the report.
@@ -79,6 +84,7 @@ impl HapticLoop {
             operator,
             emergency: EmergencyStop::default(),
             events: None,
+            device: None,
             duration,
             truth: None,
             path: None,
@@ -106,6 +112,13 @@ impl HapticLoop {
     #[must_use]
     pub fn operated_through(mut self, events: Option<Consumer<HandEvent>>) -> Self {
         self.events = events;
+        self
+    }
+
+    /// The same, its hand at this device.
+    #[must_use]
+    pub fn plugged_into(mut self, device: Option<DevicePort>) -> Self {
+        self.device = device;
         self
     }
 
@@ -178,6 +191,7 @@ impl HapticLoop {
         if self.end.master().model().not_finite() > 0 {
             self.why.get_or_insert(SessionEnd::ModelBroken);
         }
+        self.give_device(&done);
         let sent = now();
         if let Some(record) = &mut self.record {
             let given = MasterGiven {
@@ -211,15 +225,33 @@ impl HapticLoop {
         &self.end
     }
 
+    /// Where a device is plugged in it is the one hand.
     fn handle_events(&mut self) {
-        let Some(events) = &mut self.events else {
-            return;
-        };
-        for _ in 0..EVENTS_PER_TICK {
-            let Ok(event) = events.pop() else {
-                return;
-            };
+        let others = self.events.iter_mut();
+        let others = others.flat_map(|events| std::iter::from_fn(|| events.pop().ok()));
+        for event in others.take(EVENTS_PER_TICK) {
+            if self.device.is_none() || !event.is_of_the_hand() {
+                self.operator.handle(self.elapsed, event);
+            }
+        }
+        let device = self.device.iter_mut();
+        let device = device.flat_map(|device| std::iter::from_fn(|| device.next()));
+        for event in device.take(EVENTS_PER_TICK) {
             self.operator.handle(self.elapsed, event);
+        }
+    }
+
+    fn give_device(&mut self, done: &MasterTick) {
+        if let Some(device) = &mut self.device {
+            device.give(HandOutput {
+                tick: 0,
+                force: done.hand_force,
+                hip: done.sample.hip.metres(),
+                engaged: self.end.master().limiter().engaged(),
+                in_contact: done.rendered.in_contact(),
+                stopped: self.end.stopped_by().is_some(),
+                link_late: done.link > LinkState::Fresh,
+            });
         }
     }
 
@@ -287,40 +319,5 @@ impl HapticLoop {
             self.end.release();
         }
         self.releasing
-    }
-
-    fn snapshot(&self, done: &MasterTick, now: Time) -> MasterLive {
-        let (master, peer) = (self.end.master(), self.end.channel().peer());
-        let state = master.model().state();
-        let params = &state.params;
-        let rtt = peer.round_trip().histogram().quantile(0.5);
-        let age = |scene: &Scene| now.saturating_since(scene.answers).as_secs_f64();
-        MasterLive {
-            elapsed_s: self.elapsed.as_secs_f64(),
-            hip: done.sample.hip.metres(),
-            f_m: done.felt,
-            hand_force: done.hand_force,
-            model: state.pose,
-            footprint: Some(state.footprint),
-            params: [params.m(), params.b(), params.c()],
-            in_contact: master.view().in_contact,
-            proxy: done.rendered.touch.map(|touch| touch.proxy),
-            engaged: master.limiter().engaged(),
-            stopped_by: self.end.stopped_by(),
-            person: self.operator.person().map(PersonLive::from),
-            change: self.end.change().copied(),
-            updates_applied: u64::from(master.applied()),
-            pushes: self.operator.pushes_completed(),
-            link: done.link,
-            scene: self.end.scene().copied(),
-            scene_age_s: self.end.scene().map(age),
-            rtt_ms: rtt.map(|rtt| rtt.as_secs_f64() * 1e3),
-            up: peer.outgoing_at(now),
-            down: peer.incoming(),
-            unsent: 0,
-            lateness_p99_us: self.timing.lateness.p99.as_secs_f64() * 1e6,
-            skipped: self.skipped,
-            ended: self.why,
-        }
     }
 }

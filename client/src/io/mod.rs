@@ -9,6 +9,7 @@
 )]
 
 pub mod console;
+pub mod device_link;
 mod end;
 mod error;
 pub mod haptic;
@@ -44,11 +45,12 @@ use crate::device::DeviceProfile;
 use crate::end::Change;
 use crate::failsafe::LinkState;
 use crate::operator::Operator;
-use crate::operator::pointer::{Driver, HandEvent, Person};
+use crate::operator::pointer::{Driver, HandEvent, HandTuning, Person};
 use crate::operator::scripted::{Scripted, ScriptedConfig, View};
 use crate::operator::trace::Trace;
 use crate::path::PathRecorder;
 
+use device_link::DevicePort;
 pub use end::SessionEnd;
 pub use error::MasterHostError;
 pub use resume::ResumeFile;
@@ -59,12 +61,14 @@ pub use session::run;
 pub enum OperatorChoice {
     /// The scripted operator.
     Scripted(ScriptedConfig),
-    /// A person at a pointer. Until the first press `driver` moves the HIP.
+    /// A person at a pointer or a device. Until the first press `driver` moves the HIP.
     Person {
         /// What the scripted operator does in the meantime.
         scripted: ScriptedConfig,
         /// Who begins.
         driver: Driver,
+        /// How the readings of the device that is plugged in are read; none at a pointer.
+        device: Option<HandTuning>,
     },
     /// A recorded path, with the name it is reported by.
     Trace {
@@ -85,8 +89,16 @@ impl OperatorChoice {
             Self::Scripted(config) => Scripted::try_new(*config, view)
                 .map(|scripted| Operator::Scripted(Box::new(scripted))),
             Self::Trace { trace, .. } => Ok(Operator::Trace(trace.clone())),
-            Self::Person { scripted, driver } => Scripted::try_new(*scripted, view)
-                .map(|scripted| Operator::Person(Box::new(Person::new(scripted, *driver)))),
+            Self::Person {
+                scripted,
+                driver,
+                device,
+            } => {
+                let tuning = device.unwrap_or(HandTuning::POINTER);
+                Scripted::try_new(*scripted, view).map(|scripted| {
+                    Operator::Person(Box::new(Person::new(scripted, *driver, tuning)))
+                })
+            }
         }
     }
 
@@ -94,6 +106,9 @@ impl OperatorChoice {
         match self {
             Self::Scripted(_) => "scripted",
             Self::Trace { name, .. } => name,
+            Self::Person {
+                device: Some(_), ..
+            } => "device link",
             Self::Person {
                 driver: Driver::Scripted,
                 ..
@@ -122,6 +137,8 @@ pub struct MasterOptions {
     pub operator: OperatorChoice,
     /// What a person does, where one operates; the session takes it.
     pub events: Mutex<Option<Consumer<HandEvent>>>,
+    /// The device that is plugged in, where one is; the session takes it.
+    pub device_port: Mutex<Option<DevicePort>>,
     /// How long; until the operator has finished or a person ends it if absent.
     pub duration: Option<Duration>,
     /// Whose force the hand feels.
@@ -232,7 +249,7 @@ pub struct MasterConfiguration {
     pub transport: &'static str,
     /// The device.
     pub device: DeviceProfile,
-    /// `scripted`, `scripted or pointer`, `pointer` or the trace's name.
+    /// `scripted`, `scripted or pointer`, `pointer`, `device link` or the trace's name.
     pub operator: String,
     /// The scripted operator's numbers.
     pub scripted: Option<ScriptedConfig>,

@@ -22,6 +22,12 @@ pub(super) fn half(
     if let Some(completed) = haptic.operator.pushes_completed() {
         half.pushes = PushesReport::new(completed, &haptic.end.counts().breaks);
     }
+    if let Some(device) = &haptic.device {
+        for (name, count) in device.counts().dropped() {
+            half.session
+                .add_drops([(format!("device_{name}").as_str(), count)]);
+        }
+    }
     half.pose = (&haptic.pose).into();
     half.session.timing = (&haptic.timing).into();
     task.add_to(&mut half.session);

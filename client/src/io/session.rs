@@ -95,6 +95,7 @@ pub(super) async fn run_with(
     let mut haptic = HapticLoop::new(end, operator, options.duration)
         .observed_by(options.truth.take(), path)
         .operated_through(options.events.get_mut().ok().and_then(Option::take))
+        .plugged_into(options.device_port.get_mut().ok().and_then(Option::take))
         .stopped_by(options.emergency.clone());
     if let Some(recorder) = &options.record {
         let sink = record::begin(

@@ -39,6 +39,7 @@ fn scripted(fake: &Fake) -> MasterOptions {
         device: DeviceProfile::default(),
         operator: OperatorChoice::Scripted(ScriptedConfig::default()),
         events: std::sync::Mutex::default(),
+        device_port: std::sync::Mutex::default(),
         duration: Some(Duration::from_millis(400)),
         commands: CommandConfig::default(),
         netem: LinkConfig::default(),

@@ -63,7 +63,8 @@ fn drops(slave: &Slave) -> [(&'static str, u64); 9] {
 /// m, b, c: absent as long as the estimator has seen nothing that counts.
 fn model(slave: &Slave) -> ModelReport {
     let (estimate, truth) = (slave.estimate(), slave.environment().truth());
-    let [m, b, c, ..] = truth.to_array();
+    let known = !slave.is_linked();
+    let [m, b, c, ..] = truth.to_array().map(|number| known.then_some(number));
     let seen = |estimated: f64| (estimate.samples > 0).then_some(estimated);
     ModelReport {
         mass_kg: EstimateReport::new(seen(estimate.m), m),

@@ -16,6 +16,7 @@ use mmt_shared::io::truth::TruthSender;
 
 use super::SlaveConfiguration;
 use super::acceptor::Refusals;
+use super::plant_link::PlantHost;
 use crate::slave::{SlaveConfig, SlaveError};
 
 /// Why a slave host could not start or go on.
@@ -66,6 +67,7 @@ pub(super) struct Context {
     pub(super) truth: Mutex<Option<TruthSender>>,
     pub(super) record: Option<Recorder>,
     pub(super) emergency: EmergencyStop,
+    pub(super) plant: Option<PlantHost>,
 }
 
 impl Context {

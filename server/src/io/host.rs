@@ -85,6 +85,7 @@ impl SlaveHost {
             truth: Mutex::new(options.truth),
             record: options.record,
             emergency: options.emergency,
+            plant: options.plant,
         };
         Ok(Self {
             endpoint,

@@ -13,6 +13,7 @@ mod context;
 mod crowd;
 mod host;
 mod lease;
+pub mod plant_link;
 mod record;
 mod session;
 mod slave_loop;
@@ -39,6 +40,7 @@ use crate::slave::SlaveConfig;
 
 pub use context::SlaveHostError;
 pub use host::{SlaveHost, address_towards_the_world};
+use plant_link::PlantHost;
 
 /// Name and version of this program, as it gives them to the other side.
 const PROGRAM: &str = concat!("mmt ", env!("CARGO_PKG_VERSION"));
@@ -68,6 +70,8 @@ pub struct SlaveOptions {
     pub record: Option<Recorder>,
     /// The emergency stop of this side; it outlives sessions.
     pub emergency: EmergencyStop,
+    /// The plant that is plugged in, where the configuration wants one.
+    pub plant: Option<PlantHost>,
 }
 
 /// A snapshot of a running slave, for a screen.

@@ -99,6 +99,8 @@ fn message(about: &TickAbout, tick: &Ticked<SlaveGiven, Option<SlaveTick>>) -> T
         lateness_ns: about.lateness_ns,
         skipped: tick.tick.skipped,
         stops: tick.given.stops,
+        plant: (tick.given.plant).map_or_else(Vec::new, |answer| again::plant_bytes(&answer)),
+        plant_anew: tick.given.plant.is_some_and(|answer| answer.anew),
         sent_ns: tick.sent.as_nanos(),
         plays: done.is_some(),
         sample_ns: done.map_or(0, |done| done.stamp.as_nanos()),

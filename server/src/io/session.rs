@@ -29,6 +29,7 @@ use tokio::time::{sleep, timeout};
 use super::acceptor::{Admitted, refuse};
 use super::context::{Context, SlaveHostError};
 use super::lease::Lease;
+use super::plant_link::PlantHost;
 use super::slave_loop::{Finished, SlaveLoop, Snapshot};
 use super::{PROGRAM, SlaveLive, SlaveReport, record};
 use crate::end::{DISENGAGE, SlaveEnd, session_config};
@@ -64,6 +65,8 @@ struct Session<'a> {
     task: NetworkTask<Snapshot, Finished>,
     socket_before: SocketCounters,
     lease: Lease,
+    /// As it was shown last.
+    plant_silent: bool,
 }
 
 /// Serves an admitted master, from where an `earlier` session ended. Nothing if no session came about. `socket_before` is what the socket had
@@ -99,6 +102,11 @@ pub(super) async fn serve_with(
     } = admitted;
     let clock = context.clock;
     let began = clock.now();
+    let plugged_in = context
+        .plant
+        .as_ref()
+        .and_then(|plant| plant.memory(earlier));
+    let earlier = plugged_in.as_ref().or(earlier);
     let end = match SlaveEnd::of_session(began, &context.config, &hello, earlier) {
         Ok(end) => end,
         Err(error) => {
@@ -118,6 +126,8 @@ pub(super) async fn serve_with(
     }
     announce(&connection, &hello);
     let mut slave_loop = SlaveLoop::new(end, context.take_truth(), context.emergency.clone());
+    let plant = context.plant.as_ref().map(PlantHost::port);
+    slave_loop = slave_loop.plugged_into(plant);
     if let Some(recorder) = &context.record {
         slave_loop = slave_loop.recorded(record::begin(recorder, context, began, &hello, earlier));
     }
@@ -131,6 +141,7 @@ pub(super) async fn serve_with(
         send,
         socket_before,
         lease,
+        plant_silent: false,
     };
     session.operate(receive, stop, live).await.map(Some)
 }
@@ -301,6 +312,12 @@ impl Session<'_> {
             unsent: self.task.unsent(),
             ..snapshot.live
         });
+        if snapshot.plant_silent != self.plant_silent {
+            self.plant_silent = snapshot.plant_silent;
+            if self.plant_silent {
+                tracing::warn!("the plant is silent: the tool stands, and the master is told");
+            }
+        }
         let silent = |heard| now.saturating_since(heard) > SILENCE_MAX;
         if snapshot.numbers_spent {
             Some(End::Numbers(NumbersSpent))
@@ -320,6 +337,11 @@ impl Session<'_> {
         session.timing = (&finished.ticker).into();
         self.task.add_to(session);
         session.add_drops(self.context.refusals());
+        if let Some(plant) = &self.context.plant {
+            for (name, count) in plant.counts().dropped() {
+                session.add_drops([(format!("plant_{name}").as_str(), count)]);
+            }
+        }
         let meter = &self.context.meter;
         meter.add_to(session, &self.socket_before, peer, duration_s);
         half

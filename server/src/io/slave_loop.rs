@@ -12,6 +12,7 @@ use mmt_shared::io::truth::TruthSender;
 use mmt_shared::time::Time;
 
 use super::SlaveLive;
+use super::plant_link::PlantPort;
 use super::record::{self, SlaveSink};
 use crate::end::{SlaveEnd, SlaveGiven};
 use crate::slave::SlaveTick;
@@ -25,6 +26,8 @@ pub(super) struct Snapshot {
     pub(super) live: SlaveLive,
     /// When a datagram of the master last arrived; none before the loop's first snapshot.
     pub(super) last_arrival: Option<Time>,
+    /// The plant that is plugged in is silent: the tool stands.
+    pub(super) plant_silent: bool,
     /// The session has used up its datagram numbers.
     pub(super) numbers_spent: bool,
     /// The tool stands for good.
@@ -50,6 +53,8 @@ pub(super) struct SlaveLoop {
     record: Option<SlaveSink>,
     /// The emergency stop of this side.
     emergency: EmergencyStop,
+    /// The plant that is plugged in, where one is.
+    plant: Option<PlantPort>,
 }
 
 impl SlaveLoop {
@@ -61,7 +66,14 @@ impl SlaveLoop {
             newest: None,
             record: None,
             emergency,
+            plant: None,
         }
+    }
+
+    /// The same whose tool is this plant's.
+    pub(super) fn plugged_into(mut self, plant: Option<PlantPort>) -> Self {
+        self.plant = plant;
+        self
     }
 
     /// The same with a record of all that it is given and does.
@@ -100,9 +112,11 @@ impl SlaveLoop {
         now: impl FnOnce() -> Time,
     ) {
         self.receive(side);
-        let stops = self.emergency.is_set();
-        self.end.stop(stops);
+        let given = self.given(tick.deadline);
         let done = self.end.tick(tick.deadline);
+        if let (Some(plant), Some(command)) = (&mut self.plant, self.end.plant_command()) {
+            plant.send(&command);
+        }
         if let Some(tick) = done {
             if let Some(truth) = &mut self.truth {
                 truth.send(tick.stamp, tick.truth);
@@ -113,7 +127,7 @@ impl SlaveLoop {
         if let Some(record) = &mut self.record {
             record.ticked(Ticked {
                 tick,
-                given: SlaveGiven { stops },
+                given,
                 sent,
                 done,
             });
@@ -131,6 +145,21 @@ impl SlaveLoop {
                 None
             }
         });
+    }
+
+    /// Gives the end what a tick at `now` begins with: a silent plant stops the tool as an emergency stop does.
+    fn given(&mut self, now: Time) -> SlaveGiven {
+        let plant = self.plant.as_mut().and_then(|plant| plant.receive(now));
+        if let Some(answer) = &plant {
+            self.end.handle_plant(now, answer);
+        }
+        let silent = self
+            .plant
+            .as_ref()
+            .is_some_and(|plant| plant.is_silent(now));
+        let stops = silent || self.emergency.is_set();
+        self.end.stop(stops);
+        SlaveGiven { stops, plant }
     }
 
     fn show(&mut self, now: Time, side: &mut LoopSide<Snapshot>) {
@@ -184,6 +213,10 @@ impl SlaveLoop {
         Snapshot {
             live,
             last_arrival: Some(channel.last_arrival()),
+            plant_silent: self
+                .plant
+                .as_ref()
+                .is_some_and(|plant| plant.is_silent(now)),
             numbers_spent: self.numbers_spent,
             disengaged: end.is_disengaged(),
         }

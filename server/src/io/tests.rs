@@ -45,6 +45,7 @@ fn options() -> SlaveOptions {
         truth: None,
         record: None,
         emergency: EmergencyStop::default(),
+        plant: None,
     }
 }
 

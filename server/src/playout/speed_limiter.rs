@@ -47,6 +47,11 @@ impl SpeedLimiter {
         }
     }
 
+    /// The tool is there, m.
+    pub(super) fn move_to(&mut self, place: Vec2) {
+        self.hip = Some(place);
+    }
+
     /// The HIP that was played last, m; none before the first tick.
     pub(super) fn hip(&self) -> Option<Vec2> {
         self.hip.filter(|_| self.played.is_some())

@@ -10,6 +10,7 @@ use serde::{Deserialize, Serialize};
 use crate::conditioning::{Conditioner, ConditioningConfig};
 use crate::environment::{EnvironmentConfig, EnvironmentError, SceneConfig};
 use crate::estimator::EstimatorConfig;
+use crate::plant::PlantConfig;
 use crate::playout::PlayoutConfig;
 use crate::repeats::Repeats;
 use crate::sensing::{SensingConfig, SensingError, VisionConfig};
@@ -55,6 +56,8 @@ pub struct SlaveConfig {
     pub environment: EnvironmentConfig,
     /// Bodies and walls, where there is more than one body.
     pub scene: SceneConfig,
+    /// What the tool meets: the above, or a plant of somebody else's.
+    pub plant: PlantConfig,
     /// Noise, vision.
     pub sensing: SensingConfig,
     /// What is made of the measured force before it is judged.
@@ -98,6 +101,7 @@ impl SlaveConfig {
             mode,
             environment: EnvironmentConfig::default(),
             scene: SceneConfig::default(),
+            plant: PlantConfig::default(),
             sensing: SensingConfig {
                 vision,
                 ..SensingConfig::default()

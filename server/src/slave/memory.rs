@@ -25,6 +25,26 @@ pub struct Memory {
     pub(super) tool: Vec2,
 }
 
+impl Memory {
+    /// Where the first body lies.
+    pub(crate) fn object(&self) -> Option<Pose> {
+        self.bodies.first().copied()
+    }
+
+    /// The beginning at a plant whose tool and object are there (m, world), with what an earlier session found.
+    #[must_use]
+    pub fn of_plant(tool: Vec2, object: Pose, earlier: Option<&Self>) -> Self {
+        Self {
+            bodies: vec![object],
+            touched: 0,
+            found: earlier
+                .map(|memory| memory.found.clone())
+                .unwrap_or_default(),
+            tool,
+        }
+    }
+}
+
 impl Slave {
     /// A slave that goes on where an earlier session ended.
     ///
@@ -36,7 +56,7 @@ impl Slave {
         memory: &Memory,
     ) -> Result<Self, SlaveError> {
         let mut slave = Self::try_new(config, coupling)?;
-        let environment = slave.contact.environment_mut();
+        let environment = slave.environment_mut();
         environment.place(&memory.bodies);
         environment.select(memory.touched);
         let pose = environment.pose();
@@ -63,7 +83,7 @@ impl Slave {
 
     /// Puts a simulated tool, which is nowhere yet, to `hip` (m), or, if that is inside of a body, in front of it.
     pub fn start_at(&mut self, hip: Vec2) {
-        let place = self.contact.environment_mut().free_place(hip);
+        let place = self.environment_mut().free_place(hip);
         self.place_tool(place);
     }
 
@@ -76,5 +96,8 @@ impl Slave {
     fn place_tool(&mut self, place: Vec2) {
         self.tool_at = place;
         self.playout.start_at(place);
+        if let Some(plant) = self.contact.plant_mut().linked_mut() {
+            plant.place(place);
+        }
     }
 }

@@ -4,6 +4,7 @@ use ring::rand::{SecureRandom, SystemRandom};
 use sha2::{Digest, Sha256};
 
 use crate::pairing::{Pin, SECRET_BYTES, Token};
+use crate::plug::PlugToken;
 
 /// The operating system gave no random bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
@@ -24,6 +25,18 @@ impl Token {
     /// The operating system gave no random bytes.
     pub fn generate() -> Result<Self, NoRandomness> {
         let mut bytes = [0; SECRET_BYTES];
+        let filled = SystemRandom::new().fill(&mut bytes);
+        filled.map(|()| Self::new(bytes)).map_err(|_| NoRandomness)
+    }
+}
+
+impl PlugToken {
+    /// A fresh token from the operating system's generator.
+    ///
+    /// # Errors
+    /// The operating system gave no random bytes.
+    pub fn generate() -> Result<Self, NoRandomness> {
+        let mut bytes = [0; 16];
         let filled = SystemRandom::new().fill(&mut bytes);
         filled.map(|()| Self::new(bytes)).map_err(|_| NoRandomness)
     }

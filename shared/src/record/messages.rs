@@ -166,8 +166,12 @@ messages! {
         lateness_ns: u64,
         /// Ticks that were skipped before it.
         skipped: u64,
-        /// Whether the slave's emergency stop is set.
+        /// Whether the slave's emergency stop is set, or the plant that is plugged in is silent.
         stops: bool,
+        /// The newest packet of the plant that is plugged in, its token and its head's numbers zero; empty if none has come since.
+        plant: Vec<u8>,
+        /// Whether that is the first after a silence.
+        plant_anew: bool,
         /// When what it sends leaves, by the slave's clock, ns.
         sent_ns: u64,
         /// Whether a HIP sample was due; without one the rest is NaN.

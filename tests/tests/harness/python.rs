@@ -19,7 +19,7 @@ pub(crate) fn python(test: &str, module: &str) -> Option<String> {
     if found.is_none() {
         let how = format!(
             "no Python has {module}: make one with `python3 -m venv target/python` and \
-             `target/python/bin/pip install -r tests/protocol/requirements.txt`"
+             `target/python/bin/pip install -r tests/protocol/requirements.txt -r contrib/requirements.txt`"
         );
         did_not_run(test, &how);
     }

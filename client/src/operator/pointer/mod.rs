@@ -1,9 +1,10 @@
-//! A person at a pointer: mouse, pen or finger in a browser; until they press, the scripted operator may work.
+//! A person at a pointer (mouse, pen or finger in a browser) or at a haptic device; until they press, the scripted operator
+//! may work.
 //!
 //! The pointer moves the HIP as a hand on a table moves a cursor: a press engages where the HIP is, the way of the
-//! pointer from there is the way of the HIP. Its readings carry the page's stamps. They are mapped to the loop's clock
-//! (`clock_map`), read at 1 kHz a fixed play-out later (`resampler`) and filtered (`filter`). A hand that lets go
-//! or falls silent is released: the HIP stays, and no force is left on the hand.
+//! pointer from there is the way of the HIP. Its readings carry the stamps of its own clock, that of the page or the device.
+//! They are mapped to the loop's clock (`clock_map`), read at 1 kHz a fixed play-out later (`resampler`) and filtered
+//! (`filter`). A hand that lets go or falls silent is released: the HIP stays, and no force is left on the hand.
 //!
 //! Pure and without allocation in a tick; a reading that is not finite is not taken.
 
@@ -23,11 +24,27 @@ use clock_map::ClockMap;
 use filter::Filter;
 use resampler::Resampler;
 
-/// From a reading's stamp to its use, s. A page reads its pointer every 1 to 16 ms and hands readings over up to a frame
-/// late: with this one that is late by 24 ms is still in time. It adds to the filter's 27 ms.
-const PLAYOUT_S: f64 = 0.024;
-/// A pressed pointer of which nothing came for so long is let go: the page sends while it is pressed, even at rest.
-pub const SILENCE: Duration = Duration::from_millis(120);
+/// How the readings of a hand are read.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct HandTuning {
+    /// From a reading's stamp to its use, s: a reading that is no later than this is in time.
+    pub playout_s: f64,
+    /// Whether the low-pass and its speed limit follow; a device has a mass of its own.
+    pub low_pass: bool,
+    /// A pressed hand of which nothing came for so long is let go: it sends while it is pressed, even at rest.
+    pub silence: Duration,
+}
+
+impl HandTuning {
+    /// Of a pointer in a browser. A page reads its pointer every 1 to 16 ms and hands readings over up to a frame late:
+    /// with this one that is late by 24 ms is still in time. It adds to the filter's 27 ms.
+    pub const POINTER: Self = Self {
+        playout_s: 0.024,
+        low_pass: true,
+        silence: Duration::from_millis(120),
+    };
+}
+
 /// The HIP stays within this of the origin on each axis, m.
 pub const REACH_M: f64 = 1.5;
 
@@ -77,6 +94,7 @@ pub enum HandEvent {
 pub struct Person {
     scripted: Scripted,
     driver: Driver,
+    tuning: HandTuning,
     paused: bool,
     finished: bool,
     clock: ClockMap,
@@ -91,11 +109,12 @@ pub struct Person {
 
 impl Person {
     /// A person who begins where `scripted` does; until the first press `driver` moves the HIP.
-    pub fn new(scripted: Scripted, driver: Driver) -> Self {
+    pub fn new(scripted: Scripted, driver: Driver, tuning: HandTuning) -> Self {
         let hip = scripted.hip();
         Self {
             scripted,
             driver,
+            tuning,
             paused: false,
             finished: false,
             clock: ClockMap::default(),
@@ -172,7 +191,7 @@ impl Person {
 
     /// One sample period: the HIP, m. As [`super::Operator::step`].
     pub fn step(&mut self, elapsed: Duration, view: &View, force_on_hand: Vec2) -> Vec2 {
-        if elapsed.saturating_sub(self.last_reading) >= SILENCE {
+        if elapsed.saturating_sub(self.last_reading) >= self.tuning.silence {
             self.let_go();
         }
         if self.paused {
@@ -220,9 +239,20 @@ impl Person {
     fn follow(&mut self, elapsed: Duration) -> Option<Vec2> {
         let grip = self.grip?;
         let page_s = self.clock.page_s(elapsed.as_secs_f64())?;
-        let target = self.readings.at(page_s - PLAYOUT_S)? + grip;
+        let target = self.readings.at(page_s - self.tuning.playout_s)? + grip;
         let within = target.map(|metres| metres.clamp(-REACH_M, REACH_M));
-        Some(self.filter.step(within))
+        Some(if self.tuning.low_pass {
+            self.filter.step(within)
+        } else {
+            within
+        })
+    }
+}
+
+impl HandEvent {
+    /// Whether it is of the hand itself; the others steer who works.
+    pub fn is_of_the_hand(&self) -> bool {
+        !matches!(self, Self::Drive(_) | Self::Pause(_) | Self::Finish)
     }
 }
 

@@ -14,7 +14,7 @@ fn view() -> View {
 
 fn person(driver: Driver) -> Person {
     let scripted = Scripted::try_new(ScriptedConfig::default(), view()).unwrap();
-    Person::new(scripted, driver)
+    Person::new(scripted, driver, HandTuning::POINTER)
 }
 
 fn ms(n: u64) -> Duration {
@@ -154,4 +154,28 @@ fn another_page_has_another_clock() {
     let start = person.hip();
     let end = push(&mut person, 3..500, |_| 0.03);
     assert!((end.x - start.x - 0.03).abs() < 1e-3, "{end}");
+}
+
+#[test]
+fn a_device_without_the_low_pass_is_followed_its_play_out_later() {
+    let scripted = Scripted::try_new(ScriptedConfig::default(), view()).unwrap();
+    let tuning = HandTuning {
+        playout_s: 0.002,
+        low_pass: false,
+        silence: ms(40),
+    };
+    let mut person = Person::new(scripted, Driver::Pointer, tuning);
+    let start = person.hip();
+    person.handle(ms(0), HandEvent::Press(reading(ms(0), 0.0)));
+    for n in 0..=500 {
+        person.handle(ms(n), HandEvent::Move(reading(ms(n), 1e-4 * n as f64)));
+        person.step(ms(n), &view(), Vec2::zeros());
+    }
+    // the stamps are 2 ms old when they arrive, and as much is the play-out
+    let lag_ms = (0.05 - (person.hip() - start).x) / 1e-4;
+    assert!((1.9..2.2).contains(&lag_ms), "{lag_ms}");
+    person.step(ms(539), &view(), Vec2::zeros());
+    assert!(person.engaged(), "one tick before its silence");
+    person.step(ms(540), &view(), Vec2::zeros());
+    assert!(!person.engaged());
 }

@@ -1,0 +1,140 @@
+#!/usr/bin/env python3
+"""A scripted hand at mmt's device link (docs/plugs.md): it grips, pushes along the world's x, and lets go.
+
+    mmt master 'mmt://…' --device link           # prints: device: udp://127.0.0.1:PORT?token=…
+    python3 hand.py 'udp://127.0.0.1:PORT?token=…' --way 0.35
+
+Nothing but the standard library. The class Device is what a driver of a real device needs; the rest is a simulated one: a mass in
+a hand that is a spring and a damper, which the force of mmt moves.
+"""
+
+import argparse
+import json
+import math
+import socket
+import struct
+import time
+import urllib.parse
+
+HEAD = struct.Struct("<4sBBHIIQ16s")
+READING = struct.Struct("<6f")
+FORCE = struct.Struct("<6f")
+SESSION, ENGAGED, IN_CONTACT, STOPPED, LINK_LATE, REFUSED = (1 << bit for bit in range(6))
+# without a packet for so long a device has to take its force away by itself
+SILENCE_S = 0.020
+
+
+class Device:
+    """One end of the link: send what the device measured, get the force."""
+
+    def __init__(self, address):
+        parts = urllib.parse.urlsplit(address)
+        self.token = bytes.fromhex(urllib.parse.parse_qs(parts.query)["token"][0])
+        family = socket.AF_INET6 if ":" in parts.hostname else socket.AF_INET
+        self.socket = socket.socket(family, socket.SOCK_DGRAM)
+        self.socket.connect((parts.hostname, parts.port))
+        self.socket.setblocking(False)
+        self.sequence = self.newest = self.received = self.lost_down = 0
+        self.state, self.force, self.hip, self.lost_up = 0, (0.0, 0.0, 0.0), (0.0, 0.0), 0
+        self.heard = -math.inf
+
+    def send(self, position, velocity, buttons):
+        """A reading: m and m/s along the device's axes, a bit for each button."""
+        self.sequence += 1
+        head = HEAD.pack(b"MMTL", 1, 1, buttons, self.sequence, self.newest, time.monotonic_ns(), self.token)
+        try:
+            self.socket.send(head + READING.pack(*position, *velocity))
+        except OSError:
+            pass  # nobody is there (yet): the silence says so
+
+    def receive(self):
+        """Takes what has come; without anything for SILENCE_S the force is none."""
+        while True:
+            try:
+                packet = self.socket.recv(256)
+            except OSError:
+                break
+            if len(packet) != 64:
+                continue
+            magic, version, kind, state, sequence, _, _, token = HEAD.unpack_from(packet)
+            if (magic, version, kind, token) != (b"MMTL", 1, 2, self.token) or sequence <= self.newest:
+                continue
+            self.lost_down += sequence - self.newest - 1
+            self.received += 1
+            x, y, z, hip_x, hip_y, lost = FORCE.unpack_from(packet, HEAD.size)
+            self.newest, self.state, self.heard = sequence, state, time.monotonic()
+            self.force, self.hip, self.lost_up = (x, y, z), (hip_x, hip_y), int(lost)
+        if time.monotonic() - self.heard > SILENCE_S:
+            self.state, self.force = 0, (0.0, 0.0, 0.0)
+
+
+class Clutch:
+    """Grips as soon as mmt lets it, and again when it was let go: the button must be seen up before it counts."""
+
+    def __init__(self):
+        self.packets = 0
+
+    def button(self, state):
+        """Whether the button is down in the next packet."""
+        if state & ENGAGED:
+            self.packets = 0
+            return True
+        if not state & SESSION or state & STOPPED:
+            self.packets = 0
+            return False
+        # up for five packets, then down for as many as the answer may need
+        self.packets = (self.packets + 1) % 100
+        return self.packets > 5
+
+
+def main():
+    arguments = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    arguments.add_argument("address", help="as mmt printed it after “device: ”")
+    arguments.add_argument("--way", type=float, default=0.35, help="how far the hand goes along x, m of the device")
+    arguments.add_argument("--speed", type=float, default=0.1, help="how fast, m/s")
+    arguments.add_argument("--duration", type=float, default=30.0, help="how long at the most, s")
+    options = arguments.parse_args()
+    device, clutch = Device(options.address), Clutch()
+    mass, stiffness, damping, period = 0.5, 400.0, 25.0, 0.001
+    position, velocity = [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]
+    wanted, engaged_s, peak_n, contact_s, reach, first, last = 0.0, 0.0, 0.0, 0.0, None, None, None
+    begin = due = time.monotonic()
+    while due - begin < options.duration and wanted < options.way:
+        device.receive()
+        engaged = bool(device.state & ENGAGED)
+        if engaged:
+            first = first or device.hip
+            last = device.hip
+            engaged_s += period
+            contact_s += period * bool(device.state & IN_CONTACT)
+            wanted += options.speed * period
+        peak_n = max(peak_n, math.hypot(*device.force))
+        # the hand's spring towards what it wants, and the force of mmt; velocity first
+        for axis, goal in enumerate((wanted, 0.0, 0.0)):
+            drive = options.speed if engaged and axis == 0 else 0.0
+            pull = stiffness * (goal - position[axis]) + damping * (drive - velocity[axis])
+            velocity[axis] += period * (pull + device.force[axis]) / mass
+            position[axis] += period * velocity[axis]
+        device.send(position, velocity, int(clutch.button(device.state)))
+        due += period
+        wait = due - time.monotonic()
+        if wait > 0:
+            time.sleep(wait)
+        elif wait < -0.01:
+            due -= wait  # the host stood still: skip, never catch up
+    device.send(position, velocity, 0)
+    print(json.dumps({
+        "sent": device.sequence,
+        "received": device.received,
+        "lost_up": device.lost_up,
+        "lost_down": device.lost_down,
+        "engaged_s": round(engaged_s, 3),
+        "contact_s": round(contact_s, 3),
+        "force_peak_n": round(peak_n, 3),
+        "hip_from_m": first,
+        "hip_to_m": last,
+    }))
+
+
+if __name__ == "__main__":
+    main()

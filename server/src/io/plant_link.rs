@@ -1,0 +1,269 @@
+//! The object's plug on a UDP port: a thread that takes a plant's answers, and the loop's end of it.
+//!
+//! The loop takes answers from a bounded ring and sends its command itself, one system call a tick; it never waits for the
+//! plant or this thread.
+
+mod lock_step;
+
+use std::io;
+use std::net::{SocketAddr, UdpSocket};
+use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
+
+use mmt_shared::io::clock::Clock;
+use mmt_shared::io::secret::NoRandomness;
+use mmt_shared::plug::{Admitted, PlugCounts, PlugHead, PlugPeer, PlugToken};
+use mmt_shared::time::Time;
+use rtrb::{Consumer, Producer, RingBuffer};
+
+use crate::plant::{PlantAnswer, PlantCommand, SILENCE};
+use crate::slave::Memory;
+pub use lock_step::{LockStep, LockStepError};
+
+/// Answers that may wait for the loop: a quarter of a second at 1 kHz.
+const ANSWERS_MAX: usize = 256;
+/// Room for a packet, bytes: more than any of ours, so that a longer one is seen to be longer.
+const PACKET_MAX: usize = 256;
+/// A command that cannot be sent at once is lost.
+const SEND_WAIT: Duration = Duration::from_micros(500);
+/// A socket that fails is asked again after this.
+const PAUSE: Duration = Duration::from_millis(10);
+
+/// A plant cannot be plugged in.
+#[derive(Debug, thiserror::Error)]
+pub enum PlantHostError {
+    /// The address cannot be had.
+    #[error("the plant's plug cannot listen on {address}: {source}")]
+    Listen {
+        /// The address.
+        address: SocketAddr,
+        /// Why.
+        source: io::Error,
+    },
+    /// No token.
+    #[error(transparent)]
+    Token(#[from] NoRandomness),
+    /// No thread.
+    #[error("no thread for the plant's plug: {0}")]
+    Thread(#[source] io::Error),
+}
+
+/// An answer, and where it came from.
+#[derive(Clone, Copy, Debug)]
+struct Taken {
+    from: SocketAddr,
+    sequence: u32,
+    answer: PlantAnswer,
+}
+
+/// What the thread knows, under a lock that no tick takes.
+#[derive(Debug, Default)]
+struct Known {
+    newest: Option<Taken>,
+    to_loop: Option<Producer<Taken>>,
+    counts: PlugCounts,
+}
+
+#[derive(Debug)]
+struct Shared {
+    socket: UdpSocket,
+    token: PlugToken,
+    clock: Clock,
+    /// Commands sent so far.
+    sent: AtomicU32,
+    known: Mutex<Known>,
+    first: Condvar,
+}
+
+impl Shared {
+    fn known(&self) -> MutexGuard<'_, Known> {
+        self.known.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// A plug for a plant; it ends with the process.
+#[derive(Clone, Debug)]
+pub struct PlantHost(Arc<Shared>);
+
+impl PlantHost {
+    /// Starts to listen.
+    ///
+    /// # Errors
+    /// See [`PlantHostError`].
+    pub fn start(listen: SocketAddr) -> Result<Self, PlantHostError> {
+        let token = PlugToken::generate()?;
+        let unheard = |source| PlantHostError::Listen {
+            address: listen,
+            source,
+        };
+        let socket = UdpSocket::bind(listen).map_err(unheard)?;
+        socket.set_write_timeout(Some(SEND_WAIT)).map_err(unheard)?;
+        let shared = Arc::new(Shared {
+            socket,
+            token,
+            clock: Clock::start(),
+            sent: AtomicU32::new(0),
+            known: Mutex::default(),
+            first: Condvar::new(),
+        });
+        let served = Arc::clone(&shared);
+        std::thread::Builder::new()
+            .name("mmt-plant".to_owned())
+            .spawn(move || serve(&served))
+            .map_err(PlantHostError::Thread)?;
+        Ok(Self(shared))
+    }
+
+    /// What the plant is told. It holds the token.
+    ///
+    /// # Errors
+    /// The system does not know the address.
+    pub fn address(&self) -> Result<String, PlantHostError> {
+        let local = self.0.socket.local_addr();
+        let local = local.map_err(PlantHostError::Thread)?;
+        Ok(format!("udp://{local}?token={}", self.0.token.reveal()))
+    }
+
+    /// Waits for a plant to plug in, at most so long; whether one has.
+    #[must_use]
+    pub fn wait(&self, most: Duration) -> bool {
+        let known = self.0.known();
+        let waited = (self.0.first).wait_timeout_while(known, most, |known| known.newest.is_none());
+        let (known, _) = waited.unwrap_or_else(PoisonError::into_inner);
+        known.newest.is_some()
+    }
+
+    /// What a session begins with: the tool and the object as the plant reported them last. None before its first answer.
+    pub(super) fn memory(&self, earlier: Option<&Memory>) -> Option<Memory> {
+        let answer = self.0.known().newest?.answer;
+        let seen = earlier.and_then(Memory::object);
+        let object = answer.object.or(seen).unwrap_or_default();
+        Some(Memory::of_plant(answer.tool, object, earlier))
+    }
+
+    /// The plant for the loop of a session that begins; the one before gets nothing any more.
+    pub(super) fn port(&self) -> PlantPort {
+        let (producer, answers) = RingBuffer::new(ANSWERS_MAX);
+        let mut known = self.0.known();
+        known.to_loop = Some(producer);
+        PlantPort {
+            shared: Arc::clone(&self.0),
+            answers,
+            newest: known.newest,
+            heard: None,
+        }
+    }
+
+    /// What became of the plant's packets.
+    pub(super) fn counts(&self) -> PlugCounts {
+        self.0.known().counts
+    }
+}
+
+/// The loop's end of the plug.
+#[derive(Debug)]
+pub(super) struct PlantPort {
+    shared: Arc<Shared>,
+    answers: Consumer<Taken>,
+    newest: Option<Taken>,
+    /// When the newest answer was taken; none before the first tick.
+    heard: Option<Time>,
+}
+
+impl PlantPort {
+    /// The newest answer, if one has come since the tick before; `now` is this one's deadline.
+    pub(super) fn receive(&mut self, now: Time) -> Option<PlantAnswer> {
+        self.heard.get_or_insert(now);
+        let mut anew = false;
+        let mut newest = None;
+        while let Ok(taken) = self.answers.pop() {
+            anew |= taken.answer.anew;
+            newest = Some(taken);
+        }
+        let taken = newest?;
+        (self.newest, self.heard) = (newest, Some(now));
+        Some(PlantAnswer {
+            anew,
+            ..taken.answer
+        })
+    }
+
+    /// Whether the plant is silent at `now`.
+    pub(super) fn is_silent(&self, now: Time) -> bool {
+        self.heard
+            .is_some_and(|heard| now.saturating_since(heard) >= SILENCE)
+    }
+
+    /// Sends the tool on.
+    pub(super) fn send(&mut self, command: &PlantCommand) {
+        let Some(newest) = self.newest else {
+            return;
+        };
+        let shared = &self.shared;
+        let sequence = shared.sent.fetch_add(1, Ordering::Relaxed).wrapping_add(1);
+        let head = PlugHead {
+            flags: 0,
+            sequence,
+            answers: newest.sequence,
+            stamp_ns: shared.clock.now().as_nanos(),
+        };
+        // one that cannot be sent is a lost one: the next is due in a millisecond
+        let packet = command.packet(&shared.token, &head);
+        let _ = shared.socket.send_to(&packet, newest.from);
+    }
+}
+
+fn serve(shared: &Shared) {
+    let mut peer = PlugPeer::new(SILENCE);
+    let mut is_new = false;
+    let mut packet = [0; PACKET_MAX];
+    loop {
+        // an error of a socket without a connection is about a packet of before
+        let Ok((length, from)) = shared.socket.recv_from(&mut packet) else {
+            std::thread::sleep(PAUSE);
+            continue;
+        };
+        let packet = packet.get(..length).unwrap_or_default();
+        let taken = take(&mut peer, &mut is_new, shared, from, packet);
+        let mut known = shared.known();
+        known.counts = peer.counts;
+        if let Some(taken) = taken {
+            known.newest = Some(taken);
+            // a full ring is a loop that stands: it takes the newest later
+            if let Some(to_loop) = &mut known.to_loop {
+                let _ = to_loop.push(taken);
+            }
+            shared.first.notify_all();
+        }
+    }
+}
+
+/// An answer of the plant that is plugged in, if it is one; `is_new`: none of it has been taken yet.
+fn take(
+    peer: &mut PlugPeer,
+    is_new: &mut bool,
+    shared: &Shared,
+    from: SocketAddr,
+    packet: &[u8],
+) -> Option<Taken> {
+    let read = PlantAnswer::read(&shared.token, packet);
+    let (head, answer) = read.map_err(|why| peer.refuse(why)).ok()?;
+    let admitted = peer.admit(shared.clock.now(), from, head.sequence)?;
+    if admitted == Admitted::First {
+        *is_new = true;
+        tracing::info!("a plant is plugged in at {from}");
+    }
+    let Some(answer) = answer else {
+        peer.counts.nonsense += 1;
+        return None;
+    };
+    Some(Taken {
+        from,
+        sequence: head.sequence,
+        answer: PlantAnswer {
+            anew: std::mem::take(is_new),
+            ..answer
+        },
+    })
+}

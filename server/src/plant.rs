@@ -1,0 +1,235 @@
+//! What the tool meets: the simulated world, or a plant of somebody else's behind the object's plug.
+//!
+//! Both are met through [`Plant::meet`]: the tool's place in, what was measured out. Pure: a plant that is plugged in gives its
+//! answers as inputs ([`PlantAnswer`]) and takes commands as outputs ([`PlantCommand`]), so that a session with it runs again
+//! from its record. Its answer to a command counts in the next tick.
+
+mod follower;
+mod packet;
+#[cfg(test)]
+mod tests;
+
+use mmt_shared::model::contact::Coupling;
+use mmt_shared::model::geometry::{Pose, Vec2};
+use mmt_shared::range::{OutOfRange, in_range};
+use mmt_shared::time::Time;
+use serde::{Deserialize, Serialize};
+
+use crate::environment::Environment;
+use crate::sensing::{Sensed, Sensing, VisionSample};
+use follower::Follower;
+
+pub use packet::{PlantAnswer, PlantCommand, SILENCE};
+
+/// Accepted greatest acceleration of the tool, m/s².
+const ACCELERATION_MAX_M_PER_S2: (f64, f64) = (0.5, 100.0);
+
+/// What the tool meets.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct PlantConfig {
+    /// Whether a plant is plugged in. Default: no, the simulated world.
+    pub link: bool,
+    /// Greatest acceleration of the tool that a plant is sent, m/s². Default 13, what the manual of a common arm allows.
+    pub acceleration_max_m_per_s2: f64,
+}
+
+impl Default for PlantConfig {
+    fn default() -> Self {
+        Self {
+            link: false,
+            acceleration_max_m_per_s2: 13.0,
+        }
+    }
+}
+
+/// What the tool met in one tick.
+pub(crate) struct Met {
+    /// What the sensors gave.
+    pub(crate) sensed: Sensed,
+    /// The contact force as it is, N; of a plant that is plugged in as it measured it.
+    pub(crate) force: Vec2,
+    /// The object's pose then: true, or as a plant saw it last.
+    pub(crate) pose: Pose,
+    /// Number of the body that is touched, or was last.
+    pub(crate) body: usize,
+}
+
+/// Behind one interface: the world of `environment`, or somebody else's.
+pub(crate) enum Plant {
+    /// The simulated world with the slave's sensors.
+    World {
+        /// The bodies and their ground.
+        environment: Box<Environment>,
+        /// What the slave measures of them.
+        sensing: Box<Sensing>,
+    },
+    /// One that is plugged in and measures for itself.
+    Linked(Box<LinkedPlant>),
+}
+
+impl Plant {
+    /// One tick with the tool at `tool` (m), moving at `velocity` (m/s). `body` was touched last.
+    pub(crate) fn meet(&mut self, now: Time, tool: Vec2, velocity: Vec2, body: usize) -> Met {
+        match self {
+            Self::World {
+                environment,
+                sensing,
+            } => {
+                let met = environment.step(tool, velocity);
+                if met.body != body {
+                    sensing.drop_images();
+                }
+                Met {
+                    sensed: sensing.sense(now, tool, met.force, &met.pose),
+                    force: met.force,
+                    pose: met.pose,
+                    body: met.body,
+                }
+            }
+            Self::Linked(plant) => plant.meet(now, tool, velocity),
+        }
+    }
+
+    /// The bodies: the truth, or what stands for a plant's object where it was seen last.
+    pub(crate) fn environment(&self) -> &Environment {
+        match self {
+            Self::World { environment, .. } => environment,
+            Self::Linked(plant) => &plant.stand_in,
+        }
+    }
+
+    /// The same, to be changed.
+    pub(crate) fn environment_mut(&mut self) -> &mut Environment {
+        match self {
+            Self::World { environment, .. } => environment,
+            Self::Linked(plant) => &mut plant.stand_in,
+        }
+    }
+
+    /// The plant that is plugged in; none in the simulated world.
+    pub(crate) fn linked(&self) -> Option<&LinkedPlant> {
+        match self {
+            Self::World { .. } => None,
+            Self::Linked(plant) => Some(plant),
+        }
+    }
+
+    /// The same, to be given answers.
+    pub(crate) fn linked_mut(&mut self) -> Option<&mut LinkedPlant> {
+        match self {
+            Self::World { .. } => None,
+            Self::Linked(plant) => Some(plant),
+        }
+    }
+}
+
+/// The slave's end of the object's plug.
+pub(crate) struct LinkedPlant {
+    /// The configured object, where the plant's was seen last.
+    stand_in: Environment,
+    follower: Follower,
+    /// `k_p` and `k_d` that the tool is to meet things with.
+    coupling: Coupling,
+    force_max_n: f64,
+    /// Whether the slave itself lets the tool give: then the plant's need not.
+    is_stiff: bool,
+    newest: Option<PlantAnswer>,
+    /// An image that no tick has taken yet.
+    image: Option<VisionSample>,
+    command: Option<PlantCommand>,
+}
+
+impl LinkedPlant {
+    /// A plant that has not answered yet. `stand_in` is the configured object; the tool meets things with `coupling`, by
+    /// itself or, if `is_stiff`, by the slave's compliance.
+    ///
+    /// # Errors
+    /// The acceleration is out of its range.
+    pub(crate) fn try_new(
+        config: PlantConfig,
+        stand_in: Environment,
+        coupling: Coupling,
+        (speed_max_m_per_s, force_max_n): (f64, f64),
+        is_stiff: bool,
+    ) -> Result<Self, OutOfRange> {
+        let most = config.acceleration_max_m_per_s2;
+        in_range(
+            "plant: acceleration_max",
+            "m/s²",
+            most,
+            ACCELERATION_MAX_M_PER_S2,
+        )?;
+        Ok(Self {
+            stand_in,
+            follower: Follower::new(speed_max_m_per_s, most),
+            coupling,
+            force_max_n,
+            is_stiff,
+            newest: None,
+            image: None,
+            command: None,
+        })
+    }
+
+    /// Puts the tool to a place, m: where the plant's tool is.
+    pub(crate) fn place(&mut self, tool: Vec2) {
+        self.follower.place(tool);
+        self.command = Some(self.commanded(tool, Vec2::zeros()));
+    }
+
+    /// Takes in an answer that came at `now`.
+    pub(crate) fn take(&mut self, now: Time, answer: &PlantAnswer) {
+        if let Some(pose) = answer.object {
+            self.stand_in.place(&[pose]);
+            let age_ns = (answer.image_age_s * 1e9) as i64;
+            self.image = Some(VisionSample {
+                taken: now.offset_by(-age_ns),
+                pose,
+            });
+        }
+        self.newest = Some(*answer);
+    }
+
+    /// Where the tool has to go; none before its first place is known.
+    pub(crate) fn command(&self) -> Option<PlantCommand> {
+        self.command
+    }
+
+    fn meet(&mut self, _now: Time, tool: Vec2, velocity: Vec2) -> Met {
+        let (at, speed) = self.follower.step(tool, velocity);
+        self.command = Some(self.commanded(at, speed));
+        let (measured, force) = match &self.newest {
+            Some(answer) => (answer.tool, answer.force),
+            None => (at, Vec2::zeros()),
+        };
+        // what the model renders as penetration of the HIP is how far the tool gives
+        let given = if self.is_stiff {
+            Vec2::zeros()
+        } else {
+            force / self.coupling.stiffness_n_per_m
+        };
+        Met {
+            sensed: Sensed {
+                tool: measured + given,
+                force,
+                vision: self.image.take(),
+            },
+            force,
+            pose: self.stand_in.pose(),
+            body: 0,
+        }
+    }
+
+    fn commanded(&self, tool: Vec2, velocity: Vec2) -> PlantCommand {
+        PlantCommand {
+            tool,
+            velocity,
+            stiffness_n_per_m: self.coupling.stiffness_n_per_m,
+            damping_ns_per_m: self.coupling.damping_ns_per_m,
+            force_max_n: self.force_max_n,
+            begins: false,
+            held: false,
+        }
+    }
+}

@@ -1,0 +1,208 @@
+//! A plant that is plugged in, in virtual time.
+
+use mmt_shared::model::sample::{ForceCounts, HipCounts, HipSample};
+use mmt_shared::plug::{NotTaken, PLANT_BYTES, PlugHead, PlugKind, PlugToken, encode};
+use mmt_shared::time::{TICK, TICK_S};
+
+use super::*;
+use crate::environment::EnvironmentConfig;
+use crate::slave::{Slave, SlaveConfig};
+
+const TOKEN: PlugToken = PlugToken::new([3; 16]);
+
+fn linked() -> SlaveConfig {
+    SlaveConfig {
+        plant: PlantConfig {
+            link: true,
+            ..PlantConfig::default()
+        },
+        ..SlaveConfig::default()
+    }
+}
+
+fn answer() -> PlantAnswer {
+    PlantAnswer {
+        tool: Vec2::new(0.1, -0.2),
+        velocity: Vec2::new(0.3, 0.4),
+        force: Vec2::new(1.5, -2.5),
+        object: Some(Pose::new(0.5, 0.6, 0.7)),
+        image_age_s: 0.02,
+        anew: false,
+    }
+}
+
+#[test]
+fn an_answer_reads_back_and_one_that_cannot_be_is_none() {
+    let head = PlugHead {
+        sequence: 9,
+        ..PlugHead::default()
+    };
+    let read = |answer: PlantAnswer| {
+        let packet = answer.packet(&TOKEN, &head);
+        let (found, answer) = PlantAnswer::read(&TOKEN, &packet).unwrap();
+        assert_eq!(found.sequence, 9);
+        answer
+    };
+    assert_eq!(read(answer()), Some(answer()));
+    let blind = PlantAnswer {
+        object: None,
+        image_age_s: 0.0,
+        ..answer()
+    };
+    assert_eq!(read(blind), Some(blind));
+    for bad in [f64::NAN, f64::INFINITY, -1e9] {
+        let vector = Vec2::new(0.0, bad);
+        assert_eq!(
+            read(PlantAnswer {
+                tool: vector,
+                ..answer()
+            }),
+            None
+        );
+        assert_eq!(
+            read(PlantAnswer {
+                velocity: vector,
+                ..answer()
+            }),
+            None
+        );
+        assert_eq!(
+            read(PlantAnswer {
+                force: vector,
+                ..answer()
+            }),
+            None
+        );
+        let object = Some(Pose::new(0.0, bad, 0.0));
+        assert_eq!(read(PlantAnswer { object, ..answer() }), None);
+        assert_eq!(
+            read(PlantAnswer {
+                image_age_s: bad,
+                ..answer()
+            }),
+            None
+        );
+    }
+}
+
+#[test]
+fn a_packet_of_another_kind_or_token_is_not_taken() {
+    let head = PlugHead::default();
+    let other = PlugToken::new([4; 16]);
+    let stranger = answer().packet(&other, &head);
+    assert_eq!(
+        PlantAnswer::read(&TOKEN, &stranger),
+        Err(NotTaken::Stranger)
+    );
+    let command: [u8; PLANT_BYTES] = encode(PlugKind::Tool, &TOKEN, &head, [[0_u8; 8]; 10]);
+    assert_eq!(
+        PlantAnswer::read(&TOKEN, &command),
+        Err(NotTaken::Malformed)
+    );
+}
+
+/// A slave whose hand goes along x at 0.1 m/s from −0.3 m, and whose plant answers what `plant` makes of the command.
+fn drive(ticks: u64, mut plant: impl FnMut(&PlantCommand) -> Option<PlantAnswer>) -> Slave {
+    let mut slave = Slave::try_new(&linked(), Coupling::for_stiffness(1000.0)).unwrap();
+    slave.start_at(Vec2::new(-0.3, 0.0));
+    for n in 1..=ticks {
+        let now = Time::ZERO + TICK * n as u32;
+        let sample = HipSample {
+            stamp: now,
+            hip: HipCounts::nearest(Vec2::new(-0.3 + 1e-4 * n as f64, 0.0)),
+            force: ForceCounts::nearest(Vec2::zeros()),
+        };
+        slave.handle_sample(now, &sample, 0);
+        let command = slave.plant_command().unwrap();
+        if let Some(answer) = plant(&command) {
+            slave.handle_plant(now, &answer);
+        }
+        slave.tick(now);
+    }
+    slave
+}
+
+/// A wall at x = −0.2 m, of the stiffness that the command asks for.
+fn wall(command: &PlantCommand) -> PlantAnswer {
+    let depth = (command.tool.x + 0.2).max(0.0);
+    PlantAnswer {
+        tool: Vec2::new(command.tool.x.min(-0.2), command.tool.y),
+        force: Vec2::new(depth * command.stiffness_n_per_m, 0.0),
+        object: Some(Pose::default()),
+        ..PlantAnswer::default()
+    }
+}
+
+#[test]
+fn the_force_that_a_plant_measured_is_f_s_a_period_later_and_the_tool_goes_where_the_hand_was() {
+    let mut commands = Vec::new();
+    let mut slave = drive(1100, |command| {
+        commands.push(*command);
+        Some(wall(command))
+    });
+    assert!(slave.is_linked());
+    let forward = commands.last().unwrap().tool.x + 0.3;
+    assert!(
+        (0.1..0.11).contains(&forward),
+        "behind the play-out: {forward}"
+    );
+    for pair in commands.windows(2) {
+        assert!((pair[1].tool - pair[0].tool).norm() <= 0.6 * TICK_S + 1e-12);
+    }
+    let now = Time::ZERO + TICK * 1101;
+    let tick = slave.tick(now).unwrap();
+    let depth = commands.last().unwrap().tool.x + 0.2;
+    assert!(tick.in_contact && depth > 0.0);
+    assert!(
+        (tick.f_s.x - 1000.0 * depth).abs() < 0.5,
+        "{} {depth}",
+        tick.f_s
+    );
+}
+
+#[test]
+fn a_tool_that_gives_by_itself_is_rendered_as_penetration() {
+    let coupling = Coupling::for_stiffness(1000.0);
+    let limits = (0.6, 15.0);
+    for (is_stiff, given) in [(false, 0.0015), (true, 0.0)] {
+        let stand_in = Environment::try_new(EnvironmentConfig::default()).unwrap();
+        let mut plant =
+            LinkedPlant::try_new(linked().plant, stand_in, coupling, limits, is_stiff).unwrap();
+        plant.take(Time::ZERO, &answer());
+        let met = plant.meet(Time::ZERO, Vec2::zeros(), Vec2::zeros());
+        assert!((met.sensed.tool.x - 0.1 - given).abs() < 1e-12);
+        assert_eq!(met.force, answer().force);
+        assert_eq!(met.pose, Pose::new(0.5, 0.6, 0.7));
+    }
+}
+
+#[test]
+fn after_a_silence_the_tool_is_where_the_plant_says_and_waits_for_the_hand() {
+    let mut n = 0;
+    let mut places = Vec::new();
+    drive(3000, |command| {
+        n += 1;
+        places.push(command.tool);
+        let anew = n == 1000;
+        // somebody carried it 5 cm back meanwhile
+        let tool = Vec2::new(command.tool.x - if anew { 0.05 } else { 0.0 }, 0.0);
+        (!(900..1000).contains(&n)).then_some(PlantAnswer {
+            tool,
+            anew,
+            ..PlantAnswer::default()
+        })
+    });
+    let carried = places[1000];
+    assert!((carried.x - (places[999].x - 0.05)).abs() < 1e-9);
+    assert_eq!(places[1100], carried, "the hand is 5 cm away and goes on");
+    assert_eq!(places[2999], carried);
+}
+
+#[test]
+fn an_acceleration_that_no_tool_should_have_is_refused() {
+    let mut config = linked();
+    for bad in [f64::NAN, 0.0, 1e6] {
+        config.plant.acceleration_max_m_per_s2 = bad;
+        assert!(Slave::try_new(&config, Coupling::for_stiffness(1000.0)).is_err());
+    }
+}
