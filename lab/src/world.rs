@@ -18,7 +18,6 @@ use mmt_netem::link::LinkId;
 use mmt_netem::{Link, Packet};
 use mmt_server::end::SlaveEnd;
 use mmt_server::environment::Environment;
-use mmt_server::plant::{PlantAnswer, PlantCommand};
 use mmt_server::slave::{Slave, SlaveTick};
 use mmt_shared::metrics::{ForceSummary, PoseError, Staleness};
 use mmt_shared::model::geometry::Vec2;
@@ -33,6 +32,7 @@ mod config;
 mod datagram;
 mod outcome;
 pub(crate) mod picture;
+mod plant;
 mod slave_clock;
 
 pub use config::{WorldConfig, WorldError};
@@ -158,18 +158,6 @@ impl World {
     #[must_use]
     pub fn slave_end(&self) -> &SlaveEnd {
         &self.slave
-    }
-
-    /// Where the plant that is plugged in has to move the tool now; none in the simulated world.
-    #[must_use]
-    pub fn plant_command(&self) -> Option<PlantCommand> {
-        self.slave.plant_command()
-    }
-
-    /// Takes in what that plant measured.
-    pub fn answer_of_plant(&mut self, answer: &PlantAnswer) {
-        let now = self.slave_clock.at(self.now);
-        self.slave.handle_plant(now, answer);
     }
 
     /// What was sent: messages by kind, and datagrams with bits per second.
