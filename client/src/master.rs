@@ -7,12 +7,12 @@ mod port;
 
 use std::time::Duration;
 
-use mmt_shared::model::geometry::Vec2;
+use mmt_shared::model::geometry::{Pose, Vec2};
 use mmt_shared::model::local_model::{LocalModel, Rendered};
 use mmt_shared::model::sample::{ForceCounts, HipCounts, HipSample};
 use mmt_shared::model::tool::{HandPort, Tool};
 use mmt_shared::model::update::Update;
-use mmt_shared::time::Time;
+use mmt_shared::time::{TICK_S, Time};
 use mmt_shared::wire::{Architecture, Welcome};
 
 use crate::failsafe::LinkState;
@@ -20,6 +20,11 @@ use crate::limiter::ForceLimiter;
 use crate::operator::scripted::View;
 use crate::tdpa::TdpaHand;
 pub use port::PortObserver;
+
+/// This far from the box, m, a HIP that was carried comes back to the device.
+const CLEAR_M: f64 = 0.02;
+/// How fast it comes back, m/s.
+const RETURN_M_PER_S: f64 = 0.05;
 
 /// What one haptic tick gave.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -51,7 +56,10 @@ pub struct Master {
     /// An emergency stop is set.
     stopped: bool,
     port: PortObserver,
-    hip: HipCounts,
+    /// The last reading that was of numbers, m.
+    reading: Vec2,
+    /// By how much the HIP is elsewhere than the device, m ([`LocalModel::carry`]).
+    offset: Vec2,
     bad_readings: u64,
     applied: u32,
     frozen: u32,
@@ -78,7 +86,8 @@ impl Master {
             ended: false,
             stopped: false,
             port: PortObserver::default(),
-            hip: HipCounts::default(),
+            reading: Vec2::zeros(),
+            offset: Vec2::zeros(),
             bad_readings: 0,
             applied: 0,
             frozen: 0,
@@ -131,9 +140,17 @@ impl Master {
         let touches_model = self.model.rendered().in_contact();
         let tdpa = self.tdpa.as_ref();
         View {
-            pose: state.pose,
+            pose: self.seen_by_hand(state.pose),
             footprint: state.footprint,
             in_contact: tdpa.map_or(touches_model, TdpaHand::tool_in_contact),
+        }
+    }
+
+    /// A pose of the world from where the hand is: the HIP may be elsewhere than the device.
+    pub fn seen_by_hand(&self, pose: Pose) -> Pose {
+        Pose {
+            position: pose.position - self.offset,
+            ..pose
         }
     }
 
@@ -185,17 +202,20 @@ impl Master {
     /// for how long one of the two ways has been silent.
     pub fn tick(&mut self, stamp: Time, reading: Vec2, silence: Duration) -> MasterTick {
         if reading.x.is_finite() && reading.y.is_finite() {
-            self.hip = HipCounts::nearest(reading);
+            self.reading = reading;
         } else {
             self.bad_readings += 1;
         }
+        let offset = self.offset;
+        let counts = HipCounts::nearest(self.reading + offset);
         // A released hand stays released: it takes a new session to feel again.
         self.link = self.link_after(silence);
         if self.link == LinkState::Released {
             self.limiter.release();
         }
-        let hip = self.hip.metres();
+        let hip = counts.metres();
         let rendered = self.model.step(stamp, hip);
+        self.carry(hip);
         if self.model.not_finite() > 0 {
             self.release();
         }
@@ -206,7 +226,7 @@ impl Master {
         let force = ForceCounts::nearest(felt);
         let sample = HipSample {
             stamp,
-            hip: self.hip,
+            hip: counts,
             force,
         };
         let wanted = if self.stopped { Vec2::zeros() } else { -felt };
@@ -214,7 +234,7 @@ impl Master {
         if let Some(tdpa) = &mut self.tdpa {
             tdpa.displayed(hand_force);
         }
-        self.port.push(hip, hand_force);
+        self.port.push(hip - offset, hand_force);
         MasterTick {
             sample,
             port: self.tdpa.as_ref().map(TdpaHand::port),
@@ -222,6 +242,19 @@ impl Master {
             felt,
             hand_force,
             link: self.link,
+        }
+    }
+
+    /// Moves the HIP of the next tick against the device: with the box that is carried back, and later, clear of the box,
+    /// towards the device again. A hand that feels the tool is not moved.
+    fn carry(&mut self, hip: Vec2) {
+        if self.tdpa.is_some() {
+            return;
+        }
+        self.offset += self.model.carry();
+        let away = self.offset.norm();
+        if away > 0.0 && self.model.clearance(hip) > CLEAR_M {
+            self.offset *= (1.0 - RETURN_M_PER_S * TICK_S / away).max(0.0);
         }
     }
 

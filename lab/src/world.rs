@@ -275,9 +275,14 @@ impl World {
     /// What the operator sees; contact is felt, not seen.
     fn seen(&mut self) -> View {
         let model = self.master().view();
-        self.picture.as_mut().map_or(model, |picture| View {
-            in_contact: model.in_contact,
-            ..picture.seen(self.now)
+        let (picture, master) = (self.picture.as_mut(), self.master.master());
+        picture.map_or(model, |picture| {
+            let seen = picture.seen(self.now);
+            View {
+                pose: master.seen_by_hand(seen.pose),
+                in_contact: model.in_contact,
+                ..seen
+            }
         })
     }
 

@@ -1,12 +1,12 @@
 //! The passivity observer at the haptic port: what the hand has put in, less what it got back.
 //!
-//! It watches the force that is really sent and where the HIP really goes, so that the model, the limiter
+//! It watches the force that is really sent and where the device really goes, so that the model, the limiter
 //! and the sampling all count. It observes and changes nothing.
 
 use mmt_shared::model::geometry::Vec2;
 
 /// Integrates f·v at the port. A force is held for a tick, so a tick's share is the force (N, on the hand)
-/// times the way (m) that the HIP makes until the next: E = −Σ f_hand(n)·(x(n+1) − x(n)), which is exact
+/// times the way (m) that the device makes until the next: E = −Σ f_hand(n)·(x(n+1) − x(n)), which is exact
 /// for a force that is held (Hannaford and Ryu, "Time-domain passivity control of haptic interfaces",
 /// 2002, with the force of the past sample).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -17,7 +17,7 @@ pub struct PortObserver {
 }
 
 impl PortObserver {
-    /// Takes one tick: the HIP (m, world) and the force on the hand (N) from now on.
+    /// Takes one tick: where the device is (m, world; the HIP may be elsewhere) and the force on the hand (N) from now on.
     pub fn push(&mut self, hip: Vec2, force_on_hand: Vec2) {
         if let Some((from, force)) = self.last {
             self.energy_j -= force.dot(&(hip - from));

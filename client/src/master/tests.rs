@@ -121,3 +121,51 @@ fn both_sides_compute_with_the_rounded_hip() {
     assert_eq!(met, HipCounts::nearest(hip).metres());
     assert_ne!(met, hip);
 }
+
+#[test]
+fn a_hip_that_goes_back_with_the_box_does_not_move_the_hand_and_returns_clear_of_the_box() {
+    let mut master = master();
+    let state = welcome().state;
+    let coupling = Coupling::for_stiffness(1000.0);
+    let held = ModelParams::of_square(5.0, 3.0, 150.0, 0.4, &coupling).unwrap();
+    let at = |x, answers_ms, sequence| Update {
+        sequence,
+        answers: Time::from_millis(answers_ms),
+        state: ModelState::try_new(
+            held,
+            state.footprint(),
+            Pose::new(x, 0.0, 0.0),
+            Twist::default(),
+            &coupling,
+        )
+        .unwrap(),
+        ..update()
+    };
+    let hold = |master: &mut Master, ticks: std::ops::RangeInclusive<u64>, hand| {
+        let tick = |n| master.tick(Time::from_millis(n), hand, Duration::ZERO);
+        ticks.map(tick).last().unwrap()
+    };
+    let (pressing, away) = (Vec2::new(-0.196, 0.0), Vec2::new(-0.4, 0.0));
+    hold(&mut master, 1..=20, pressing);
+    master.apply(&at(0.0, 20, 1));
+    let before = hold(&mut master, 21..=200, pressing);
+    let given = master.port().energy_j();
+    master.apply(&at(-0.03, 200, 2));
+    let seen = master.view().pose.position;
+    let after = hold(&mut master, 201..=400, pressing);
+    let back = before.sample.hip.metres() - after.sample.hip.metres();
+    assert!((back - Vec2::new(0.03, 0.0)).norm() < 1e-3, "{back:?}");
+    assert!((after.hand_force - before.hand_force).norm() < 1e-3);
+    let got = master.port().energy_j() - given;
+    assert!(
+        got.abs() < 1e-6,
+        "the hand did no work and got none: {got} J"
+    );
+    let hand_sees = master.view().pose.position;
+    assert!((hand_sees - seen).norm() < 1e-3, "{hand_sees:?}");
+
+    let first = hold(&mut master, 401..=401, away).sample.hip.metres();
+    assert!((first - away + back).norm() < 1e-3, "it is led, not thrown");
+    let last = hold(&mut master, 402..=1100, away);
+    assert!((last.sample.hip.metres() - away).norm() < 1e-6);
+}

@@ -269,6 +269,9 @@ fn loss_on_the_way_up_changes_no_draw_on_the_way_down() {
 
 mod delay;
 mod hard;
+#[cfg(test)]
+mod still;
+
 mod scenes;
 mod sight;
 

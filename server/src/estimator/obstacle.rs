@@ -13,10 +13,15 @@ const HOLD_TICKS: u32 = 20;
 const PUSH_NEEDS: (f64, f64) = (3.0, 1.0);
 /// How long that must last, ticks.
 const IMPACT_TICKS: u32 = 5;
-/// Friction that is sent for an object that stands, as a multiple of the force, and the share of it that the force may
-/// come to before more is sent.
-const MARGIN: (f64, f64) = (2.0, 0.8);
-/// Friction beyond which more makes no difference to a model, N.
+/// An object that this force does not move is held by something that the hand does not move, N: the default device's limit.
+const HAND_GIVES_N: f64 = 8.0;
+/// Friction that is sent for an object that stands, as a multiple of the force, where friction is known: as an obstacle it
+/// gives way to nothing. Where friction is not known, it is at least the force.
+const MARGIN: f64 = 2.0;
+/// Share of the friction sent that the force may come to before more is sent.
+const ENOUGH: f64 = 0.8;
+/// Friction that is sent for an object that the hand does not move, N: how hard it is held cannot be seen, and a hand that
+/// went on for a round trip presses its model with all that its stiffness gives.
 pub const OBSTACLE_N: f64 = 150.0;
 
 /// What a tick of contact is like, as [`Obstacle`] takes it.
@@ -32,6 +37,17 @@ pub(super) enum MotionState {
     Sticks,
 }
 
+/// What friction is taken for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Friction {
+    /// c, N.
+    pub(super) c: f64,
+    /// Whether c was seen for a while, and is not only what is believed of a body that nobody has pushed.
+    pub(super) known: bool,
+    /// Whether any of it was seen.
+    pub(super) seen: bool,
+}
+
 /// Watches for an obstacle.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Obstacle {
@@ -42,29 +58,48 @@ pub(super) struct Obstacle {
 }
 
 impl Obstacle {
-    /// Takes the force (N), the share m a + b v of it that is `needed` to move the object so (N), how it moves, and c (N)
-    /// as it was estimated before. True in the tick in which the object is found to stand against an obstacle.
-    pub(super) fn step(&mut self, force: f64, needed: f64, motion: MotionState, c: f64) -> bool {
+    /// Takes the force (N), the share m a + b v of it that is `needed` to move the object so (N), how it moves, and the
+    /// friction as it was estimated before. True in the tick in which the object is found to stand against an obstacle.
+    pub(super) fn step(
+        &mut self,
+        force: f64,
+        needed: f64,
+        motion: MotionState,
+        friction: Friction,
+    ) -> bool {
         let slides = matches!(motion, MotionState::Slides | MotionState::SlidesOn);
         if self.stands && !slides {
-            let (most, enough) = MARGIN;
-            if self.holding.is_none_or(|holding| force > enough * holding) {
-                self.holding = Some((most * force).min(OBSTACLE_N));
-            }
+            self.stand(force, friction.known);
             return false;
         }
         self.stands = false;
-        let held = motion == MotionState::Sticks && beyond(force, FRICTION_HOLDS, c);
+        let held = motion == MotionState::Sticks && beyond(force, FRICTION_HOLDS, friction.c);
         self.held_ticks = if held { self.held_ticks + 1 } else { 0 };
         if self.held_ticks >= HOLD_TICKS {
             self.stands = true;
-            self.holding = Some((MARGIN.0 * force).min(OBSTACLE_N));
+            self.holding = None;
+            self.stand(force, friction.known);
             return true;
         }
-        let hard = motion == MotionState::SlidesOn && beyond(force - needed, PUSH_NEEDS, c);
+        if !friction.known {
+            // what has broken away was held by no more, and slides with as much until more is seen
+            self.holding = self.holding.filter(|_| !friction.seen);
+            return false;
+        }
+        let hard =
+            motion == MotionState::SlidesOn && beyond(force - needed, PUSH_NEEDS, friction.c);
         self.hard_ticks = if hard { self.hard_ticks + 1 } else { 0 };
         self.holding = (self.hard_ticks >= IMPACT_TICKS).then_some(force.min(OBSTACLE_N));
         false
+    }
+
+    /// The friction that is sent for an object that stands against this force, N.
+    fn stand(&mut self, force: f64, known: bool) {
+        let (margin, enough) = if known { (MARGIN, ENOUGH) } else { (1.0, 1.0) };
+        if self.holding.is_none_or(|holding| force > enough * holding) {
+            let held = force > HAND_GIVES_N;
+            self.holding = Some(if held { OBSTACLE_N } else { margin * force });
+        }
     }
 
     /// The friction (N) that holds a model as the obstacle holds the object; none without an obstacle.
@@ -87,7 +122,16 @@ fn beyond(force: f64, (share, more): (f64, f64), c: f64) -> bool {
 mod tests {
     use super::*;
 
-    const C: f64 = 2.0;
+    const C: Friction = Friction {
+        c: 2.0,
+        known: true,
+        seen: true,
+    };
+    const UNKNOWN: Friction = Friction {
+        c: 1.0,
+        known: false,
+        seen: false,
+    };
 
     /// Presses from 0 to `most` N at a rate in N/ms, then holds it for 100 ticks.
     fn press(rate: f64, most: f64) -> Obstacle {
@@ -101,20 +145,43 @@ mod tests {
 
     #[test]
     fn what_friction_holds_is_no_obstacle_and_more_is() {
-        assert_eq!(press(0.02, 1.25 * C).holding(), None);
+        assert_eq!(press(0.02, 1.25 * C.c).holding(), None);
         let held = press(0.02, 5.0).holding().unwrap();
         assert!(held > 5.0 / 0.8 && held <= 10.0, "{held}");
         assert_eq!(press(10.0, 1000.0).holding(), Some(150.0));
     }
 
     #[test]
+    fn friction_that_is_not_known_is_at_least_the_force_and_what_no_hand_moves_is_held() {
+        let mut obstacle = Obstacle::default();
+        let mut press = |force, motion, friction| {
+            (0..20).for_each(|_| {
+                obstacle.step(force, 0.0, motion, friction);
+            });
+            obstacle.holding()
+        };
+        assert_eq!(press(1.5, MotionState::Sticks, UNKNOWN), None);
+        assert_eq!(press(2.0, MotionState::Sticks, UNKNOWN), Some(2.0));
+        assert_eq!(press(5.0, MotionState::Sticks, UNKNOWN), Some(5.0));
+        assert_eq!(press(4.0, MotionState::Sticks, UNKNOWN), Some(5.0));
+        let broken_away = press(4.0, MotionState::Slides, UNKNOWN);
+        assert_eq!(broken_away, Some(5.0), "until its own friction is seen");
+        let seen = Friction {
+            seen: true,
+            ..UNKNOWN
+        };
+        assert_eq!(press(4.0, MotionState::Slides, seen), None);
+        assert_eq!(press(9.0, MotionState::Sticks, seen), Some(OBSTACLE_N));
+    }
+
+    #[test]
     fn static_friction_that_gives_way_within_20_ms_is_no_obstacle() {
         let mut obstacle = Obstacle::default();
         for _ in 0..19 {
-            assert!(!obstacle.step(1.5 * C, 0.0, MotionState::Sticks, C));
+            assert!(!obstacle.step(1.5 * C.c, 0.0, MotionState::Sticks, C));
         }
-        obstacle.step(1.5 * C, 0.0, MotionState::Slides, C);
-        assert!(!obstacle.step(1.5 * C, 0.0, MotionState::Sticks, C));
+        obstacle.step(1.5 * C.c, 0.0, MotionState::Slides, C);
+        assert!(!obstacle.step(1.5 * C.c, 0.0, MotionState::Sticks, C));
         assert_eq!(obstacle.holding(), None);
     }
 
@@ -130,7 +197,7 @@ mod tests {
     #[test]
     fn an_object_that_moves_on_under_a_force_beyond_any_push_has_hit_something() {
         let mut obstacle = Obstacle::default();
-        for (force, sent) in [(3.0 * C + 1.0, None), (10.0, Some(10.0))] {
+        for (force, sent) in [(3.0 * C.c + 1.0, None), (10.0, Some(10.0))] {
             for _ in 0..5 {
                 assert!(!obstacle.step(force, 0.0, MotionState::SlidesOn, C));
             }

@@ -13,7 +13,7 @@ use super::creep::Creep;
 use super::direction::{DirectionConfig, ForceDirection};
 use super::filter::{Row, StateVariableFilter, stage_weight};
 use super::gate::{Gate, GateConfig, GateState};
-use super::obstacle::{MotionState, Obstacle};
+use super::obstacle::{Friction, MotionState, Obstacle};
 use super::recursive::{RecursiveConfig, RecursiveLeastSquares, Verdict};
 use super::surface::{Surface, SurfaceMotion};
 use super::turning::{self, Seen};
@@ -152,13 +152,10 @@ impl RecommendedEstimator {
         self.stand(motion.row.force, gate == GateState::Open);
     }
 
-    /// Whether something beyond friction holds the object against this force, N. Before friction has been
-    /// seen for a while, nothing is an obstacle.
+    /// Whether something beyond friction holds the object against this force, N.
     fn stand(&mut self, force: f64, slides_on: bool) {
         let [older, _] = self.copies;
-        if older.samples == 0 {
-            return;
-        }
+        let known = older.samples > 0;
         let slides = self.gate.slides(self.estimate.speed);
         let motion = match (slides, self.estimate.sticking) {
             (true, _) if slides_on => MotionState::SlidesOn,
@@ -166,9 +163,14 @@ impl RecommendedEstimator {
             (false, true) => MotionState::Sticks,
             (false, false) => MotionState::Slowly,
         };
-        let known = older.estimate;
-        let needed = known.x * self.estimate.acceleration + known.y * self.estimate.speed;
-        if self.obstacle.step(force, needed, motion, known.z) {
+        let found = if known { &older } else { &self.recursive }.estimate;
+        let needed = found.x * self.estimate.acceleration + found.y * self.estimate.speed;
+        let friction = Friction {
+            c: found.z,
+            known,
+            seen: self.recursive.samples > 0,
+        };
+        if self.obstacle.step(force, needed, motion, friction) && known {
             self.recursive = older;
             self.copies = [older; 2];
         }

@@ -6,15 +6,16 @@
 //! the paper's literal mode), never allocate in a tick, and never see a number that was not checked.
 
 mod body;
+mod received;
 mod replay;
 
 use crate::model::correction::{Correction, IN_CONTACT, IN_CONTACT_REPLAYED, Tank};
 use crate::model::dynamics::Motion;
-use crate::model::geometry::{Twist, Vec2, rotate};
+use crate::model::geometry::{Twist, Vec2};
 use crate::model::history::{HISTORY_TICKS, History, Moment};
 use crate::model::params::{ModelParams, ModelState};
 use crate::model::settings::{ModelSettings, PoseCorrection, Smoothing};
-use crate::model::update::{Cause, Update};
+use crate::model::update::Update;
 use crate::time::{TICK, TICK_S, Time};
 
 pub use body::{BodyState, Rendered};
@@ -97,6 +98,16 @@ impl LocalModel {
         self.not_finite
     }
 
+    /// How far the HIP goes before the next sample without the hand, m: the box goes with it.
+    pub fn carry(&self) -> Vec2 {
+        self.correction.carry()
+    }
+
+    /// How far the HIP is from the nearest face, m; negative inside.
+    pub fn clearance(&self, hip: Vec2) -> f64 {
+        self.body.gap(hip).1
+    }
+
     /// Whether a received pose has been replayed up to the newest sample.
     pub fn is_replayed(&self) -> bool {
         self.replay.is_live()
@@ -131,89 +142,12 @@ impl LocalModel {
         self.injected_j = other.injected_j;
     }
 
-    fn take_params(&mut self, received: &ModelParams) {
-        self.target = *received;
-        if let Smoothing::PerPacket { lambda } = self.settings.smoothing {
-            // (4)
-            self.body.state.params = self.body.state.params.blend(received, lambda);
-            self.target = self.body.state.params;
-        }
-    }
-
-    /// The paper's way. Cases 1 and 2 of III-A and a lost contact set position and orientation, a force
-    /// mismatch or the timer the orientation alone (a timer packet may carry the model's own).
-    fn snap(&mut self, update: &Update) {
-        self.aim(update);
-        let state = &mut self.body.state;
-        match update.cause {
-            Cause::MasterOnlyContact | Cause::SlaveOnlyContact | Cause::ContactLost => {
-                state.footprint = update.state.footprint();
-                self.correction.snap(&mut state.pose);
-                state.twist = update.state.twist();
-            }
-            Cause::Deadband | Cause::EverySample | Cause::Timer => {
-                let pivot = self.rendered.touch.map_or(state.pose.position, |t| t.proxy);
-                self.correction.snap_turn(&mut state.pose, pivot);
-            }
-        }
-        self.correction.remaining = Default::default();
-        if let Some((_, hip)) = self.previous {
-            let state = &self.body.state;
-            self.body.god.after_jump(&state.footprint, &state.pose, hip);
-        }
-    }
-
-    /// Compares at the stamp that the update answers; the ticks bleed the difference in.
-    fn match_stamps(&mut self, update: &Update) {
-        let retracted = !update.slave_in_contact;
-        let shift = self.take_footprint(update, retracted);
-        self.correction.count(shift);
-        self.aim(update);
-    }
-
-    fn aim(&mut self, update: &Update) {
-        let Some(then) = self.history.at(update.answers) else {
-            return;
-        };
-        self.correction
-            .aim(&update.state.pose(), &then.motion.pose, &then.corrected);
-    }
-
-    /// Begins to replay the HIP from the sample that the update answers; the ticks go on with it. Until it
-    /// has caught up the face goes on to where the last replay has it: with the old centre and the new
-    /// offset it would recede from a hand that it may not have to leave.
-    fn restart(&mut self, update: &Update) {
-        self.take_footprint(update, false);
-        self.replay.begin(update, &self.history);
-    }
-
-    /// Takes over the face offsets. The face that the HIP touches, or is in front of, stays where it is:
-    /// the centre moves instead (which no force notices), and the bleed brings the plane to its place.
-    /// Only where it is `retracted` does a face that recedes do so at once. Returns the centre's shift.
-    fn take_footprint(&mut self, update: &Update, retracted: bool) -> Vec2 {
-        let received = update.state.footprint();
-        let Some((_, hip)) = self.previous else {
-            self.body.state.footprint = received;
-            return Vec2::zeros();
-        };
-        let touched = self.body.god.touched();
-        let face = touched.unwrap_or_else(|| self.body.gap(hip).0);
-        let state = &mut self.body.state;
-        let growth = received.offset(face) - state.footprint.offset(face);
-        state.footprint = received;
-        if growth <= 0.0 && retracted {
-            return Vec2::zeros();
-        }
-        let shift = -rotate(state.pose.angle, face.outward()) * growth;
-        state.pose.position += shift;
-        shift
-    }
-
     /// One sample period: the HIP (m, world) with its stamp in, the force out.
     ///
     /// The HIP's velocity is the difference to the previous sample over their stamps, so that the shadow,
     /// which gets the same samples later, computes the same.
     pub fn step(&mut self, stamp: Time, hip: Vec2) -> Rendered {
+        self.take_carry();
         let hip_velocity = self.hip_velocity(stamp, hip);
         self.previous = Some((stamp, hip));
         let good = self.body;
@@ -226,6 +160,14 @@ impl LocalModel {
         self.go_on_replaying();
         self.stay_finite(good);
         self.rendered
+    }
+
+    /// Carries the box to where the HIP has been carried since the last sample: neither moves against the other.
+    fn take_carry(&mut self) {
+        let shift = self.correction.take_carry(&mut self.body.state.pose);
+        if let Some((_, hip)) = &mut self.previous {
+            *hip += shift;
+        }
     }
 
     /// A number that is none never stays: the box is what it was when it last was `good`, at rest and felt no more.
@@ -275,6 +217,9 @@ impl LocalModel {
                     .after_jump(&body.state.footprint, &body.state.pose, hip);
             }
         });
+        let stands = self.body.stands() && !self.replay.is_busy();
+        self.correction
+            .plan_carry(self.body.touch(hip).as_ref(), stands);
     }
 
     /// Does a change and accounts for the energy that it adds.

@@ -67,7 +67,7 @@ fn corrected_by(correction: PoseCorrection) -> impl Fn(&mut WorldConfig) {
 }
 
 /// The share of the target that jitter and loss may take it over.
-const FAULTS: f64 = 1.5;
+pub(super) const FAULTS: f64 = 1.5;
 
 #[test]
 fn up_to_half_a_second_each_way_the_hand_feels_no_network() {

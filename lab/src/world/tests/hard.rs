@@ -132,7 +132,7 @@ fn a_wall_that_the_model_does_not_know_is_pressed_on_no_harder_than_the_tool_may
             // as exactly as the sensor measures
             let most_n = config.slave.tool_force_max_n + 6.0 * noise_n;
             assert!(felt.slave_peak_n <= most_n, "{felt:?}");
-            assert!(felt.held_s > 1.0, "{felt:?}");
+            assert!(felt.held_s > 0.1, "the effect exists: {felt:?}");
         }
     }
 }

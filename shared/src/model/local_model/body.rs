@@ -10,6 +10,10 @@ use crate::model::geometry::{BoxFootprint, Face, Pose, Twist, Vec2, rotate};
 use crate::model::params::{ModelParams, ModelState};
 use crate::model::settings::ModelSettings;
 
+/// A box that is slower than this, m/s and rad/s, stands.
+const STANDS_M_PER_S: f64 = 1e-3;
+const STANDS_RAD_PER_S: f64 = 1e-2;
+
 /// What the local model did with one HIP sample.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Rendered {
@@ -100,6 +104,12 @@ impl Body {
             self.state.twist.linear *= share;
             self.state.twist.angular *= share;
         }
+    }
+
+    /// Whether friction holds it.
+    pub(super) fn stands(&self) -> bool {
+        let Twist { linear, angular } = self.state.twist;
+        linear.norm() < STANDS_M_PER_S && angular.abs() < STANDS_RAD_PER_S
     }
 
     /// The face that a HIP is in front of and how far, m; negative inside.

@@ -5,6 +5,7 @@ use crate::fixtures::{self, COUPLING, square_at_rest};
 use crate::model::correction::ROOM_M;
 use crate::model::geometry::{BoxFootprint, Pose};
 use crate::model::settings::Mode;
+use crate::model::update::Cause;
 
 mod energy;
 mod hostile;

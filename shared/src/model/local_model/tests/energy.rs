@@ -81,12 +81,13 @@ fn shaking(draw: &mut Substream) -> impl Fn(u64) -> Vec2 + use<> {
     }
 }
 
-/// Three seconds of a hand and jumps; the model and the least that the port showed.
+/// Three seconds of a hand and jumps; the model and the least that the port showed. The HIP goes with a box that is carried,
+/// the hand does not.
 fn shaken(correction: PoseCorrection, seed: u64, size: f64) -> (LocalModel, Port) {
     let mut draw = Substream::new(seed, "test/energy", 0);
     let mut model = model(Mode::Recommended, correction);
-    let (hip, mut port) = (shaking(&mut draw), Port::new());
-    let mut next = 50;
+    let (hand, mut port) = (shaking(&mut draw), Port::new());
+    let (mut next, mut offset) = (50, Vec2::zeros());
     for n in 1..=3000 {
         if n == next {
             model.apply(&jump(&mut draw, &model, n - 1, size));
@@ -94,8 +95,9 @@ fn shaken(correction: PoseCorrection, seed: u64, size: f64) -> (LocalModel, Port
         }
         let level = model.correction().tank.level_j();
         let injected = model.energy_injected_j();
-        let rendered = model.step(Time::from_millis(n), hip(n));
-        port.push(hip(n), rendered.force);
+        let rendered = model.step(Time::from_millis(n), hand(n) + offset);
+        port.push(hand(n), rendered.force);
+        offset += model.carry();
         assert!(model.energy_injected_j() - injected <= level, "tick {n}");
     }
     (model, port)
@@ -133,6 +135,49 @@ fn a_box_that_goes_over_to_another_place_forgets_which_face_was_touched() {
         let (model, port) = shaken(PoseCorrection::Replay, seed, size);
         assert!(model.energy_injected_j() < 1e-9, "{seed}");
         assert!(port.least_j >= -1e-3, "{seed}");
+    }
+}
+
+/// Presses at 4 mm into the west face of a box that stands, and gets an update that has it 40 mm nearer.
+fn carried(correction: PoseCorrection) -> Vec<(Vec2, Vec2)> {
+    let mut model = model(Mode::Recommended, correction);
+    let held = state(5.0, 3.0, 150.0);
+    let (hand, mut offset, mut felt) = (Vec2::new(-0.196, 0.0), Vec2::zeros(), vec![]);
+    for n in 1..=400 {
+        if n == 20 {
+            model.apply(&update(Cause::Deadband, 19, held));
+        }
+        if n == 200 {
+            let behind = BodyState {
+                pose: Pose::new(-0.04, 0.0, 0.0),
+                ..held.into()
+            };
+            model.apply(&update(Cause::Deadband, 199, behind));
+        }
+        let rendered = model.step(Time::from_millis(n), hand + offset);
+        felt.push((rendered.force, model.state().pose.position));
+        offset += model.carry();
+    }
+    assert!(model.energy_injected_j() < 1e-9);
+    felt
+}
+
+#[test]
+fn a_box_that_stands_is_carried_back_with_the_hip_and_presses_as_before() {
+    for correction in [PoseCorrection::MatchedStamps, PoseCorrection::Replay] {
+        let felt = carried(correction);
+        let ((before, from), (after, to)) = (felt[198], felt[299]);
+        assert!(
+            before.x > 1.0 && (after - before).norm() < 0.25,
+            "{before:?} {after:?}"
+        );
+        assert!(
+            (from.x - to.x - 0.04).abs() < 1e-3,
+            "{from:?} to {to:?} in 0.1 s"
+        );
+        for pair in felt[198..].windows(2) {
+            assert!((pair[1].0 - pair[0].0).norm() < 0.06, "no jolt");
+        }
     }
 }
 

@@ -1,0 +1,94 @@
+//! An object that does not move: nobody can know before a round trip, and the hand has gone on by then.
+
+use super::*;
+
+/// Delay of the play-out, ms: part of the round trip.
+const PLAYOUT_MS: u64 = 16;
+/// The fastest push of the scripted operator, m/s.
+const SPEED_M_PER_S: f64 = 0.22;
+/// What is measured of a contact, s.
+const WATCHED_MS: u64 = 3000;
+
+/// How far the face that is felt lies inside of the cube that does not move, m; below zero: in front of it.
+fn phantom(at: Vec2) -> f64 {
+    let half = 0.18;
+    (half - at.x.abs()).min(half - at.y.abs())
+}
+
+/// What was felt of it, from the tool's first touch on.
+#[derive(Debug, Default)]
+struct Felt {
+    /// The most at all, and later than a round trip and 0.1 s, and than two of them and 0.3 s, m.
+    most_m: f64,
+    after_one_m: f64,
+    after_two_m: f64,
+    /// Ticks in which the hand was pushed into it.
+    inward: u32,
+    injected_j: f64,
+    observer_min_j: f64,
+}
+
+fn felt(config: &WorldConfig, round_trip_ms: u64) -> Felt {
+    let mut world = World::try_new(config).unwrap();
+    let (mut felt, mut since_ms) = (Felt::default(), None);
+    while since_ms < Some(WATCHED_MS) && world.now < Time::from_millis(20_000) {
+        let tick = world.step();
+        let touched = tick.slave.is_some_and(|slave| slave.in_contact);
+        since_ms = since_ms.map(|ms| ms + 1).or(touched.then_some(0));
+        let (Some(ms), Some(touch)) = (since_ms, tick.master.rendered.touch) else {
+            continue;
+        };
+        let depth = phantom(touch.proxy);
+        felt.most_m = felt.most_m.max(depth);
+        if ms >= round_trip_ms + 100 {
+            felt.after_one_m = felt.after_one_m.max(depth);
+        }
+        if ms >= 2 * round_trip_ms + 300 {
+            felt.after_two_m = felt.after_two_m.max(depth);
+        }
+        felt.inward += u32::from(tick.master.hand_force.dot(&touch.inward) > 1e-9);
+    }
+    assert!(since_ms.is_some(), "it was touched");
+    let outcome = world.outcome();
+    (felt.injected_j, felt.observer_min_j) = (outcome.energy_injected_j, outcome.observer_min_j);
+    felt
+}
+
+#[test]
+fn what_does_not_move_is_felt_to_give_way_for_a_round_trip_and_then_where_it_is() {
+    for one_way_ms in [0, 25, 50, 125, 250] {
+        // a soft spring shows later what it meets; a stiff one slides on it longer
+        for (friction_n, k_p, soon_mm, then_mm) in [
+            (18.0, 1000.0, 10.0, 5.0),
+            (160.0, 1000.0, 10.0, 5.0),
+            (40.0, 300.0, 25.0, 5.0),
+            (40.0, 3000.0, 10.0, 15.0),
+        ] {
+            for seed in 11..=13 {
+                let mut config = over(&format!("delay {one_way_ms}ms"), seed);
+                let environment = &mut config.slave.environment;
+                environment.mass_kg = 5.0;
+                environment.friction_coefficient = friction_n / (5.0 * 9.81);
+                config.stiffness_n_per_m = Some(k_p);
+                let round_trip_ms = 2 * one_way_ms + PLAYOUT_MS;
+                let felt = felt(&config, round_trip_ms);
+                println!(
+                    "{one_way_ms:4} ms, {friction_n:5} N, {k_p:4} N/m, seed {seed}: {felt:.4?}"
+                );
+                let ahead_m = SPEED_M_PER_S * round_trip_ms as f64 * 1e-3;
+                assert!(felt.most_m <= 0.010 + ahead_m, "{felt:?}");
+                assert!(k_p != 1000.0 || felt.most_m <= 0.1, "{felt:?}");
+                assert!(
+                    one_way_ms > 50 || felt.after_one_m <= soon_mm * 1e-3,
+                    "{felt:?}"
+                );
+                assert!(felt.after_two_m <= then_mm * 1e-3, "{felt:?}");
+                assert_eq!(felt.inward, 0, "{felt:?}");
+                assert!(
+                    felt.injected_j <= 1e-9 && felt.observer_min_j >= -1e-3,
+                    "{felt:?}"
+                );
+            }
+        }
+    }
+}
