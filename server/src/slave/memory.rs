@@ -27,7 +27,8 @@ pub struct Memory {
 
 impl Memory {
     /// Where the first body lies.
-    pub(crate) fn object(&self) -> Option<Pose> {
+    #[must_use]
+    pub fn object(&self) -> Option<Pose> {
         self.bodies.first().copied()
     }
 

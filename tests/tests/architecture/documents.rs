@@ -3,7 +3,7 @@
 use super::{File, hold, listing, repository};
 
 /// What a path in a code span starts with when it means a file of this repository.
-const ROOTS: &str = "shared/ netem/ server/ client/ lab/ cli/ tests/ docs/ .ci/";
+const ROOTS: &str = "shared/ netem/ server/ client/ lab/ cli/ tests/ docs/ contrib/ .ci/";
 
 /// The targets of the links of a line that lead to files, as paths from the root of the repository.
 fn links(document: &str, line: &str) -> Vec<String> {
