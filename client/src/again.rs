@@ -16,7 +16,7 @@ use serde::{Deserialize, Serialize};
 use crate::commands::CommandConfig;
 use crate::end::MasterEnd;
 use crate::limiter::{ForceLimiter, Limits};
-use crate::master::Master;
+use crate::master::{Master, MasterTick as Done};
 
 /// What a session's end at the master is made of besides the welcome.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -113,12 +113,24 @@ impl MasterSetting {
 pub struct MasterAgain {
     end: MasterEnd,
     digest: RunDigest,
+    done: Option<Done>,
+    left: Vec<Vec<u8>>,
 }
 
 impl MasterAgain {
     /// The end as it is now.
     pub fn end(&self) -> &MasterEnd {
         &self.end
+    }
+
+    /// What the newest tick gave; none before the first.
+    pub fn done(&self) -> Option<&Done> {
+        self.done.as_ref()
+    }
+
+    /// The datagrams that left after it.
+    pub fn left(&self) -> impl Iterator<Item = &[u8]> {
+        self.left.iter().map(Vec::as_slice)
     }
 }
 
@@ -131,6 +143,8 @@ impl EndAgain for MasterAgain {
         Ok(Self {
             end: MasterSetting::of_session(session)?.end()?,
             digest: RunDigest::default(),
+            done: None,
+            left: Vec::new(),
         })
     }
 
@@ -149,9 +163,18 @@ impl EndAgain for MasterAgain {
         let done = self.end.tick(Time::from_nanos(tick.deadline_ns), reading);
         self.digest.tick(&done);
         let value = self.digest.value();
-        let (end, sent) = (&mut self.end, Time::from_nanos(tick.sent_ns));
-        self.digest
-            .datagrams(|out| end.poll_transmit(sent, out).ok().flatten());
+        self.done = Some(done);
+        self.left.clear();
+        let (end, left, sent) = (
+            &mut self.end,
+            &mut self.left,
+            Time::from_nanos(tick.sent_ns),
+        );
+        self.digest.datagrams(|out| {
+            let length = end.poll_transmit(sent, out).ok().flatten()?;
+            left.push(out.get(..length).unwrap_or_default().to_vec());
+            Some(length)
+        });
         value
     }
 

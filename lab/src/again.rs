@@ -10,7 +10,7 @@ use mmt_shared::clean::clean;
 use mmt_shared::record::PROGRAM;
 use mmt_shared::record::again::EndAgain;
 use mmt_shared::record::cdr::CdrError;
-use mmt_shared::record::messages::{Arrival, Message, Session};
+use mmt_shared::record::messages::{Arrival, MasterTick, Message, Session, SlaveTick};
 
 /// Why a record did not run again.
 #[derive(Debug, thiserror::Error)]
@@ -78,6 +78,29 @@ impl RanAgain {
     }
 }
 
+/// Which input of a session a message of a record was.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Input<T> {
+    /// The session began.
+    Beginning(Session),
+    /// A datagram arrived.
+    Arrival(Arrival),
+    /// A tick.
+    Tick(T),
+}
+
+/// What a message of a record was: an input of the session of this number, which has taken it.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Taken {
+    /// At the master.
+    Master(u32, Input<MasterTick>),
+    /// At the slave.
+    Slave(u32, Input<SlaveTick>),
+}
+
+/// The session and the input, if a message was one.
+type TakenBy<E> = Result<Option<(u32, Input<<E as EndAgain>::Tick>)>, AgainError>;
+
 /// The sessions of one end.
 struct Sessions<E>(BTreeMap<u32, (E, RanAgain)>);
 
@@ -88,8 +111,8 @@ impl<E> Default for Sessions<E> {
 }
 
 impl<E: EndAgain<Error: Into<AgainError>>> Sessions<E> {
-    /// `what`: the rest of the topic.
-    fn take(&mut self, what: &str, topic: &str, message: &[u8]) -> Result<(), AgainError> {
+    /// `what`: the rest of the topic. None of what is no input, or comes after inputs that are missing.
+    fn take(&mut self, what: &str, topic: &str, message: &[u8]) -> TakenBy<E> {
         match what {
             "session" => {
                 let session = beginning(topic, message)?;
@@ -98,33 +121,37 @@ impl<E: EndAgain<Error: Into<AgainError>>> Sessions<E> {
                     RanAgain::default(),
                 );
                 self.0.insert(session.session, began);
+                Ok(Some((session.session, Input::Beginning(session))))
             }
             "arrivals" => {
                 let arrival: Arrival = parse(topic, message)?;
                 let (end, ran) = self.session(arrival.session)?;
-                if ran.is_next(arrival.index) {
-                    end.arrival(&arrival);
+                if !ran.is_next(arrival.index) {
+                    return Ok(None);
                 }
+                end.arrival(&arrival);
+                Ok(Some((arrival.session, Input::Arrival(arrival))))
             }
             "ticks" => {
                 let tick: E::Tick = parse(topic, message)?;
                 let input = E::input(&tick);
                 let (end, ran) = self.session(input.session)?;
-                if ran.is_next(input.index) {
-                    let digest = end.tick(&tick);
-                    if digest != input.digest {
-                        return Err(AgainError::Difference {
-                            side: E::SIDE,
-                            session: input.session,
-                            tick: ran.ticks,
-                        });
-                    }
-                    (ran.ticks, ran.digest) = (ran.ticks + 1, digest);
+                if !ran.is_next(input.index) {
+                    return Ok(None);
                 }
+                let digest = end.tick(&tick);
+                if digest != input.digest {
+                    return Err(AgainError::Difference {
+                        side: E::SIDE,
+                        session: input.session,
+                        tick: ran.ticks,
+                    });
+                }
+                (ran.ticks, ran.digest) = (ran.ticks + 1, digest);
+                Ok(Some((input.session, Input::Tick(tick))))
             }
-            _ => {}
+            _ => Ok(None),
         }
-        Ok(())
     }
 
     fn session(&mut self, session: u32) -> Result<&mut (E, RanAgain), AgainError> {
@@ -147,18 +174,32 @@ pub struct SessionsAgain {
 }
 
 impl SessionsAgain {
-    /// Takes the next message of the record; one that is no input changes nothing.
+    /// Takes the next message of the record, and returns which input it was; one that is no input changes nothing.
     ///
     /// # Errors
     /// The message is broken, a session cannot begin, or a tick gave something else.
-    pub fn take(&mut self, topic: &str, message: &[u8]) -> Result<(), AgainError> {
+    pub fn take(&mut self, topic: &str, message: &[u8]) -> Result<Option<Taken>, AgainError> {
         if let Some(what) = topic.strip_prefix("/master/") {
-            self.masters.take(what, topic, message)
+            let taken = self.masters.take(what, topic, message)?;
+            Ok(taken.map(|(session, input)| Taken::Master(session, input)))
         } else if let Some(what) = topic.strip_prefix("/slave/") {
-            self.slaves.take(what, topic, message)
+            let taken = self.slaves.take(what, topic, message)?;
+            Ok(taken.map(|(session, input)| Taken::Slave(session, input)))
         } else {
-            Ok(())
+            Ok(None)
         }
+    }
+
+    /// The master of this session, as far as it has run again.
+    #[must_use]
+    pub fn master(&self, session: u32) -> Option<&MasterAgain> {
+        self.masters.0.get(&session).map(|(end, _)| end)
+    }
+
+    /// The slave of this session, as far as it has run again.
+    #[must_use]
+    pub fn slave(&self, session: u32) -> Option<&SlaveAgain> {
+        self.slaves.0.get(&session).map(|(end, _)| end)
     }
 
     /// Each session with its side and number, the master's first.

@@ -20,11 +20,12 @@ mod stiffness;
 mod traces;
 mod transport;
 mod tupdate;
+mod worlds;
 
 use crate::experiment::description::Experiment;
 
 /// Every experiment, in the order in which they run.
-pub const ALL: [&Experiment; 17] = [
+pub const ALL: [&Experiment; 18] = [
     &physics::PHYSICS,
     &fig5::FIG5,
     &traces::FIG6,
@@ -42,6 +43,7 @@ pub const ALL: [&Experiment; 17] = [
     &netem::NETEM,
     &transport::TRANSPORT,
     &delay::DELAY,
+    &worlds::EXPERIMENT,
 ];
 
 #[cfg(test)]

@@ -3,6 +3,7 @@
 pub mod again;
 pub mod architecture;
 pub mod baselines;
+pub mod check;
 mod digest;
 pub mod experiment;
 #[cfg(feature = "io")]
@@ -17,9 +18,11 @@ pub mod record_report;
 pub mod replay;
 pub mod setting;
 pub mod statistics;
+pub mod swarm;
 pub mod sweep;
 pub mod table;
 pub mod transport;
 pub mod trial;
 pub mod what_if;
 pub mod world;
+pub mod worlds;

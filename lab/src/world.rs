@@ -7,29 +7,28 @@
 use std::time::Duration;
 
 use mmt_client::device::DeviceProfile;
-use mmt_client::end::MasterEnd;
+use mmt_client::end::{MasterEnd, MasterGiven};
 use mmt_client::limiter::ForceLimiter;
 use mmt_client::master::{Master, MasterTick};
 use mmt_client::operator::Operator;
 use mmt_client::operator::scripted::{Picture, Scripted, View};
 use mmt_client::operator::trace::Trace;
-use mmt_netem::counters::Tally;
 use mmt_netem::link::LinkId;
 use mmt_netem::{Link, Packet};
-use mmt_server::end::SlaveEnd;
-use mmt_server::environment::Environment;
+use mmt_server::end::{SlaveEnd, SlaveGiven};
 use mmt_server::slave::{Slave, SlaveTick};
-use mmt_shared::metrics::{ForceSummary, PoseError, Staleness};
+use mmt_shared::metrics::{PoseError, Staleness};
 use mmt_shared::model::geometry::Vec2;
 use mmt_shared::pairing::Token;
 use mmt_shared::time::{TICK, Time};
 use mmt_shared::wire::{DATAGRAM_MAX, Label, Welcome};
 use sha2::{Digest, Sha256};
 
-use crate::digest::hex;
+use crate::check::SessionChecks;
 
 mod config;
 mod datagram;
+mod measures;
 mod outcome;
 pub(crate) mod picture;
 mod plant;
@@ -73,6 +72,9 @@ pub struct World {
     staleness: Staleness,
     pose: PoseError,
     log: Sha256,
+    /// They see every tick of every test, and of runs that ask for it.
+    checks: Box<SessionChecks>,
+    judges: bool,
 }
 
 impl World {
@@ -116,7 +118,16 @@ impl World {
         let operator = operator(view)?;
         slave.start_at(operator.start());
         let down_delay = config.down.delay.middle();
+        let checks = SessionChecks::new(
+            (Time::ZERO + down_delay, Time::ZERO + SLAVE_EPOCH),
+            device.limits(),
+            settings,
+            config.slave(),
+            slave.tool_at(),
+        );
         Ok(Self {
+            checks: Box::new(checks),
+            judges: cfg!(test),
             now: Time::ZERO,
             slave: SlaveEnd::new(Time::ZERO + SLAVE_EPOCH, slave, config.slave_end()),
             // a session begins with the slave's welcome, which takes its time as well
@@ -135,85 +146,6 @@ impl World {
             pose: PoseError::default(),
             log: Sha256::new(),
         })
-    }
-
-    /// The slave.
-    #[must_use]
-    pub fn slave(&self) -> &Slave {
-        self.slave.slave()
-    }
-
-    /// The real object, to be changed in mid-run.
-    pub fn environment_mut(&mut self) -> &mut Environment {
-        self.slave.slave_mut().environment_mut()
-    }
-
-    /// The master.
-    #[must_use]
-    pub fn master(&self) -> &Master {
-        self.master.master()
-    }
-
-    /// The slave's end.
-    #[must_use]
-    pub fn slave_end(&self) -> &SlaveEnd {
-        &self.slave
-    }
-
-    /// What was sent: messages by kind, and datagrams with bits per second.
-    #[must_use]
-    pub fn traffic(&self) -> Traffic {
-        let ends = (self.master.channel(), self.slave.channel());
-        let repeated = self.slave.counts().repeated;
-        Traffic::of(ends, repeated, self.sent(), self.now.as_secs_f64())
-    }
-
-    /// Datagrams sent up and down, as long as their payload.
-    #[must_use]
-    pub fn sent(&self) -> [Tally; 2] {
-        [self.up.counters().offered, self.down.counters().offered]
-    }
-
-    /// Datagrams that the queues before the bottlenecks of both directions dropped.
-    #[must_use]
-    pub fn dropped_in_queues(&self) -> u64 {
-        let of = |path: &Link<Datagram>| path.counters().dropped.queue.packets;
-        of(&self.up) + of(&self.down)
-    }
-
-    /// The operator.
-    #[must_use]
-    pub fn operator(&self) -> &Operator {
-        &self.operator
-    }
-
-    /// What the run has come to so far.
-    #[must_use]
-    pub fn outcome(&self) -> Outcome {
-        let (master, counts) = (self.master(), self.master.counts());
-        Outcome {
-            updates: self.slave.counts().updates,
-            age: counts.age,
-            staleness: self.staleness.clone(),
-            pose: self.pose,
-            breaks: counts.breaks,
-            on_hand: counts.on_hand,
-            energy_injected_j: master.energy_injected_j(),
-            observer_min_j: master.port().least_j(),
-            forces: self.slave.channel().counts().sent.tools,
-        }
-    }
-
-    /// The force metrics so far.
-    #[must_use]
-    pub fn force(&self) -> ForceSummary {
-        self.slave().force().summary()
-    }
-
-    /// SHA-256 of the event log so far, in hexadecimal digits: equal for equal configurations.
-    #[must_use]
-    pub fn digest(&self) -> String {
-        hex(&self.log.clone().finalize())
     }
 
     /// Runs for a duration and hands every tick to `watch`.
@@ -248,6 +180,9 @@ impl World {
             if !packet.is_corrupted() {
                 self.master
                     .handle_datagram(packet.due, packet.payload.bytes());
+                if self.judges {
+                    self.checks.came_down(packet.due, packet.payload.bytes());
+                }
             }
         }
         let before = self.master.counts().newest_applied;
@@ -264,10 +199,23 @@ impl World {
         let reading = self.operator.step(elapsed, &view, self.hand_force);
         let tick = self.master.tick(self.now, reading);
         self.hand_force = tick.hand_force;
+        if self.judges {
+            let given = MasterGiven {
+                reading,
+                engaged: true,
+                releases: false,
+                stops: false,
+            };
+            self.checks
+                .master_ticked(self.now, given, &tick, &self.master);
+        }
         let mut bytes = [0; DATAGRAM_MAX];
         while let Ok(Some(length)) = self.master.poll_transmit(self.now, &mut bytes) {
-            self.up
-                .offer(self.now, Packet::new(length, Datagram { bytes, length }));
+            let datagram = Datagram { bytes, length };
+            if self.judges {
+                self.checks.up(self.now, datagram.bytes());
+            }
+            self.up.offer(self.now, Packet::new(length, datagram));
         }
         tick
     }
@@ -291,6 +239,9 @@ impl World {
             if !packet.is_corrupted() {
                 let arrived = self.slave_clock.at(packet.due);
                 self.slave.handle_datagram(arrived, packet.payload.bytes());
+                if self.judges {
+                    self.checks.came_up(arrived, packet.payload.bytes());
+                }
             }
         }
     }
@@ -298,6 +249,14 @@ impl World {
     fn slave_tick(&mut self) -> Option<SlaveTick> {
         let now = self.slave_clock.at(self.now);
         let tick = self.slave.tick(now);
+        if self.judges {
+            let given = SlaveGiven {
+                stops: false,
+                plant: None,
+            };
+            self.checks
+                .slave_ticked(now, given, tick.as_ref(), &self.slave);
+        }
         if let Some(tick) = &tick {
             if let Some(picture) = &mut self.picture {
                 let scene = scene(self.slave.slave().environment(), tick.in_contact);
@@ -313,8 +272,11 @@ impl World {
         }
         let mut bytes = [0; DATAGRAM_MAX];
         while let Ok(Some(length)) = self.slave.poll_transmit(now, &mut bytes) {
-            self.down
-                .offer(self.now, Packet::new(length, Datagram { bytes, length }));
+            let datagram = Datagram { bytes, length };
+            if self.judges {
+                self.checks.down(now, datagram.bytes());
+            }
+            self.down.offer(self.now, Packet::new(length, datagram));
         }
         tick
     }
@@ -342,6 +304,16 @@ impl World {
                     .for_each(number);
                 self.log.update(update.answers.as_nanos().to_le_bytes());
             }
+        }
+    }
+}
+
+/// A test's world holds what every session promises, whatever else the test is about.
+#[cfg(test)]
+impl Drop for World {
+    fn drop(&mut self) {
+        if let (Some(verdict), false) = (self.verdict(), std::thread::panicking()) {
+            assert!(verdict.holds(), "{verdict}");
         }
     }
 }

@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::end::SlaveEnd;
 use crate::plant::PlantAnswer;
-use crate::slave::{Memory, SlaveConfig, SlaveError};
+use crate::slave::{Memory, SlaveConfig, SlaveError, SlaveTick as Done};
 
 /// Why a recorded session cannot be run again.
 #[derive(Debug, thiserror::Error)]
@@ -110,6 +110,8 @@ impl SlaveSetting {
 pub struct SlaveAgain {
     end: SlaveEnd,
     digest: RunDigest,
+    done: Option<Done>,
+    left: Vec<Vec<u8>>,
 }
 
 impl SlaveAgain {
@@ -117,6 +119,17 @@ impl SlaveAgain {
     #[must_use]
     pub fn end(&self) -> &SlaveEnd {
         &self.end
+    }
+
+    /// What the newest tick gave; none before the first sample is due.
+    #[must_use]
+    pub fn done(&self) -> Option<&Done> {
+        self.done.as_ref()
+    }
+
+    /// The datagrams that left after it.
+    pub fn left(&self) -> impl Iterator<Item = &[u8]> {
+        self.left.iter().map(Vec::as_slice)
     }
 }
 
@@ -135,6 +148,8 @@ impl EndAgain for SlaveAgain {
         Ok(Self {
             end: SlaveEnd::of_session(began, &config, &hello, earlier.as_ref())?,
             digest: RunDigest::default(),
+            done: None,
+            left: Vec::new(),
         })
     }
 
@@ -153,9 +168,18 @@ impl EndAgain for SlaveAgain {
         let done = self.end.tick(now);
         self.digest.tick(&done);
         let value = self.digest.value();
-        let (end, sent) = (&mut self.end, Time::from_nanos(tick.sent_ns));
-        self.digest
-            .datagrams(|out| end.poll_transmit(sent, out).ok().flatten());
+        self.done = done;
+        self.left.clear();
+        let (end, left, sent) = (
+            &mut self.end,
+            &mut self.left,
+            Time::from_nanos(tick.sent_ns),
+        );
+        self.digest.datagrams(|out| {
+            let length = end.poll_transmit(sent, out).ok().flatten()?;
+            left.push(out.get(..length).unwrap_or_default().to_vec());
+            Some(length)
+        });
         value
     }
 

@@ -277,7 +277,8 @@ impl SlaveEnd {
     /// One sample period; `now` is the tick's deadline. None before the first HIP sample is due.
     pub fn tick(&mut self, now: Time) -> Option<SlaveTick> {
         self.consider_disengaging(now);
-        self.slave.hold_tool(self.stopped_by().is_some());
+        let stands = self.stopped_by().is_some() || self.disengaged;
+        self.slave.hold_tool(stands);
         let tick = self.slave.tick(now)?;
         self.counts.updates.tick(tick.in_contact);
         if let Some(update) = tick.update {

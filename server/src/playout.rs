@@ -41,6 +41,9 @@ pub struct PlayoutBuffer {
     limiter: SpeedLimiter,
     counts: PlayoutCounts,
     delays: Histogram,
+    /// Stamp of the newest sample, and for how long there has been no newer one.
+    newest: Option<Time>,
+    silent: Duration,
     /// The tool is to stand.
     held: bool,
     /// It stands.
@@ -57,9 +60,11 @@ impl PlayoutBuffer {
         Ok(Self {
             buffer: JitterBuffer::new(&config),
             interpolator: Interpolator::new(&config),
-            limiter: SpeedLimiter::new(config.speed_max_m_per_s, config.reach_m),
+            limiter: SpeedLimiter::new(&config),
             counts: PlayoutCounts::default(),
             delays: Histogram::default(),
+            newest: None,
+            silent: Duration::ZERO,
             held: false,
             stands: false,
         })
@@ -76,6 +81,12 @@ impl PlayoutBuffer {
         self.stands = true;
     }
 
+    /// The place within the tool's reach that is nearest to `place`, m.
+    #[must_use]
+    pub fn within_reach(&self, place: Vec2) -> Vec2 {
+        self.limiter.within_reach(place)
+    }
+
     /// Holds the tool where it is, from the next tick on; or no longer: then it follows again once the HIP comes within
     /// 2 cm of it.
     pub fn hold(&mut self, held: bool) {
@@ -85,6 +96,10 @@ impl PlayoutBuffer {
     /// Takes in a sample that arrived at `arrived` by the slave's clock, in any order.
     pub fn push(&mut self, arrived: Time, sample: &HipSample) {
         self.buffer.push(arrived, sample, &mut self.counts);
+        let newest = self.buffer.samples().back().map(|newest| newest.stamp);
+        if newest != self.newest {
+            (self.newest, self.silent) = (newest, Duration::ZERO);
+        }
     }
 
     /// The HIP to follow at `now` by the slave's clock; to be called every tick.
@@ -92,11 +107,15 @@ impl PlayoutBuffer {
     /// None until the first sample is due.
     pub fn advance(&mut self, now: Time) -> Option<Played> {
         let elapsed = self.limiter.elapsed(now);
+        self.silent += elapsed;
         let stamp = self.buffer.due(now, elapsed)?;
         let aim = self.aim(stamp)?;
         let stood = self.standing_at(aim.hip);
-        let step = self.limiter.step(now, elapsed, stood.unwrap_or(aim.hip));
+        let target = stood.unwrap_or(aim.hip);
+        let slowing = aim.slowing.min(self.interpolator.slowing(self.silent));
+        let step = self.limiter.step(now, elapsed, target, slowing);
         let limited = step.limited || stood.is_some();
+        let stopped = !slowing.is_zero() && step.velocity == Vec2::zeros();
         let played = Played {
             stamp: self.buffer.play(stamp),
             hip: step.hip,
@@ -104,6 +123,7 @@ impl PlayoutBuffer {
             force: aim.force.filter(|_| !limited),
             status: aim.status,
             limited,
+            stands: stood.is_some() || stopped,
         };
         self.counts.note(&played);
         self.delays.record(self.delay());

@@ -66,6 +66,12 @@ impl ToolDrive {
         self.passive = true;
     }
 
+    /// Begins at `place` (m), where an earlier session left the tool with this force on it, N.
+    pub(crate) fn begin_at(&mut self, place: Vec2, force: Vec2) {
+        self.own = Some(place);
+        self.port.measured(force);
+    }
+
     /// One tick: the tool follows the played HIP from `before` (the one played last, m), or goes towards it. When it may
     /// follow again it catches up within the speed limit. The force of the master is that of the HIP, not of a tool that
     /// is held back.
@@ -73,7 +79,12 @@ impl ToolDrive {
         let Some(tool) = self.own.or(before) else {
             return played;
         };
-        let wanted = played.hip - tool;
+        // nothing draws a tool that has to stand; it may give way all the same
+        let wanted = if played.stands {
+            Vec2::zeros()
+        } else {
+            played.hip - tool
+        };
         let follows = self.own.is_none() && !self.passive;
         let free = if follows {
             wanted
@@ -103,7 +114,7 @@ impl ToolDrive {
         self.force.moved(velocity, held);
         let behind = (wanted - way).norm() > BEHIND_M;
         self.held_back = held || (self.held_back && behind);
-        let there = !self.passive && way == wanted;
+        let there = !self.passive && !played.stands && way == wanted;
         self.own = Some(tool + way).filter(|_| !there);
         Played {
             hip: tool + way,
@@ -127,5 +138,63 @@ fn period_s(way: &Vec2, played: &Played) -> f64 {
         (way.norm() / speed).max(TICK_S)
     } else {
         TICK_S
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::playout::Status;
+    use mmt_shared::model::contact::Coupling;
+    use mmt_shared::time::Time;
+
+    fn drive() -> ToolDrive {
+        let coupling = Coupling::for_stiffness(1000.0);
+        let force = ToolForce::try_new(15.0, coupling).unwrap();
+        ToolDrive::new(ToolPort::new(0.01, 0.6), force)
+    }
+
+    fn played(x: f64, stands: bool) -> Played {
+        Played {
+            stamp: Time::ZERO,
+            hip: Vec2::new(x, 0.0),
+            velocity: Vec2::zeros(),
+            force: None,
+            status: Status::Interpolated,
+            limited: false,
+            stands,
+        }
+    }
+
+    #[test]
+    fn a_tool_that_its_force_held_back_stands_when_it_has_to_and_gives_way_all_the_same() {
+        let mut drive = drive();
+        drive.measured(Vec2::new(15.0, 0.0));
+        let at = |drive: &mut ToolDrive, stands| {
+            drive.step(Some(Vec2::zeros()), played(0.05, stands)).hip.x
+        };
+        // at the limit of its force it is behind a HIP that is 5 cm further
+        let held = at(&mut drive, false);
+        assert!(held < 1e-3, "{held}");
+        // what it pressed on is gone
+        drive.measured(Vec2::zeros());
+        for _ in 0..100 {
+            assert_eq!(at(&mut drive, true), held, "nothing draws it");
+        }
+        drive.measured(Vec2::new(26.0, 0.0));
+        assert!(at(&mut drive, true) < held, "it is pressed on");
+        drive.measured(Vec2::zeros());
+        let before = at(&mut drive, true);
+        assert!(at(&mut drive, false) > before, "it may follow again");
+    }
+
+    #[test]
+    fn a_tool_that_an_earlier_session_left_pressing_presses_no_harder_in_its_first_tick() {
+        let (mut pressing, mut free) = (drive(), drive());
+        pressing.begin_at(Vec2::zeros(), Vec2::new(15.0, 0.0));
+        let first = pressing.step(None, played(0.6e-3, false)).hip.x;
+        assert!(first <= 0.0, "{first} m at the limit of its force");
+        free.begin_at(Vec2::zeros(), Vec2::zeros());
+        assert!((free.step(None, played(0.6e-3, false)).hip.x - 0.6e-3).abs() < 1e-12);
     }
 }

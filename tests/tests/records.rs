@@ -56,6 +56,14 @@ fn replayed(record: &str) -> (Value, Vec<(String, f64)>) {
     (record, sessions)
 }
 
+/// Whether what these records show keeps what is promised, both ends together; how many invariants were looked at.
+fn checked(records: &[&str]) -> usize {
+    let arguments = [&["check"], records, &["--json"]].concat();
+    let document = done(&arguments).document(0).unwrap();
+    assert_eq!(document["holds"], true, "{document:#}");
+    document["invariants"].as_array().unwrap().len()
+}
+
 /// The recorded hand over the recorded network, and over one of half a second with an update each 20 ms.
 fn what_if_it_had_been_slower(record: &str) {
     let other = ["--scheme", "timer 20ms", "--netem", "delay 250ms", "--json"];
@@ -96,6 +104,7 @@ fn a_demo_is_recorded_runs_again_and_is_read_by_decoders_that_know_nothing_of_it
     let report = demo.document(0).unwrap();
     let (again, sessions) = replayed(record);
     assert_eq!(again["is_whole"], true);
+    assert!(checked(&[record]) >= 24);
     what_if_it_had_been_slower(record);
     let sides: Vec<&str> = sessions.iter().map(|(side, _)| side.as_str()).collect();
     assert_eq!(sides, ["master", "slave"]);
@@ -231,6 +240,8 @@ fn each_host_of_two_keeps_a_record_that_runs_again_by_itself() {
     assert_eq!((sessions.len(), sessions[0].0.as_str()), (1, "slave"));
     let (_, sessions) = replayed(&of_master);
     assert_eq!((sessions.len(), sessions[0].0.as_str()), (1, "master"));
+    // one end alone shows nothing of what the other sent
+    assert!(checked(&[&of_slave]) < checked(&[&of_slave, &of_master]));
     // where the two files are shown together they lie on one axis
     let both = done(&["replay", &of_slave, &of_master]).out.join("\n");
     assert_eq!(both.matches("the same bits").count(), 2, "{both}");
@@ -287,6 +298,7 @@ fn what_was_recorded_before_a_kill_runs_again() {
     drop(demo);
     let (again, sessions) = replayed(record);
     assert_eq!(again["is_whole"], false);
+    assert!(checked(&[record]) > 20);
     assert_eq!(sessions.len(), 2);
     assert!(
         sessions.iter().all(|(_, ticks)| *ticks > 200.0),

@@ -23,6 +23,7 @@ use mmt_client::device::DeviceProfile;
 use mmt_client::io::{MasterLive, MasterOptions, OperatorChoice};
 use mmt_client::operator::scripted::ScriptedConfig;
 use mmt_lab::again::{AgainError, RanAgain, SessionsAgain};
+use mmt_lab::check::{Invariant, RecordChecks};
 use mmt_netem::LinkConfig;
 use mmt_netem::io::socket::SocketExtras;
 use mmt_server::io::{SlaveHost, SlaveLive, SlaveOptions};
@@ -32,7 +33,7 @@ use mmt_shared::io::identity::Identity;
 use mmt_shared::io::record::{Ended, RecordError, RecordOutcome, Recorder, read};
 use mmt_shared::io::transport::Transport;
 use mmt_shared::record::cdr::CdrWriter;
-use mmt_shared::record::messages::{Arrival, Message, Session};
+use mmt_shared::record::messages::{Arrival, Message, Session, SlaveTick};
 use mmt_shared::wire::Architecture;
 use tokio::sync::watch;
 
@@ -153,6 +154,7 @@ fn a_live_session_runs_again_to_the_same_bits_at_each_tick_of_both_ends() {
         let ran = again(&messages, |_, message| message.to_vec()).unwrap();
         let sides: Vec<_> = ran.iter().map(|(side, n, _)| (*side, *n)).collect();
         assert_eq!(sides, [("master", 1), ("slave", 1)]);
+        checked(&messages);
         for (side, _, ran) in ran {
             assert!(ran.ticks > 100 && !ran.has_gap, "{side}: {ran:?}");
         }
@@ -160,6 +162,33 @@ fn a_live_session_runs_again_to_the_same_bits_at_each_tick_of_both_ends() {
         frames_count(&messages, "/slave/arrivals", "slave");
         another_version_is_refused_by_name(&messages);
     }
+}
+
+/// What is promised holds, with an emergency stop on the way; and another bit is seen.
+fn checked(messages: &[(String, Vec<u8>)]) {
+    let mut checks = RecordChecks::default();
+    for (topic, message) in messages {
+        checks.take(topic, message).unwrap();
+    }
+    let verdict = checks.verdict(true);
+    assert!(verdict.holds(), "{verdict}");
+    let stops = verdict
+        .judged()
+        .filter(|(of, _)| *of == Invariant::ToolStops);
+    assert!(stops.count() == 1, "the emergency stop was looked at");
+    let mut checks = RecordChecks::default();
+    for (topic, message) in messages {
+        let mut message = message.clone();
+        if topic == "/slave/ticks" {
+            let mut tick = SlaveTick::read(&message).unwrap();
+            tick.digest ^= 1;
+            message = written(&tick);
+        }
+        checks.take(topic, &message).unwrap();
+    }
+    let verdict = checks.verdict(true);
+    let broken: Vec<_> = verdict.broken().map(|(of, _)| of).collect();
+    assert_eq!(broken, [Invariant::SameBits]);
 }
 
 /// Without a hundred of its datagrams a session gives something else, and the tick is named.

@@ -21,6 +21,9 @@ pub(super) const NETEM: &str = include_str!("help/netem.txt").trim_ascii_end();
 /// Examples of `mmt replay`.
 pub(super) const REPLAY: &str = include_str!("help/replay.txt").trim_ascii_end();
 
+/// Examples of `mmt check`.
+pub(super) const CHECK: &str = include_str!("help/check.txt").trim_ascii_end();
+
 /// Examples of `mmt report`.
 pub(super) const REPORT: &str = include_str!("help/report.txt").trim_ascii_end();
 
@@ -29,6 +32,9 @@ pub(super) const EXPORT: &str = include_str!("help/export.txt").trim_ascii_end()
 
 /// Examples of `mmt reproduce`.
 pub(super) const REPRODUCE: &str = include_str!("help/reproduce.txt").trim_ascii_end();
+
+/// Examples of `mmt swarm`.
+pub(super) const SWARM: &str = include_str!("help/swarm.txt").trim_ascii_end();
 
 /// Examples of `mmt sweep`.
 pub(super) const SWEEP: &str = include_str!("help/sweep.txt").trim_ascii_end();

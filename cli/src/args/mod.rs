@@ -9,6 +9,7 @@ mod netem;
 mod plant;
 mod records;
 mod reproduce;
+mod swarm;
 mod sweep;
 mod transport;
 mod values;
@@ -40,8 +41,9 @@ pub(crate) use console::ConsoleArguments;
 pub(crate) use device::{DeviceArguments, DeviceWords};
 pub(crate) use doctor::{DoctorArguments, ManArguments};
 pub(crate) use plant::PlantArguments;
-pub(crate) use records::{ExportArguments, ReplayArguments, ReportArguments};
+pub(crate) use records::{CheckArguments, ExportArguments, ReplayArguments, ReportArguments};
 pub(crate) use reproduce::ReproduceArguments;
+pub(crate) use swarm::SwarmArguments;
 pub(crate) use sweep::SweepArguments;
 pub(crate) use transport::TransportArguments;
 pub(crate) use values::{OperatorWords, PairingWords};
@@ -73,6 +75,9 @@ pub(crate) enum Command {
     /// Replay recorded pushes of a real object, or run recorded sessions again to the same bits
     #[command(after_help = help::REPLAY)]
     Replay(Box<ReplayArguments>),
+    /// Do recorded sessions keep what is promised? The exit code is the answer
+    #[command(after_help = help::CHECK)]
+    Check(CheckArguments),
     /// The table and the figures of a recorded run
     #[command(after_help = help::REPORT)]
     Report(ReportArguments),
@@ -82,6 +87,9 @@ pub(crate) enum Command {
     /// Reproduce the paper's figures, and go beyond them, in virtual time
     #[command(after_help = help::REPRODUCE, subcommand_required = true, arg_required_else_help = true)]
     Reproduce(ReproduceArguments),
+    /// Random worlds with random faults in virtual time, judged as check judges records
+    #[command(after_help = help::SWARM)]
+    Swarm(SwarmArguments),
     /// Run any grid over configuration in virtual time: in shards, resumable, the same bytes
     #[command(after_help = help::SWEEP)]
     Sweep(SweepArguments),

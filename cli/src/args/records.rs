@@ -1,4 +1,4 @@
-//! The arguments of the commands that take what was recorded: replay, report, export.
+//! The arguments of the commands that take what was recorded: replay, check, report, export.
 
 use std::path::PathBuf;
 
@@ -40,6 +40,17 @@ pub(crate) struct ReplayArguments {
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub(crate) seed: u64,
     /// Print one JSON document instead of tables
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// Arguments of `mmt check`.
+#[derive(Debug, Args)]
+pub(crate) struct CheckArguments {
+    /// Records of one run made with --record: of a demo, of one host, or of both hosts
+    #[arg(value_name = "FILE", required = true)]
+    pub(crate) files: Vec<PathBuf>,
+    /// Print one JSON document instead of a table
     #[arg(long)]
     pub(crate) json: bool,
 }

@@ -1,6 +1,7 @@
 //! The commands, one file each: arguments to configuration to run.
 
 pub(crate) mod bench;
+pub(crate) mod check;
 mod console;
 pub(crate) mod demo;
 mod device;
@@ -15,5 +16,6 @@ pub(crate) mod replay;
 pub(crate) mod report;
 pub(crate) mod reproduce;
 pub(crate) mod slave;
+pub(crate) mod swarm;
 pub(crate) mod sweep;
 mod viewer;

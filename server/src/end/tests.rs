@@ -368,10 +368,34 @@ fn samples_that_come_after_two_seconds_of_none_move_nothing() {
 }
 
 #[test]
+fn a_hip_that_jumped_away_before_a_silence_moves_a_disengaged_tool_nowhere() {
+    // 1.9 m, which take more than three seconds
+    let hand = |ms| (ms < 1020).then(|| if ms < 1000 { -0.9 } else { 1.0 });
+    let mut disengaged_at = None;
+    let end = four_seconds(hand, |_, slave, _| {
+        if slave.is_disengaged() {
+            let x = slave.slave().tool_at().x;
+            assert_eq!(*disengaged_at.get_or_insert(x), x, "it goes on");
+        }
+    });
+    assert!(end.is_disengaged() && disengaged_at.is_some());
+}
+
+#[test]
 fn before_the_first_sample_nothing_is_disengaged() {
     let mut end = end("none", Architecture::Mmt, 0);
     (1..=4000).for_each(|ms| {
         end.tick(AT(ms));
     });
     assert!(!end.is_disengaged());
+}
+
+#[test]
+fn a_hello_far_away_starts_within_reach() {
+    let mut slave =
+        Slave::try_new(&SlaveConfig::default(), Coupling::for_stiffness(1000.0)).unwrap();
+    slave.start_at(Vec2::new(-4.0, 3.0));
+    assert!((slave.tool_at() - Vec2::new(-1.6, 1.2)).norm() < 1e-12);
+    slave.start_at(Vec2::new(-0.45, 0.0));
+    assert_eq!(slave.tool_at(), Vec2::new(-0.45, 0.0));
 }

@@ -205,6 +205,11 @@ impl Environment {
         place
     }
 
+    /// The force of a tool that stands at this place (m) on what it touches there, N.
+    pub fn force_at(&mut self, tool: Vec2) -> Vec2 {
+        self.touch(tool, Vec2::zeros()).force
+    }
+
     /// Takes another body for the one that is touched: initial conditions of tests and studies.
     ///
     /// Without such a body nothing changes.

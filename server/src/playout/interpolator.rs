@@ -24,6 +24,8 @@ pub(super) struct Aim {
     /// f_m that the master rendered there, N; none where it rendered nothing.
     pub(super) force: Option<Vec2>,
     pub(super) status: Status,
+    /// Once samples have run out: for how long the tool has had to become slower.
+    pub(super) slowing: Duration,
 }
 
 impl Aim {
@@ -33,6 +35,7 @@ impl Aim {
             hip,
             force: None,
             status: Status::Stopped,
+            slowing: Duration::ZERO,
         }
     }
 
@@ -42,6 +45,7 @@ impl Aim {
             hip: mix(a.hip.metres(), b.hip.metres()),
             force: Some(mix(a.force.newtons(), b.force.newtons())),
             status: Status::Interpolated,
+            slowing: Duration::ZERO,
         }
     }
 }
@@ -101,7 +105,13 @@ impl Interpolator {
             } else {
                 Status::Stopped
             },
+            slowing: self.slowing(since),
         }
+    }
+
+    /// For how long the tool has had to become slower, `since` after the last sample.
+    pub(super) fn slowing(&self, since: Duration) -> Duration {
+        since.saturating_sub(self.extrapolation)
     }
 
     /// Mean velocity over the last [`AVERAGE`] before a sample, m/s, within the speed limit.

@@ -33,6 +33,8 @@ pub struct Played {
     pub status: Status,
     /// Whether the speed limit holds the HIP back.
     pub limited: bool,
+    /// Whether the tool has to stand: it is held, or there are no samples and the ramp to a stop is over.
+    pub stands: bool,
 }
 
 /// What happened to samples that were not played, and how often play-out was not nominal.

@@ -6,6 +6,8 @@ use std::time::Duration;
 use mmt_shared::model::geometry::Vec2;
 use mmt_shared::time::{TICK, Time};
 
+use super::config::PlayoutConfig;
+
 /// A tick is at most this long to the speed limit: a slave that was stopped for a second must not jump.
 const TICK_MAX: Duration = Duration::from_millis(10);
 
@@ -23,6 +25,7 @@ pub(super) struct Step {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct SpeedLimiter {
     speed_max_m_per_s: f64,
+    deceleration_m_per_s2: f64,
     reach_m: f64,
     /// Where the HIP is, m; none before it is known.
     hip: Option<Vec2>,
@@ -31,10 +34,11 @@ pub(super) struct SpeedLimiter {
 }
 
 impl SpeedLimiter {
-    pub(super) fn new(speed_max_m_per_s: f64, reach_m: f64) -> Self {
+    pub(super) fn new(config: &PlayoutConfig) -> Self {
         Self {
-            speed_max_m_per_s,
-            reach_m,
+            speed_max_m_per_s: config.speed_max_m_per_s,
+            deceleration_m_per_s2: config.deceleration_m_per_s2,
+            reach_m: config.reach_m,
             hip: None,
             played: None,
         }
@@ -68,16 +72,31 @@ impl SpeedLimiter {
             .map_or(TICK, |then| now.saturating_since(then).min(TICK_MAX))
     }
 
-    /// One tick of length `elapsed` towards `aim`, m.
-    pub(super) fn step(&mut self, now: Time, elapsed: Duration, aim: Vec2) -> Step {
-        let period = elapsed.as_secs_f64();
-        let move_max = self.speed_max_m_per_s * period;
-        let beyond = aim.norm() > self.reach_m;
-        let aim = if beyond {
-            aim * (self.reach_m / aim.norm())
+    /// The place within reach that is nearest to `aim`, m.
+    pub(super) fn within_reach(&self, aim: Vec2) -> Vec2 {
+        let far = aim.norm();
+        if far > self.reach_m {
+            aim * (self.reach_m / far)
         } else {
             aim
-        };
+        }
+    }
+
+    /// One tick of length `elapsed` towards `aim`, m. Once samples have run out a HIP that is still behind becomes slower as
+    /// well, for `slowing` by now: it does not go on to a place of long ago.
+    pub(super) fn step(
+        &mut self,
+        now: Time,
+        elapsed: Duration,
+        aim: Vec2,
+        slowing: Duration,
+    ) -> Step {
+        let period = elapsed.as_secs_f64();
+        let slower = slowing.saturating_sub(elapsed).as_secs_f64() * self.deceleration_m_per_s2;
+        let move_max = (self.speed_max_m_per_s - slower).max(0.0) * period;
+        let within = self.within_reach(aim);
+        let beyond = within != aim;
+        let aim = within;
         let wanted = self.hip.map_or_else(Vec2::zeros, |from| aim - from);
         let distance = wanted.norm();
         // a hair of room, so that a motion at the limit is not held back by rounding

@@ -387,3 +387,38 @@ fn a_hip_that_is_far_away_takes_the_tool_no_farther_than_its_reach() {
     }
     assert!((most - 0.5).abs() < 1e-9, "{most} m");
 }
+
+#[test]
+fn a_hip_that_jumped_away_is_not_gone_to_once_samples_have_run_out() {
+    let config = PlayoutConfig::default();
+    let mut buffer = PlayoutBuffer::try_new(config).unwrap();
+    let (mut at, mut stood) = (Vec2::zeros(), None);
+    for k in 0..2000_u64 {
+        let now = Time::from_millis(k);
+        if k < 500 {
+            let x = if k < 400 { 0.0 } else { 1.5 };
+            buffer.push(
+                now,
+                &HipSample {
+                    stamp: stamp(k),
+                    hip: HipCounts::nearest(Vec2::new(x, 0.0)),
+                    ..HipSample::default()
+                },
+            );
+        }
+        let Some(played) = buffer.advance(now) else {
+            continue;
+        };
+        let way = (played.hip - at).norm();
+        assert!(way <= 0.6e-3 + 1e-9, "{way} m at {k} ms");
+        // 16 ms of delay, 30 ms on, 60 ms from 0.6 m/s to a stop
+        if way > 0.0 {
+            assert!(k <= 500 + 16 + 30 + 60 + 2, "it goes on at {k} ms");
+        } else if k > 500 {
+            stood.get_or_insert(k);
+            assert!(played.stands, "{k} ms");
+        }
+        at = played.hip;
+    }
+    assert!(stood.is_some() && at.x > 0.05 && at.x < 0.15, "{at}");
+}

@@ -68,6 +68,11 @@ impl Slave {
         slave.start = ModelState::nearest(params, footprint, pose, Twist::default(), &coupling)?;
         slave.shadow = Shadow::new(slave.settings, slave.start);
         slave.place_tool(memory.tool);
+        // what a plant's tool touches the plant will say
+        if slave.contact.plant_mut().linked_mut().is_none() {
+            let force = slave.environment_mut().force_at(memory.tool);
+            slave.tool.begin_at(memory.tool, force);
+        }
         Ok(slave)
     }
 
@@ -82,8 +87,10 @@ impl Slave {
         }
     }
 
-    /// Puts a simulated tool, which is nowhere yet, to `hip` (m), or, if that is inside of a body, in front of it.
+    /// Puts a simulated tool, which is nowhere yet, to `hip` (m), or as near as its reach allows; if that is inside of a
+    /// body, in front of it.
     pub fn start_at(&mut self, hip: Vec2) {
+        let hip = self.playout.within_reach(hip);
         let place = self.environment_mut().free_place(hip);
         self.place_tool(place);
     }

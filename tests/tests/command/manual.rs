@@ -2,15 +2,17 @@
 
 use super::mmt;
 
-const COMMANDS: [&str; 12] = [
+const COMMANDS: [&str; 14] = [
     "demo",
     "slave",
     "master",
     "netem",
     "replay",
+    "check",
     "report",
     "export",
     "reproduce",
+    "swarm",
     "sweep",
     "doctor",
     "completions",

@@ -125,7 +125,8 @@ fn what_if(arguments: &ReplayArguments, otherwise: &Otherwise) -> Result<(), Fai
 fn again(path: &Path) -> Result<Record, Error> {
     let mut sessions = SessionsAgain::default();
     let ended = read(path, |topic, message| -> Result<(), Error> {
-        Ok(sessions.take(topic, message)?)
+        sessions.take(topic, message)?;
+        Ok(())
     })?;
     let ran = sessions.ran().map(|(side, session, ran)| {
         let RanAgain {

@@ -62,10 +62,10 @@ impl ModelState {
     }
 
     /// The state nearest to these numbers that [`ModelState::try_new`] accepts: an object that has left the workspace
-    /// is at its edge.
+    /// is at its edge, and an inertia that is too small for these faces is the least that is stable.
     ///
     /// # Errors
-    /// Names the first number that is not a number, or the inertia if it is too small for these faces.
+    /// Names the first number that is not a number.
     pub fn nearest(
         params: ModelParams,
         footprint: BoxFootprint,
@@ -98,6 +98,7 @@ impl ModelState {
             within(twist.linear.y, VELOCITY_M_PER_S),
             within(twist.angular, RATE_RAD_PER_S),
         );
+        let params = params.steadied(&footprint, coupling);
         Self::try_new(params, footprint, pose, twist, coupling)
     }
 

@@ -90,3 +90,14 @@ fn the_nearest_state_is_the_same_within_the_ranges_and_on_their_edge_beyond() {
     );
     assert!(none.is_err());
 }
+
+#[test]
+fn an_inertia_that_is_too_small_for_the_faces_that_were_found_is_the_least_that_is_stable() {
+    let params = ModelParams::try_new(0.1, 0.0, 0.4, 4e-4, 0.02, &COUPLING).unwrap();
+    let (faces, pose) = (BoxFootprint::square(0.6), Pose::default());
+    let exact = ModelState::try_new(params, faces, pose, Twist::default(), &COUPLING);
+    assert!(matches!(exact, Err(ParamsError::Unstable { .. })));
+    let state = ModelState::nearest(params, faces, pose, Twist::default(), &COUPLING).unwrap();
+    let least = least_stable_inertia(&faces, &COUPLING);
+    assert_eq!(state.params().to_array(), [0.1, 0.0, 0.4, least, 0.02]);
+}

@@ -1,0 +1,138 @@
+//! `mmt swarm`: random worlds with random faults in virtual time, judged as `mmt check` judges records.
+
+use mmt_lab::check::Verdict;
+use mmt_lab::io::{Repeated, swarm_of};
+use mmt_lab::swarm::Swarmed;
+use serde::Serialize;
+
+use super::check::{Row, rows, show_rows};
+use crate::args::SwarmArguments;
+use crate::failure::Failure;
+use crate::output::{print, print_json};
+use crate::progress::Bar;
+
+#[derive(Debug, Serialize)]
+struct Document {
+    version: &'static str,
+    command: &'static str,
+    seeds: usize,
+    duration_s: f64,
+    sessions: u64,
+    faults: usize,
+    /// Seeds that were run twice.
+    repeated: usize,
+    holds: bool,
+    failed: Vec<Failed>,
+    invariants: Vec<Row>,
+}
+
+/// A seed in which something broke.
+#[derive(Debug, Serialize)]
+struct Failed {
+    seed: u64,
+    /// What runs it again.
+    again: String,
+    what: Vec<String>,
+}
+
+/// Runs `mmt swarm`.
+///
+/// # Errors
+/// Something that is promised did not hold, or two runs of one seed differ; stdout cannot be written to.
+pub(crate) fn run(arguments: &SwarmArguments) -> Result<(), Failure> {
+    let all = || (arguments.first..).take(usize::try_from(arguments.seeds).unwrap_or(usize::MAX));
+    let seeds: Vec<u64> = arguments
+        .seed
+        .map_or_else(|| all().collect(), |seed| vec![seed]);
+    let bar = Bar::new();
+    let progress = |what: &str, done, whole| bar.show(what, done, whole);
+    let ran = swarm_of(&seeds, arguments.duration, arguments.jobs, &progress);
+    bar.clear();
+    let ran = ran.map_err(|error| Failure::failed(format!("a random world is none: {error}")))?;
+    let document = document(arguments, &ran);
+    if arguments.json {
+        print_json(&document)?;
+    } else {
+        show(arguments, &document, &ran)?;
+    }
+    if document.holds {
+        return Ok(());
+    }
+    let what = format!(
+        "{} of {} seeds broke a promise",
+        document.failed.len(),
+        document.seeds
+    );
+    Err(Failure::failed(what).remedy("run a seed again with the command that is printed for it"))
+}
+
+fn document(arguments: &SwarmArguments, ran: &[Repeated]) -> Document {
+    let mut sum = Verdict::default();
+    ran.iter()
+        .for_each(|one| sum.add(one.swarmed.verdict.clone()));
+    let failed: Vec<_> = ran
+        .iter()
+        .filter_map(|one| failed(arguments, one))
+        .collect();
+    Document {
+        version: env!("CARGO_PKG_VERSION"),
+        command: "swarm",
+        seeds: ran.len(),
+        duration_s: arguments.duration.as_secs_f64(),
+        sessions: ran.iter().map(|one| one.swarmed.sessions).sum(),
+        faults: ran.iter().map(|one| one.swarmed.faults.len()).sum(),
+        repeated: ran.iter().filter(|one| one.same.is_some()).count(),
+        holds: failed.is_empty(),
+        failed,
+        invariants: rows(&sum),
+    }
+}
+
+fn failed(arguments: &SwarmArguments, one: &Repeated) -> Option<Failed> {
+    let Repeated { swarmed, same } = one;
+    let broken = swarmed.verdict.broken();
+    let mut what: Vec<String> = broken
+        .map(|(of, first)| {
+            format!(
+                "{of} at {:.3} s of its session: {}",
+                first.at_s, first.values
+            )
+        })
+        .collect();
+    if *same == Some(false) {
+        what.push("two runs of this seed differ".to_owned());
+    }
+    let (seed, seconds) = (swarmed.seed, arguments.duration.as_secs_f64());
+    let again = format!("mmt swarm --seed {seed} --duration {seconds}s");
+    (!what.is_empty()).then_some(Failed { seed, again, what })
+}
+
+fn show(arguments: &SwarmArguments, document: &Document, ran: &[Repeated]) -> Result<(), Failure> {
+    if let (Some(_), [one]) = (arguments.seed, ran) {
+        show_faults(&one.swarmed)?;
+    }
+    for Failed { again, what, .. } in &document.failed {
+        print(again)?;
+        what.iter()
+            .try_for_each(|what| print(format_args!("  BROKEN {what}")))?;
+    }
+    let Document {
+        seeds,
+        duration_s,
+        sessions,
+        faults,
+        repeated,
+        ..
+    } = document;
+    print(format_args!(
+        "{seeds} seeds of {duration_s} s: {sessions} sessions, {faults} faults, {repeated} seeds run twice"
+    ))?;
+    show_rows(&document.invariants)
+}
+
+fn show_faults(swarmed: &Swarmed) -> Result<(), Failure> {
+    for fault in &swarmed.faults {
+        print(fault)?;
+    }
+    print(format_args!("digest {:016x}", swarmed.digest))
+}

@@ -1,0 +1,78 @@
+//! Random worlds: what the recommended scheme comes to where nothing is as it expects, and the worst worlds by number.
+//!
+//! What the hand can move is judged by force, the rest by pose, sign and energy.
+
+mod run;
+mod tables;
+
+use crate::experiment::prelude::*;
+use crate::worlds::RandomWorld;
+use run::{Measured as Reached, reach};
+
+/// The worlds.
+pub(super) const EXPERIMENT: Experiment = Experiment {
+    arguments: &[
+        Argument {
+            name: "world",
+            help: "Only the world of this number",
+            number: Some(("N", 0.0)),
+        },
+        Argument {
+            name: "stiff-tool",
+            help: "With a tool that does not give",
+            number: None,
+        },
+    ],
+    duration: Duration::from_secs(20),
+    in_all: false,
+    ..Experiment::new(
+        "worlds",
+        "Random worlds by one documented distribution: force error, packets, pose, energy, and the worst ten",
+        1000,
+        run,
+    )
+};
+
+/// A world and what came of it.
+struct Row {
+    world: RandomWorld,
+    reached: Reached,
+}
+
+/// Keeps `worlds.csv` and `worlds.svg`.
+fn run(runner: &Runner, request: &Request) -> Result<Findings, ExperimentError> {
+    let extent = request.extent;
+    let one = request.number("world").filter(|number| *number >= 1.0);
+    let (seeds, first) = one.map_or((extent.seeds, 1), |number| (1, number as u64));
+    let groups = runner.grid("worlds", seeds, vec![first], |first, seed| {
+        let mut world = RandomWorld::new(first + seed - 1);
+        if request.flag("stiff-tool") {
+            world.config.slave.tool_compliance = None;
+        }
+        let reached = reach(&world.config, extent.duration)?;
+        Ok(Row { world, reached })
+    })?;
+    let rows: Vec<Row> = groups.into_iter().flat_map(|group| group.runs).collect();
+    let all = Table::of("Random worlds", &rows, &tables::columns());
+    runner.keep_table("worlds.csv", &all)?;
+    let digests = rows.iter().map(|row| row.reached.digest.as_str());
+    let digest = crate::digest::of_runs(digests);
+    if one.is_some() {
+        let tables = vec![all];
+        return Ok(Findings {
+            digest,
+            tables,
+            ..Findings::default()
+        });
+    }
+    runner.keep_figure("worlds.svg", &tables::figure(&rows))?;
+    Ok(Findings {
+        digest,
+        tables: vec![
+            tables::distribution(&rows, extent),
+            tables::targets(&rows),
+            tables::worst(&rows),
+        ],
+        ..Findings::default()
+    })
+}

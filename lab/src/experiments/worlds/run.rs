@@ -1,0 +1,155 @@
+//! One random world, run and measured.
+
+use std::collections::VecDeque;
+use std::time::Duration;
+
+use mmt_shared::model::geometry::Vec2;
+use mmt_shared::time::TICK_S;
+
+use crate::experiment::findings::ExperimentError;
+use crate::trial::TrialError;
+use crate::world::{World, WorldConfig, WorldTick};
+
+/// What a round trip takes besides the path: packing, play-out, a tick each, s.
+const WORKING_S: f64 = 0.05;
+/// Beyond the hand's way in a round trip the pose is off by no more than this, m.
+const POSE_M: f64 = 0.1;
+/// The tool may give as much more than the hand gave as it takes to press with its limit over the hand's way in a round trip.
+const PRESS_N: f64 = 15.0;
+/// Below this a force has no direction, N.
+const LEAST_N: f64 = 0.5;
+/// And this share of the hand's work.
+const WORK_SHARE: f64 = 0.25;
+
+/// What a world came to.
+pub(super) struct Measured {
+    /// Relative error of f_m against the true force; none without contact.
+    pub(super) relative_error: Option<f64>,
+    /// The same against the measured force.
+    pub(super) measured_error: Option<f64>,
+    pub(super) packets_hz: Option<f64>,
+    pub(super) contact_s: f64,
+    pub(super) pushes: u64,
+    pub(super) breaks_per_push: Option<f64>,
+    /// Of the model's place, m.
+    pub(super) pose_rms_m: Option<f64>,
+    pub(super) pose_max_m: f64,
+    /// The most by which the pose was off beyond 0.1 m and the hand's way in a round trip, m; at most 0 if it never was.
+    pub(super) pose_excess_m: f64,
+    /// Energy that updates added to the model and nothing paid, J.
+    pub(super) injected_j: f64,
+    /// The most by which the tool's work on the object exceeded the hand's work and the budget, J.
+    pub(super) work_excess_j: f64,
+    /// Share of the time in contact at both ends in which f_m opposes the true force.
+    pub(super) opposed_share: Option<f64>,
+    pub(super) force_peak_n: Option<f64>,
+    /// Invariants of `mmt check` that did not hold.
+    pub(super) broken: String,
+    pub(super) digest: String,
+}
+
+/// Runs a world.
+pub(super) fn reach(config: &WorldConfig, duration: Duration) -> Result<Measured, ExperimentError> {
+    let mut world = World::try_new(config).map_err(TrialError::from)?.judged();
+    let path_s = (config.up.delay.middle() + config.down.delay.middle()).as_secs_f64();
+    let mut seen = Seen::new(path_s + WORKING_S);
+    for _ in 0..duration.as_millis() {
+        let tick = world.step();
+        seen.take(&world, &tick);
+    }
+    let (outcome, truth) = (world.outcome(), world.slave().true_force());
+    let pushes = world.operator().pushes_completed().unwrap_or_default();
+    let verdict = world.verdict().unwrap_or_default();
+    let broken: Vec<&str> = verdict.broken().map(|(of, _)| of.name()).collect();
+    Ok(Measured {
+        relative_error: truth.relative_error_true.get(),
+        measured_error: world.force().relative_error,
+        packets_hz: outcome.updates.rate_hz(),
+        contact_s: outcome.updates.contact_s(),
+        pushes,
+        breaks_per_push: outcome.breaks.per_push(pushes),
+        pose_rms_m: outcome.pose.position_rms_m(),
+        pose_max_m: outcome.pose.position_max_m().unwrap_or_default(),
+        pose_excess_m: seen.pose_excess_m,
+        injected_j: outcome.energy_injected_j,
+        work_excess_j: seen.work_excess_j,
+        opposed_share: seen.opposed_share(),
+        force_peak_n: outcome.on_hand.largest_n(),
+        broken: broken.join(" "),
+        digest: world.digest(),
+    })
+}
+
+/// What is summed up tick by tick.
+struct Seen {
+    /// Ways of the HIP of the last round trip, m a tick, and their sum.
+    ways: VecDeque<f64>,
+    way_m: f64,
+    round_trip_ticks: usize,
+    hip: Option<Vec2>,
+    tool: Option<Vec2>,
+    /// Work of the tool on the object, J.
+    tool_j: f64,
+    /// The hand's way in a round trip at its longest, m.
+    way_max_m: f64,
+    pose_excess_m: f64,
+    work_excess_j: f64,
+    opposed_ticks: u64,
+    paired_ticks: u64,
+}
+
+impl Seen {
+    fn new(round_trip_s: f64) -> Self {
+        Self {
+            ways: VecDeque::new(),
+            way_m: 0.0,
+            round_trip_ticks: (round_trip_s / TICK_S) as usize,
+            hip: None,
+            tool: None,
+            tool_j: 0.0,
+            way_max_m: 0.0,
+            pose_excess_m: -POSE_M,
+            work_excess_j: 0.0,
+            opposed_ticks: 0,
+            paired_ticks: 0,
+        }
+    }
+
+    fn take(&mut self, world: &World, tick: &WorldTick) {
+        let hip = tick.master.sample.hip.metres();
+        let way = self
+            .hip
+            .replace(hip)
+            .map_or(0.0, |before| (hip - before).norm());
+        self.ways.push_back(way);
+        self.way_m += way;
+        while self.ways.len() > self.round_trip_ticks {
+            self.way_m -= self.ways.pop_front().unwrap_or_default();
+        }
+        self.way_max_m = self.way_max_m.max(self.way_m);
+        let Some(slave) = &tick.slave else {
+            return;
+        };
+        let before = self.tool.replace(slave.tool).unwrap_or(slave.tool);
+        self.tool_j += slave.true_force.dot(&(slave.tool - before));
+        let hand_j = world.master().port().energy_j();
+        let budget_j = WORK_SHARE * hand_j.max(0.0) + PRESS_N * self.way_max_m;
+        self.work_excess_j = self.work_excess_j.max(self.tool_j - hand_j - budget_j);
+        if let Some(then) = world.master().model().history().at(slave.stamp) {
+            let off = (then.motion.pose.position - slave.truth.position).norm();
+            self.pose_excess_m = self.pose_excess_m.max(off - POSE_M - self.way_m);
+        }
+        let paired = slave
+            .f_m
+            .filter(|f_m| f_m.norm().min(slave.true_force.norm()) > LEAST_N);
+        if let Some(f_m) = paired {
+            self.paired_ticks += 1;
+            self.opposed_ticks += u64::from(f_m.dot(&slave.true_force) < 0.0);
+        }
+    }
+
+    fn opposed_share(&self) -> Option<f64> {
+        let share = self.opposed_ticks as f64 / self.paired_ticks as f64;
+        (self.paired_ticks > 0).then_some(share)
+    }
+}
