@@ -78,7 +78,7 @@ invariants! {
     /// Acknowledgements.
     Acknowledged "acknowledged" "a command acknowledges the newest accepted update and nothing else";
     /// The samples sent.
-    SamplesTrue "samples-true" "a command's samples are those of the ticks: HIP as read, force as rendered";
+    SamplesTrue "samples-true" "a command's samples are those of the ticks: HIP as used, force as rendered";
     /// Numbers and stamps.
     Numbers "numbers" "datagrams are numbered one by one, stamped with when they leave, and carry the sender's emergency stop";
     /// Echoes.
