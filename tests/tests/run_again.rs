@@ -84,14 +84,14 @@ async fn session(architecture: Architecture, path: &Path) {
         truth: None,
         emergency: emergency.clone(),
     };
-    tokio::spawn(async move {
-        tokio::time::sleep(DURATION / 2).await;
-        emergency.set(true);
-        tokio::time::sleep(DURATION / 8).await;
-        emergency.set(false);
-    });
     let (_stop, stopped) = watch::channel(false);
-    let (live, _shown) = watch::channel(MasterLive::default());
+    let (live, mut shown) = watch::channel(MasterLive::default());
+    tokio::spawn(async move {
+        for (from_s, stops) in [(2.0, true), (2.5, false)] {
+            let _ = shown.wait_for(|live| live.elapsed_s >= from_s).await;
+            emergency.set(stops);
+        }
+    });
     let served =
         tokio::spawn(host.run(stopped.clone(), Arc::<watch::Sender<SlaveLive>>::default()));
     mmt_client::io::run(options, stopped, live).await.unwrap();

@@ -6,6 +6,7 @@ use std::time::Duration;
 
 use mmt_server::end::{SlaveEnd, SlaveGiven};
 use mmt_server::slave::{SlaveConfig, SlaveTick};
+use mmt_server::trigger::MismatchMetric;
 use mmt_shared::model::contact::Coupling;
 use mmt_shared::model::geometry::Vec2;
 use mmt_shared::model::sample::ForceCounts;
@@ -312,10 +313,13 @@ impl SlaveChecks {
             .any(|(.., cause)| *cause == update.cause);
         // a touch of another body shows the master that body, also after the touch
         let lone = self.about.config.scene.bodies.len() < 2;
+        let metric = self.about.config.trigger.metric;
         let fits = !lone
             || match update.cause {
                 Cause::MasterOnlyContact | Cause::ContactLost => !touches,
-                Cause::SlaveOnlyContact | Cause::Deadband => touches,
+                Cause::SlaveOnlyContact => touches,
+                // parameters and pose can differ in free space
+                Cause::Deadband => touches || metric != MismatchMetric::Force,
                 Cause::Timer | Cause::EverySample => true,
             };
         let holds =
