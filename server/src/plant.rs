@@ -1,6 +1,6 @@
 //! What the tool meets: the simulated world, or a plant of somebody else's behind the object's plug.
 //!
-//! Both are met through [`Plant::meet`]: the tool's place in, what was measured out. Pure: a plant that is plugged in gives its
+//! Both are met through `Plant::meet`: the tool's place in, what was measured out. Pure: a plant that is plugged in gives its
 //! answers as inputs ([`PlantAnswer`]) and takes commands as outputs ([`PlantCommand`]), so that a session with it runs again
 //! from its record. Its answer to a command counts in the next tick.
 
