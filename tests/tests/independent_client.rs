@@ -70,29 +70,30 @@ fn altered(pairing: &str, key: &str) -> String {
 
 #[test]
 fn a_master_that_knows_only_the_document_pushes_the_box_of_the_real_slave() {
-    let _turn = alone();
-    let test = "the session of the independent client";
-    let Some(python) = python(test, "aioquic") else {
-        return;
-    };
-    let place = tempfile::tempdir().unwrap();
-    let (capture, keys) = (place.path().join("session.pcap"), place.path().join("keys"));
-    let (slave, pairing) = slave(place.path());
-    let options = [
-        "--capture",
-        capture.to_str().unwrap(),
-        "--keys",
-        keys.to_str().unwrap(),
-    ];
-    let client = said(&client(&python, &pairing, &options), 0);
-    let slave = ok(slave.end(GENEROUS));
-    assert_eq!(slave.status.code(), Some(0), "{}", slave.err);
-    let slave = ok(slave.document(1));
-    assert_eq!(client.pointer("/outcome"), Some(&json!("finished")));
-    assert_eq!(slave.pointer("/ending"), Some(&json!("finished")));
-    it_pushed(&client);
-    both_counted_the_same(&client, &slave);
-    the_dissector_shows_it(test, &client, &capture, &keys, &pairing);
+    alone(|| {
+        let test = "the session of the independent client";
+        let Some(python) = python(test, "aioquic") else {
+            return;
+        };
+        let place = tempfile::tempdir().unwrap();
+        let (capture, keys) = (place.path().join("session.pcap"), place.path().join("keys"));
+        let (slave, pairing) = slave(place.path());
+        let options = [
+            "--capture",
+            capture.to_str().unwrap(),
+            "--keys",
+            keys.to_str().unwrap(),
+        ];
+        let client = said(&client(&python, &pairing, &options), 0);
+        let slave = ok(slave.end(GENEROUS));
+        assert_eq!(slave.status.code(), Some(0), "{}", slave.err);
+        let slave = ok(slave.document(1));
+        assert_eq!(client.pointer("/outcome"), Some(&json!("finished")));
+        assert_eq!(slave.pointer("/ending"), Some(&json!("finished")));
+        it_pushed(&client);
+        both_counted_the_same(&client, &slave);
+        the_dissector_shows_it(test, &client, &capture, &keys, &pairing);
+    });
 }
 
 /// Contact came and went, updates told so, and what they told is what the object is.
@@ -190,30 +191,31 @@ fn the_dissector_shows_it(test: &str, client: &Value, capture: &Path, keys: &Pat
 
 #[test]
 fn who_has_another_pin_or_token_or_version_gets_no_session() {
-    let _turn = alone();
-    let Some(python) = python("the refusals of the independent client", "aioquic") else {
-        return;
-    };
-    let place = tempfile::tempdir().unwrap();
-    let (slave, pairing) = slave(place.path());
-    let refused = said(&client(&python, &altered(&pairing, "token"), &[]), REFUSED);
-    assert_eq!(
-        refused,
-        json!({ "outcome": "refused", "refusal": "wrong_token" })
-    );
-    let other = said(&client(&python, &altered(&pairing, "pin"), &[]), WRONG_PIN);
-    assert_eq!(other.pointer("/outcome"), Some(&json!("wrong_pin")));
-    let offered = other.pointer("/offered").and_then(Value::as_str).unwrap();
-    assert!(pairing.contains(&format!("pin={offered}")), "{offered}");
-    let none = said(
-        &client(&python, &pairing, &["--alpn", "mmt/2"]),
-        NO_PROTOCOL,
-    );
-    assert_eq!(none.pointer("/code"), Some(&json!(0x178)));
-    ok(slave.interrupt());
-    let slave = ok(slave.end(GENEROUS));
-    assert!(!slave.err.contains("panicked"), "{}", slave.err);
-    for what in ["WrongToken", "no handshake with"] {
-        assert!(slave.err.contains(what), "{what}: {}", slave.err);
-    }
+    alone(|| {
+        let Some(python) = python("the refusals of the independent client", "aioquic") else {
+            return;
+        };
+        let place = tempfile::tempdir().unwrap();
+        let (slave, pairing) = slave(place.path());
+        let refused = said(&client(&python, &altered(&pairing, "token"), &[]), REFUSED);
+        assert_eq!(
+            refused,
+            json!({ "outcome": "refused", "refusal": "wrong_token" })
+        );
+        let other = said(&client(&python, &altered(&pairing, "pin"), &[]), WRONG_PIN);
+        assert_eq!(other.pointer("/outcome"), Some(&json!("wrong_pin")));
+        let offered = other.pointer("/offered").and_then(Value::as_str).unwrap();
+        assert!(pairing.contains(&format!("pin={offered}")), "{offered}");
+        let none = said(
+            &client(&python, &pairing, &["--alpn", "mmt/2"]),
+            NO_PROTOCOL,
+        );
+        assert_eq!(none.pointer("/code"), Some(&json!(0x178)));
+        ok(slave.interrupt());
+        let slave = ok(slave.end(GENEROUS));
+        assert!(!slave.err.contains("panicked"), "{}", slave.err);
+        for what in ["WrongToken", "no handshake with"] {
+            assert!(slave.err.contains(what), "{what}: {}", slave.err);
+        }
+    });
 }

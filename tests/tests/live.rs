@@ -65,55 +65,46 @@ fn nothing_is_nan(value: &Value, path: &str) {
     }
 }
 
-/// A demo that this host let run: one that stands still for a second ends a session, as it must.
-fn undisturbed(arguments: &[&str]) -> Ended {
-    let demo = || ok(ok(Running::mmt(arguments)).end(Duration::from_secs(90)));
-    let stood_still = |ended: &Ended| ended.err.contains("for 1 s nothing came");
-    let ended = demo();
-    if stood_still(&ended) {
-        return demo();
-    }
-    ended
-}
-
 #[test]
 fn the_demonstration_ends_with_a_report_whose_numbers_belong_together() {
-    let _turn = alone();
-    let arguments = ["demo", "--duration", "15s", "--seed", "1", "--json"];
-    let ended = undisturbed(&arguments);
-    ended_with(0, &ended);
-    let report = ok(ended.document(0));
-    nothing_is_nan(&report, "");
-    assert_eq!(ending(&report), "finished");
-    let get = |path: &str| {
-        let found = number(&report, path);
-        found.unwrap_or_else(|| panic!("{path} is {:?}", report.pointer(path)))
-    };
-    assert_eq!((get("/seed"), get("/model/mass_kg/truth")), (1.0, 0.7));
-    counts_belong_together(&report, get);
-    forces_obey_their_limits_and_definitions(get);
-    // 45 to 55 ms each way, more on a busy host; the histogram's classes are a percent wide
-    let round_trip = get("/link/rtt_ms/p50");
-    assert!(round_trip > 89.0, "{round_trip} ms");
-    // packing and twice 5 ms of jitter at least
-    assert!(get("/link/playout_delay_ms/p50") >= 20.0);
-    for (way, kinds) in [
-        ("up", &["commands", "heartbeats"][..]),
-        ("down", &["updates", "scenes", "heartbeats"][..]),
-    ] {
-        let kinds = kinds.iter().map(|kind| format!("/messages/{way}/{kind}"));
-        let sent: f64 = kinds.map(|path| get(&path)).sum();
-        let lost = get(&format!("/link/loss_{way}")) * sent;
-        assert!(is_by_chance(lost, sent, 0.01), "{way}: {lost} of {sent}");
-    }
-    for path in [
-        "/haptic_loop/cpu_us",
-        "/haptic_loop/lateness_us",
-        "/slave_loop/cpu_us",
-    ] {
-        let [p50, p99, p999] = ["p50", "p99", "p999"].map(|name| get(&format!("{path}/{name}")));
-        assert!(p50 <= p99 && p99 <= p999, "{path}: {p50} {p99} {p999}");
-    }
+    alone(|| {
+        let arguments = ["demo", "--duration", "15s", "--seed", "1", "--json"];
+        let ended = ok(ok(Running::mmt(&arguments)).end(Duration::from_secs(90)));
+        ended_with(0, &ended);
+        let report = ok(ended.document(0));
+        nothing_is_nan(&report, "");
+        assert_eq!(ending(&report), "finished");
+        let get = |path: &str| {
+            let found = number(&report, path);
+            found.unwrap_or_else(|| panic!("{path} is {:?}", report.pointer(path)))
+        };
+        assert_eq!((get("/seed"), get("/model/mass_kg/truth")), (1.0, 0.7));
+        counts_belong_together(&report, get);
+        forces_obey_their_limits_and_definitions(get);
+        // 45 to 55 ms each way, more on a busy host; the histogram's classes are a percent wide
+        let round_trip = get("/link/rtt_ms/p50");
+        assert!(round_trip > 89.0, "{round_trip} ms");
+        // packing and twice 5 ms of jitter at least
+        assert!(get("/link/playout_delay_ms/p50") >= 20.0);
+        for (way, kinds) in [
+            ("up", &["commands", "heartbeats"][..]),
+            ("down", &["updates", "scenes", "heartbeats"][..]),
+        ] {
+            let kinds = kinds.iter().map(|kind| format!("/messages/{way}/{kind}"));
+            let sent: f64 = kinds.map(|path| get(&path)).sum();
+            let lost = get(&format!("/link/loss_{way}")) * sent;
+            assert!(is_by_chance(lost, sent, 0.01), "{way}: {lost} of {sent}");
+        }
+        for path in [
+            "/haptic_loop/cpu_us",
+            "/haptic_loop/lateness_us",
+            "/slave_loop/cpu_us",
+        ] {
+            let [p50, p99, p999] =
+                ["p50", "p99", "p999"].map(|name| get(&format!("{path}/{name}")));
+            assert!(p50 <= p99 && p99 <= p999, "{path}: {p50} {p99} {p999}");
+        }
+    });
 }
 
 /// What is counted in two places, or twice in one, is the same.
@@ -171,154 +162,161 @@ fn forces_obey_their_limits_and_definitions(get: impl Fn(&str) -> f64) {
 
 #[test]
 fn with_tdpa_the_hand_feels_the_tool_from_the_first_sample() {
-    let _turn = alone();
-    let tdpa = ["demo", "--architecture", "tdpa", "--duration", "12s"];
-    let arguments = [&tdpa[..], &["--netem", "delay 2ms", "--json"]].concat();
-    let ended = undisturbed(&arguments);
-    ended_with(0, &ended);
-    let report = ok(ended.document(0));
-    nothing_is_nan(&report, "");
-    let name = report.pointer("/architecture/name").and_then(Value::as_str);
-    assert_eq!(name, Some("tdpa"));
-    let get = |path: &str| {
-        let value = number(&report, path);
-        value.unwrap_or_else(|| panic!("{path} is {:?}", report.pointer(path)))
-    };
-    let (haptic, slave) = (get("/haptic_loop/ticks"), get("/slave_loop/ticks"));
-    for (path, least, most) in [
-        // both ways and the play-out
-        ("/architecture/round_trip_ms", 4.0, f64::INFINITY),
-        // each tick at most, fewer on a busy host
-        ("/messages/up/commands", 1.0, haptic),
-        ("/messages/down/tools", 1.0, slave),
-        // what TDPA keeps back is 2 mJ
-        ("/passivity/observer_min_j", -2e-3, 0.0),
-        ("/passivity/energy_injected_j", 0.0, 1e-9),
-        ("/pushes/completed", 0.0, 2.0),
-    ] {
-        let value = get(path);
-        assert!(
-            (least..=most).contains(&value),
-            "{path} is {value}, not {least} to {most}"
-        );
-    }
+    alone(|| {
+        let tdpa = ["demo", "--architecture", "tdpa", "--duration", "12s"];
+        let arguments = [&tdpa[..], &["--netem", "delay 2ms", "--json"]].concat();
+        let ended = ok(ok(Running::mmt(&arguments)).end(Duration::from_secs(90)));
+        ended_with(0, &ended);
+        let report = ok(ended.document(0));
+        nothing_is_nan(&report, "");
+        let name = report.pointer("/architecture/name").and_then(Value::as_str);
+        assert_eq!(name, Some("tdpa"));
+        let get = |path: &str| {
+            let value = number(&report, path);
+            value.unwrap_or_else(|| panic!("{path} is {:?}", report.pointer(path)))
+        };
+        let (haptic, slave) = (get("/haptic_loop/ticks"), get("/slave_loop/ticks"));
+        for (path, least, most) in [
+            // both ways and the play-out
+            ("/architecture/round_trip_ms", 4.0, f64::INFINITY),
+            // each tick at most, fewer on a busy host
+            ("/messages/up/commands", 1.0, haptic),
+            ("/messages/down/tools", 1.0, slave),
+            // what TDPA keeps back is 2 mJ
+            ("/passivity/observer_min_j", -2e-3, 0.0),
+            ("/passivity/energy_injected_j", 0.0, 1e-9),
+            ("/pushes/completed", 0.0, 2.0),
+        ] {
+            let value = get(path);
+            assert!(
+                (least..=most).contains(&value),
+                "{path} is {value}, not {least} to {most}"
+            );
+        }
+    });
 }
 
 #[test]
 fn the_master_that_is_interrupted_ends_both_sides_with_their_reports() {
-    let _turn = alone();
-    let (slave, pairing) = slave(&["--once"]);
-    let master = master(&pairing, "60s");
-    std::thread::sleep(Duration::from_secs(10));
-    ok(master.interrupt());
-    let (master, slave) = (ok(master.end(SOON)), ok(slave.end(SOON)));
-    for (ended, skip) in [(&master, 0), (&slave, 1)] {
-        ended_with(0, ended);
-        let report = ok(ended.document(skip));
-        assert_eq!(ending(&report), "interrupted", "{}", ended.err);
-        let error = number(&report, "/force/relative_error");
-        assert!(error > Some(0.0), "{error:?}: {}", ended.err);
-    }
+    alone(|| {
+        let (slave, pairing) = slave(&["--once"]);
+        let master = master(&pairing, "60s");
+        std::thread::sleep(Duration::from_secs(10));
+        ok(master.interrupt());
+        let (master, slave) = (ok(master.end(SOON)), ok(slave.end(SOON)));
+        for (ended, skip) in [(&master, 0), (&slave, 1)] {
+            ended_with(0, ended);
+            let report = ok(ended.document(skip));
+            assert_eq!(ending(&report), "interrupted", "{}", ended.err);
+            let error = number(&report, "/force/relative_error");
+            assert!(error > Some(0.0), "{error:?}: {}", ended.err);
+        }
+    });
 }
 
 #[test]
 fn the_slave_that_is_interrupted_ends_both_sides_with_their_reports() {
-    let _turn = alone();
-    let (slave, pairing) = slave(&[]);
-    let master = master(&pairing, "60s");
-    std::thread::sleep(Duration::from_secs(3));
-    ok(slave.interrupt());
-    let (master, slave) = (ok(master.end(SOON)), ok(slave.end(SOON)));
-    for (ended, skip) in [(&master, 0), (&slave, 1)] {
-        ended_with(0, ended);
-        let report = ok(ended.document(skip));
-        assert_eq!(ending(&report), "interrupted", "{}", ended.err);
-        let datagrams = number(&report, "/wire/up/datagrams");
-        assert!(datagrams > Some(10.0), "{datagrams:?}: {}", ended.err);
-    }
+    alone(|| {
+        let (slave, pairing) = slave(&[]);
+        let master = master(&pairing, "60s");
+        std::thread::sleep(Duration::from_secs(3));
+        ok(slave.interrupt());
+        let (master, slave) = (ok(master.end(SOON)), ok(slave.end(SOON)));
+        for (ended, skip) in [(&master, 0), (&slave, 1)] {
+            ended_with(0, ended);
+            let report = ok(ended.document(skip));
+            assert_eq!(ending(&report), "interrupted", "{}", ended.err);
+            let datagrams = number(&report, "/wire/up/datagrams");
+            assert!(datagrams > Some(10.0), "{datagrams:?}: {}", ended.err);
+        }
+    });
 }
 
 #[test]
 fn an_emergency_stop_of_either_side_is_shown_on_both_until_it_is_cleared_there() {
-    let _turn = alone();
-    let (mut slave, pairing) = slave(&["--once"]);
-    let mut master = master(&pairing, "600s");
-    ok(master.wait_for_line(SOON, |line| line.contains("the session begins")));
-    for side in ["slave", "master"] {
-        let stopped = format!("EMERGENCY STOP ({side})");
-        let stops = if side == "slave" { &slave } else { &master };
-        ok(stops.signal(Signal::USR1));
-        for shows in [&mut slave, &mut master] {
-            ok(shows.wait_for_next_line(SOON, |line| line.contains(&stopped)));
+    alone(|| {
+        let (mut slave, pairing) = slave(&["--once"]);
+        let mut master = master(&pairing, "600s");
+        ok(master.wait_for_line(SOON, |line| line.contains("the session begins")));
+        for side in ["slave", "master"] {
+            let stopped = format!("EMERGENCY STOP ({side})");
+            let stops = if side == "slave" { &slave } else { &master };
+            ok(stops.signal(Signal::USR1));
+            for shows in [&mut slave, &mut master] {
+                ok(shows.wait_for_next_line(SOON, |line| line.contains(&stopped)));
+            }
+            // the other side cannot clear it
+            let other = if side == "slave" { &master } else { &slave };
+            ok(other.signal(Signal::USR2));
+            ok(master.wait_for_next_line(SOON, |line| line.contains(&stopped)));
+            let stops = if side == "slave" { &slave } else { &master };
+            ok(stops.signal(Signal::USR2));
+            for shows in [&mut slave, &mut master] {
+                let goes_on = |line: &str| line.contains("rtt") && !line.contains("EMERGENCY");
+                ok(shows.wait_for_next_line(SOON, goes_on));
+            }
         }
-        // the other side cannot clear it
-        let other = if side == "slave" { &master } else { &slave };
-        ok(other.signal(Signal::USR2));
-        ok(master.wait_for_next_line(SOON, |line| line.contains(&stopped)));
-        let stops = if side == "slave" { &slave } else { &master };
-        ok(stops.signal(Signal::USR2));
-        for shows in [&mut slave, &mut master] {
-            let goes_on = |line: &str| line.contains("rtt") && !line.contains("EMERGENCY");
-            ok(shows.wait_for_next_line(SOON, goes_on));
+        ok(master.interrupt());
+        for ended in [ok(master.end(SOON)), ok(slave.end(SOON))] {
+            ended_with(0, &ended);
         }
-    }
-    ok(master.interrupt());
-    for ended in [ok(master.end(SOON)), ok(slave.end(SOON))] {
-        ended_with(0, &ended);
-    }
+    });
 }
 
 #[test]
 fn a_second_master_is_refused_by_name_and_disturbs_nobody() {
-    let _turn = alone();
-    let (slave, pairing) = slave(&["--once"]);
-    let first = master(&pairing, "5s");
-    std::thread::sleep(Duration::from_secs(2));
-    let second = ok(master(&pairing, "5s").end(SOON));
-    assert_ne!(second.status.code(), Some(0), "{}", second.err);
-    assert!(second.err.to_lowercase().contains("busy"), "{}", second.err);
-    assert!(!second.err.contains("panicked"), "{}", second.err);
-    assert_eq!(second.out, Vec::<String>::new(), "no session, no report");
-    let (first, slave) = (ok(first.end(SOON)), ok(slave.end(SOON)));
-    for (ended, skip) in [(&first, 0), (&slave, 1)] {
-        ended_with(0, ended);
-        assert_eq!(ending(&ok(ended.document(skip))), "finished");
-    }
+    alone(|| {
+        let (slave, pairing) = slave(&["--once"]);
+        let first = master(&pairing, "5s");
+        std::thread::sleep(Duration::from_secs(2));
+        let second = ok(master(&pairing, "5s").end(SOON));
+        assert_ne!(second.status.code(), Some(0), "{}", second.err);
+        assert!(second.err.to_lowercase().contains("busy"), "{}", second.err);
+        assert!(!second.err.contains("panicked"), "{}", second.err);
+        assert_eq!(second.out, Vec::<String>::new(), "no session, no report");
+        let (first, slave) = (ok(first.end(SOON)), ok(slave.end(SOON)));
+        for (ended, skip) in [(&first, 0), (&slave, 1)] {
+            ended_with(0, ended);
+            assert_eq!(ending(&ok(ended.document(skip))), "finished");
+        }
+    });
 }
 
 #[test]
 fn a_wrong_pairing_string_is_told_with_what_is_right_and_exit_code_2() {
-    let _turn = alone();
-    let good = "mmt://127.0.0.1:4433?pin=00&token=00";
-    for wrong in [
-        "",
-        "nonsense",
-        "http://127.0.0.1:4433",
-        "mmt://127.0.0.1",
-        good,
-    ] {
-        let ended = ok(ok(Running::mmt(&["master", wrong, "--json"])).end(SOON));
-        ended_with(2, &ended);
-        assert!(ended.out.is_empty(), "{:?}", ended.out);
-        assert!(ended.err.contains("mmt"), "{wrong:?}: {}", ended.err);
-        assert!(ended.err.contains("slave"), "{wrong:?}: {}", ended.err);
-        assert!(!ended.err.contains("RUST_BACKTRACE"), "{}", ended.err);
-    }
+    alone(|| {
+        let good = "mmt://127.0.0.1:4433?pin=00&token=00";
+        for wrong in [
+            "",
+            "nonsense",
+            "http://127.0.0.1:4433",
+            "mmt://127.0.0.1",
+            good,
+        ] {
+            let ended = ok(ok(Running::mmt(&["master", wrong, "--json"])).end(SOON));
+            ended_with(2, &ended);
+            assert!(ended.out.is_empty(), "{:?}", ended.out);
+            assert!(ended.err.contains("mmt"), "{wrong:?}: {}", ended.err);
+            assert!(ended.err.contains("slave"), "{wrong:?}: {}", ended.err);
+            assert!(!ended.err.contains("RUST_BACKTRACE"), "{}", ended.err);
+        }
+    });
 }
 
 #[test]
 fn a_token_of_another_slave_is_refused_by_name() {
-    let _turn = alone();
-    let (slave, pairing) = slave(&["--once"]);
-    let (_, token) = pairing.rsplit_once("token=").unwrap();
-    let first = if token.starts_with('A') { "B" } else { "A" };
-    let other = format!("{first}{}", token.get(1..).unwrap());
-    let ended = ok(master(&pairing.replace(token, &other), "5s").end(SOON));
-    assert_ne!(ended.status.code(), Some(0));
-    assert!(ended.err.contains("token"), "{}", ended.err);
-    ok(slave.interrupt());
-    let slave = ok(slave.end(SOON));
-    assert!(!slave.err.contains("panicked"), "{}", slave.err);
+    alone(|| {
+        let (slave, pairing) = slave(&["--once"]);
+        let (_, token) = pairing.rsplit_once("token=").unwrap();
+        let first = if token.starts_with('A') { "B" } else { "A" };
+        let other = format!("{first}{}", token.get(1..).unwrap());
+        let ended = ok(master(&pairing.replace(token, &other), "5s").end(SOON));
+        assert_ne!(ended.status.code(), Some(0));
+        assert!(ended.err.contains("token"), "{}", ended.err);
+        ok(slave.interrupt());
+        let slave = ok(slave.end(SOON));
+        assert!(!slave.err.contains("panicked"), "{}", slave.err);
+    });
 }
 
 /// A command of an operator who keeps state in a place of their own.
@@ -330,42 +328,43 @@ fn of_operator(state: &std::path::Path, arguments: &[&str]) -> Running {
 
 #[test]
 fn a_master_that_was_killed_is_back_at_once_and_another_operator_has_to_ask() {
-    let _turn = alone();
-    let (here, elsewhere) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
-    let arguments = ["slave", "--listen", "127.0.0.1:0", "--json", "--once"];
-    let mut slave = of_operator(here.path(), &arguments);
-    let pairing = ok(slave.wait_for_line(SOON, |line| line.starts_with("mmt://")));
-    let master = |state, options: &[&str]| {
-        let arguments = [&["master", &pairing, "--json", "--duration"], options].concat();
-        of_operator(state, &arguments)
-    };
-    let begun = |line: &str| line.contains("the session begins");
+    alone(|| {
+        let (here, elsewhere) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+        let arguments = ["slave", "--listen", "127.0.0.1:0", "--json", "--once"];
+        let mut slave = of_operator(here.path(), &arguments);
+        let pairing = ok(slave.wait_for_line(SOON, |line| line.starts_with("mmt://")));
+        let master = |state, options: &[&str]| {
+            let arguments = [&["master", &pairing, "--json", "--duration"], options].concat();
+            of_operator(state, &arguments)
+        };
+        let begun = |line: &str| line.contains("the session begins");
 
-    let mut killed = master(here.path(), &["60s"]);
-    ok(killed.wait_for_line(SOON, begun));
-    // neither a second one here, while the first lives, nor one elsewhere
-    for state in [here.path(), elsewhere.path()] {
-        let refused = ok(master(state, &["1s"]).end(SOON));
-        ended_with(3, &refused);
-        assert!(refused.err.contains("--take-over"), "{}", refused.err);
-    }
-    drop(killed);
-    let mut resumed = master(here.path(), &["60s"]);
-    ok(resumed.wait_for_line(SOON, begun));
+        let mut killed = master(here.path(), &["60s"]);
+        ok(killed.wait_for_line(SOON, begun));
+        // neither a second one here, while the first lives, nor one elsewhere
+        for state in [here.path(), elsewhere.path()] {
+            let refused = ok(master(state, &["1s"]).end(SOON));
+            ended_with(3, &refused);
+            assert!(refused.err.contains("--take-over"), "{}", refused.err);
+        }
+        drop(killed);
+        let mut resumed = master(here.path(), &["60s"]);
+        ok(resumed.wait_for_line(SOON, begun));
 
-    let other = master(elsewhere.path(), &["1s", "--take-over"]);
-    let lost = ok(resumed.end(SOON));
-    ended_with(1, &lost);
-    assert!(
-        lost.err
-            .contains("another operator has taken the slave over"),
-        "{}",
-        lost.err
-    );
-    let finished = ok(other.end(SOON));
-    ended_with(0, &finished);
-    assert_eq!(ending(&ok(finished.document(0))), "finished");
-    let served = ok(slave.end(SOON));
-    ended_with(0, &served);
-    assert_eq!(ending(&ok(served.document(1))), "finished");
+        let other = master(elsewhere.path(), &["1s", "--take-over"]);
+        let lost = ok(resumed.end(SOON));
+        ended_with(1, &lost);
+        assert!(
+            lost.err
+                .contains("another operator has taken the slave over"),
+            "{}",
+            lost.err
+        );
+        let finished = ok(other.end(SOON));
+        ended_with(0, &finished);
+        assert_eq!(ending(&ok(finished.document(0))), "finished");
+        let served = ok(slave.end(SOON));
+        ended_with(0, &served);
+        assert_eq!(ending(&ok(served.document(1))), "finished");
+    });
 }

@@ -1,6 +1,6 @@
 //! Devices and plants of somebody else's, in another language, plugged into the real programs (`contrib`, `docs/plugs.md`).
 //!
-//! Needs Python: without, it says so, and with `CI` set it fails.
+//! Needs Python: without it, the test reports that, and fails where `CI` is set.
 #![allow(
     clippy::unwrap_used,
     clippy::indexing_slicing,
@@ -67,45 +67,46 @@ fn get(document: &Value, path: &str) -> f64 {
 
 #[test]
 fn a_hand_that_knows_only_the_document_is_plugged_in_and_pushes_the_box() {
-    let _turn = alone();
-    let Some(python) = python("a hand in Python", "socket") else {
-        return;
-    };
-    let place = tempfile::tempdir().unwrap();
-    let record = place.path().join("hand.mcap");
-    let record = record.to_str().unwrap();
-    let (slave, pairing) = slave(place.path(), &[]);
-    let device = ["master", &pairing, "--device", "link", "--json"];
-    let device = [&device[..], &["--record", record]].concat();
-    let mut master = Running::mmt(&device).unwrap();
-    let address = announced(&mut master, "device: ");
-    a_stranger_knocks(&address);
-    let hand = contrib(&python, "hand.py", &[&address, "--way", "0.45"]);
-    let hand = document(&hand.end(GENEROUS).unwrap(), 0);
-    master.interrupt().unwrap();
-    let master = document(&master.end(GENEROUS).unwrap(), 0);
-    let slave = document(&slave.end(GENEROUS).unwrap(), 1);
-    assert_eq!(master["configuration"]["operator"], "device link");
-    // the way is the device's, less what the force of the box takes of it
-    let way = get(&hand, "/hip_to_m/0") - get(&hand, "/hip_from_m/0");
-    assert!(way > 0.3, "{hand:#}");
-    assert!(get(&hand, "/contact_s") > 0.3, "{hand:#}");
-    assert!(get(&hand, "/force_peak_n") > 0.5, "{hand:#}");
-    assert!(get(&hand, "/force_peak_n") <= 8.0, "{hand:#}");
-    assert!(get(&slave, "/updates/sent") >= 3.0, "{slave:#}");
-    // what one counts as sent the other has taken or missed
-    let counted = |name: &str| get(&master, &format!("/drops/device_{name}"));
-    assert_eq!(counted("stranger"), 1.0, "{master:#}");
-    assert_eq!(counted("malformed"), 1.0, "{master:#}");
-    assert!(counted("lost") <= get(&hand, "/sent"), "{master:#}");
-    assert_eq!(counted("nonsense"), 0.0, "{master:#}");
-    // its readings are inputs: the session runs again to the same bits
-    let again = Running::mmt(&["replay", record, "--json"]).unwrap();
-    let again = document(&again.end(GENEROUS).unwrap(), 0);
-    assert!(
-        get(&again, "/records/0/sessions/0/ticks") > 1000.0,
-        "{again:#}"
-    );
+    alone(|| {
+        let Some(python) = python("a hand in Python", "socket") else {
+            return;
+        };
+        let place = tempfile::tempdir().unwrap();
+        let record = place.path().join("hand.mcap");
+        let record = record.to_str().unwrap();
+        let (slave, pairing) = slave(place.path(), &[]);
+        let device = ["master", &pairing, "--device", "link", "--json"];
+        let device = [&device[..], &["--record", record]].concat();
+        let mut master = Running::mmt(&device).unwrap();
+        let address = announced(&mut master, "device: ");
+        a_stranger_knocks(&address);
+        let hand = contrib(&python, "hand.py", &[&address, "--way", "0.45"]);
+        let hand = document(&hand.end(GENEROUS).unwrap(), 0);
+        master.interrupt().unwrap();
+        let master = document(&master.end(GENEROUS).unwrap(), 0);
+        let slave = document(&slave.end(GENEROUS).unwrap(), 1);
+        assert_eq!(master["configuration"]["operator"], "device link");
+        // the way is the device's, less what the force of the box takes of it
+        let way = get(&hand, "/hip_to_m/0") - get(&hand, "/hip_from_m/0");
+        assert!(way > 0.3, "{hand:#}");
+        assert!(get(&hand, "/contact_s") > 0.3, "{hand:#}");
+        assert!(get(&hand, "/force_peak_n") > 0.5, "{hand:#}");
+        assert!(get(&hand, "/force_peak_n") <= 8.0, "{hand:#}");
+        assert!(get(&slave, "/updates/sent") >= 3.0, "{slave:#}");
+        // what one counts as sent the other has taken or missed
+        let counted = |name: &str| get(&master, &format!("/drops/device_{name}"));
+        assert_eq!(counted("stranger"), 1.0, "{master:#}");
+        assert_eq!(counted("malformed"), 1.0, "{master:#}");
+        assert!(counted("lost") <= get(&hand, "/sent"), "{master:#}");
+        assert_eq!(counted("nonsense"), 0.0, "{master:#}");
+        // its readings are inputs: the session runs again to the same bits
+        let again = Running::mmt(&["replay", record, "--json"]).unwrap();
+        let again = document(&again.end(GENEROUS).unwrap(), 0);
+        assert!(
+            get(&again, "/records/0/sessions/0/ticks") > 1000.0,
+            "{again:#}"
+        );
+    });
 }
 
 /// A packet with another token, and one that is none: neither is answered.
@@ -208,64 +209,65 @@ fn objects_of_mujoco_are_pushed_over_the_emulated_network_within_the_contract() 
 
 #[test]
 fn a_plant_that_dies_stops_the_tool_and_the_master_is_told_and_its_return_ends_that() {
-    let _turn = alone();
-    let Some(python) = python("a plant in Python", "socket") else {
-        return;
-    };
-    let place = tempfile::tempdir().unwrap();
-    let record = place.path().join("plant.mcap");
-    let identity = place.path().join("identity");
-    let options = [
-        "slave",
-        "--listen",
-        "127.0.0.1:0",
-        "--once",
-        "--json",
-        "--plant",
-        "link",
-    ];
-    let kept = [
-        "--identity",
-        identity.to_str().unwrap(),
-        "--record",
-        record.to_str().unwrap(),
-    ];
-    let mut slave = Running::mmt(&[&options[..], &kept].concat()).unwrap();
-    let address = announced(&mut slave, "plant: ");
-    let plant = contrib(&python, "plant.py", &[&address]);
-    let pairing = slave
-        .wait_for_line(GENEROUS, |line| line.starts_with("mmt://"))
-        .unwrap();
-    let mut master = Running::mmt(&["master", &pairing, "--json"]).unwrap();
-    master
-        .wait_for_line(GENEROUS, |line| line.contains("the session begins"))
-        .unwrap();
-    std::thread::sleep(Duration::from_secs(6));
-    drop(plant);
-    slave
-        .wait_for_line(GENEROUS, |line| line.contains("the plant is silent"))
-        .unwrap();
-    master
-        .wait_for_line(GENEROUS, |line| line.contains("EMERGENCY STOP (slave)"))
-        .unwrap();
-    let _plant = contrib(&python, "plant.py", &[&address]);
-    slave
-        .wait_for_next_line(GENEROUS, |line| line.contains("a plant is plugged in"))
-        .unwrap();
-    std::thread::sleep(Duration::from_secs(1));
-    master.interrupt().unwrap();
-    document(&master.end(GENEROUS).unwrap(), 0);
-    let slave = document(&slave.end(GENEROUS).unwrap(), 1);
-    assert_eq!(slave["model"]["mass_kg"]["truth"], Value::Null);
-    assert!(get(&slave, "/updates/sent") >= 1.0, "{slave:#}");
-    assert_eq!(get(&slave, "/drops/plant_nonsense"), 0.0, "{slave:#}");
-    // the plant's answers are inputs: the session runs again to the same bits without the plant
-    let again = Running::mmt(&["replay", record.to_str().unwrap(), "--json"]).unwrap();
-    let again = document(&again.end(GENEROUS).unwrap(), 0);
-    assert!(
-        get(&again, "/records/0/sessions/0/ticks") > 1000.0,
-        "{again:#}"
-    );
+    alone(|| {
+        let Some(python) = python("a plant in Python", "socket") else {
+            return;
+        };
+        let place = tempfile::tempdir().unwrap();
+        let record = place.path().join("plant.mcap");
+        let identity = place.path().join("identity");
+        let options = [
+            "slave",
+            "--listen",
+            "127.0.0.1:0",
+            "--once",
+            "--json",
+            "--plant",
+            "link",
+        ];
+        let kept = [
+            "--identity",
+            identity.to_str().unwrap(),
+            "--record",
+            record.to_str().unwrap(),
+        ];
+        let mut slave = Running::mmt(&[&options[..], &kept].concat()).unwrap();
+        let address = announced(&mut slave, "plant: ");
+        let plant = contrib(&python, "plant.py", &[&address]);
+        let pairing = slave
+            .wait_for_line(GENEROUS, |line| line.starts_with("mmt://"))
+            .unwrap();
+        let mut master = Running::mmt(&["master", &pairing, "--json"]).unwrap();
+        master
+            .wait_for_line(GENEROUS, |line| line.contains("the session begins"))
+            .unwrap();
+        std::thread::sleep(Duration::from_secs(6));
+        drop(plant);
+        slave
+            .wait_for_line(GENEROUS, |line| line.contains("the plant is silent"))
+            .unwrap();
+        master
+            .wait_for_line(GENEROUS, |line| line.contains("EMERGENCY STOP (slave)"))
+            .unwrap();
+        let _plant = contrib(&python, "plant.py", &[&address]);
+        slave
+            .wait_for_next_line(GENEROUS, |line| line.contains("a plant is plugged in"))
+            .unwrap();
+        std::thread::sleep(Duration::from_secs(1));
+        master.interrupt().unwrap();
+        document(&master.end(GENEROUS).unwrap(), 0);
+        let slave = document(&slave.end(GENEROUS).unwrap(), 1);
+        assert_eq!(slave["model"]["mass_kg"]["truth"], Value::Null);
+        assert!(get(&slave, "/updates/sent") >= 1.0, "{slave:#}");
+        assert_eq!(get(&slave, "/drops/plant_nonsense"), 0.0, "{slave:#}");
+        // the plant's answers are inputs: the session runs again to the same bits without the plant
+        let again = Running::mmt(&["replay", record.to_str().unwrap(), "--json"]).unwrap();
+        let again = document(&again.end(GENEROUS).unwrap(), 0);
+        assert!(
+            get(&again, "/records/0/sessions/0/ticks") > 1000.0,
+            "{again:#}"
+        );
+    });
 }
 
 /// A client of `contrib` in C++, compiled without a warning; none where there is no compiler.
@@ -286,47 +288,48 @@ fn compiled(place: &Path, name: &str) -> Option<String> {
 
 #[test]
 fn a_hand_and_a_plant_in_cpp_meet_over_the_emulated_network() {
-    let _turn = alone();
-    let place = tempfile::tempdir().unwrap();
-    let programs = (
-        compiled(place.path(), "hand"),
-        compiled(place.path(), "plant"),
-    );
-    let (Some(hand), Some(plant)) = programs else {
-        return;
-    };
-    let start = |program: &str, address: &str, more: &str| {
-        let mut command = Command::new(program);
-        command.args([address, more]);
-        Running::start(command).unwrap()
-    };
-    let identity = place.path().join("identity");
-    let network = ["--netem", "delay 20ms loss 1%"];
-    let slave = [
-        "slave",
-        "--listen",
-        "127.0.0.1:0",
-        "--once",
-        "--json",
-        "--plant",
-        "link",
-    ];
-    let identity = ["--identity", identity.to_str().unwrap()];
-    let mut slave = Running::mmt(&[&slave[..], &identity, &network].concat()).unwrap();
-    let address = announced(&mut slave, "plant: ");
-    let _plant = start(&plant, &address, "100");
-    let pairing = slave.wait_for_line(GENEROUS, |line| line.starts_with("mmt://"));
-    let pairing = pairing.unwrap();
-    let master = ["master", &pairing, "--device", "link", "--json"];
-    let mut master = Running::mmt(&[&master[..], &network].concat()).unwrap();
-    let address = announced(&mut master, "device: ");
-    let hand = start(&hand, &address, "0.45").end(GENEROUS).unwrap();
-    let hand = document(&hand, 0);
-    master.interrupt().unwrap();
-    document(&master.end(GENEROUS).unwrap(), 0);
-    let slave = document(&slave.end(GENEROUS).unwrap(), 1);
-    assert!(get(&hand, "/contact_s") > 0.3, "{hand:#}");
-    assert!(get(&hand, "/force_peak_n") > 0.5, "{hand:#}");
-    assert!(get(&slave, "/force/contact_samples") > 300.0, "{slave:#}");
-    assert_eq!(get(&slave, "/drops/plant_malformed"), 0.0, "{slave:#}");
+    alone(|| {
+        let place = tempfile::tempdir().unwrap();
+        let programs = (
+            compiled(place.path(), "hand"),
+            compiled(place.path(), "plant"),
+        );
+        let (Some(hand), Some(plant)) = programs else {
+            return;
+        };
+        let start = |program: &str, address: &str, more: &str| {
+            let mut command = Command::new(program);
+            command.args([address, more]);
+            Running::start(command).unwrap()
+        };
+        let identity = place.path().join("identity");
+        let network = ["--netem", "delay 20ms loss 1%"];
+        let slave = [
+            "slave",
+            "--listen",
+            "127.0.0.1:0",
+            "--once",
+            "--json",
+            "--plant",
+            "link",
+        ];
+        let identity = ["--identity", identity.to_str().unwrap()];
+        let mut slave = Running::mmt(&[&slave[..], &identity, &network].concat()).unwrap();
+        let address = announced(&mut slave, "plant: ");
+        let _plant = start(&plant, &address, "100");
+        let pairing = slave.wait_for_line(GENEROUS, |line| line.starts_with("mmt://"));
+        let pairing = pairing.unwrap();
+        let master = ["master", &pairing, "--device", "link", "--json"];
+        let mut master = Running::mmt(&[&master[..], &network].concat()).unwrap();
+        let address = announced(&mut master, "device: ");
+        let hand = start(&hand, &address, "0.45").end(GENEROUS).unwrap();
+        let hand = document(&hand, 0);
+        master.interrupt().unwrap();
+        document(&master.end(GENEROUS).unwrap(), 0);
+        let slave = document(&slave.end(GENEROUS).unwrap(), 1);
+        assert!(get(&hand, "/contact_s") > 0.3, "{hand:#}");
+        assert!(get(&hand, "/force_peak_n") > 0.5, "{hand:#}");
+        assert!(get(&slave, "/force/contact_samples") > 300.0, "{slave:#}");
+        assert_eq!(get(&slave, "/drops/plant_malformed"), 0.0, "{slave:#}");
+    });
 }

@@ -96,39 +96,40 @@ fn column(table: &Path, name: &str) -> Vec<String> {
 
 #[test]
 fn a_demo_is_recorded_runs_again_and_is_read_by_decoders_that_know_nothing_of_it() {
-    let _turn = alone();
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("demo.mcap");
-    let record = path.to_str().unwrap();
-    let demo = done(&["demo", "--duration", "12s", "--json", "--record", record]);
-    let report = demo.document(0).unwrap();
-    let (again, sessions) = replayed(record);
-    assert_eq!(again["is_whole"], true);
-    assert!(checked(&[record]) >= 24);
-    what_if_it_had_been_slower(record);
-    let sides: Vec<&str> = sessions.iter().map(|(side, _)| side.as_str()).collect();
-    assert_eq!(sides, ["master", "slave"]);
-    for ((side, ticks), of) in sessions.iter().zip(["haptic_loop", "slave_loop"]) {
-        let live = number(&report, &format!("/{of}/ticks")).unwrap();
-        assert_eq!(*ticks, live, "every tick of the {side}");
-    }
-    let tables = folder.path().join("tables");
-    done(&["export", record, "--out", tables.to_str().unwrap()]);
-    let sent = column(&tables.join("slave-packets.csv"), "fate");
-    let kinds = column(&tables.join("slave-packets.csv"), "kind");
-    let sent = sent.iter().zip(&kinds);
-    let sent = sent
-        .filter(|(fate, kind)| *fate == "sent" && *kind == "update")
-        .count();
-    assert_eq!(Some(sent as f64), number(&report, "/updates/sent"));
-    let hand = std::fs::read_to_string(tables.join("hand.csv")).unwrap();
-    let hand = Trace::from_csv(&hand).unwrap();
-    assert!(
-        hand.duration() > Duration::from_secs(3),
-        "a trace for an operator"
-    );
-    decoded(record, &tables);
-    reported(record, &folder.path().join("report"), &report);
+    alone(|| {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("demo.mcap");
+        let record = path.to_str().unwrap();
+        let demo = done(&["demo", "--duration", "12s", "--json", "--record", record]);
+        let report = demo.document(0).unwrap();
+        let (again, sessions) = replayed(record);
+        assert_eq!(again["is_whole"], true);
+        assert!(checked(&[record]) >= 24);
+        what_if_it_had_been_slower(record);
+        let sides: Vec<&str> = sessions.iter().map(|(side, _)| side.as_str()).collect();
+        assert_eq!(sides, ["master", "slave"]);
+        for ((side, ticks), of) in sessions.iter().zip(["haptic_loop", "slave_loop"]) {
+            let live = number(&report, &format!("/{of}/ticks")).unwrap();
+            assert_eq!(*ticks, live, "every tick of the {side}");
+        }
+        let tables = folder.path().join("tables");
+        done(&["export", record, "--out", tables.to_str().unwrap()]);
+        let sent = column(&tables.join("slave-packets.csv"), "fate");
+        let kinds = column(&tables.join("slave-packets.csv"), "kind");
+        let sent = sent.iter().zip(&kinds);
+        let sent = sent
+            .filter(|(fate, kind)| *fate == "sent" && *kind == "update")
+            .count();
+        assert_eq!(Some(sent as f64), number(&report, "/updates/sent"));
+        let hand = std::fs::read_to_string(tables.join("hand.csv")).unwrap();
+        let hand = Trace::from_csv(&hand).unwrap();
+        assert!(
+            hand.duration() > Duration::from_secs(3),
+            "a trace for an operator"
+        );
+        decoded(record, &tables);
+        reported(record, &folder.path().join("report"), &report);
+    });
 }
 
 /// The table and the figures of a run, held against the report that the run itself printed.
@@ -218,55 +219,57 @@ fn decoded(record: &str, tables: &Path) {
 
 #[test]
 fn each_host_of_two_keeps_a_record_that_runs_again_by_itself() {
-    let _turn = alone();
-    let folder = tempfile::tempdir().unwrap();
-    let place = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
-    let (identity, of_slave, of_master) = (place("identity"), place("s.mcap"), place("m.mcap"));
-    let listen = ["slave", "--listen", "127.0.0.1:0", "--identity", &identity];
-    let arguments = [&listen[..], &["--once", "--record", &of_slave]].concat();
-    let mut slave = Running::mmt(&arguments).unwrap();
-    let pairing = slave.wait_for_line(GENEROUS, |line| line.starts_with("mmt://"));
-    let pairing = pairing.unwrap();
-    done(&[
-        "master",
-        &pairing,
-        "--duration",
-        "3s",
-        "--record",
-        &of_master,
-    ]);
-    assert_eq!(slave.end(GENEROUS).unwrap().status.code(), Some(0));
-    let (_, sessions) = replayed(&of_slave);
-    assert_eq!((sessions.len(), sessions[0].0.as_str()), (1, "slave"));
-    let (_, sessions) = replayed(&of_master);
-    assert_eq!((sessions.len(), sessions[0].0.as_str()), (1, "master"));
-    // one end alone shows nothing of what the other sent
-    assert!(checked(&[&of_slave]) < checked(&[&of_slave, &of_master]));
-    // where the two files are shown together they lie on one axis
-    let both = done(&["replay", &of_slave, &of_master]).out.join("\n");
-    assert_eq!(both.matches("the same bits").count(), 2, "{both}");
+    alone(|| {
+        let folder = tempfile::tempdir().unwrap();
+        let place = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+        let (identity, of_slave, of_master) = (place("identity"), place("s.mcap"), place("m.mcap"));
+        let listen = ["slave", "--listen", "127.0.0.1:0", "--identity", &identity];
+        let arguments = [&listen[..], &["--once", "--record", &of_slave]].concat();
+        let mut slave = Running::mmt(&arguments).unwrap();
+        let pairing = slave.wait_for_line(GENEROUS, |line| line.starts_with("mmt://"));
+        let pairing = pairing.unwrap();
+        done(&[
+            "master",
+            &pairing,
+            "--duration",
+            "3s",
+            "--record",
+            &of_master,
+        ]);
+        assert_eq!(slave.end(GENEROUS).unwrap().status.code(), Some(0));
+        let (_, sessions) = replayed(&of_slave);
+        assert_eq!((sessions.len(), sessions[0].0.as_str()), (1, "slave"));
+        let (_, sessions) = replayed(&of_master);
+        assert_eq!((sessions.len(), sessions[0].0.as_str()), (1, "master"));
+        // one end alone shows nothing of what the other sent
+        assert!(checked(&[&of_slave]) < checked(&[&of_slave, &of_master]));
+        // where the two files are shown together they lie on one axis
+        let both = done(&["replay", &of_slave, &of_master]).out.join("\n");
+        assert_eq!(both.matches("the same bits").count(), 2, "{both}");
+    });
 }
 
 #[test]
 fn a_full_disk_costs_the_record_and_neither_the_session_nor_its_report() {
-    let _turn = alone();
-    let ended = mmt(&[
-        "demo",
-        "--duration",
-        "2s",
-        "--json",
-        "--record",
-        "/dev/full",
-    ]);
-    let report = ended.document(0).unwrap();
-    assert_eq!(report["ending"], "finished");
-    assert_eq!(ended.status.code(), Some(1), "{}", ended.err);
-    assert!(
-        ended.err.contains("/dev/full is not whole"),
-        "{}",
-        ended.err
-    );
-    assert!(ended.err.contains("No space left"), "{}", ended.err);
+    alone(|| {
+        let ended = mmt(&[
+            "demo",
+            "--duration",
+            "2s",
+            "--json",
+            "--record",
+            "/dev/full",
+        ]);
+        let report = ended.document(0).unwrap();
+        assert_eq!(report["ending"], "finished");
+        assert_eq!(ended.status.code(), Some(1), "{}", ended.err);
+        assert!(
+            ended.err.contains("/dev/full is not whole"),
+            "{}",
+            ended.err
+        );
+        assert!(ended.err.contains("No space left"), "{}", ended.err);
+    });
 }
 
 #[test]
@@ -283,25 +286,26 @@ fn a_record_that_cannot_be_written_is_refused_before_anything_runs() {
 
 #[test]
 fn what_was_recorded_before_a_kill_runs_again() {
-    let _turn = alone();
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("killed.mcap");
-    let record = path.to_str().unwrap();
-    let demo = Running::mmt(&["demo", "--duration", "60s", "--record", record]).unwrap();
-    let length = || std::fs::metadata(&path).map_or(0, |of| of.len());
-    let end = std::time::Instant::now() + GENEROUS;
-    while length() < 1_000_000 {
-        assert!(std::time::Instant::now() < end, "{} bytes", length());
-        std::thread::sleep(Duration::from_millis(50));
-    }
-    // dropped, it is killed
-    drop(demo);
-    let (again, sessions) = replayed(record);
-    assert_eq!(again["is_whole"], false);
-    assert!(checked(&[record]) > 10);
-    assert_eq!(sessions.len(), 2);
-    assert!(
-        sessions.iter().all(|(_, ticks)| *ticks > 200.0),
-        "{sessions:?}"
-    );
+    alone(|| {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("killed.mcap");
+        let record = path.to_str().unwrap();
+        let demo = Running::mmt(&["demo", "--duration", "60s", "--record", record]).unwrap();
+        let length = || std::fs::metadata(&path).map_or(0, |of| of.len());
+        let end = std::time::Instant::now() + GENEROUS;
+        while length() < 1_000_000 {
+            assert!(std::time::Instant::now() < end, "{} bytes", length());
+            std::thread::sleep(Duration::from_millis(50));
+        }
+        // dropped, it is killed
+        drop(demo);
+        let (again, sessions) = replayed(record);
+        assert_eq!(again["is_whole"], false);
+        assert!(checked(&[record]) > 10);
+        assert_eq!(sessions.len(), 2);
+        assert!(
+            sessions.iter().all(|(_, ticks)| *ticks > 200.0),
+            "{sessions:?}"
+        );
+    });
 }

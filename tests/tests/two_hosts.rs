@@ -33,20 +33,21 @@ fn get(report: &Value, path: &str) -> f64 {
 
 #[test]
 fn two_hosts_report_the_same_session_and_agree_with_their_cables() {
-    let _turn = alone();
-    let test = "two_hosts";
-    let hosts = match Hosts::try_new() {
-        Err(HostsError::Unavailable(why)) => return did_not_run(test, &why),
-        hosts => hosts.unwrap_or_else(|error| panic!("{error}")),
-    };
-    let session = hosts.session(LINK, SECONDS, 1);
-    let session = session.unwrap_or_else(|error| panic!("{error}"));
-    the_job_was_done(&session);
-    what_one_side_counted_the_other_reports(&session);
-    what_was_sent_was_received_or_lost(&session);
-    the_cables_counted_the_same(&session);
-    the_kernels_counted_the_same(&session);
-    the_three_rates_belong_together(&session);
+    alone(|| {
+        let test = "two_hosts";
+        let hosts = match Hosts::try_new() {
+            Err(HostsError::Unavailable(why)) => return did_not_run(test, &why),
+            hosts => hosts.unwrap_or_else(|error| panic!("{error}")),
+        };
+        let session = hosts.session(LINK, SECONDS, 1);
+        let session = session.unwrap_or_else(|error| panic!("{error}"));
+        the_job_was_done(&session);
+        what_one_side_counted_the_other_reports(&session);
+        what_was_sent_was_received_or_lost(&session);
+        the_cables_counted_the_same(&session);
+        the_kernels_counted_the_same(&session);
+        the_three_rates_belong_together(&session);
+    });
 }
 
 /// A host that stands still for a while makes it longer.

@@ -54,7 +54,7 @@ fn a_demo_records_what_its_packets_met_and_meets_it_again() {
     assert_eq!(up["words"], "delay 30ms loss every 10");
     assert_eq!(report["down"]["words"], "delay 5ms");
     let offered = up["achieved"]["offered"]["packets"].as_u64().unwrap();
-    assert!(offered > 100, "{offered}");
+    assert!(offered >= 10, "{offered}");
     assert_eq!(up["achieved"]["dropped"]["loss"], offered / 10);
     assert!(up["achieved"]["mean_ms"].as_f64().unwrap() >= 30.0);
 

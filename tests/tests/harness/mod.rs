@@ -6,8 +6,11 @@
     reason = "each of the two binaries uses a part of it; it watches processes in real time"
 )]
 
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::path::{Path, PathBuf};
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Mutex, PoisonError};
+use std::time::{Duration, Instant};
 
 pub(crate) mod hosts;
 pub(crate) mod process;
@@ -20,10 +23,42 @@ pub(crate) fn root() -> PathBuf {
     here.parent().unwrap_or(here).to_path_buf()
 }
 
-/// One session at a time: each wants two cores in real time.
-pub(crate) fn alone() -> MutexGuard<'static, ()> {
+/// A host whose threads wait so long for their turn is no host for a session.
+const STOOD_STILL: Duration = Duration::from_millis(100);
+
+/// Runs a test of sessions while no other one runs: each wants two cores in real time. A session ends when its host stands
+/// still for a second, as it must; so a test that fails while the host stands still runs again, three times at most.
+pub(crate) fn alone(test: impl Fn()) {
     static TURN: Mutex<()> = Mutex::new(());
-    TURN.lock().unwrap_or_else(PoisonError::into_inner)
+    let _turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
+    for _ in 0..3 {
+        let (ended, stood) = watched(&test);
+        let Err(why) = ended else { return };
+        if stood < STOOD_STILL {
+            resume_unwind(why);
+        }
+    }
+    test();
+}
+
+/// Runs a test and measures for how long at most a thread that does nothing did not get its turn.
+fn watched(test: &impl Fn()) -> (std::thread::Result<()>, Duration) {
+    const NAP: Duration = Duration::from_millis(5);
+    let over = AtomicBool::new(false);
+    std::thread::scope(|scope| {
+        let watch = scope.spawn(|| {
+            let mut stood = Duration::ZERO;
+            while !over.load(Ordering::Relaxed) {
+                let began = Instant::now();
+                std::thread::sleep(NAP);
+                stood = stood.max(began.elapsed() - NAP);
+            }
+            stood
+        });
+        let ended = catch_unwind(AssertUnwindSafe(test));
+        over.store(true, Ordering::Relaxed);
+        (ended, watch.join().unwrap_or_default())
+    })
 }
 
 /// Whether `lost` of `sent` is what chance makes of a share of loss, but for once in 50 000 runs.

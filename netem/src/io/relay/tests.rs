@@ -24,8 +24,16 @@ fn relay(listen: IpAddr, to: SocketAddr, up: &str, down: &str) -> RelayHandle {
 
 fn receive(socket: &UdpSocket) -> (Vec<u8>, SocketAddr) {
     let mut buffer = [0; 2000];
-    let (len, from) = socket.recv_from(&mut buffer).unwrap();
-    (buffer[..len].to_vec(), from)
+    loop {
+        match socket.recv_from(&mut buffer) {
+            // a process that was stopped and goes on
+            Err(error) if error.kind() == std::io::ErrorKind::Interrupted => {}
+            received => {
+                let (len, from) = received.unwrap();
+                return (buffer[..len].to_vec(), from);
+            }
+        }
+    }
 }
 
 /// Waits for something that must come, for as long as a slow machine may need.
