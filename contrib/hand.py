@@ -45,7 +45,7 @@ class Device:
         try:
             self.socket.send(head + READING.pack(*position, *velocity))
         except OSError:
-            pass  # nobody is there (yet): the silence says so
+            pass  # nobody is there (yet): the silence shows it
 
     def receive(self):
         """Takes what has come; without anything for SILENCE_S the force is none."""

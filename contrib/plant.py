@@ -47,7 +47,7 @@ class Plug:
         try:
             self.socket.send(head + NUMBERS.pack(*tool, *velocity, *force, *(pose or (0.0, 0.0, 0.0)), image_age_s))
         except OSError:
-            pass  # nobody is there (any more): the silence says so
+            pass  # nobody is there (any more): the silence shows it
 
     def command(self, wait_s):
         """The newest command, with the periods of 1 ms that have passed since the one before; None if none comes."""

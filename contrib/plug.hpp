@@ -95,7 +95,7 @@ class Plug {
     put(packet + 16, now_ns());
     std::memcpy(packet + 24, token_.data(), token_.size());
     for (std::size_t n = 0; n < N; ++n) put(packet + head_bytes + n * sizeof(Number), numbers[n]);
-    // nobody there (yet): the silence says so
+    // nobody there (yet): the silence shows it
     (void)::send(socket_, packet, bytes, MSG_DONTWAIT);
   }
 

@@ -164,17 +164,9 @@ impl EndAgain for MasterAgain {
         self.digest.tick(&done);
         let value = self.digest.value();
         self.done = Some(done);
-        self.left.clear();
-        let (end, left, sent) = (
-            &mut self.end,
-            &mut self.left,
-            Time::from_nanos(tick.sent_ns),
-        );
-        self.digest.datagrams(|out| {
-            let length = end.poll_transmit(sent, out).ok().flatten()?;
-            left.push(out.get(..length).unwrap_or_default().to_vec());
-            Some(length)
-        });
+        let (end, sent) = (&mut self.end, Time::from_nanos(tick.sent_ns));
+        let poll = |out: &mut [u8]| end.poll_transmit(sent, out).ok().flatten();
+        self.left = self.digest.datagrams(poll);
         value
     }
 

@@ -18,11 +18,20 @@ pub(crate) enum DeviceWords {
     Link,
 }
 
+/// A device by its name.
+fn device(name: &str) -> Result<DeviceWords, String> {
+    if name == "link" {
+        return Ok(DeviceWords::Link);
+    }
+    let known = DeviceProfile::by_name(name).map(DeviceWords::Known);
+    known.map_err(|error| format!("{error}, link"))
+}
+
 /// Arguments of every command with a hand.
 #[derive(Clone, Debug, Args)]
 pub(crate) struct DeviceArguments {
     /// The haptic device: default, falcon, or link (one of your own, over UDP; docs/plugs.md)
-    #[arg(long, value_name = "NAME", default_value = "default", value_parser = values::device)]
+    #[arg(long, value_name = "NAME", default_value = "default", value_parser = device)]
     pub(crate) device: DeviceWords,
     /// Axes, scale, room and limits of --device link, TOML
     #[arg(long, value_name = "FILE")]

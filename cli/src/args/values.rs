@@ -8,14 +8,11 @@ use std::str::FromStr;
 use std::time::Duration;
 
 use clap::builder::{PossibleValue, PossibleValuesParser, RangedI64ValueParser, TypedValueParser};
-use mmt_client::device::DeviceProfile;
 use mmt_netem::LinkConfig;
 use mmt_server::trigger::Scheme;
 use mmt_shared::model::settings::Mode;
 use mmt_shared::pairing::{Address, AddressError, Host};
 use mmt_shared::wire::{Architecture, SAMPLES_MAX};
-
-use super::device::DeviceWords;
 
 /// The longest duration accepted: a week.
 const DURATION_MAX: Duration = Duration::from_secs(7 * 24 * 3600);
@@ -169,15 +166,6 @@ pub(super) fn operator(text: &str) -> Result<OperatorWords, String> {
                 .to_owned(),
         ),
     }
-}
-
-/// A device by its name.
-pub(super) fn device(name: &str) -> Result<DeviceWords, String> {
-    if name == "link" {
-        return Ok(DeviceWords::Link);
-    }
-    let known = DeviceProfile::by_name(name).map(DeviceWords::Known);
-    known.map_err(|error| format!("{error}, link"))
 }
 
 /// Whether a plant is plugged in.

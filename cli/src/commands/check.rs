@@ -148,7 +148,7 @@ pub(super) fn show_rows(rows: &[Row]) -> Result<(), Failure> {
     Ok(())
 }
 
-/// The exit code says whether all holds.
+/// Succeeds if all holds.
 fn judged(document: &Document) -> Result<(), Failure> {
     if document.sessions.is_empty() {
         return Err(Failure::usage("there is no session in these records")

@@ -7,6 +7,7 @@ use mmt_client::device::link::DeviceLinkConfig;
 use mmt_client::io::device_link::{DeviceHost, DeviceHostError};
 use mmt_client::io::{MasterOptions, OperatorChoice};
 use mmt_client::operator::pointer::{Driver, HandTuning};
+use mmt_shared::io::plug_socket::PlugSocketError;
 
 use crate::args::{DeviceArguments, DeviceWords};
 use crate::config::device_config;
@@ -89,11 +90,13 @@ pub(super) fn profile(
 
 fn failure(error: DeviceHostError) -> Failure {
     match error {
-        DeviceHostError::Listen { .. } => Failure::new(Exit::Address, error)
-            .remedy("give another --device-listen address, or port 0 for any free port"),
+        DeviceHostError::Socket(PlugSocketError::Listen { .. }) => {
+            Failure::new(Exit::Address, error)
+                .remedy("give another --device-listen address, or port 0 for any free port")
+        }
         DeviceHostError::Config(_) => {
             Failure::usage(error).remedy("change that number in --device-config")
         }
-        DeviceHostError::Token(_) | DeviceHostError::Thread(_) => Failure::failed(error),
+        DeviceHostError::Socket(_) | DeviceHostError::Thread(_) => Failure::failed(error),
     }
 }

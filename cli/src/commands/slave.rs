@@ -15,6 +15,7 @@ use mmt_server::slave::SlaveConfig;
 use mmt_shared::clean::clean;
 use mmt_shared::io::emergency::EmergencyStop;
 use mmt_shared::io::identity_file::{default_directory, load_or_create};
+use mmt_shared::io::plug_socket::PlugSocketError;
 use mmt_shared::pairing::{Host as HostName, Pairing};
 use mmt_shared::report::RunReport;
 use mmt_shared::wire::Ending;
@@ -81,12 +82,15 @@ pub(crate) fn run(arguments: SlaveArguments, messages: &Messages) -> Result<(), 
 /// A plug for a plant, once one is plugged in; none if somebody ends the command before.
 fn plugged_in(listen: SocketAddr, stop: &Stop) -> Result<Option<PlantHost>, Failure> {
     let plant = PlantHost::start(listen).map_err(|error| match error {
-        PlantHostError::Listen { .. } => Failure::new(Exit::Address, error)
-            .remedy("give another --plant-listen address, or port 0 for any free port"),
-        PlantHostError::Token(_) | PlantHostError::Thread(_) => Failure::failed(error),
+        PlantHostError::Socket(PlugSocketError::Listen { .. }) => {
+            Failure::new(Exit::Address, error)
+                .remedy("give another --plant-listen address, or port 0 for any free port")
+        }
+        PlantHostError::Socket(_) | PlantHostError::Setup(_) | PlantHostError::Thread(_) => {
+            Failure::failed(error)
+        }
     })?;
-    let address = plant.address().map_err(Failure::failed)?;
-    note(format_args!("plant: {address}"));
+    note(format_args!("plant: {}", plant.address()));
     while !plant.wait(PLANT_WAIT) {
         if stop.asked() {
             return Ok(None);

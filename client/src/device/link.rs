@@ -29,7 +29,7 @@ const RAMP_OUT: Duration = Duration::from_millis(210);
 /// How far a reading may be from the one before besides what the greatest speed allows, m: quantization and noise.
 const STEP_SLACK_M: f64 = 1e-3;
 
-/// Bits of the state that the device is told.
+/// Bits of the state that is sent to the device.
 mod state {
     pub(super) const SESSION: u16 = 1;
     pub(super) const ENGAGED: u16 = 2;

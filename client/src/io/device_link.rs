@@ -4,15 +4,14 @@
 //! waits for this thread. Each reading that is taken is answered at once, so that the device sets the pace.
 
 use std::io;
-use std::net::{SocketAddr, UdpSocket};
+use std::net::SocketAddr;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-use std::time::Duration;
 
 use mmt_shared::io::clock::Clock;
-use mmt_shared::io::secret::NoRandomness;
+use mmt_shared::io::plug_socket::{PACKET_MAX, PlugSocket, PlugSocketError};
 use mmt_shared::model::geometry::Vec2;
-use mmt_shared::plug::{PlugCounts, PlugToken};
+use mmt_shared::plug::PlugCounts;
 use rtrb::{Consumer, Producer, RingBuffer};
 
 use crate::device::link::{DeviceLink, DeviceLinkConfig, DeviceLinkError, HandOutput};
@@ -20,28 +19,16 @@ use crate::operator::pointer::HandEvent;
 
 /// Events that may wait for the loop: a second at 1 kHz, in which it stands.
 const EVENTS_MAX: usize = 1024;
-/// Room for a packet, bytes: more than any of ours, so that a longer one is seen to be longer.
-const PACKET_MAX: usize = 256;
-/// A socket that fails is asked again after this.
-const PAUSE: Duration = Duration::from_millis(10);
 
 /// A device cannot be plugged in.
 #[derive(Debug, thiserror::Error)]
 pub enum DeviceHostError {
-    /// The address cannot be had.
-    #[error("the device's plug cannot listen on {address}: {source}")]
-    Listen {
-        /// The address.
-        address: SocketAddr,
-        /// Why.
-        source: io::Error,
-    },
+    /// It cannot listen.
+    #[error("the device: {0}")]
+    Socket(#[from] PlugSocketError),
     /// Its numbers.
     #[error(transparent)]
     Config(#[from] DeviceLinkError),
-    /// No token.
-    #[error(transparent)]
-    Token(#[from] NoRandomness),
     /// No thread.
     #[error("no thread for the device's plug: {0}")]
     Thread(#[source] io::Error),
@@ -133,25 +120,19 @@ impl DeviceHost {
     /// # Errors
     /// See [`DeviceHostError`].
     pub fn start(listen: SocketAddr, config: DeviceLinkConfig) -> Result<Self, DeviceHostError> {
-        let token = PlugToken::generate()?;
-        let mut link = DeviceLink::try_new(config, token)?;
-        let unheard = |source| DeviceHostError::Listen {
-            address: listen,
-            source,
-        };
-        let socket = UdpSocket::bind(listen).map_err(unheard)?;
-        let local = socket.local_addr().map_err(unheard)?;
+        let socket = PlugSocket::bind(listen)?;
+        let mut link = DeviceLink::try_new(config, *socket.token())?;
+        let address = socket.address();
         let shared = Arc::new(Shared::default());
         let served = Arc::clone(&shared);
         std::thread::Builder::new()
             .name("mmt-device".to_owned())
             .spawn(move || serve(&socket, &mut link, &served))
             .map_err(DeviceHostError::Thread)?;
-        let address = format!("udp://{local}?token={}", token.reveal());
         Ok(Self { address, shared })
     }
 
-    /// What the device is told. It holds the token.
+    /// The address for the device. It holds the token.
     pub fn address(&self) -> &str {
         &self.address
     }
@@ -203,15 +184,11 @@ impl Drop for DevicePort {
     }
 }
 
-fn serve(socket: &UdpSocket, link: &mut DeviceLink, shared: &Shared) {
+fn serve(socket: &PlugSocket, link: &mut DeviceLink, shared: &Shared) {
     let clock = Clock::start();
     let mut packet = [0; PACKET_MAX];
     loop {
-        // an error of a socket without a connection is about a packet of before
-        let Ok((length, from)) = socket.recv_from(&mut packet) else {
-            std::thread::sleep(PAUSE);
-            continue;
-        };
+        let (packet, from) = socket.receive(&mut packet);
         let now = clock.now();
         let mut loops = shared.loops();
         let give = |event| {
@@ -220,13 +197,12 @@ fn serve(socket: &UdpSocket, link: &mut DeviceLink, shared: &Shared) {
                 let _ = events.push(event);
             }
         };
-        let due = link.handle(now, from, packet.get(..length).unwrap_or_default(), give);
+        let due = link.handle(now, from, packet, give);
         loops.1 = *link.counts();
         drop(loops);
         if due {
             let answer = link.answer(now, &shared.cell.load());
-            // one that cannot be sent is a lost one
-            let _ = socket.send_to(&answer, from);
+            socket.send(&answer, from);
         }
     }
 }

@@ -53,7 +53,7 @@ pub(super) struct Session {
     to_slave: Vec<(Time, Vec<u8>)>,
 }
 
-/// What the hello of a session says besides the device.
+/// What the hello of a session holds besides the device.
 fn hello(world: &RandomWorld, session: u64, device: &DeviceProfile) -> Hello {
     let mut draws = Substream::new(world.number, "swarm/hello", session);
     let packing = [1, 5, 10, 20].get(draws.bits() as usize % 4).copied();

@@ -295,7 +295,7 @@ fn what_the_master_refuses_the_slaves_confirmed_shadow_never_takes_and_both_side
     let limiter = ForceLimiter::try_new(DeviceProfile::default().limits()).unwrap();
     let master = Master::new(&welcome, limiter);
     world.master = MasterEnd::new(Time::ZERO, master, config.commands());
-    // the judges know of the coupling that the slave was told
+    // the judges know the coupling that the slave got
     world.judges = false;
     world.run(Duration::from_secs(6), |_| {});
     let sent = world.outcome().updates.total();

@@ -6,14 +6,14 @@
 mod lock_step;
 
 use std::io;
-use std::net::{SocketAddr, UdpSocket};
+use std::net::SocketAddr;
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use mmt_shared::io::clock::Clock;
-use mmt_shared::io::secret::NoRandomness;
-use mmt_shared::plug::{Admitted, PlugCounts, PlugHead, PlugPeer, PlugToken};
+use mmt_shared::io::plug_socket::{PACKET_MAX, PlugSocket, PlugSocketError};
+use mmt_shared::plug::{Admitted, PlugCounts, PlugHead, PlugPeer};
 use mmt_shared::time::Time;
 use rtrb::{Consumer, Producer, RingBuffer};
 
@@ -23,27 +23,18 @@ pub use lock_step::{LockStep, LockStepError};
 
 /// Answers that may wait for the loop: a quarter of a second at 1 kHz.
 const ANSWERS_MAX: usize = 256;
-/// Room for a packet, bytes: more than any of ours, so that a longer one is seen to be longer.
-const PACKET_MAX: usize = 256;
 /// A command that cannot be sent at once is lost.
 const SEND_WAIT: Duration = Duration::from_micros(500);
-/// A socket that fails is asked again after this.
-const PAUSE: Duration = Duration::from_millis(10);
 
 /// A plant cannot be plugged in.
 #[derive(Debug, thiserror::Error)]
 pub enum PlantHostError {
-    /// The address cannot be had.
-    #[error("the plant's plug cannot listen on {address}: {source}")]
-    Listen {
-        /// The address.
-        address: SocketAddr,
-        /// Why.
-        source: io::Error,
-    },
-    /// No token.
-    #[error(transparent)]
-    Token(#[from] NoRandomness),
+    /// It cannot listen.
+    #[error("the plant: {0}")]
+    Socket(#[from] PlugSocketError),
+    /// Its socket cannot be set up.
+    #[error("the plant's socket cannot be set up: {0}")]
+    Setup(#[source] io::Error),
     /// No thread.
     #[error("no thread for the plant's plug: {0}")]
     Thread(#[source] io::Error),
@@ -67,8 +58,7 @@ struct Known {
 
 #[derive(Debug)]
 struct Shared {
-    socket: UdpSocket,
-    token: PlugToken,
+    socket: PlugSocket,
     clock: Clock,
     /// Commands sent so far.
     sent: AtomicU32,
@@ -92,16 +82,11 @@ impl PlantHost {
     /// # Errors
     /// See [`PlantHostError`].
     pub fn start(listen: SocketAddr) -> Result<Self, PlantHostError> {
-        let token = PlugToken::generate()?;
-        let unheard = |source| PlantHostError::Listen {
-            address: listen,
-            source,
-        };
-        let socket = UdpSocket::bind(listen).map_err(unheard)?;
-        socket.set_write_timeout(Some(SEND_WAIT)).map_err(unheard)?;
+        let socket = PlugSocket::bind(listen)?;
+        let patience = socket.socket().set_write_timeout(Some(SEND_WAIT));
+        patience.map_err(PlantHostError::Setup)?;
         let shared = Arc::new(Shared {
             socket,
-            token,
             clock: Clock::start(),
             sent: AtomicU32::new(0),
             known: Mutex::default(),
@@ -115,14 +100,10 @@ impl PlantHost {
         Ok(Self(shared))
     }
 
-    /// What the plant is told. It holds the token.
-    ///
-    /// # Errors
-    /// The system does not know the address.
-    pub fn address(&self) -> Result<String, PlantHostError> {
-        let local = self.0.socket.local_addr();
-        let local = local.map_err(PlantHostError::Thread)?;
-        Ok(format!("udp://{local}?token={}", self.0.token.reveal()))
+    /// The address for the plant. It holds the token.
+    #[must_use]
+    pub fn address(&self) -> String {
+        self.0.socket.address()
     }
 
     /// Waits for a plant to plug in, at most so long; whether one has.
@@ -208,9 +189,9 @@ impl PlantPort {
             answers: newest.sequence,
             stamp_ns: shared.clock.now().as_nanos(),
         };
-        // one that cannot be sent is a lost one: the next is due in a millisecond
-        let packet = command.packet(&shared.token, &head);
-        let _ = shared.socket.send_to(&packet, newest.from);
+        // if it is lost, the next is due in a millisecond
+        let packet = command.packet(shared.socket.token(), &head);
+        shared.socket.send(&packet, newest.from);
     }
 }
 
@@ -219,12 +200,7 @@ fn serve(shared: &Shared) {
     let mut is_new = false;
     let mut packet = [0; PACKET_MAX];
     loop {
-        // an error of a socket without a connection is about a packet of before
-        let Ok((length, from)) = shared.socket.recv_from(&mut packet) else {
-            std::thread::sleep(PAUSE);
-            continue;
-        };
-        let packet = packet.get(..length).unwrap_or_default();
+        let (packet, from) = shared.socket.receive(&mut packet);
         let taken = take(&mut peer, &mut is_new, shared, from, packet);
         let mut known = shared.known();
         known.counts = peer.counts;
@@ -247,7 +223,7 @@ fn take(
     from: SocketAddr,
     packet: &[u8],
 ) -> Option<Taken> {
-    let read = PlantAnswer::read(&shared.token, packet);
+    let read = PlantAnswer::read(shared.socket.token(), packet);
     let (head, answer) = read.map_err(|why| peer.refuse(why)).ok()?;
     let admitted = peer.admit(shared.clock.now(), from, head.sequence)?;
     if admitted == Admitted::First {

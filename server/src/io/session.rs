@@ -315,7 +315,7 @@ impl Session<'_> {
         if snapshot.plant_silent != self.plant_silent {
             self.plant_silent = snapshot.plant_silent;
             if self.plant_silent {
-                tracing::warn!("the plant is silent: the tool stands, and the master is told");
+                tracing::warn!("the plant is silent: the tool stands, and no force is on the hand");
             }
         }
         let silent = |heard| now.saturating_since(heard) > SILENCE_MAX;

@@ -1,4 +1,4 @@
-//! The packets of the object's plug (`docs/plugs.md`), and the checks on what a plant says.
+//! The packets of the object's plug (`docs/plugs.md`), and the checks on what a plant sends.
 
 use std::time::Duration;
 
@@ -42,7 +42,7 @@ pub struct PlantAnswer {
     pub object: Option<Pose>,
     /// How old that image is, s.
     pub image_age_s: f64,
-    /// Whether it is the first after a silence: the tool is where the plant says, wherever it was.
+    /// Whether it is the first after a silence: the tool is where the plant reports it, wherever it was.
     pub anew: bool,
 }
 

@@ -20,6 +20,7 @@ pub mod identity;
 pub mod identity_file;
 pub mod loop_thread;
 pub mod network_task;
+pub mod plug_socket;
 pub mod quic;
 pub mod raw_udp;
 pub mod realtime;

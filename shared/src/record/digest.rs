@@ -32,12 +32,15 @@ impl RunDigest {
         let _ = write!(self, "{gave:?}");
     }
 
-    /// Adds all datagrams that leave an end now: `poll` writes the next one and returns its length.
-    pub fn datagrams(&mut self, mut poll: impl FnMut(&mut [u8]) -> Option<usize>) {
-        let mut out = [0; DATAGRAM_MAX];
+    /// Adds all datagrams that leave an end now, and returns them: `poll` writes the next one and returns its length.
+    pub fn datagrams(&mut self, mut poll: impl FnMut(&mut [u8]) -> Option<usize>) -> Vec<Vec<u8>> {
+        let (mut out, mut left) = ([0; DATAGRAM_MAX], Vec::new());
         while let Some(length) = poll(&mut out) {
-            self.datagram(out.get(..length).unwrap_or_default());
+            let datagram = out.get(..length).unwrap_or_default();
+            self.datagram(datagram);
+            left.push(datagram.to_vec());
         }
+        left
     }
 
     /// Adds a datagram that left.

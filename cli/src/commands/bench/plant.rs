@@ -91,8 +91,7 @@ pub(super) fn run(arguments: &PlantBenchArguments) -> Result<(), Failure> {
 fn plugged_in(arguments: &PlantBenchArguments, stop: &Stop) -> Result<Option<LockStep>, Failure> {
     let plant = LockStep::start(arguments.plant.listen()?);
     let mut plant = plant.map_err(Failure::failed)?;
-    let address = plant.address().map_err(Failure::failed)?;
-    note(format_args!("plant: {address}"));
+    note(format_args!("plant: {}", plant.address()));
     while !plant.wait() {
         if stop.asked() {
             return Ok(None);

@@ -1,13 +1,14 @@
 //! A plant in lock-step: virtual time stands until the plant has answered, so that it runs as fast as the plant computes.
 
-use std::net::{SocketAddr, UdpSocket};
+use std::net::SocketAddr;
 use std::time::{Duration, Instant};
 
-use mmt_shared::plug::{PlugHead, PlugToken};
+use mmt_shared::io::plug_socket::{PACKET_MAX, PlugSocket};
+use mmt_shared::plug::PlugHead;
 
 use crate::plant::{PlantAnswer, PlantCommand};
 
-use super::{PACKET_MAX, PlantHostError};
+use super::PlantHostError;
 
 /// A plant that has not answered for so long is gone.
 const GONE: Duration = Duration::from_secs(5);
@@ -34,8 +35,7 @@ pub enum LockStepError {
 /// A plug for one plant that answers every command before the next is sent.
 #[derive(Debug)]
 pub struct LockStep {
-    socket: UdpSocket,
-    token: PlugToken,
+    socket: PlugSocket,
     plant: Option<SocketAddr>,
     sent: u32,
     newest: u32,
@@ -47,30 +47,21 @@ impl LockStep {
     /// # Errors
     /// The address cannot be had, or there is no token.
     pub fn start(listen: SocketAddr) -> Result<Self, PlantHostError> {
-        let token = PlugToken::generate()?;
-        let unheard = |source| PlantHostError::Listen {
-            address: listen,
-            source,
-        };
-        let socket = UdpSocket::bind(listen).map_err(unheard)?;
-        socket.set_read_timeout(Some(AGAIN)).map_err(unheard)?;
+        let socket = PlugSocket::bind(listen)?;
+        let patience = socket.socket().set_read_timeout(Some(AGAIN));
+        patience.map_err(PlantHostError::Setup)?;
         Ok(Self {
             socket,
-            token,
             plant: None,
             sent: 0,
             newest: 0,
         })
     }
 
-    /// What the plant is told. It holds the token.
-    ///
-    /// # Errors
-    /// The system does not know the address.
-    pub fn address(&self) -> Result<String, PlantHostError> {
-        let local = self.socket.local_addr();
-        let local = local.map_err(PlantHostError::Thread)?;
-        Ok(format!("udp://{local}?token={}", self.token.reveal()))
+    /// The address for the plant. It holds the token.
+    #[must_use]
+    pub fn address(&self) -> String {
+        self.socket.address()
     }
 
     /// Whether a plant has plugged in; waits a moment for one.
@@ -94,10 +85,10 @@ impl LockStep {
                 answers: self.newest,
                 stamp_ns: u64::from(sequence) * 1_000_000,
             };
-            let packet = command.packet(&self.token, &head);
+            let packet = command.packet(self.socket.token(), &head);
             if let Some(plant) = self.plant {
-                // one that cannot be sent is sent again
-                let _ = self.socket.send_to(&packet, plant);
+                // what is lost is sent again
+                self.socket.send(&packet, plant);
             }
             while let Some((head, answer)) = self.take() {
                 if head.answers == sequence {
@@ -112,9 +103,9 @@ impl LockStep {
     fn take(&mut self) -> Option<(PlugHead, Option<PlantAnswer>)> {
         let mut packet = [0; PACKET_MAX];
         loop {
-            let (length, from) = self.socket.recv_from(&mut packet).ok()?;
+            let (length, from) = self.socket.socket().recv_from(&mut packet).ok()?;
             let packet = packet.get(..length).unwrap_or_default();
-            let Ok(read) = PlantAnswer::read(&self.token, packet) else {
+            let Ok(read) = PlantAnswer::read(self.socket.token(), packet) else {
                 continue;
             };
             if *self.plant.get_or_insert(from) == from {
