@@ -68,7 +68,8 @@ impl PathTrace {
     /// # Errors
     /// Line and reason.
     pub fn parse(text: &str, direction: Option<Direction>) -> Result<Self, TraceError> {
-        let first = text.lines().map(str::trim).find(|line| !line.is_empty());
+        let opens = |line: &&str| !line.is_empty() && !line.starts_with("ping: ");
+        let first = text.lines().map(str::trim).find(opens);
         let first = first.unwrap_or_default();
         let samples = match first {
             line if line.starts_with('{') => irtt::parse(text, direction),

@@ -63,6 +63,11 @@ fn ping_gives_half_of_each_round_trip_and_its_gaps_are_losses() {
         path.at(Duration::from_millis(5500)),
         Some(Duration::from_millis(30))
     );
+    // as files of LENS begin
+    let warned = format!(
+        "ping: Warning: source address might be selected on device other than: ens33.\n{PING}"
+    );
+    assert_eq!(micros(&self::path(&warned, None)), micros(&path));
 }
 
 #[test]

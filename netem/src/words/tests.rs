@@ -196,6 +196,7 @@ fn an_error_tells_the_word_its_column_and_what_was_expected() {
         ("loss state 60% 60% 60%", 6, "state", "100% together"),
         ("loss list 5-3", 11, "5-3", "3,17,100-120"),
         ("outage 5s 1s", 11, "1s", "for and how long"),
+        ("outage 5s for 0s", 15, "0s", "1ns to 3600s"),
         (
             "delay cdf 5ms@0%,4ms@100%",
             11,

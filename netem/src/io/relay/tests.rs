@@ -3,8 +3,10 @@
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr};
 use std::time::Instant;
 
+use super::port::{Port, Received, Receiver, Sending};
 use super::*;
 use crate::config::Limit;
+use crate::io::driver::Outcome;
 use crate::io::record_file::RecordFile;
 
 const PATIENCE: Duration = Duration::from_secs(30);
@@ -113,6 +115,37 @@ fn ipv6_works_and_so_does_a_target_of_the_other_family() {
     forwards_both_ways(LOCAL6, LOCAL6);
     forwards_both_ways(LOCAL6, LOCAL);
     forwards_both_ways(LOCAL, LOCAL6);
+}
+
+/// What came to a port: contents, class, sender.
+fn take(port: &Port) -> (Vec<u8>, u8, SocketAddr) {
+    let start = Instant::now();
+    let mut seen = None;
+    while seen.is_none() {
+        assert!(start.elapsed() < PATIENCE, "it never came");
+        let take = |got: Received<'_>| seen = Some((got.contents.to_vec(), got.class, got.from));
+        Receiver::new().receive(port, take).unwrap();
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    seen.unwrap()
+}
+
+#[test]
+fn the_traffic_class_passes_both_ways() {
+    let (client, server) = (socket(LOCAL), socket(LOCAL));
+    let relay = relay(LOCAL, server.local_addr().unwrap(), "delay 1ms", "none");
+    let [client, server] = [client, server].map(|socket| Port::try_new(socket).unwrap());
+    let send = |port: &Port, to, class| {
+        let from = None;
+        let outcome = port.send(Sending { to, from, class }, b"class", &mut 0);
+        assert_eq!(outcome, Outcome::Sent);
+    };
+    // expedited forwarding with ECT(0), then CS1 with ECT(1)
+    send(&client, relay.local_addr(), 46 << 2 | 2);
+    let (contents, class, from) = take(&server);
+    assert_eq!((&contents[..], class), (&b"class"[..], 46 << 2 | 2));
+    send(&server, from, 8 << 2 | 1);
+    assert_eq!(take(&client).1, 8 << 2 | 1);
 }
 
 #[test]

@@ -53,13 +53,15 @@ fn order_by_fifo_is_the_same_where_no_packet_waits_for_another() {
 }
 
 /// Everything that can befall a packet on a link without a rate, but for what sets its delay.
-const FEATURES: [&str; 10] = [
+const FEATURES: [&str; 12] = [
     "loss 10%",
     "loss 10% 60%",
     "loss gemodel 5% 30%",
     "loss state 5% 30%",
     "loss burst 5% 20ms",
     "loss every 7",
+    "loss list 3,17,100-120",
+    "loss 10% ecn",
     "duplicate 20% 30%",
     "corrupt 20% 30%",
     "outage 10s for 5s",
@@ -67,7 +69,7 @@ const FEATURES: [&str; 10] = [
 ];
 
 /// Everything that sets a delay.
-const DELAYS: [&str; 8] = [
+const DELAYS: [&str; 10] = [
     "delay 50ms 5ms",
     "delay 50ms 5ms order free",
     "delay 50ms 5ms 70%",
@@ -76,6 +78,8 @@ const DELAYS: [&str; 8] = [
     "delay 50ms 5ms order free reorder 30% gap 3",
     "delay 50ms 5ms slot 3ms 9ms packets 5",
     "delay 50ms duplicate 30%",
+    "delay cdf 40ms@0%,50ms@90%,200ms@100% tau 50ms",
+    "delay 20ms 5ms distribution gamma slot distribution normal 4ms 1ms",
 ];
 
 /// Packets of 100 and of 1000 bytes at 1 kHz, through a link with these words: what became of each.
@@ -135,6 +139,12 @@ fn raising_a_share_only_ever_adds() {
         ("loss gemodel 2% 30% 60% 1%", "loss gemodel 2% 30% 70% 2%"),
         ("loss burst 1% 20ms", "loss burst 3% 20ms"),
         ("loss burst 40% 20ms 50%", "loss burst 90% 20ms 60%"),
+        (
+            "outage 1s for 500ms every 9s",
+            "outage 1s for 900ms every 9s",
+        ),
+        ("loss list 100-250", "loss list 50-400"),
+        ("loss 2%; then loss 1%", "loss 2%; then loss 3%"),
     ] {
         let (few, many): (Vec<bool>, Vec<bool>) = (all(few, &lost), all(many, &lost));
         only_adds(&few, &many);
