@@ -126,25 +126,27 @@ impl fmt::Display for DirectionReport {
             writeln!(f, "  dropped ({cause}) {packets}")?;
         }
         writeln!(f, "  {:22} {:>12} {:>12}", "", "configured", "achieved")?;
-        type Number = (&'static str, fn(&Effect) -> f64, f64);
+        type Number = (&'static str, fn(&Effect) -> Option<f64>, f64);
+        // what a full queue drops has runs that the effect does not count
+        let burst = |e: &Effect| (e.queue_drops + e.over_limit == 0.0).then_some(e.burst_packets);
         let rows: [Number; 6] = [
-            ("mean delay, ms", |e| e.mean_ms, seen.mean_ms),
-            ("standard deviation, ms", |e| e.sd_ms, seen.sd_ms),
-            ("p99, ms", |e| e.p99_ms, seen.p99_ms),
+            ("mean delay, ms", |e| Some(e.mean_ms), seen.mean_ms),
+            ("standard deviation, ms", |e| Some(e.sd_ms), seen.sd_ms),
+            ("p99, ms", |e| Some(e.p99_ms), seen.p99_ms),
             (
                 "dropped, %",
-                |e| 100.0 * (e.loss + e.queue_drops + e.over_limit),
+                |e| Some(100.0 * (e.loss + e.queue_drops + e.over_limit)),
                 100.0 * seen.loss,
             ),
-            ("burst, packets", |e| e.burst_packets, seen.burst_packets),
+            ("burst, packets", burst, seen.burst_packets),
             (
                 "reordered, %",
-                |e| 100.0 * e.reordered,
+                |e| Some(100.0 * e.reordered),
                 100.0 * seen.reordered,
             ),
         ];
         for (label, configured, achieved) in rows {
-            let configured = self.configured.as_ref().map(configured);
+            let configured = self.configured.as_ref().and_then(configured);
             let shown = configured.map_or_else(|| "-".to_owned(), |value| format!("{value:.3}"));
             writeln!(f, "  {label:22} {shown:>12} {achieved:>12.3}")?;
         }

@@ -45,12 +45,6 @@ impl Ends {
         let first = u32::from(Ipv4Addr::new(100, 64, 0, 0)) + 4 * number;
         let (far_ip, near_ip) = (Ipv4Addr::from(first + 1), Ipv4Addr::from(first + 2));
         let name = format!("mmt{number}");
-        let forbidden = |error: Error| {
-            Failure::failed(format!("this host forbids network namespaces or TUN devices: {error}")).remedy(
-                "run it as root, in a container with CAP_NET_ADMIN and CAP_SYS_ADMIN; /dev/net/tun must be there \
-                 (mknod /dev/net/tun c 10 200) and open to this user (chmod 666 /dev/net/tun, as most hosts have it)",
-            )
-        };
         let far = if beside {
             Namespace::make().map_err(forbidden)?
         } else {
@@ -113,6 +107,10 @@ impl Ends {
 /// Starts this program again as root of a user namespace, where the way to the host's network is pasta's. Returns only if
 /// that is not to be.
 fn go_on_as_root(beside: bool) -> Failure {
+    // pasta would only print that it failed
+    if let Err(error) = tun::open() {
+        return forbidden(error);
+    }
     let program = std::env::current_exe();
     let program = program.unwrap_or_else(|_| "mmt".into());
     let arguments = std::env::args_os().skip(1);
@@ -128,23 +126,30 @@ fn go_on_as_root(beside: bool) -> Failure {
     let namespace = ["--user", "--map-root-user"];
     let mut probe = Command::new("unshare");
     let probe = probe.args(namespace).arg("true").output();
-    let forbidden = |why: &str| {
+    let no_users = |why: &str| {
         Failure::failed(format!("this host forbids user namespaces: {why}")).remedy(
             "run it as root, or allow them (sysctl kernel.unprivileged_userns_clone=1, on Ubuntu \
              kernel.apparmor_restrict_unprivileged_userns=0)",
         )
     };
     match probe {
-        Err(error) => return forbidden(&format!("unshare: {error}")),
+        Err(error) => return no_users(&format!("unshare: {error}")),
         Ok(output) if !output.status.success() => {
-            return forbidden(String::from_utf8_lossy(&output.stderr).trim());
+            return no_users(String::from_utf8_lossy(&output.stderr).trim());
         }
         Ok(_) => {}
     }
     let mut again = Command::new("unshare");
     again.args(namespace).arg(program);
     let error = again.args(arguments).exec();
-    forbidden(&error.to_string())
+    no_users(&error.to_string())
+}
+
+fn forbidden(error: Error) -> Failure {
+    Failure::failed(format!("this host forbids network namespaces or TUN devices: {error}")).remedy(
+        "run it as root, in a container with CAP_NET_ADMIN and CAP_SYS_ADMIN; /dev/net/tun must be there \
+         (mknod /dev/net/tun c 10 200) and open to this user (chmod 666 /dev/net/tun, as most hosts have it)",
+    )
 }
 
 fn lacks_ip(error: Error) -> Failure {

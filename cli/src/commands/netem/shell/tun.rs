@@ -2,7 +2,7 @@
 //!
 //! One call of the kernel. The crate for it, `tun-rs`, would bring 22 packages, most of them for other systems.
 
-use std::fs::OpenOptions;
+use std::fs::{File, OpenOptions};
 use std::io;
 use std::os::fd::OwnedFd;
 
@@ -21,6 +21,15 @@ struct Request {
     rest: [u8; 22],
 }
 
+/// The device from which interfaces are made.
+///
+/// # Errors
+/// It is not there, or not open to this user.
+pub(super) fn open() -> io::Result<File> {
+    let device = OpenOptions::new().read(true).write(true).open(DEVICE);
+    device.map_err(|error| io::Error::new(error.kind(), format!("{DEVICE}: {error}")))
+}
+
 /// A new interface of this name in the namespace of this thread. It is gone when its descriptor is closed.
 ///
 /// # Errors
@@ -28,9 +37,7 @@ struct Request {
 pub(super) fn make(name: &str) -> io::Result<OwnedFd> {
     /// `TUNSETIFF` (linux/if_tun.h).
     const MAKE: rustix::ioctl::Opcode = opcode::write::<i32>(b'T', 202);
-    let device = OpenOptions::new().read(true).write(true).open(DEVICE);
-    let device =
-        device.map_err(|error| io::Error::new(error.kind(), format!("{DEVICE}: {error}")))?;
+    let device = open()?;
     let mut request = Request {
         name: [0; NAME_MAX + 1],
         // packets begin with their IP header
