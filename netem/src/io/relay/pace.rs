@@ -54,6 +54,13 @@ impl Pace {
     }
 }
 
+/// What ends a wait after a rest: what is due later, or what has become due meanwhile, at once. If nothing has, the next
+/// datagram does; a rest that ended the wait by itself would wake up again and again with nothing to do.
+pub(super) fn after(rest: Option<Time>, due: Option<Time>) -> (Option<Time>, Option<Time>) {
+    let passed = due.filter(|due| rest.is_some_and(|rest| *due <= rest));
+    (due.filter(|_| passed.is_none()), passed)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -95,5 +102,15 @@ mod tests {
         assert_eq!(pace.rest(us(10_230), None, us(0)), None, "long at work");
         pace.wakes(us(11_000));
         assert_eq!(pace.rest(us(11_001), None, us(0)), None);
+    }
+
+    #[test]
+    fn a_rest_ends_the_wait_after_it_only_for_what_became_due() {
+        let (rest, early, late) = (Some(us(100)), Some(us(90)), Some(us(110)));
+        assert_eq!(after(rest, None), (None, None));
+        assert_eq!(after(rest, late), (late, None));
+        assert_eq!(after(rest, early), (None, early));
+        assert_eq!(after(rest, rest), (None, rest));
+        assert_eq!(after(None, late), (late, None));
     }
 }

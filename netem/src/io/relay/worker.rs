@@ -12,7 +12,7 @@ use mmt_shared::time::Time;
 
 use super::clients::Clients;
 use super::origin::{Origin, datagram};
-use super::pace::Pace;
+use super::pace::{Pace, after};
 use super::port::{Port, Received, Receiver, Sending};
 use super::sockets::{ALARM, LISTEN, Ready};
 use super::{RelaySnapshot, Shared};
@@ -164,12 +164,12 @@ impl Worker {
         if rest.is_some() {
             wait(&mut [self.shared.alarm.as_poll_fd()], rest)?;
         }
-        let due = due.filter(|due| rest.is_none_or(|rest| rest < *due));
+        let (due, at_once) = after(rest, due);
         let others = [
             self.expiry,
             self.rebind.map(|(_, next)| next),
             self.unpublished,
-            rest,
+            at_once,
         ];
         let about = others.into_iter().flatten().min();
         self.clients.sockets.wait(due, about, ready)?;
