@@ -1,32 +1,111 @@
-//! The files of a slave, configuration and scene: TOML, unknown keys are errors with line and caret.
+//! The files of a configuration, a scene and a device: TOML, unknown keys are errors with line and caret.
 //!
-//! What the file leaves out is the mode's, and the mode is the command line's before the file's.
+//! One configuration serves every program (`mmt_lab::layers`); what a file leaves out is the mode's, and the command line
+//! comes before the file.
 
 use std::path::Path;
 
 use mmt_client::device::link::DeviceLinkConfig;
-use mmt_lab::overlay::laid_over;
+use mmt_lab::layers::{Flag, Layers, Program};
+use mmt_lab::text_error::TextError;
+use mmt_lab::world::WorldConfig;
 use mmt_server::environment::SceneConfig;
-use mmt_server::slave::SlaveConfig;
-use mmt_shared::model::settings::Mode;
+use serde::Serialize;
+use serde::de::DeserializeOwned;
 
 use crate::failure::Failure;
 use crate::input::read_text;
 
-/// The slave of a file, if there is one, in a mode, if one is given.
+/// What the command line sets of a configuration.
+#[derive(Debug, Default)]
+pub(crate) struct Flags {
+    keys: Vec<Flag>,
+    seed: Option<u64>,
+}
+
+impl Flags {
+    /// The seed of everything.
+    pub(crate) fn seed(mut self, seed: Option<u64>) -> Self {
+        self.seed = seed;
+        self
+    }
+
+    /// Where the flag is given it sets these keys.
+    pub(crate) fn set(
+        mut self,
+        name: &'static str,
+        keys: &[&'static str],
+        value: Option<impl Serialize>,
+    ) -> Self {
+        if let Some(value) = value {
+            let flags = keys.iter().filter_map(|key| Flag::new(name, key, &value));
+            self.keys.extend(flags);
+        }
+        self
+    }
+
+    /// The same for bodies and walls in a file of their own.
+    ///
+    /// # Errors
+    /// The file cannot be read, is no TOML, or is no scene.
+    pub(crate) fn scene(self, path: Option<&Path>) -> Result<Self, Failure> {
+        let scene = path.map(scene).transpose()?;
+        Ok(self.set("--scene", &["slave.scene"], scene))
+    }
+}
+
+/// The file of a configuration, read.
+pub(crate) struct ConfigFile<'a> {
+    path: Option<&'a Path>,
+    pub(crate) text: String,
+}
+
+impl<'a> ConfigFile<'a> {
+    /// Reads it, if there is one.
+    ///
+    /// # Errors
+    /// It cannot be read.
+    pub(crate) fn read(path: Option<&'a Path>) -> Result<Self, Failure> {
+        let text = path.map(|path| read_text(path, "the configuration"));
+        Ok(Self {
+            path,
+            text: text.transpose()?.unwrap_or_default(),
+        })
+    }
+
+    /// What is made of it and the command line.
+    ///
+    /// # Errors
+    /// What is wrong with the file, or with a flag.
+    pub(crate) fn with<T>(
+        &self,
+        program: Program,
+        flags: &Flags,
+        read: impl FnOnce(Layers) -> Result<T, TextError>,
+    ) -> Result<T, Failure> {
+        let layers = Layers {
+            program,
+            file: &self.text,
+            flags: &flags.keys,
+            seed: flags.seed,
+        };
+        read(layers).map_err(|error| match self.path {
+            Some(path) => refused(path, "the configuration", "docs/configuration.md", &error),
+            None => Failure::usage(error).remedy("change that option"),
+        })
+    }
+}
+
+/// The configuration of a program: the file's, if there is one, and over it what the command line sets.
 ///
 /// # Errors
-/// The file cannot be read, is no TOML, or is no configuration.
-pub(crate) fn slave_config(
+/// The file cannot be read, is no TOML, or is no configuration; a number is out of range.
+pub(crate) fn configuration(
+    program: Program,
     path: Option<&Path>,
-    mode: Option<Mode>,
-) -> Result<SlaveConfig, Failure> {
-    let Some(path) = path else {
-        return Ok(SlaveConfig::of_mode(mode.unwrap_or(Mode::Recommended)));
-    };
-    read(path, "the configuration", "docs/commands.md", |text| {
-        parse(text, mode)
-    })
+    flags: &Flags,
+) -> Result<WorldConfig, Failure> {
+    ConfigFile::read(path)?.with(program, flags, |layers| layers.config())
 }
 
 /// The device of a file that is to be plugged in, if there is one.
@@ -35,9 +114,7 @@ pub(crate) fn slave_config(
 /// The file cannot be read, is no TOML, or is no device.
 pub(crate) fn device_config(path: Option<&Path>) -> Result<DeviceLinkConfig, Failure> {
     path.map_or(Ok(DeviceLinkConfig::default()), |path| {
-        read(path, "the device", "docs/plugs.md", |text| {
-            toml::from_str(text)
-        })
+        read(path, "the device", "docs/plugs.md")
     })
 }
 
@@ -46,39 +123,38 @@ pub(crate) fn device_config(path: Option<&Path>) -> Result<DeviceLinkConfig, Fai
 /// # Errors
 /// The file cannot be read, is no TOML, or is no scene.
 pub(crate) fn scene(path: &Path) -> Result<SceneConfig, Failure> {
-    read(path, "the scene", "docs/scenes.md", |text| {
-        toml::from_str(text)
-    })
+    read(path, "the scene", "docs/scenes.md")
 }
 
 /// Reads a file that `page` describes.
-fn read<T>(
-    path: &Path,
-    what: &str,
-    page: &str,
-    parse: impl Fn(&str) -> Result<T, toml::de::Error>,
-) -> Result<T, Failure> {
+fn read<T: DeserializeOwned>(path: &Path, what: &str, page: &str) -> Result<T, Failure> {
     let text = read_text(path, what)?;
-    parse(&text).map_err(|error| {
-        let (path, error) = (path.display(), error.to_string());
-        let what = format!("{what} {path}: {}", error.trim_end());
-        Failure::usage(what).remedy(format!("correct that line; {page} lists every key"))
-    })
+    toml::from_str(&text).map_err(|error| refused(path, what, page, &TextError::of(&text, &error)))
 }
 
-fn parse(text: &str, mode: Option<Mode>) -> Result<SlaveConfig, toml::de::Error> {
-    // First as it stands, for errors with their place.
-    let alone: SlaveConfig = toml::from_str(text)?;
-    let mode = mode.unwrap_or(alone.mode);
-    let merged = laid_over(&SlaveConfig::of_mode(mode), text)?;
-    Ok(SlaveConfig { mode, ..merged })
+fn refused(path: &Path, what: &str, page: &str, error: &TextError) -> Failure {
+    Failure::usage(format!("{what} {}: {error}", path.display()))
+        .remedy(format!("correct that place; {page} describes every key"))
 }
 
 #[cfg(test)]
 mod tests {
+    use mmt_server::slave::SlaveConfig;
     use mmt_server::trigger::{Scheme, TriggerConfig};
+    use mmt_shared::model::settings::Mode;
 
     use super::*;
+
+    fn parse(text: &str, mode: Option<Mode>) -> Result<SlaveConfig, TextError> {
+        let flags = Flags::default().set("--mode", &["slave.mode"], mode);
+        let layers = Layers {
+            program: Program::Slave,
+            file: text,
+            flags: &flags.keys,
+            seed: None,
+        };
+        layers.config().map(|config| config.slave)
+    }
 
     #[test]
     fn an_empty_file_is_the_default_and_a_mode_alone_is_that_mode() {
@@ -181,7 +257,9 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("slave.toml");
         std::fs::write(&path, "seed = \"one\"").unwrap();
-        let text = slave_config(Some(&path), None).unwrap_err().to_string();
+        let text = configuration(Program::Slave, Some(&path), &Flags::default())
+            .unwrap_err()
+            .to_string();
         for part in ["slave.toml", "line 1", "^", "what to do"] {
             assert!(text.contains(part), "{text}");
         }

@@ -12,6 +12,7 @@ pub mod figure;
 pub mod forces;
 #[cfg(feature = "io")]
 pub mod io;
+pub mod layers;
 pub mod overlay;
 pub mod physics;
 pub mod record_report;
@@ -21,6 +22,7 @@ pub mod statistics;
 pub mod swarm;
 pub mod sweep;
 pub mod table;
+pub mod text_error;
 pub mod transport;
 pub mod trial;
 pub mod what_if;

@@ -70,7 +70,7 @@ pub(crate) fn lay_at<'i>(
 }
 
 /// Puts the given keys over the ones that are there, table by table.
-fn lay_over<'i>(whole: &mut DeTable<'i>, given: DeTable<'i>) {
+pub(crate) fn lay_over<'i>(whole: &mut DeTable<'i>, given: DeTable<'i>) {
     for (key, value) in given {
         lay_one(whole, key, value);
     }

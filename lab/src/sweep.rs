@@ -3,19 +3,20 @@
 //! Pure: a row is a function of the plan and the row's number. It must never depend on which rows ran before, on
 //! which machine or in which shard, so that results come out the same byte for byte however the work is cut.
 
-mod error;
 mod measures;
+mod placed;
 mod plan;
 mod reader;
 mod results;
 mod shard;
 mod start;
 
-pub use error::PlanError;
 pub use measures::columns;
 pub use plan::{Axis, Plan, ROWS_MAX, Row, Seeds, Start};
+pub(crate) use reader::SEED_KEYS;
 pub use results::{PartError, Results, RowResult, part_header};
 pub use shard::{Shard, ShardError};
+pub(crate) use start::beginning;
 
 #[cfg(test)]
 mod tests;

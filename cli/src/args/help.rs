@@ -39,6 +39,9 @@ pub(super) const SWARM: &str = include_str!("help/swarm.txt").trim_ascii_end();
 /// Examples of `mmt sweep`.
 pub(super) const SWEEP: &str = include_str!("help/sweep.txt").trim_ascii_end();
 
+/// Examples of `mmt config`.
+pub(super) const CONFIG: &str = include_str!("help/config.txt").trim_ascii_end();
+
 /// Examples of `mmt completions`.
 pub(super) const COMPLETIONS: &str = include_str!("help/completions.txt").trim_ascii_end();
 

@@ -1,6 +1,7 @@
 //! The arguments of every command, as clap takes them, with help and examples.
 
 mod bench;
+mod config;
 mod console;
 mod device;
 mod doctor;
@@ -21,7 +22,6 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use clap::{Args, Parser, Subcommand};
-use mmt_client::commands::CommandConfig;
 use mmt_netem::LinkConfig;
 use mmt_server::repeats::Repeats;
 use mmt_server::trigger::Scheme;
@@ -37,6 +37,7 @@ pub(crate) use self::netem::{
 pub(crate) use bench::{
     BenchArguments, BenchSubject, PlantBenchArguments, TransportBenchArguments,
 };
+pub(crate) use config::{ConfigArguments, ConfigCommand, ShowArguments};
 pub(crate) use console::ConsoleArguments;
 pub(crate) use device::{DeviceArguments, DeviceWords};
 pub(crate) use doctor::{DoctorArguments, ManArguments};
@@ -96,6 +97,9 @@ pub(crate) enum Command {
     /// Is this host fit for a 1 kHz loop, and does a slave answer?
     #[command(after_help = help::DOCTOR)]
     Doctor(DoctorArguments),
+    /// Every key of a configuration: its default, its unit, what is accepted, and where its value comes from
+    #[command(after_help = help::CONFIG, subcommand_required = true, arg_required_else_help = true)]
+    Config(ConfigArguments),
     /// Print the completions of a shell
     #[command(after_help = help::COMPLETIONS)]
     Completions {
@@ -116,12 +120,15 @@ pub(crate) struct DemoArguments {
     /// How long the operator works; a demo that a browser shows goes on until that is closed
     #[arg(long, value_name = "TIME", default_value = "20s", value_parser = values::duration)]
     pub(crate) duration: Duration,
-    /// Seed of operator, sensors and network
-    #[arg(long, value_name = "N", default_value_t = 1)]
-    pub(crate) seed: u64,
-    /// Emulated network in each direction
-    #[arg(long, value_name = "WORDS", default_value = "delay 50ms 5ms loss 1%", value_parser = values::netem)]
-    pub(crate) netem: LinkConfig,
+    /// Configuration of both sides, TOML (docs/configuration.md)
+    #[arg(long, value_name = "FILE")]
+    pub(crate) config: Option<PathBuf>,
+    /// Seed of operator, sensors and network [default: the file's, else 1]
+    #[arg(long, value_name = "N")]
+    pub(crate) seed: Option<u64>,
+    /// Emulated network in each direction [default: the file's, else "delay 50ms 5ms loss 1%"]
+    #[arg(long, value_name = "WORDS", value_parser = values::netem)]
+    pub(crate) netem: Option<LinkConfig>,
     /// Emulated network from master to slave [default: --netem]
     #[arg(long, value_name = "WORDS", value_parser = values::netem)]
     pub(crate) netem_up: Option<LinkConfig>,
@@ -134,29 +141,29 @@ pub(crate) struct DemoArguments {
     /// Record the session of both ends in this file, MCAP: for mmt replay, report, export and the tools of ROS 2
     #[arg(long, value_name = "FILE")]
     pub(crate) record: Option<PathBuf>,
-    /// The bundle of choices
-    #[arg(long, value_name = "NAME", default_value = "recommended", value_parser = values::mode())]
-    pub(crate) mode: Mode,
-    /// Whose force the hand feels
-    #[arg(long, value_name = "NAME", default_value = "mmt", value_parser = values::architecture())]
-    pub(crate) architecture: Architecture,
-    /// Bodies and walls, TOML [default: one cube]
+    /// The bundle of choices [default: the file's, else recommended]
+    #[arg(long, value_name = "NAME", value_parser = values::mode())]
+    pub(crate) mode: Option<Mode>,
+    /// Whose force the hand feels [default: the file's, else mmt]
+    #[arg(long, value_name = "NAME", value_parser = values::architecture())]
+    pub(crate) architecture: Option<Architecture>,
+    /// Bodies and walls, TOML [default: the configuration's, else one cube]
     #[arg(long, value_name = "FILE")]
     pub(crate) scene: Option<PathBuf>,
-    /// When updates are sent [default: the mode's]
+    /// When updates are sent [default: the file's, else the mode's]
     #[arg(long, value_name = "WORDS", value_parser = values::scheme)]
     pub(crate) scheme: Option<Scheme>,
     /// What carries the session.
     #[command(flatten)]
     pub(crate) transport: TransportArguments,
-    /// When an update is repeated, such as "10ms 30ms", or none [default: the mode's]
+    /// When an update is repeated, such as "10ms 30ms", or none [default: the file's, else the mode's]
     #[arg(long, value_name = "WORDS")]
     pub(crate) repeats: Option<Repeats>,
-    /// How many commands before it each command repeats the samples of
-    #[arg(long, value_name = "N", default_value_t = 0, value_parser = values::repeat_samples())]
-    pub(crate) repeat_samples: u8,
+    /// How many commands before it each command repeats the samples of [default: the file's, else 0]
+    #[arg(long, value_name = "N", value_parser = values::repeat_samples())]
+    pub(crate) repeat_samples: Option<u8>,
     /// Greatest factor that congestion may stretch Delta, T_update and the time between samples by; 1: off
-    /// [default: the mode's]
+    /// [default: the file's, else the mode's]
     #[arg(long, value_name = "FACTOR")]
     pub(crate) stretch_max: Option<StretchMax>,
     /// The haptic device.
@@ -192,7 +199,7 @@ pub(crate) struct SlaveArguments {
     /// mode's]
     #[arg(long, value_name = "FACTOR")]
     pub(crate) stretch_max: Option<StretchMax>,
-    /// Configuration of the slave, TOML
+    /// Configuration, TOML (docs/configuration.md)
     #[arg(long, value_name = "FILE")]
     pub(crate) config: Option<PathBuf>,
     /// Bodies and walls, TOML [default: the configuration's, else one cube]
@@ -201,9 +208,9 @@ pub(crate) struct SlaveArguments {
     /// What the tool meets.
     #[command(flatten)]
     pub(crate) plant: PlantArguments,
-    /// Emulated network on what the slave sends
-    #[arg(long, value_name = "WORDS", default_value = "none", value_parser = values::netem)]
-    pub(crate) netem: LinkConfig,
+    /// Emulated network on what the slave sends [default: the file's, else none]
+    #[arg(long, value_name = "WORDS", value_parser = values::netem)]
+    pub(crate) netem: Option<LinkConfig>,
     /// Record and control of the emulated network
     #[command(flatten)]
     pub(crate) emulation: EmulationArguments,
@@ -251,15 +258,18 @@ pub(crate) struct MasterArguments {
     /// The haptic device.
     #[command(flatten)]
     pub(crate) device: DeviceArguments,
-    /// Virtual stiffness k_p, N/m [default: the device's]
+    /// Configuration, TOML (docs/configuration.md)
+    #[arg(long, value_name = "FILE")]
+    pub(crate) config: Option<PathBuf>,
+    /// Virtual stiffness k_p, N/m [default: the file's, else the device's]
     #[arg(long, value_name = "N_PER_M")]
     pub(crate) stiffness: Option<f64>,
-    /// Whose force the hand feels
-    #[arg(long, value_name = "NAME", default_value = "mmt", value_parser = values::architecture())]
-    pub(crate) architecture: Architecture,
-    /// Emulated network on what the master sends
-    #[arg(long, value_name = "WORDS", default_value = "none", value_parser = values::netem)]
-    pub(crate) netem: LinkConfig,
+    /// Whose force the hand feels [default: the file's, else mmt]
+    #[arg(long, value_name = "NAME", value_parser = values::architecture())]
+    pub(crate) architecture: Option<Architecture>,
+    /// Emulated network on what the master sends [default: the file's, else none]
+    #[arg(long, value_name = "WORDS", value_parser = values::netem)]
+    pub(crate) netem: Option<LinkConfig>,
     /// Record and control of the emulated network
     #[command(flatten)]
     pub(crate) emulation: EmulationArguments,
@@ -272,21 +282,21 @@ pub(crate) struct MasterArguments {
     /// Keep the path to the slave in this file: half of each round trip, and losses; a trace for --netem
     #[arg(long, value_name = "FILE")]
     pub(crate) record_path: Option<PathBuf>,
-    /// Seed of operator and network
-    #[arg(long, value_name = "N", default_value_t = 1)]
-    pub(crate) seed: u64,
-    /// HIP samples (1 a millisecond) in a datagram
-    #[arg(long, value_name = "N", default_value_t = 10, value_parser = values::samples_per_command())]
-    pub(crate) samples_per_command: u8,
+    /// Seed of operator and network [default: the file's, else 1]
+    #[arg(long, value_name = "N")]
+    pub(crate) seed: Option<u64>,
+    /// HIP samples (1 a millisecond) in a datagram [default: the file's, else 10]
+    #[arg(long, value_name = "N", value_parser = values::samples_per_command())]
+    pub(crate) samples_per_command: Option<u8>,
     /// What carries the session.
     #[command(flatten)]
     pub(crate) transport: TransportArguments,
-    /// How many datagrams before it each datagram repeats the samples of
-    #[arg(long, value_name = "N", default_value_t = 0, value_parser = values::repeat_samples())]
-    pub(crate) repeat_samples: u8,
-    /// Greatest factor that congestion may stretch the time between samples by; 1: off
-    #[arg(long, value_name = "FACTOR", default_value_t = CommandConfig::default().stretch_max)]
-    pub(crate) stretch_max: StretchMax,
+    /// How many datagrams before it each datagram repeats the samples of [default: the file's, else 0]
+    #[arg(long, value_name = "N", value_parser = values::repeat_samples())]
+    pub(crate) repeat_samples: Option<u8>,
+    /// Greatest factor that congestion may stretch the time between samples by; 1: off [default: the file's, else 3]
+    #[arg(long, value_name = "FACTOR")]
+    pub(crate) stretch_max: Option<StretchMax>,
     /// The console.
     #[command(flatten)]
     pub(crate) console: ConsoleArguments,

@@ -12,6 +12,9 @@ pub(crate) struct SweepArguments {
     /// The plan, TOML
     #[arg(value_name = "PLAN.toml")]
     pub(crate) plan: PathBuf,
+    /// Configuration below the plan's keys, TOML (docs/configuration.md)
+    #[arg(long, value_name = "FILE")]
+    pub(crate) config: Option<PathBuf>,
     /// Folder for the rows and results.csv; made if it is not there
     #[arg(long, value_name = "DIR", default_value = "sweep")]
     pub(crate) out: PathBuf,

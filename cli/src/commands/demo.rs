@@ -9,10 +9,9 @@ use mmt_client::device::DeviceProfile;
 use mmt_client::io::console::Order;
 use mmt_client::io::{MasterConfiguration, MasterLive, MasterOptions, OperatorChoice, SessionEnd};
 use mmt_client::operator::pointer::Driver;
-use mmt_client::operator::scripted::ScriptedConfig;
+use mmt_lab::world::WorldConfig;
 use mmt_netem::Direction;
 use mmt_server::io::{SlaveConfiguration, SlaveOptions};
-use mmt_server::slave::SlaveConfig;
 use mmt_shared::io::emergency::EmergencyStop;
 use mmt_shared::io::identity::Identity;
 use mmt_shared::io::transport::Transport;
@@ -36,10 +35,8 @@ use crate::stop::Stop;
 use crate::view::{Caption, Screen};
 
 mod setting;
-use setting::{Setting, down, up};
+use setting::Setting;
 
-/// Samples in a command.
-const SAMPLES_PER_COMMAND: u8 = 10;
 /// How long the slave may take to notice that the master has ended before it is asked to end as well.
 const FAREWELL: Duration = Duration::from_secs(3);
 
@@ -49,12 +46,12 @@ const FAREWELL: Duration = Duration::from_secs(3);
 /// A host could not start, or the session broke.
 pub(crate) fn run(arguments: &DemoArguments, messages: &Messages) -> Result<(), Failure> {
     let mut setting = Setting::new(arguments);
-    setting.slave_config()?;
-    let (up, down) = (up(arguments), down(arguments));
+    let config = setting.config()?;
+    let WorldConfig { up, down, seed, .. } = &config;
     note(effect(Direction::Up, up)?);
     note(effect(Direction::Down, down)?);
     arguments.transport.warning().into_iter().for_each(note);
-    let device = Device::start(&arguments.device, None)?;
+    let device = Device::start(&arguments.device, config.stiffness_n_per_m)?;
     let record = Record::start(arguments.record.as_deref())?;
     let stop = Stop::on_signals()?;
     let dashboard = !arguments.json && !arguments.emulation.netem_control;
@@ -65,7 +62,7 @@ pub(crate) fn run(arguments: &DemoArguments, messages: &Messages) -> Result<(), 
     )?;
     let controlled = desk.is_some();
     let emulation = &arguments.emulation;
-    let emulation = Emulation::start(emulation, controlled, arguments.seed, Some(up), Some(down))?;
+    let emulation = Emulation::start(emulation, controlled, *seed, Some(up), Some(down))?;
     let mut viewer = Viewer::new(Caption::default(), dashboard, messages, &stop);
     let ended = loop {
         let mut round = Round {
@@ -121,15 +118,13 @@ type Ended = Option<(
 impl Round<'_> {
     /// Runs slave and master to their end; none if the slave ended before it listened.
     fn session(&mut self) -> Result<Ended, Failure> {
-        let config = self.setting.slave_config()?;
+        let config = self.setting.config()?;
         let arguments = &self.setting.arguments;
         let mut caption = caption(arguments, &config);
         let transport = arguments.transport.choose()?;
         let (stop, stop_slave) = (Stop::new(), Stop::new());
-        // both sides stretch as far
-        let stretch_max = config.stretch_max;
         let (truth_from, truth_to) = truth::pair();
-        let mut options = slave_options(arguments, transport, self.emulation, config, truth_from)?;
+        let mut options = slave_options(transport, self.emulation, &config, truth_from)?;
         options.record = self.record.recorder();
         let (slave, started) = slave::start(options, None, stop_slave.receiver())?;
         let Ok(started) = started.recv() else {
@@ -139,10 +134,10 @@ impl Round<'_> {
             arguments,
             transport,
             self.emulation,
+            &config,
             started.pairing,
             truth_to,
         );
-        options.commands.stretch_max = stretch_max;
         options.record = self.record.recorder();
         options.emergency = self.stop.emergency().clone();
         options.scene_hz = Viewer::scene_hz(self.dashboard);
@@ -219,8 +214,12 @@ impl Round<'_> {
             match order {
                 Order::End => stop.end(),
                 Order::Network(wish) => {
-                    let networks = self.setting.networks();
-                    desk.change_networks(&wish, self.emulation, networks.map(Some));
+                    match self.setting.networks() {
+                        Ok(ways) => {
+                            desk.change_networks(&wish, self.emulation, ways.map(Some));
+                        }
+                        Err(what) => desk.tell([("note", what.to_string().into())]),
+                    }
                     desk.tell(self.setting.shown());
                 }
                 Order::Restart(wish) => match self.setting.wished(&wish) {
@@ -246,20 +245,20 @@ fn operated_at(desk: &Desk, options: &mut MasterOptions) {
     }
 }
 
-fn caption(arguments: &DemoArguments, config: &SlaveConfig) -> Caption {
-    let environment = &config.environment;
+fn caption(arguments: &DemoArguments, config: &WorldConfig) -> Caption {
+    let (slave, environment) = (&config.slave, &config.slave.environment);
     let m = environment.mass_kg;
     let c = environment.friction_coefficient * m * environment.gravity_m_per_s2;
-    let mode = match config.mode {
+    let mode = match slave.mode {
         Mode::Paper => "paper",
         Mode::Recommended => "recommended",
     };
-    let (scheme, seed) = (config.trigger.scheme, arguments.seed);
-    let network = match (up(arguments), down(arguments)) {
+    let (scheme, seed) = (slave.trigger.scheme, config.seed);
+    let network = match (&config.up, &config.down) {
         (up, down) if up == down => format!("network each way: {up}"),
         (up, down) => format!("network up: {up}, down: {down}"),
     };
-    let mode = match arguments.architecture {
+    let mode = match config.architecture {
         Architecture::Mmt => mode.to_owned(),
         other => format!("{mode}, {}", other.name()),
     };
@@ -268,24 +267,23 @@ fn caption(arguments: &DemoArguments, config: &SlaveConfig) -> Caption {
         duration_s: Some(arguments.duration.as_secs_f64()),
         setting: format!("{mode}, {scheme}; {network}; seed {seed}"),
         // of several bodies the one that is touched counts
-        truth: (config.scene.bodies.is_empty()).then_some([m, environment.damping_ns_per_m, c]),
+        truth: (slave.scene.bodies.is_empty()).then_some([m, environment.damping_ns_per_m, c]),
     }
 }
 
 fn slave_options(
-    arguments: &DemoArguments,
     transport: Transport,
     emulation: &Emulation,
-    config: SlaveConfig,
+    config: &WorldConfig,
     truth: TruthSender,
 ) -> Result<SlaveOptions, Failure> {
     Ok(SlaveOptions {
         transport,
         listen: SocketAddr::from((Ipv4Addr::LOCALHOST, 0)),
         identity: Identity::ephemeral().map_err(Failure::failed)?,
-        config,
-        netem: down(arguments).clone(),
-        netem_seed: arguments.seed,
+        config: config.slave.clone(),
+        netem: config.down.clone(),
+        netem_seed: config.seed,
         netem_extras: emulation.extras(Direction::Down),
         once: true,
         truth: Some(truth),
@@ -299,6 +297,7 @@ fn master_options(
     arguments: &DemoArguments,
     transport: Transport,
     emulation: &Emulation,
+    config: &WorldConfig,
     pairing: Pairing,
     truth: TruthReceiver,
 ) -> MasterOptions {
@@ -306,22 +305,19 @@ fn master_options(
         transport,
         pairing,
         device: DeviceProfile::default(),
-        operator: OperatorChoice::Scripted(ScriptedConfig {
-            seed: arguments.seed,
-            ..ScriptedConfig::default()
-        }),
+        operator: OperatorChoice::Scripted(config.operator),
         events: std::sync::Mutex::default(),
         device_port: std::sync::Mutex::default(),
         duration: Some(arguments.duration),
-        architecture: arguments.architecture,
+        architecture: config.architecture,
         scene_hz: 0,
         commands: CommandConfig {
-            samples_per_command: SAMPLES_PER_COMMAND,
-            repeat_samples: arguments.repeat_samples,
-            ..CommandConfig::default()
+            samples_per_command: config.samples_per_command,
+            repeat_samples: config.repeat_samples,
+            stretch_max: config.stretch_max,
         },
-        netem: up(arguments).clone(),
-        netem_seed: arguments.seed,
+        netem: config.up.clone(),
+        netem_seed: config.seed,
         netem_extras: emulation.extras(Direction::Up),
         path: None,
         take_over: false,

@@ -13,6 +13,7 @@ use mmt_client::io::{
 use mmt_client::operator::pointer::Driver;
 use mmt_client::operator::scripted::ScriptedConfig;
 use mmt_client::operator::trace::Trace;
+use mmt_lab::layers::Program;
 use mmt_netem::Direction;
 use mmt_netem::io::socket::SocketExtras;
 use mmt_netem::trace::mmt::path_text;
@@ -33,6 +34,7 @@ use super::netem::wrap::{Emulation, effect};
 use super::record::Record;
 use super::viewer::Viewer;
 use crate::args::{DeviceWords, MasterArguments, OperatorWords, PairingWords};
+use crate::config::configuration;
 use crate::failure::{Exit, Failure};
 use crate::input::read_text;
 use crate::log::Messages;
@@ -49,19 +51,20 @@ const TRACE_START_M: (f64, f64) = (-0.25, 0.0);
 /// # Errors
 /// Wrong input, no session, or a session that broke.
 pub(crate) fn run(arguments: MasterArguments, messages: &Messages) -> Result<(), Failure> {
-    let mut options = options(&arguments)?;
-    let device = Device::start(&arguments.device, arguments.stiffness)?;
+    let (mut options, stiffness) = options(&arguments)?;
+    let device = Device::start(&arguments.device, stiffness)?;
     device.give(&mut options);
     let record = Record::start(arguments.record.as_deref())?;
     options.record = record.recorder();
     // not before the pairing has been read from stdin: the orders come after it
-    let (netem, seed) = (Some(&arguments.netem), arguments.seed);
+    let mut link = options.netem.clone();
+    let seed = options.netem_seed;
     let wanted = matches!(arguments.operator, OperatorWords::Pointer);
     let stop = Stop::on_signals()?;
     options.emergency = stop.emergency().clone();
     let mut desk = Desk::start(&arguments.console, wanted, stop.emergency())?;
     let controlled = desk.is_some();
-    let emulation = Emulation::start(&arguments.emulation, controlled, seed, netem, None)?;
+    let emulation = Emulation::start(&arguments.emulation, controlled, seed, Some(&link), None)?;
     options.netem_extras = emulation.extras(Direction::Up);
     let dashboard = !arguments.json && !emulation.takes_orders();
     options.scene_hz = Viewer::scene_hz(dashboard);
@@ -69,19 +72,18 @@ pub(crate) fn run(arguments: MasterArguments, messages: &Messages) -> Result<(),
         options.scene_hz = console::SCENE_HZ;
         options.events = std::sync::Mutex::new(Some(desk.events()));
     }
-    if !arguments.netem.is_transparent() {
-        note(effect(Direction::Up, &arguments.netem)?);
+    if !link.is_transparent() {
+        note(effect(Direction::Up, &link)?);
     }
     let mut caption = Caption {
         command: "master",
         duration_s: options.duration.map(|time| time.as_secs_f64()),
-        setting: format!("slave at {}, {}", options.pairing.address, arguments.netem),
+        setting: format!("slave at {}, {link}", options.pairing.address),
         truth: None,
     };
     arguments.transport.warning().into_iter().for_each(note);
     let path = options.path.clone();
     let (host, live) = start(options, stop.receiver())?;
-    let mut link = arguments.netem.clone();
     if let Some(desk) = &mut desk {
         let shown = live.clone();
         desk.show(&caption, move || *shown.borrow(), || None);
@@ -149,24 +151,28 @@ pub(super) fn judge(end: Option<SessionEnd>) -> Result<(), Failure> {
     }
 }
 
-fn options(arguments: &MasterArguments) -> Result<MasterOptions, Failure> {
+/// What the session needs, and the stiffness that the device is to be used with, N/m, if one is given.
+fn options(arguments: &MasterArguments) -> Result<(MasterOptions, Option<f64>), Failure> {
     let pairing = pairing(&arguments.pairing)?;
-    Ok(MasterOptions {
+    let path = arguments.config.as_deref();
+    let config = configuration(Program::Master, path, &arguments.flags())?;
+    let stiffness = config.stiffness_n_per_m;
+    let options = MasterOptions {
         transport: arguments.transport.choose()?,
-        device: device::profile(&arguments.device, arguments.stiffness)?,
-        operator: operator(arguments)?,
+        device: device::profile(&arguments.device, stiffness)?,
+        operator: operator(arguments, config.operator)?,
         events: std::sync::Mutex::default(),
         device_port: std::sync::Mutex::default(),
         duration: arguments.duration,
-        architecture: arguments.architecture,
+        architecture: config.architecture,
         scene_hz: 0,
         commands: CommandConfig {
-            samples_per_command: arguments.samples_per_command,
-            repeat_samples: arguments.repeat_samples,
-            stretch_max: arguments.stretch_max,
+            samples_per_command: config.samples_per_command,
+            repeat_samples: config.repeat_samples,
+            stretch_max: config.stretch_max,
         },
-        netem: arguments.netem.clone(),
-        netem_seed: arguments.seed,
+        netem: config.up,
+        netem_seed: config.seed,
         netem_extras: SocketExtras::default(),
         record: None,
         path: arguments.record_path.is_some().then(SharedPath::default),
@@ -175,7 +181,8 @@ fn options(arguments: &MasterArguments) -> Result<MasterOptions, Failure> {
         resume: resume_file(&pairing),
         emergency: EmergencyStop::default(),
         pairing,
-    })
+    };
+    Ok((options, stiffness))
 }
 
 /// The file for this slave's session, for a master that is killed; without one it waits until the slave has missed it.
@@ -220,11 +227,10 @@ pub(super) fn pairing(words: &PairingWords) -> Result<Pairing, Failure> {
         .map_err(|error| Failure::usage(format!("PAIRING: {error}")))
 }
 
-fn operator(arguments: &MasterArguments) -> Result<OperatorChoice, Failure> {
-    let scripted = ScriptedConfig {
-        seed: arguments.seed,
-        ..ScriptedConfig::default()
-    };
+fn operator(
+    arguments: &MasterArguments,
+    scripted: ScriptedConfig,
+) -> Result<OperatorChoice, Failure> {
     let person = |driver| OperatorChoice::Person {
         scripted,
         driver,

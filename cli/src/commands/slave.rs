@@ -5,13 +5,13 @@ use std::sync::Arc;
 use std::sync::mpsc;
 use std::time::Duration;
 
+use mmt_lab::layers::Program;
 use mmt_netem::Direction;
 use mmt_netem::io::socket::SocketExtras;
 use mmt_server::io::plant_link::{PlantHost, PlantHostError};
 use mmt_server::io::{
     SlaveConfiguration, SlaveHost, SlaveHostError, SlaveLive, SlaveOptions, SlaveReport,
 };
-use mmt_server::slave::SlaveConfig;
 use mmt_shared::clean::clean;
 use mmt_shared::io::emergency::EmergencyStop;
 use mmt_shared::io::identity_file::{default_directory, load_or_create};
@@ -27,7 +27,7 @@ use super::netem::wrap::{Emulation, effect};
 use super::record::Record;
 use super::viewer::Viewer;
 use crate::args::SlaveArguments;
-use crate::config::{scene, slave_config};
+use crate::config::configuration;
 use crate::failure::{Exit, Failure};
 use crate::log::Messages;
 use crate::output::{note, print, print_report};
@@ -45,11 +45,11 @@ pub(crate) fn run(arguments: SlaveArguments, messages: &Messages) -> Result<(), 
     let mut options = options(&arguments)?;
     let record = Record::start(arguments.record.as_deref())?;
     options.record = record.recorder();
-    let (netem, seed) = (Some(&arguments.netem), options.netem_seed);
+    let (netem, seed) = (Some(&options.netem), options.netem_seed);
     let emulation = Emulation::start(&arguments.emulation, false, seed, None, netem)?;
     options.netem_extras = emulation.extras(Direction::Down);
-    if !arguments.netem.is_transparent() {
-        note(effect(Direction::Down, &arguments.netem)?);
+    if !options.netem.is_transparent() {
+        note(effect(Direction::Down, &options.netem)?);
     }
     let unserved = unserved(&options);
     arguments.transport.warning().into_iter().for_each(note);
@@ -164,17 +164,9 @@ pub(super) fn start(
 }
 
 fn options(arguments: &SlaveArguments) -> Result<SlaveOptions, Failure> {
-    let mode = arguments.mode;
-    let mut config: SlaveConfig = slave_config(arguments.config.as_deref(), mode)?;
-    if let Some(path) = &arguments.scene {
-        config.scene = scene(path)?;
-    }
-    if let Some(scheme) = arguments.scheme {
-        config.trigger.scheme = scheme;
-    }
-    config.repeats_ms = arguments.repeats.unwrap_or(config.repeats_ms);
-    config.stretch_max = arguments.stretch_max.unwrap_or(config.stretch_max);
-    config.seed = arguments.seed.unwrap_or(config.seed);
+    let path = arguments.config.as_deref();
+    let world = configuration(Program::Slave, path, &arguments.flags()?)?;
+    let mut config = world.slave;
     config.plant.link = arguments.plant.is_linked(config.plant.link);
     let directory = match &arguments.identity {
         Some(directory) => directory.clone(),
@@ -187,9 +179,9 @@ fn options(arguments: &SlaveArguments) -> Result<SlaveOptions, Failure> {
         transport,
         listen: arguments.listen,
         identity: load_or_create(&directory).map_err(Failure::usage)?,
-        netem_seed: config.seed,
+        netem_seed: world.seed,
         config,
-        netem: arguments.netem.clone(),
+        netem: world.down,
         netem_extras: SocketExtras::default(),
         once: arguments.once,
         truth: None,

@@ -7,9 +7,11 @@ mod summary;
 use std::fmt::Display;
 
 use mmt_lab::io::{SweepDir, SweepError};
+use mmt_lab::layers::Program;
 use mmt_lab::sweep::{Plan, Results};
 
 use crate::args::SweepArguments;
+use crate::config::{ConfigFile, Flags};
 use crate::failure::Failure;
 use crate::input::read_text;
 use crate::output::{print, print_json};
@@ -24,7 +26,9 @@ use summary::{Preview, Summary};
 /// The plan is wrong or not that of the folder; the folder cannot be read or written; rows are missing at the end.
 pub(crate) fn run(arguments: &SweepArguments) -> Result<(), Failure> {
     let text = read_text(&arguments.plan, "the plan")?;
-    let plan = Plan::parse(&text).map_err(|error| {
+    let below = ConfigFile::read(arguments.config.as_deref())?;
+    below.with(Program::Sweep, &Flags::default(), |layers| layers.config())?;
+    let plan = Plan::parse_over(&text, &below.text).map_err(|error| {
         Failure::usage(format!("the plan {}: {error}", arguments.plan.display()))
             .remedy("correct that place; docs/sweep.md describes what a plan holds")
     })?;

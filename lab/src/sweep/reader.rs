@@ -10,29 +10,39 @@ use serde::de::IgnoredAny;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue, Deserializer};
 
-use super::error::PlanError;
-use super::plan::{Axis, Plan, ROWS_MAX, Seeds, Start, steps};
+use super::placed::{AxisHead, PlacedAxis, placed_axis};
+use super::plan::{Plan, ROWS_MAX, Seeds, Start, steps};
 use super::start::beginning;
-use crate::overlay::{lay, lay_at};
+use crate::layers::configuration;
+use crate::overlay::{lay, lay_at, lay_over};
+use crate::text_error::TextError;
 use crate::trial::{Change, TrialError};
 use crate::world::{World, WorldConfig};
 
 /// Accepted length of a run, s: one tick to a week.
 const DURATION_S: (f64, f64) = (0.001, 604_800.0);
 /// What the seeds of a plan set.
-const SEED_KEYS: [&str; 3] = ["seed", "slave.seed", "operator.seed"];
+pub(crate) const SEED_KEYS: [&str; 3] = ["seed", "slave.seed", "operator.seed"];
 
 impl Plan {
     /// The plan of a text in TOML (`docs/sweep.md` has its keys).
     ///
     /// # Errors
     /// What is wrong with which key or value, with its line: nothing of the plan has run by then.
-    pub fn parse(text: &str) -> Result<Self, PlanError> {
-        let root = DeTable::parse(text).map_err(|error| PlanError::of(text, &error))?;
+    pub fn parse(text: &str) -> Result<Self, TextError> {
+        Self::parse_over(text, "")
+    }
+
+    /// The same, with the plan's keys laid over those of a configuration that has been read before.
+    ///
+    /// # Errors
+    /// As [`Plan::parse`].
+    pub fn parse_over(text: &str, below: &str) -> Result<Self, TextError> {
+        let root = DeTable::parse(text).map_err(|error| TextError::of(text, &error))?;
         let head = Head::deserialize(Deserializer::from(root.clone()))
-            .map_err(|error| PlanError::of(text, &error))?;
+            .map_err(|error| TextError::of(text, &error))?;
         let duration = head.duration(text)?;
-        let reader = Reader::new(text, &root, &head)?;
+        let reader = Reader::new(text, below, &root, &head)?;
         reader.check_size(head.seeds.get_ref(), &head.seeds.span())?;
         let change = head.change(text)?;
         Ok(Self {
@@ -59,78 +69,52 @@ struct Head {
     change: Option<Spanned<Change>>,
 }
 
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct AxisHead {
-    key: Option<Spanned<String>>,
-    keys: Option<Spanned<Vec<Spanned<String>>>>,
-    values: Spanned<Vec<IgnoredAny>>,
-}
-
 impl Head {
-    fn duration(&self, text: &str) -> Result<Duration, PlanError> {
+    fn duration(&self, text: &str) -> Result<Duration, TextError> {
         let (least, most) = DURATION_S;
         let seconds = *self.duration_s.get_ref();
         if !(least..=most).contains(&seconds) {
             let what = format!("duration_s is {seconds}; it must be {least} to {most}");
-            return Err(PlanError::at(text, Some(self.duration_s.span()), what));
+            return Err(TextError::at(text, Some(self.duration_s.span()), what));
         }
         Ok(Duration::from_secs_f64(seconds))
     }
 
-    fn change(&self, text: &str) -> Result<Option<Change>, PlanError> {
+    fn change(&self, text: &str) -> Result<Option<Change>, TextError> {
         let Some(change) = &self.change else {
             return Ok(None);
         };
         let contact_s = change.get_ref().contact_s;
         if !(contact_s.is_finite() && contact_s >= 0.0) {
             let what = format!("contact_s of the change is {contact_s}; it must be at least 0");
-            return Err(PlanError::at(text, Some(change.span()), what));
+            return Err(TextError::at(text, Some(change.span()), what));
         }
         Ok(Some(*change.get_ref()))
-    }
-}
-
-/// An axis with the places of its keys and values.
-struct PlacedAxis<'i> {
-    keys: Vec<Spanned<String>>,
-    /// Per step a value for every key.
-    steps: Vec<Vec<Spanned<DeValue<'i>>>>,
-}
-
-impl PlacedAxis<'_> {
-    fn plain(&self, text: &str) -> Axis {
-        let written = |step: &Vec<_>| step.iter().map(|value| written(text, value)).collect();
-        Axis {
-            keys: self.keys.iter().map(|key| key.get_ref().clone()).collect(),
-            values: self.steps.iter().map(written).collect(),
-        }
-    }
-}
-
-/// A value as the plan writes it; of a string what is between the quotes.
-fn written(text: &str, value: &Spanned<DeValue>) -> String {
-    match value.get_ref() {
-        DeValue::String(string) => string.to_string(),
-        _ => text.get(value.span()).unwrap_or_default().to_owned(),
     }
 }
 
 /// Turns the placed keys and values into configurations.
 struct Reader<'i> {
     text: &'i str,
+    /// The keys of a configuration below all of these.
+    below: Spanned<DeTable<'i>>,
     start: Start,
     base: Spanned<DeTable<'i>>,
     axes: Vec<PlacedAxis<'i>>,
 }
 
 impl<'i> Reader<'i> {
-    fn new(text: &'i str, root: &Spanned<DeTable<'i>>, head: &Head) -> Result<Self, PlanError> {
+    fn new(
+        text: &'i str,
+        below: &'i str,
+        root: &Spanned<DeTable<'i>>,
+        head: &Head,
+    ) -> Result<Self, TextError> {
         let base = match (root.get_ref().get("base"), &head.base) {
             (Some(base), Some(place)) => match base.get_ref() {
                 DeValue::Table(table) => Spanned::new(place.span(), table.clone()),
                 _ => {
-                    return Err(PlanError::at(
+                    return Err(TextError::at(
                         text,
                         Some(place.span()),
                         "base must be a table",
@@ -148,6 +132,7 @@ impl<'i> Reader<'i> {
         let axes = axes.map(|(head, placed)| placed_axis(text, head, placed.get_ref()));
         let reader = Self {
             text,
+            below: configuration(below).map_err(|error| TextError::of(below, &error))?,
             start: head.start,
             base,
             axes: axes.collect::<Result<_, _>>()?,
@@ -157,11 +142,11 @@ impl<'i> Reader<'i> {
     }
 
     /// No key twice or within another, and no seed.
-    fn check_keys(&self) -> Result<(), PlanError> {
+    fn check_keys(&self) -> Result<(), TextError> {
         let keys: Vec<&Spanned<String>> = self.axes.iter().flat_map(|axis| &axis.keys).collect();
         for (n, key) in keys.iter().enumerate() {
             let name = key.get_ref();
-            let refuse = |what: String| Err(PlanError::at(self.text, Some(key.span()), what));
+            let refuse = |what: String| Err(TextError::at(self.text, Some(key.span()), what));
             if name.split('.').any(str::is_empty) {
                 return refuse(format!(
                     "`{name}` is no key; write it as slave.trigger.scheme"
@@ -193,14 +178,14 @@ impl<'i> Reader<'i> {
             }
             if let Some((place, _)) = inner.and_then(|base| base.get_key_value(last)) {
                 let what = format!("`{key}` is not for base: the seeds of a plan are `seeds`");
-                return Err(PlanError::at(self.text, Some(place.span()), what));
+                return Err(TextError::at(self.text, Some(place.span()), what));
             }
         }
         Ok(())
     }
 
-    fn check_size(&self, seeds: &Seeds, place: &Range<usize>) -> Result<(), PlanError> {
-        let refuse = |what: String| Err(PlanError::at(self.text, Some(place.clone()), what));
+    fn check_size(&self, seeds: &Seeds, place: &Range<usize>) -> Result<(), TextError> {
+        let refuse = |what: String| Err(TextError::at(self.text, Some(place.clone()), what));
         if seeds.count == 0 {
             return refuse("count of seeds is 0; it must be at least 1".to_owned());
         }
@@ -218,7 +203,7 @@ impl<'i> Reader<'i> {
     }
 
     /// The configuration at every point of the grid, each tried.
-    fn points(&self, change: Option<Change>) -> Result<Vec<WorldConfig>, PlanError> {
+    fn points(&self, change: Option<Change>) -> Result<Vec<WorldConfig>, TextError> {
         let sizes: Vec<usize> = self.axes.iter().map(|axis| axis.steps.len()).collect();
         let points = 0..sizes.iter().product();
         points
@@ -235,14 +220,17 @@ impl<'i> Reader<'i> {
     }
 
     /// The configuration with each axis at a step, or left out.
-    fn config(&self, steps: &[Option<usize>]) -> Result<WorldConfig, PlanError> {
+    fn config(&self, steps: &[Option<usize>]) -> Result<WorldConfig, TextError> {
         let mut given = self.base.clone();
         for (key, value) in self.assignments(steps) {
             lay_at(given.get_mut(), key.get_ref(), &key.span(), value.clone());
         }
-        let start = beginning(self.start, &given);
-        lay(&start, given, self.text.len())
-            .map_err(|error| PlanError::of(self.text, &error).context(&self.named(steps)))
+        let mut hints = self.below.clone();
+        lay_over(hints.get_mut(), given.get_ref().clone());
+        let start = beginning(self.start, &hints);
+        lay(&start, self.below.clone(), self.text.len())
+            .and_then(|start| lay(&start, given, self.text.len()))
+            .map_err(|error| TextError::of(self.text, &error).context(&self.named(steps)))
     }
 
     fn assignments(
@@ -270,13 +258,13 @@ impl<'i> Reader<'i> {
         steps: &[Option<usize>],
         change: Option<Change>,
         error: &TrialError,
-    ) -> PlanError {
+    ) -> TextError {
         let refuses = |steps: &[Option<usize>]| {
             let config = self.config(steps);
             config.is_ok_and(|config| attempt(&config, change).is_err())
         };
         if refuses(&vec![None; steps.len()]) {
-            return PlanError::at(self.text, Some(self.base.span()), error);
+            return TextError::at(self.text, Some(self.base.span()), error);
         }
         let alone = |axis: usize| -> Vec<Option<usize>> {
             let kept = |(n, step): (usize, &Option<usize>)| step.filter(|_| n == axis);
@@ -288,45 +276,8 @@ impl<'i> Reader<'i> {
             let first = spans.next()?;
             Some(first.start..spans.last().map_or(first.end, |last| last.end))
         });
-        PlanError::at(self.text, place, error).context(&self.named(steps))
+        TextError::at(self.text, place, error).context(&self.named(steps))
     }
-}
-
-fn placed_axis<'i>(
-    text: &str,
-    head: &Spanned<AxisHead>,
-    placed: &DeValue<'i>,
-) -> Result<PlacedAxis<'i>, PlanError> {
-    let axis = head.get_ref();
-    let refuse = |span, what: &str| Err(PlanError::at(text, Some(span), what));
-    let keys = match (&axis.key, &axis.keys) {
-        (Some(key), None) => vec![key.clone()],
-        (None, Some(keys)) if !keys.get_ref().is_empty() => keys.get_ref().clone(),
-        _ => return refuse(head.span(), "an axis has either `key` or `keys`"),
-    };
-    let values = placed.as_table().and_then(|axis| axis.get("values"));
-    let values = values.and_then(|values| values.get_ref().as_array());
-    let values: Vec<_> = values
-        .into_iter()
-        .flat_map(|values| values.iter())
-        .collect();
-    if values.is_empty() {
-        return refuse(axis.values.span(), "an axis needs at least one value");
-    }
-    let mut steps = Vec::new();
-    for value in values {
-        match (&axis.keys, value.get_ref()) {
-            (None, _) => steps.push(vec![value.clone()]),
-            (Some(_), DeValue::Array(row)) if row.len() == keys.len() => steps.push(row.to_vec()),
-            _ => {
-                return refuse(
-                    value.span(),
-                    "with `keys`, a value is a list with one value per key",
-                );
-            }
-        }
-    }
-    Ok(PlacedAxis { keys, steps })
 }
 
 /// Makes the world, and where there is a change makes it at once: whatever a run could refuse is refused here.

@@ -33,7 +33,7 @@ struct SlaveHints {
 
 /// The start in the mode that the keys name. The local model's settings and the estimator's are the mode's own
 /// and absent, unless a key reaches into them.
-pub(super) fn beginning(start: Start, given: &Spanned<DeTable>) -> WorldConfig {
+pub(crate) fn beginning(start: Start, given: &Spanned<DeTable>) -> WorldConfig {
     // keys of a wrong type are reported when everything is read
     let hints = Hints::deserialize(Deserializer::from(given.clone())).unwrap_or_default();
     let mode = hints.slave.mode.unwrap_or(Mode::Recommended);

@@ -2,7 +2,7 @@
 
 use super::mmt;
 
-const COMMANDS: [&str; 14] = [
+const COMMANDS: [&str; 15] = [
     "demo",
     "slave",
     "master",
@@ -15,6 +15,7 @@ const COMMANDS: [&str; 14] = [
     "swarm",
     "sweep",
     "doctor",
+    "config",
     "completions",
     "bench",
 ];

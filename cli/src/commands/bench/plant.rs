@@ -3,12 +3,13 @@
 
 use std::fmt;
 
+use mmt_lab::layers::Program;
 use mmt_lab::world::{World, WorldConfig};
 use mmt_server::io::plant_link::LockStep;
 use serde::Serialize;
 
 use crate::args::PlantBenchArguments;
-use crate::config::slave_config;
+use crate::config::{Flags, configuration};
 use crate::failure::Failure;
 use crate::output::{note, print, print_json};
 use crate::stop::Stop;
@@ -48,11 +49,10 @@ struct Document {
 /// # Errors
 /// Wrong input, no plant, or one that went away.
 pub(super) fn run(arguments: &PlantBenchArguments) -> Result<(), Failure> {
-    let mut slave = slave_config(arguments.config.as_deref(), None)?;
+    let flags = Flags::default().set("--scheme", &["slave.trigger.scheme"], arguments.scheme);
+    let path = arguments.config.as_deref();
+    let mut slave = configuration(Program::Slave, path, &flags)?.slave;
     slave.plant.link = arguments.plant.is_linked(slave.plant.link);
-    if let Some(scheme) = arguments.scheme {
-        slave.trigger.scheme = scheme;
-    }
     let linked = slave.plant.link;
     let config = WorldConfig {
         slave,

@@ -1,17 +1,17 @@
 //! What a session of a demo is made of: the arguments, and what viewers have changed since.
 
 use mmt_client::io::console::SessionWish;
+use mmt_lab::layers::Program;
+use mmt_lab::world::WorldConfig;
 use mmt_netem::LinkConfig;
-use mmt_server::playout::PlayoutConfig;
-use mmt_server::slave::SlaveConfig;
+use mmt_server::plant::PlantConfig;
 use mmt_shared::model::settings::Mode;
 use mmt_shared::range::in_range;
 use mmt_shared::wire::Architecture;
 use serde_json::{Value, json};
 
-use super::SAMPLES_PER_COMMAND;
 use crate::args::DemoArguments;
-use crate::config::scene;
+use crate::config::configuration;
 use crate::failure::Failure;
 
 /// Masses that a viewer may choose, kg: what a force of 8 N moves well.
@@ -30,14 +30,6 @@ pub(super) struct Setting {
     friction: Option<f64>,
 }
 
-pub(super) fn up(arguments: &DemoArguments) -> &LinkConfig {
-    arguments.netem_up.as_ref().unwrap_or(&arguments.netem)
-}
-
-pub(super) fn down(arguments: &DemoArguments) -> &LinkConfig {
-    arguments.netem_down.as_ref().unwrap_or(&arguments.netem)
-}
-
 impl Setting {
     /// The arguments' own.
     pub(super) fn new(arguments: &DemoArguments) -> Self {
@@ -48,28 +40,17 @@ impl Setting {
         }
     }
 
-    /// The slave.
+    /// The configuration of both sides.
     ///
     /// # Errors
-    /// The scene's file.
-    pub(super) fn slave_config(&self) -> Result<SlaveConfig, Failure> {
+    /// The files of configuration and scene.
+    pub(super) fn config(&self) -> Result<WorldConfig, Failure> {
         let arguments = &self.arguments;
-        let mut config = SlaveConfig::of_mode(arguments.mode);
-        config.seed = arguments.seed;
-        if let Some(path) = &arguments.scene {
-            config.scene = scene(path)?;
-        }
-        // where the tool may be felt the play-out finds out by itself how long it has to wait
-        if !arguments.architecture.feels_tool() {
-            let jitter = up(arguments).jitter_span();
-            config.playout = PlayoutConfig::for_packing_and_jitter(SAMPLES_PER_COMMAND, jitter);
-        }
-        if let Some(scheme) = arguments.scheme {
-            config.trigger.scheme = scheme;
-        }
-        config.repeats_ms = arguments.repeats.unwrap_or(config.repeats_ms);
-        config.stretch_max = arguments.stretch_max.unwrap_or(config.stretch_max);
-        let environment = &mut config.environment;
+        let path = arguments.config.as_deref();
+        let mut config = configuration(Program::Demo, path, &arguments.flags()?)?;
+        // nothing can be plugged in here
+        config.slave.plant = PlantConfig::default();
+        let environment = &mut config.slave.environment;
         environment.mass_kg = self.mass_kg.unwrap_or(environment.mass_kg);
         environment.friction_coefficient =
             self.friction.unwrap_or(environment.friction_coefficient);
@@ -77,36 +58,38 @@ impl Setting {
     }
 
     /// Both networks, to be changed.
-    pub(super) fn networks(&mut self) -> [&mut LinkConfig; 2] {
+    ///
+    /// # Errors
+    /// As [`Self::config`].
+    pub(super) fn networks(&mut self) -> Result<[&mut LinkConfig; 2], Failure> {
+        let WorldConfig { up, down, .. } = self.config()?;
         let DemoArguments {
-            netem,
             netem_up,
             netem_down,
             ..
         } = &mut self.arguments;
-        [netem_up, netem_down].map(|way| way.get_or_insert_with(|| netem.clone()))
+        Ok([netem_up.insert(up), netem_down.insert(down)])
     }
 
     /// What the page shows of it and may change.
     pub(super) fn shown(&self) -> [(&'static str, Value); 2] {
-        let arguments = &self.arguments;
-        let (up, down) = (up(arguments).to_string(), down(arguments).to_string());
-        let session = self.slave_config().ok().map(|config| {
-            let environment = &config.environment;
+        let config = self.config().ok();
+        let network = config.as_ref().map(
+            |WorldConfig { up, down, .. }| json!({"up": up.to_string(), "down": down.to_string()}),
+        );
+        let session = config.map(|config| {
+            let (slave, environment) = (&config.slave, &config.slave.environment);
             // of several bodies none is the object
-            let one = config.scene.bodies.is_empty();
+            let one = slave.scene.bodies.is_empty();
             json!({
-                "mode": arguments.mode,
-                "architecture": arguments.architecture.name(),
-                "scheme": config.trigger.scheme.to_string(),
+                "mode": slave.mode,
+                "architecture": config.architecture.name(),
+                "scheme": slave.trigger.scheme.to_string(),
                 "mass_kg": one.then_some(environment.mass_kg),
                 "friction": one.then_some(environment.friction_coefficient),
             })
         });
-        [
-            ("network", json!({"up": up, "down": down})),
-            ("settings", json!(session)),
-        ]
+        [("network", json!(network)), ("settings", json!(session))]
     }
 
     /// The setting that a viewer wishes.
@@ -118,13 +101,14 @@ impl Setting {
         let arguments = &mut next.arguments;
         match wish.mode.as_deref() {
             None => {}
-            Some("paper") => arguments.mode = Mode::Paper,
-            Some("recommended") => arguments.mode = Mode::Recommended,
+            Some("paper") => arguments.mode = Some(Mode::Paper),
+            Some("recommended") => arguments.mode = Some(Mode::Recommended),
             Some(other) => return Err(format!("no mode {other:?}")),
         }
         if let Some(name) = &wish.architecture {
             let found = Architecture::ALL.into_iter().find(|of| of.name() == name);
-            arguments.architecture = found.ok_or_else(|| format!("no architecture {name:?}"))?;
+            arguments.architecture =
+                Some(found.ok_or_else(|| format!("no architecture {name:?}"))?);
         }
         match wish.scheme.as_deref() {
             None => {}
@@ -157,14 +141,19 @@ impl Setting {
 
 #[cfg(test)]
 mod tests {
-    use std::time::Duration;
+    use mmt_client::commands::CommandConfig;
+    use mmt_server::slave::SlaveConfig;
 
     use super::*;
     use crate::args::{Arguments, Command};
     use clap::Parser;
 
     fn setting() -> Setting {
-        match Arguments::parse_from(["mmt", "demo", "--scheme", "timer 100ms"]).command {
+        of(&["--scheme", "timer 100ms"])
+    }
+
+    fn of(words: &[&str]) -> Setting {
+        match Arguments::parse_from(["mmt", "demo"].iter().chain(words)).command {
             Command::Demo(arguments) => Setting::new(&arguments),
             other => panic!("{other:?}"),
         }
@@ -172,16 +161,40 @@ mod tests {
 
     #[test]
     fn the_play_out_waits_for_packing_and_the_whole_jitter() {
-        let peak_to_peak = |text: &str| {
-            let link: LinkConfig = text.parse().unwrap();
-            link.jitter_span()
+        let delay_ms = |words: &[&str]| of(words).config().unwrap().slave.playout.delay_ms;
+        let own = SlaveConfig::default().playout.delay_ms;
+        assert_eq!(delay_ms(&[]), 21.0);
+        assert_eq!(delay_ms(&["--netem", "delay 50ms"]), 11.0);
+        let normal = "delay 50ms 4ms distribution normal";
+        assert_eq!(delay_ms(&["--netem-up", normal]), 31.0);
+        assert_eq!(delay_ms(&["--architecture", "tdpa"]), own);
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("mmt.toml");
+        std::fs::write(&path, "[slave.playout]\ndelay_ms = 33\n").unwrap();
+        assert_eq!(delay_ms(&["--config", path.to_str().unwrap()]), 33.0);
+    }
+
+    #[test]
+    fn without_a_file_it_is_the_default_over_the_documented_network() {
+        let config = of(&["--seed", "7"]).config().unwrap();
+        let network = LinkConfig::default();
+        assert_ne!((&config.up, &config.down), (&network, &network));
+        let slave = SlaveConfig {
+            seed: 7,
+            playout: config.slave.playout,
+            ..SlaveConfig::default()
         };
-        assert_eq!(peak_to_peak("delay 50ms"), Duration::ZERO);
-        assert_eq!(peak_to_peak("delay 50ms 5ms"), Duration::from_millis(10));
-        let normal = peak_to_peak("delay 50ms 4ms distribution normal");
-        assert_eq!(normal, Duration::from_millis(20));
-        let playout = PlayoutConfig::for_packing_and_jitter(10, peak_to_peak("delay 50ms 5ms"));
-        assert_eq!(playout.delay_ms, 21.0);
+        assert_eq!((config.seed, config.operator.seed), (7, 7));
+        assert_eq!(config.slave, slave);
+        assert_eq!(
+            config.samples_per_command,
+            CommandConfig::default().samples_per_command
+        );
+        let paper = of(&["--mode", "paper"]).config().unwrap();
+        assert_eq!(
+            paper.stretch_max, paper.slave.stretch_max,
+            "both sides stretch as far"
+        );
     }
 
     #[test]
@@ -193,15 +206,14 @@ mod tests {
             ..SessionWish::default()
         };
         let before = setting();
-        let config = before.wished(&wish).unwrap().slave_config().unwrap();
+        let config = before.wished(&wish).unwrap().config().unwrap().slave;
         let own = SlaveConfig::of_mode(Mode::Paper);
         assert_eq!(config.mode, Mode::Paper);
         assert_eq!(config.trigger.scheme, own.trigger.scheme, "the mode's own");
         assert_eq!(config.environment.mass_kg, 1.5);
         assert_eq!(config.environment.friction_coefficient, 0.3);
         let same = before.wished(&SessionWish::default()).unwrap();
-        let (same, before) = (same.slave_config().unwrap(), before.slave_config().unwrap());
-        assert_eq!(same.trigger.scheme, before.trigger.scheme);
+        assert_eq!(same.config().unwrap(), before.config().unwrap());
     }
 
     #[test]
@@ -231,10 +243,11 @@ mod tests {
     #[test]
     fn a_network_that_is_changed_in_one_direction_stays_in_the_other() {
         let mut setting = setting();
-        let down = down(&setting.arguments).clone();
-        let [up, _] = setting.networks();
+        let before = setting.config().unwrap();
+        let [up, _] = setting.networks().unwrap();
         *up = "delay 1ms".parse().unwrap();
-        assert_eq!(super::down(&setting.arguments), &down);
-        assert_ne!(super::up(&setting.arguments), &down);
+        let after = setting.config().unwrap();
+        assert_eq!(after.down, before.down);
+        assert_ne!(after.up, before.up);
     }
 }

@@ -37,7 +37,7 @@ fn the_options_say_what_the_arguments_said() {
         "--seed",
         "7",
     ];
-    let options = options(&arguments(&words)).unwrap();
+    let (options, _) = options(&arguments(&words)).unwrap();
     assert_eq!(options.pairing.to_string(), pairing);
     assert_eq!(options.device.stiffness_n_per_m(), 2000.0);
     assert_eq!(

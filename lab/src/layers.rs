@@ -1,0 +1,290 @@
+//! One configuration for every program: the program's own, the keys of a file laid over it, and over those the flags.
+//!
+//! The keys are the fields of [`WorldConfig`]; no other list of them exists. Whatever a run could refuse is refused here,
+//! with its place in the file.
+
+mod known;
+mod template;
+#[cfg(test)]
+mod tests;
+
+use std::ops::Range;
+
+use mmt_netem::config::LinkConfig;
+use mmt_server::playout::PlayoutConfig;
+use mmt_server::slave::SlaveConfig;
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+use toml::Spanned;
+use toml::de::{DeTable, DeValue, Deserializer};
+
+pub use known::{Known, Origin};
+pub use template::template;
+
+use crate::overlay::{lay, lay_at};
+use crate::sweep::{SEED_KEYS, Start, beginning};
+use crate::text_error::TextError;
+use crate::world::{World, WorldConfig};
+
+/// The emulated network of a demo, each way, where nobody wants another one.
+const DEMO_NETWORK: &str = "delay 50ms 5ms loss 1%";
+
+/// Keys at the top of a file that hold for these as well, where the file does not give these.
+const SHARED: [(&str, &[&str]); 2] = [
+    ("seed", &["slave.seed", "operator.seed"]),
+    ("stretch_max", &["slave.stretch_max"]),
+];
+
+/// Who reads the configuration.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Program {
+    /// Both sides on one machine.
+    Demo,
+    /// The host with the object.
+    Slave,
+    /// The host with the hand.
+    Master,
+    /// Experiments in virtual time.
+    Sweep,
+}
+
+impl Program {
+    /// All of them.
+    pub const ALL: [Self; 4] = [Self::Demo, Self::Slave, Self::Master, Self::Sweep];
+
+    /// Its name on the command line.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Demo => "demo",
+            Self::Slave => "slave",
+            Self::Master => "master",
+            Self::Sweep => "sweep",
+        }
+    }
+
+    /// Whether a key has an effect in it; the keys of the other side have none.
+    #[must_use]
+    pub fn uses(self, key: &str) -> bool {
+        let any = |tables: &[&str]| tables.iter().any(|table| within(key, table));
+        match self {
+            Self::Demo => !any(&["settings", "slave.plant"]),
+            Self::Slave => any(&["seed", "slave", "down"]),
+            Self::Master => !any(&["settings", "slave", "down"]),
+            Self::Sweep => !any(&SEED_KEYS) && !any(&["slave.plant"]),
+        }
+    }
+}
+
+/// A key that the command line sets.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Flag {
+    name: &'static str,
+    key: &'static str,
+    /// In TOML.
+    value: String,
+}
+
+impl Flag {
+    /// The flag `name` sets `key` to this value; none if it cannot be written in TOML.
+    #[must_use]
+    pub fn new(name: &'static str, key: &'static str, value: &impl Serialize) -> Option<Self> {
+        let value = toml::Value::try_from(value).ok()?.to_string();
+        Some(Self { name, key, value })
+    }
+}
+
+/// What a configuration is made of.
+#[derive(Clone, Copy, Debug)]
+pub struct Layers<'a> {
+    /// Who reads it.
+    pub program: Program,
+    /// The text of the file; empty if there is none.
+    pub file: &'a str,
+    /// The flags, each later one over those before it.
+    pub flags: &'a [Flag],
+    /// The seed of everything, if the command line gives one.
+    pub seed: Option<u64>,
+}
+
+impl<'a> Layers<'a> {
+    /// The configuration.
+    ///
+    /// # Errors
+    /// What is wrong with the file, with line and caret: no TOML, an unknown key, a value that a run refuses.
+    pub fn config(&self) -> Result<WorldConfig, TextError> {
+        let given = self.given()?;
+        let config = self.laid(&given)?;
+        self.check(&given, &config)?;
+        Ok(match self.seed {
+            Some(seed) => config.seeded(seed),
+            None => config,
+        })
+    }
+
+    /// The keys that file and flags give; those of flags stand behind the end of the file.
+    fn given(&self) -> Result<Spanned<DeTable<'a>>, TextError> {
+        let read = |error| TextError::of(self.file, &error);
+        let mut given = configuration(self.file).map_err(read)?;
+        for (n, flag) in self.flags.iter().enumerate() {
+            let place = self.file.len() + 1 + n;
+            let place = place..place;
+            let value = DeValue::parse(&flag.value).map_err(read)?.into_inner();
+            let value = Spanned::new(place.clone(), value);
+            lay_at(given.get_mut(), flag.key, &place, value);
+        }
+        Ok(given)
+    }
+
+    fn laid(&self, given: &Spanned<DeTable>) -> Result<WorldConfig, TextError> {
+        let start = beginning(Start::Live, given);
+        if self.program != Program::Demo {
+            return self.lay(&start, given.clone());
+        }
+        let network: LinkConfig = DEMO_NETWORK.parse().unwrap_or_default();
+        let mut start = WorldConfig {
+            up: network.clone(),
+            down: network,
+            ..start
+        };
+        let wanted = self.lay(&start, given.clone())?;
+        // both sides stretch as far
+        start.stretch_max = wanted.slave.stretch_max;
+        // where the tool may be felt the play-out finds out by itself how long it has to wait
+        if !wanted.architecture.feels_tool() {
+            let jitter = wanted.up.jitter_span();
+            start.slave.playout =
+                PlayoutConfig::for_packing_and_jitter(wanted.samples_per_command, jitter);
+        }
+        self.lay(&start, given.clone())
+    }
+
+    fn lay(&self, start: &WorldConfig, given: Spanned<DeTable>) -> Result<WorldConfig, TextError> {
+        let length = self.file.len() + 1 + self.flags.len();
+        lay(start, given, length).map_err(|error| TextError::of(self.file, &error))
+    }
+
+    /// Makes the world, and where that is refused finds the key to blame: the first one that is refused without the others.
+    fn check(&self, given: &Spanned<DeTable>, config: &WorldConfig) -> Result<(), TextError> {
+        let Err(error) = self.attempt(config) else {
+            return Ok(());
+        };
+        let mut leaves = Vec::new();
+        leaves_of(given.get_ref(), "", &mut leaves);
+        let refused = leaves.into_iter().find(|(key, value)| {
+            let mut alone = DeTable::new();
+            lay_at(&mut alone, key, &value.span(), (*value).clone());
+            let config = self.laid(&Spanned::new(0..0, alone));
+            config.is_ok_and(|config| self.attempt(&config).is_err())
+        });
+        let Some((_, value)) = refused else {
+            return Err(TextError::at(self.file, None, error));
+        };
+        let place = value.span();
+        Err(match self.flag_at(&place) {
+            Some(flag) => TextError::at("", None, format_args!("{}: {error}", flag.name)),
+            None => TextError::at(self.file, Some(place), error),
+        })
+    }
+
+    /// Why no run could be so; empty of what a live program asks the device itself.
+    fn attempt(&self, config: &WorldConfig) -> Result<(), String> {
+        let mut config = config.clone();
+        if self.program != Program::Sweep {
+            config.stiffness_n_per_m = None;
+        }
+        let world = World::try_new(&config);
+        world.map(drop).map_err(|error| error.to_string())
+    }
+
+    fn flag_at(&self, place: &Range<usize>) -> Option<&'a Flag> {
+        self.flags
+            .get(place.start.checked_sub(self.file.len() + 1)?)
+    }
+}
+
+/// The keys of a file, each at its home.
+pub(crate) fn configuration(text: &str) -> Result<Spanned<DeTable<'_>>, toml::de::Error> {
+    let mut given = DeTable::parse(text)?;
+    bring_home(given.get_mut());
+    Ok(given)
+}
+
+/// Whether a key is `table` or stands in it.
+fn within(key: &str, table: &str) -> bool {
+    key.strip_prefix(table)
+        .is_some_and(|rest| rest.is_empty() || rest.starts_with('.'))
+}
+
+/// The value at a key written with dots.
+fn at<'t, 'i>(table: &'t DeTable<'i>, key: &str) -> Option<&'t Spanned<DeValue<'i>>> {
+    match key.split_once('.') {
+        None => table.get(key),
+        Some((first, rest)) => at(table.get(first)?.get_ref().as_table()?, rest),
+    }
+}
+
+/// Every value that is no table, with its key; an empty table is a value.
+fn leaves_of<'t, 'i>(
+    table: &'t DeTable<'i>,
+    path: &str,
+    leaves: &mut Vec<(String, &'t Spanned<DeValue<'i>>)>,
+) {
+    for (key, value) in table {
+        let key = format!("{path}{}", key.get_ref());
+        match value.get_ref() {
+            DeValue::Table(inner) if !inner.is_empty() => {
+                leaves_of(inner, &format!("{key}."), leaves);
+            }
+            _ => leaves.push((key, value)),
+        }
+    }
+}
+
+/// What stands at the top of a file and is the slave's alone belongs into `slave`, so that a file of a slave needs no
+/// other word before its keys; and what both sides share is given to each that has none of its own.
+fn bring_home(given: &mut DeTable) {
+    let (all, of_slave) = (fields::<WorldConfig>(), fields::<SlaveConfig>());
+    let top: Vec<String> = given.keys().map(|key| key.get_ref().to_string()).collect();
+    for name in top {
+        let Some((key, value)) = given.get_key_value(name.as_str()) else {
+            continue;
+        };
+        let (place, value) = (key.span(), value.clone());
+        let shared = SHARED.iter().find(|(shared, _)| *shared == name);
+        let own = format!("slave.{name}");
+        let moved = shared.is_none() && !all.contains(&name) && of_slave.contains(&name);
+        let mut homes = shared.map_or_else(Vec::new, |(_, homes)| homes.to_vec());
+        if moved {
+            homes.push(&own);
+        }
+        for home in homes {
+            // of a key that is there twice the one at the top is refused as unknown
+            if at(given, home).is_none() {
+                lay_at(given, home, &place, value.clone());
+                if moved {
+                    given.remove(name.as_str());
+                }
+            }
+        }
+    }
+}
+
+/// The names of a configuration's fields, as its reader lists them to who gives it another one.
+fn fields<T: DeserializeOwned>() -> Vec<String> {
+    let unknown = DeTable::parse("\"?\" = 0").map(|text| T::deserialize(Deserializer::from(text)));
+    let refused = unknown.map(|read| read.err());
+    refused.map_or_else(
+        |_| Vec::new(),
+        |error| error.map_or_else(Vec::new, |error| named(error.message())),
+    )
+}
+
+/// The fields that a message on an unknown one names.
+fn named(message: &str) -> Vec<String> {
+    let Some(message) = message.strip_prefix("unknown field ") else {
+        return Vec::new();
+    };
+    let words = message.split('`').skip(1).step_by(2);
+    words.skip(1).map(str::to_owned).collect()
+}

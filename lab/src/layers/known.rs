@@ -1,0 +1,232 @@
+//! Every key of a configuration: its value, its unit, what is accepted, and where the value comes from.
+//!
+//! What is accepted is what the checks answer to a value that cannot be; the unit is the end of the key.
+
+use mmt_client::device::DeviceProfile;
+use mmt_server::estimator::EstimatorConfig;
+use serde::Serialize;
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
+
+use super::{Layers, SEED_KEYS, at, named, within};
+use crate::overlay::{lay, lay_at};
+use crate::text_error::TextError;
+use crate::world::{World, WorldConfig};
+
+/// How keys end, and the units that they say; the longest first.
+const UNITS: [(&str, &str); 19] = [
+    ("_n_per_m", "N/m"),
+    ("_n_per_s", "N/s"),
+    ("_ns_per_m", "N s/m"),
+    ("_m_per_s2", "m/s^2"),
+    ("_m_per_s", "m/s"),
+    ("_rad_per_s", "rad/s"),
+    ("_nms", "N m s"),
+    ("_kg", "kg"),
+    ("_hz", "Hz"),
+    ("_ms", "ms"),
+    ("_us", "µs"),
+    ("_rad", "rad"),
+    ("_n2", "N^2"),
+    ("_m2", "m^2"),
+    ("_n", "N"),
+    ("_m", "m"),
+    ("_s", "s"),
+    ("nanos", "ns"),
+    ("secs", "s"),
+];
+/// Before the range in the message of a number outside it.
+const RANGE: &str = "outside the accepted range ";
+/// Values that no number may have, of either sign: one of them is refused wherever there is a range.
+const IMPOSSIBLE: [&str; 4] = ["1e300", "-1e300", "9223372036854775807", "-1"];
+
+/// Where a value comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Origin {
+    /// The program's own, or the mode's.
+    Default,
+    /// The file, in this line from 1.
+    File(usize),
+    /// This flag.
+    Flag(&'static str),
+}
+
+/// A key of a configuration.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Known {
+    /// Written with dots.
+    pub key: String,
+    /// In TOML; none where it is left out and nothing takes its place.
+    pub value: Option<String>,
+    /// Unit; empty for a ratio, a number of things and words.
+    pub unit: &'static str,
+    /// What is accepted, a range in that unit or words; empty where the checks name neither.
+    pub accepted: String,
+    /// Where the value comes from.
+    pub origin: Origin,
+    /// Whether it has an effect in the program.
+    pub in_force: bool,
+}
+
+impl Layers<'_> {
+    /// Every key in its order: the keys of a table before the tables in it.
+    ///
+    /// # Errors
+    /// As [`Layers::config`].
+    pub fn known(&self) -> Result<Vec<Known>, TextError> {
+        let given = self.given()?;
+        let whole = whole(&self.config()?);
+        let mut keys = Vec::new();
+        let read = |error| TextError::of("", &error);
+        let tree = toml::Value::try_from(&whole)
+            .map_err(|error| TextError::at("", None, format_args!("no TOML: {error}")))?;
+        walk(&whole, &tree, "", &mut keys).map_err(read)?;
+        let known = keys.into_iter().map(|(key, value)| Known {
+            unit: unit_of(&key),
+            accepted: accepted(&whole, &key, value.as_ref()),
+            origin: self.origin(&given, &key),
+            in_force: self.program.uses(&key),
+            value: value.map(|value| value.to_string()),
+            key,
+        });
+        Ok(known.collect())
+    }
+
+    fn origin(&self, given: &Spanned<DeTable>, key: &str) -> Origin {
+        if self.seed.is_some() && SEED_KEYS.contains(&key) {
+            return Origin::Flag("--seed");
+        }
+        if let Some(flag) = self.flags.iter().rfind(|flag| within(key, flag.key)) {
+            return Origin::Flag(flag.name);
+        }
+        // a value that is no table stands for all below it
+        let mut path = Some(key);
+        while let Some(shorter) = path {
+            if let Some(value) = at(given.get_ref(), shorter)
+                && (shorter == key || !value.get_ref().is_table())
+                && let Some(before) = self.file.get(..value.span().start)
+            {
+                return Origin::File(before.matches('\n').count() + 1);
+            }
+            path = shorter.rsplit_once('.').map(|(shorter, _)| shorter);
+        }
+        Origin::Default
+    }
+}
+
+/// The same run with the parts written out that are the mode's where they are left out.
+pub(super) fn whole(config: &WorldConfig) -> WorldConfig {
+    let device = DeviceProfile::default();
+    let used = device.used_with(config.stiffness_n_per_m, None);
+    let coupling = used.unwrap_or(device).coupling();
+    let mut whole = config.clone();
+    whole.stiffness_n_per_m = Some(coupling.stiffness_n_per_m);
+    whole.settings = Some(config.model_settings(coupling));
+    let estimator = EstimatorConfig::of_mode(config.slave.mode, coupling);
+    whole.slave.estimator.get_or_insert(estimator);
+    whole
+}
+
+/// The unit that a key says.
+fn unit_of(key: &str) -> &'static str {
+    let unit = UNITS.iter().find(|(end, _)| key.ends_with(end));
+    unit.map_or("", |(_, unit)| unit)
+}
+
+/// A key with its value; without one where it is left out.
+pub(super) type Leaf = (String, Option<toml::Value>);
+
+/// All keys of a table and of those in it.
+fn walk(
+    whole: &WorldConfig,
+    tree: &toml::Value,
+    path: &str,
+    keys: &mut Vec<Leaf>,
+) -> Result<(), toml::de::Error> {
+    let Some(table) = tree.as_table() else {
+        return Ok(());
+    };
+    let mut inner = Vec::new();
+    for (name, value) in table {
+        let key = format!("{path}{name}");
+        if value.as_table().is_some_and(|table| !table.is_empty()) {
+            inner.push((key, value));
+        } else {
+            keys.push((key, Some(value.clone())));
+        }
+    }
+    let left_out = answer(whole, &format!("{path}?"), "0").unwrap_or_default();
+    let left_out = named(&left_out).into_iter();
+    let left_out = left_out.filter(|name| !table.contains_key(name));
+    keys.extend(left_out.map(|name| (format!("{path}{name}"), None)));
+    for (key, value) in inner {
+        walk(whole, value, &format!("{key}."), keys)?;
+    }
+    Ok(())
+}
+
+/// What the checks accept there.
+fn accepted(whole: &WorldConfig, key: &str, value: Option<&toml::Value>) -> String {
+    use toml::Value as V;
+    let of = |value: &str| answer(whole, key, value);
+    let number = |numbers: usize| {
+        let list = |value: &str| format!("[{}]", vec![value; numbers].join(", "));
+        IMPOSSIBLE.into_iter().find_map(|value| {
+            let value = if numbers == 0 {
+                value.to_owned()
+            } else {
+                list(value)
+            };
+            range(&of(&value)?, unit_of(key))
+        })
+    };
+    let accepted = match value {
+        Some(V::Boolean(_)) => Some("true or false".to_owned()),
+        Some(V::String(_)) => of("\"?\"").map(words),
+        Some(V::Integer(_) | V::Float(_)) => number(0),
+        Some(V::Array(list)) if list.iter().all(|one| one.is_float() || one.is_integer()) => {
+            number(list.len())
+        }
+        _ => None,
+    };
+    accepted.unwrap_or_default()
+}
+
+/// The range of a message, of a number in this unit: what follows from the number may be refused before it.
+fn range(message: &str, unit: &str) -> Option<String> {
+    if message.ends_with("expected u8") {
+        return Some("0 to 255".to_owned());
+    }
+    if message.ends_with("expected u64") || message.ends_with("expected u32") {
+        return Some("a whole number from 0".to_owned());
+    }
+    let (_, rest) = message.split_once(RANGE)?;
+    let mut words = rest.splitn(4, ' ');
+    let (min, _to, max) = (words.next()?, words.next()?, words.next()?);
+    let found = words.next().unwrap_or_default();
+    match found.strip_prefix(unit) {
+        Some("") => Some(format!("{min} to {max}")),
+        Some(_) if unit.is_empty() => Some(format!("{min} to {max} {found}")),
+        Some(more) if more.starts_with(' ') => Some(format!("{min} to {max}")),
+        _ => None,
+    }
+}
+
+/// What the checks say to a value of a key; none if they take it.
+fn answer(whole: &WorldConfig, key: &str, value: &str) -> Option<String> {
+    let mut given = DeTable::new();
+    let value = DeValue::parse(value).ok()?;
+    lay_at(&mut given, key, &(0..0), value);
+    match lay(whole, Spanned::new(0..0, given), 0) {
+        Err(error) => Some(error.message().to_owned()),
+        Ok(config) => Some(World::try_new(&config).err()?.to_string()),
+    }
+}
+
+/// The words that a message names; else the message.
+fn words(message: String) -> String {
+    let leads = ["expected one of ", "expected ", "use one of "];
+    let named = leads.iter().find_map(|lead| message.split_once(lead));
+    named.map_or_else(|| message.clone(), |(_, words)| words.replace('`', ""))
+}

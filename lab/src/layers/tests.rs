@@ -1,0 +1,186 @@
+//! One file for every program, each key with its origin.
+
+use std::collections::BTreeSet;
+
+use mmt_shared::model::settings::Mode;
+
+use super::*;
+
+const MODES: [Mode; 2] = [Mode::Recommended, Mode::Paper];
+
+fn layers<'a>(program: Program, file: &'a str, flags: &'a [Flag]) -> Layers<'a> {
+    Layers {
+        program,
+        file,
+        flags,
+        seed: None,
+    }
+}
+
+fn of_mode(mode: Mode) -> Vec<Flag> {
+    vec![Flag::new("--mode", "slave.mode", &mode).unwrap()]
+}
+
+fn known(program: Program, file: &str, flags: &[Flag], key: &str) -> Known {
+    let all = layers(program, file, flags).known().unwrap();
+    all.into_iter().find(|known| known.key == key).unwrap()
+}
+
+#[test]
+fn the_default_file_given_back_changes_nothing_in_any_program() {
+    for mode in MODES {
+        let text = template(mode).unwrap();
+        for program in Program::ALL {
+            let flags = of_mode(mode);
+            let without = layers(program, "", &flags).config().unwrap();
+            assert_eq!(layers(program, &text, &[]).config().unwrap(), without);
+        }
+    }
+}
+
+#[test]
+fn what_the_default_file_leaves_out_can_be_taken_in_and_is_the_same_run() {
+    for mode in MODES {
+        let text = template(mode).unwrap();
+        let taken_in = text.lines().map(|line| match line.strip_prefix("# ") {
+            Some(line) if line.starts_with('[') => line,
+            Some(key) if key.contains(" = ") && !key.contains("(left out)") => key,
+            _ => line,
+        });
+        let text: Vec<&str> = taken_in.collect();
+        let config = layers(Program::Sweep, &text.join("\n"), &[])
+            .config()
+            .unwrap();
+        let flags = of_mode(mode);
+        let own = layers(Program::Sweep, "", &flags).config().unwrap();
+        assert_eq!(known::whole(&config), known::whole(&own));
+    }
+}
+
+#[test]
+fn the_default_file_has_every_key_with_unit_and_range() {
+    let text = template(Mode::Recommended).unwrap();
+    for line in [
+        "mass_kg = 0.7  # 0.05 to 50 kg",
+        "samples_per_command = 10  # 0 to 255",
+        "# up = \"none\"",
+        "# [settings]",
+        "[slave.environment]",
+        "# tool_compliance = (left out)",
+        "mode = \"recommended\"  # paper or recommended",
+    ] {
+        let found = text.lines().any(|other| other.starts_with(line));
+        assert!(found, "{line} is not in:\n{text}");
+    }
+    let whole = known::whole(&WorldConfig::default());
+    let tree = toml::to_string(&whole).unwrap();
+    let mut leaves = Vec::new();
+    let tree = DeTable::parse(&tree).unwrap();
+    leaves_of(tree.get_ref(), "", &mut leaves);
+    let known = layers(Program::Sweep, "", &[]).known().unwrap();
+    let known: BTreeSet<&str> = known.iter().map(|known| known.key.as_str()).collect();
+    for (key, _) in leaves {
+        assert!(known.contains(key.as_str()), "{key}");
+    }
+    for left_out in ["slave.tool_compliance", "slave.environment.contact"] {
+        assert!(known.contains(left_out), "{left_out}");
+    }
+}
+
+#[test]
+fn each_value_says_whether_it_is_the_programs_the_files_or_a_flags() {
+    let file = "seed = 5\n[slave.environment]\nmass_kg = 1.5\n[operator]\nhold_s = 0.5\n";
+    let flags = [Flag::new("--netem", "up", &"delay 9ms").unwrap()];
+    let origin = |key| known(Program::Master, file, &flags, key).origin;
+    assert_eq!(origin("seed"), Origin::File(1));
+    assert_eq!(origin("slave.seed"), Origin::File(1));
+    assert_eq!(origin("slave.environment.mass_kg"), Origin::File(3));
+    assert_eq!(origin("up"), Origin::Flag("--netem"));
+    assert_eq!(origin("down"), Origin::Default);
+    let force = |key| known(Program::Master, file, &flags, key).in_force;
+    assert!(force("operator.hold_s") && !force("slave.environment.mass_kg"));
+    let mass = known(Program::Slave, file, &[], "slave.environment.mass_kg");
+    assert_eq!((mass.value.as_deref(), mass.unit), (Some("1.5"), "kg"));
+    assert_eq!(mass.accepted, "0.05 to 50");
+}
+
+#[test]
+fn a_flag_comes_before_the_file_and_the_file_before_the_mode() {
+    let file =
+        "[slave]\nmode = \"paper\"\nrepeats_ms = [5]\n[slave.trigger]\nscheme = \"timer 50ms\"\n";
+    let config = layers(Program::Slave, file, &[]).config().unwrap();
+    assert_eq!(
+        (config.slave.mode, config.slave.stretch_max.get()),
+        (Mode::Paper, 1.0)
+    );
+    let flags = [
+        Flag::new("--mode", "slave.mode", &Mode::Recommended).unwrap(),
+        Flag::new("--scheme", "slave.trigger.scheme", &"every-sample").unwrap(),
+    ];
+    let config = layers(Program::Slave, file, &flags).config().unwrap();
+    assert_eq!(
+        (config.slave.mode, config.slave.stretch_max.get()),
+        (Mode::Recommended, 3.0)
+    );
+    assert_eq!(config.slave.trigger.scheme.to_string(), "every-sample");
+    assert_eq!(config.slave.repeats_ms.to_string(), "5ms");
+}
+
+#[test]
+fn a_file_of_a_slave_alone_means_what_it_has_always_meant() {
+    let file = "seed = 5\nmode = \"paper\"\nstretch_max = 2\n[environment]\nmass_kg = 1.5\n";
+    for program in Program::ALL {
+        let config = layers(program, file, &[]).config().unwrap();
+        let slave = &config.slave;
+        assert_eq!(
+            (slave.seed, slave.mode, slave.stretch_max.get()),
+            (5, Mode::Paper, 2.0)
+        );
+        assert_eq!(slave.environment.mass_kg, 1.5);
+    }
+    let twice = "mode = \"paper\"\n[slave]\nmode = \"recommended\"\n";
+    let error = layers(Program::Slave, twice, &[])
+        .config()
+        .unwrap_err()
+        .to_string();
+    assert!(
+        error.contains("line 1") && error.contains("`mode`"),
+        "{error}"
+    );
+}
+
+#[test]
+fn what_is_wrong_is_answered_with_line_caret_and_what_was_meant() {
+    let refused = |file: &str| {
+        layers(Program::Demo, file, &[])
+            .config()
+            .unwrap_err()
+            .to_string()
+    };
+    let range = refused("[operator]\nhold_s = 0.5\n[slave.environment]\nmass_kg = 1e9\n");
+    for part in ["line 4, column 11", "^^^", "0.05 to 50 kg"] {
+        assert!(range.contains(part), "{range}");
+    }
+    let word = refused("[slave.environment]\nmas_kg = 1.0\n");
+    for part in ["line 2", "^^^^^^", "did you mean `mass_kg`?"] {
+        assert!(word.contains(part), "{word}");
+    }
+    let flags = [Flag::new("--repeat-samples", "repeat_samples", &-1).unwrap()];
+    assert!(layers(Program::Master, "", &flags).config().is_err());
+}
+
+#[test]
+fn a_demo_without_a_file_has_its_network_and_a_play_out_for_it() {
+    let config = layers(Program::Demo, "", &[]).config().unwrap();
+    assert_eq!(config.up.to_string(), DEMO_NETWORK);
+    assert_eq!(config.slave.playout.delay_ms, 21.0);
+    let given = "up = \"delay 5ms\"\n";
+    let config = layers(Program::Demo, given, &[]).config().unwrap();
+    assert_eq!(
+        (
+            config.up.to_string().as_str(),
+            config.slave.playout.delay_ms
+        ),
+        ("delay 5ms", 11.0)
+    );
+}
