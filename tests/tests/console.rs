@@ -1,4 +1,4 @@
-//! The operator's console in a real browser (`tests/console/check.py`) against a running demo.
+//! The operator's console in a real browser: `tests/console/check.py` against a running demo, `blind.py` with a study.
 //!
 //! Needs Python with playwright, and chromium: without, it says so, and with `CI` set it fails.
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test may panic")]
@@ -22,6 +22,16 @@ fn runs(command: &mut Command) -> bool {
 
 #[test]
 fn a_person_at_a_browser_pushes_the_box_and_changes_the_run() {
+    holds("check.py", "a drag moves the box");
+}
+
+#[test]
+fn a_participant_of_a_blind_comparison_answers_both_parts_and_learns_nothing() {
+    holds("blind.py", "the next participant has the other order");
+}
+
+/// Runs a script of `tests/console`, which must find that this promise holds.
+fn holds(script: &str, promise: &str) {
     let own = root().join("target/python/bin/python");
     let pythons = [own.to_string_lossy().into_owned(), "python3".to_owned()];
     let mut pythons = pythons.into_iter();
@@ -36,11 +46,11 @@ fn a_person_at_a_browser_pushes_the_box_and_changes_the_run() {
     };
     let mut command = Command::new(python);
     command
-        .arg(root().join("tests/console/check.py"))
+        .arg(root().join("tests/console").join(script))
         .arg(PROGRAM);
     let ended = Running::start(command).and_then(|check| check.end(GENEROUS));
     let ended = ended.unwrap_or_else(|error| panic!("{error}"));
     let printed = ended.out.join("\n");
     assert!(ended.status.success(), "{printed}\n{}", ended.err);
-    assert!(printed.contains("a drag moves the box"), "{printed}");
+    assert!(printed.contains(promise), "{printed}");
 }

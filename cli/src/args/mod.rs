@@ -169,6 +169,24 @@ pub(crate) struct DemoArguments {
     /// The haptic device.
     #[command(flatten)]
     pub(crate) device: DeviceArguments,
+    /// A blind comparison: two configurations, in the browser, in random order, a question on each (docs/console.md)
+    #[arg(long, value_names = ["A.toml", "B.toml"], num_args = 2, requires = "consent",
+          conflicts_with_all = ["config", "record", "json", "full", "netem_record", "netem_control", "no_console"])]
+    pub(crate) blind: Option<Vec<PathBuf>>,
+    /// What a participant agrees to, text, with --blind
+    #[arg(long, value_name = "FILE", requires = "blind")]
+    pub(crate) consent: Option<PathBuf>,
+    /// What a participant is asked after each part, with --blind
+    #[arg(
+        long,
+        value_name = "TEXT",
+        requires = "blind",
+        default_value = "How real did the box feel?"
+    )]
+    pub(crate) question: String,
+    /// Folder of the answers and records, with --blind
+    #[arg(long, value_name = "DIR", requires = "blind", default_value = "study")]
+    pub(crate) study: PathBuf,
     /// The console; on a terminal there is one unless it is switched off.
     #[command(flatten)]
     pub(crate) console: ConsoleArguments,

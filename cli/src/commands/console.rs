@@ -29,11 +29,33 @@ struct Frame {
     slave: Option<SlaveLive>,
 }
 
+/// Of a session what the hand meets, and no more.
+fn felt(master: &MasterLive) -> MasterLive {
+    MasterLive {
+        elapsed_s: master.elapsed_s,
+        hip: master.hip,
+        f_m: master.f_m,
+        hand_force: master.hand_force,
+        model: master.model,
+        footprint: master.footprint,
+        scene: master.scene,
+        in_contact: master.in_contact,
+        proxy: master.proxy,
+        engaged: master.engaged,
+        stopped_by: master.stopped_by,
+        person: master.person,
+        link: master.link,
+        ..MasterLive::default()
+    }
+}
+
 /// A console, and what it shows besides the frames.
 pub(super) struct Desk {
     console: Console,
     about: Map<String, Value>,
     sessions: u64,
+    /// Whether whoever looks on must not learn how the session is set.
+    blind: bool,
 }
 
 impl Desk {
@@ -64,7 +86,14 @@ impl Desk {
             console,
             about,
             sessions: 0,
+            blind: false,
         }))
+    }
+
+    /// From now on shows what the hand meets and nothing of how it is made: no setting, no network, no number of either.
+    pub(super) fn blindfold(&mut self) {
+        self.blind = true;
+        self.about.clear();
     }
 
     /// What a person opens.
@@ -85,19 +114,23 @@ impl Desk {
         mut slave: impl FnMut() -> Option<SlaveLive> + Send + 'static,
     ) {
         self.sessions += 1;
+        let blind = self.blind;
         let source = move || {
-            let frame = Frame {
-                master: master(),
-                slave: slave(),
+            let frame = if blind {
+                let (master, slave) = (felt(&master()), None);
+                Frame { master, slave }
+            } else {
+                let (master, slave) = (master(), slave());
+                Frame { master, slave }
             };
             // numbers and names only: it cannot fail
             serde_json::to_string(&frame).unwrap_or_default()
         };
         self.console.show(Box::new(source));
         self.tell([
-            ("command", json!(caption.command)),
-            ("setting", json!(caption.setting)),
-            ("truth", json!(caption.truth)),
+            ("command", json!((!blind).then_some(caption.command))),
+            ("setting", json!((!blind).then_some(&caption.setting))),
+            ("truth", json!(caption.truth.filter(|_| !blind))),
             ("session", json!(self.sessions)),
             ("state", json!("running")),
             ("why", Value::Null),

@@ -34,17 +34,24 @@ use crate::output::{note, print_report};
 use crate::stop::Stop;
 use crate::view::{Caption, Screen};
 
+mod blind;
 mod setting;
+mod study;
 use setting::Setting;
 
 /// How long the slave may take to notice that the master has ended before it is asked to end as well.
 const FAREWELL: Duration = Duration::from_secs(3);
+/// Between two looks at a session that nobody is shown.
+const PATIENCE: Duration = Duration::from_millis(50);
 
 /// Runs `mmt demo`.
 ///
 /// # Errors
 /// A host could not start, or the session broke.
 pub(crate) fn run(arguments: &DemoArguments, messages: &Messages) -> Result<(), Failure> {
+    if let Some([a, b]) = arguments.blind.as_deref() {
+        return blind::run(arguments, [a, b], messages);
+    }
     let mut setting = Setting::new(arguments);
     let config = setting.config()?;
     let WorldConfig { up, down, seed, .. } = &config;
@@ -74,6 +81,7 @@ pub(crate) fn run(arguments: &DemoArguments, messages: &Messages) -> Result<(), 
             dashboard,
             viewer: &mut viewer,
             desk: desk.as_mut(),
+            blind: false,
             again: None,
         };
         let ended = round.session();
@@ -105,6 +113,8 @@ struct Round<'a> {
     dashboard: bool,
     viewer: &'a mut Viewer,
     desk: Option<&'a mut Desk>,
+    /// Whether this is a part of a blind comparison: the hand is the person's, the duration holds, nothing is shown.
+    blind: bool,
     /// The session that a viewer wants next.
     again: Option<Setting>,
 }
@@ -142,7 +152,7 @@ impl Round<'_> {
         options.emergency = self.stop.emergency().clone();
         options.scene_hz = Viewer::scene_hz(self.dashboard);
         if let Some(desk) = &self.desk {
-            operated_at(desk, &mut options);
+            operated_at(desk, &mut options, self.blind);
         }
         self.device.give(&mut options);
         let (master, master_live) = master::start(options, stop.receiver())?;
@@ -150,7 +160,9 @@ impl Round<'_> {
             let (slave, master) = (Arc::clone(&started.live), master_live.clone());
             let connected = move || Some(*slave.borrow()).filter(|slave| slave.connected);
             desk.show(&caption, move || *master.borrow(), connected);
-            desk.tell(self.setting.shown());
+            if !self.blind {
+                desk.tell(self.setting.shown());
+            }
             caption.setting = format!("{}  {}", desk.address(), caption.setting);
         }
         self.viewer.caption(caption);
@@ -158,10 +170,12 @@ impl Round<'_> {
         while master.is_running() || slave.is_running() {
             // copied first: a borrow that lives through the viewer's wait would stop the hosts' tasks
             let (slave_now, master_now) = (*started.live.borrow(), *master_live.borrow());
-            self.viewer.look(
-                Some(slave_now).filter(|slave| slave.connected),
-                Some(master_now),
-            );
+            if self.blind {
+                std::thread::sleep(PATIENCE);
+            } else {
+                let slave_now = Some(slave_now).filter(|slave| slave.connected);
+                self.viewer.look(slave_now, Some(master_now));
+            }
             self.attend(&stop);
             if self.stop.asked() || self.again.is_some() {
                 stop.end();
@@ -187,6 +201,7 @@ impl Round<'_> {
     fn finish_unwatched(&self, master: &MasterLive) {
         let duration_s = self.setting.arguments.duration.as_secs_f64();
         if let Some(desk) = &self.desk
+            && !self.blind
             && master.elapsed_s >= duration_s
             && !desk.is_watched()
         {
@@ -212,12 +227,13 @@ impl Round<'_> {
         };
         while let Some(order) = desk.next_order() {
             match order {
+                // a participant steers nothing
+                _ if self.blind => {}
+                Order::Study(_) => {}
                 Order::End => stop.end(),
                 Order::Network(wish) => {
                     match self.setting.networks() {
-                        Ok(ways) => {
-                            desk.change_networks(&wish, self.emulation, ways.map(Some));
-                        }
+                        Ok(ways) => desk.change_networks(&wish, self.emulation, ways.map(Some)),
                         Err(what) => desk.tell([("note", what.to_string().into())]),
                     }
                     desk.tell(self.setting.shown());
@@ -232,14 +248,19 @@ impl Round<'_> {
 }
 
 /// A person may take the hand of the scripted operator.
-fn operated_at(desk: &Desk, options: &mut MasterOptions) {
+fn operated_at(desk: &Desk, options: &mut MasterOptions, blind: bool) {
     options.scene_hz = console::SCENE_HZ;
     options.events = std::sync::Mutex::new(Some(desk.events()));
-    options.duration = None;
+    let driver = if blind {
+        Driver::Pointer
+    } else {
+        options.duration = None;
+        Driver::Scripted
+    };
     if let OperatorChoice::Scripted(scripted) = options.operator {
         options.operator = OperatorChoice::Person {
             scripted,
-            driver: Driver::Scripted,
+            driver,
             device: None,
         };
     }

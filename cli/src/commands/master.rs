@@ -103,7 +103,7 @@ pub(crate) fn run(arguments: MasterArguments, messages: &Messages) -> Result<(),
                     desk.tell([("network", json!({"up": link.to_string()}))]);
                 }
                 // the object is another host's
-                Order::Restart(_) => {}
+                Order::Restart(_) | Order::Study(_) => {}
             }
         }
     }

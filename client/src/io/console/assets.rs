@@ -30,6 +30,7 @@ const FILES: &[(&str, &str)] = files![
     "controls.js",
     "feedback.js",
     "hum.js",
+    "study.js",
 ];
 
 /// Nothing from elsewhere, no script in the page itself, no frame of another page.

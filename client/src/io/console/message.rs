@@ -35,6 +35,24 @@ pub(super) enum FromPage {
     Network(NetworkWish),
     /// A new session.
     Restart(SessionWish),
+    /// The next step of a blind comparison.
+    Study(StudyWish),
+}
+
+/// A step of a participant in a blind comparison.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum StudyWish {
+    /// Somebody new agrees to take part.
+    Agree,
+    /// Whoever was interrupted goes on.
+    Resume,
+    /// The next part begins.
+    Begin,
+    /// The answer to a part, 1 to 7.
+    Answer(u8),
+    /// The next participant.
+    Next,
 }
 
 /// Both directions in the words of an emulated link.
@@ -72,6 +90,8 @@ pub enum Order {
     Network(NetworkWish),
     /// Begin a new session.
     Restart(SessionWish),
+    /// Go on with a blind comparison.
+    Study(StudyWish),
 }
 
 fn sample([stamp_ms, x, y]: [f64; 3]) -> PointerSample {
@@ -96,7 +116,8 @@ impl FromPage {
             | Self::End
             | Self::Take
             | Self::Network(_)
-            | Self::Restart(_) => (None, &[][..]),
+            | Self::Restart(_)
+            | Self::Study(_) => (None, &[][..]),
         };
         let moves = more.iter().map(|moved| HandEvent::Move(sample(*moved)));
         one.into_iter().chain(moves)
@@ -108,6 +129,7 @@ impl FromPage {
             Self::End => Some(Order::End),
             Self::Network(wish) => Some(Order::Network(wish)),
             Self::Restart(wish) => Some(Order::Restart(wish)),
+            Self::Study(wish) => Some(Order::Study(wish)),
             _ => None,
         }
     }
@@ -138,6 +160,12 @@ mod tests {
         let order = read(r#"{"network":{"up":"delay 5ms"}}"#).unwrap().order();
         let up = Some("delay 5ms".to_owned());
         assert_eq!(order, Some(Order::Network(NetworkWish { up, down: None })));
+        let answer = read(r#"{"study":{"answer":7}}"#).unwrap().order();
+        assert_eq!(answer, Some(Order::Study(StudyWish::Answer(7))));
+        assert_eq!(
+            read(r#"{"study":"agree"}"#),
+            Some(FromPage::Study(StudyWish::Agree))
+        );
         for bad in [
             "",
             "{}",

@@ -6,6 +6,7 @@ import { Network } from "./network.js";
 import { Pointer } from "./pointer.js";
 import { Controls } from "./controls.js";
 import { Feedback } from "./feedback.js";
+import { Study } from "./study.js";
 import { lines, raster, WINDOW_S } from "./charts.js";
 
 const $ = (id) => document.getElementById(id);
@@ -28,6 +29,7 @@ const network = new Network($("network"), colours);
 const pointer = new Pointer($("scene"), link, scene);
 const controls = new Controls(link);
 const feedback = new Feedback();
+new Study(link);
 let history = [];
 let packets = [];
 let log = [];
@@ -148,9 +150,9 @@ function write({ master, slave }) {
 function writeState(frame) {
   const { about } = link;
   const running = link.open && about.state === "running";
-  const state = !link.open ? "not connected" : !running ? "ended" : !frame ? "connecting" : frame.master.footprint ? `link ${frame.master.link}` : "connecting";
+  const state = !link.open ? "not connected" : about.study && !running ? "waiting" : !running ? "ended" : !frame ? "connecting" : frame.master.footprint ? `link ${frame.master.link}` : "connecting";
   $("link").textContent = state;
-  $("lamp").className = `lamp ${{ "link fresh": "good", "link late": "warn", connecting: "" }[state] ?? "bad"}`;
+  $("lamp").className = `lamp ${{ "link fresh": "good", "link late": "warn", connecting: "", waiting: "" }[state] ?? "bad"}`;
   const role = link.open ? { operator: "the operator", observer: "an observer", free: "an observer" }[link.role] : "–";
   $("role").value = role;
   $("take").hidden = link.role !== "free";
@@ -158,10 +160,10 @@ function writeState(frame) {
   const scripted = person?.driver === "scripted";
   for (const [id, on] of [["driver", scripted], ["pause", person?.paused]]) {
     $(id).setAttribute("aria-pressed", Boolean(on));
-    $(id).disabled = !link.operates || !person || !running;
+    $(id).disabled = !link.operates || !person || !running || (id === "driver" && Boolean(about.study));
   }
   $("stop").disabled = !running;
-  $("end").disabled = !running || !link.operates;
+  $("end").disabled = !running || !link.operates || Boolean(about.study);
   $("scene").classList.toggle("watching", !link.operates || !running || !person);
   const hint = !running ? "" : !person ? "A script pushes; you watch." : !link.operates ? "Another page has the hand; you watch."
     : frame.master.stopped_by ? "" : person.paused ? "The hand rests. Press P to go on." : pointer.held ? "" : scripted ? "A script pushes. Drag anywhere to take the hand." : "Drag anywhere to push. The hand feels what the model feels.";
@@ -174,7 +176,7 @@ function writeState(frame) {
 function banner() {
   const { about } = link;
   const lost = !link.open ? "No connection to mmt: it has ended, or this page's address has another token. Trying again …" : null;
-  const ended = about.state === "ended" ? `The session ended: ${about.why}.` : null;
+  const ended = about.state === "ended" && !about.study ? `The session ended: ${about.why}.` : null;
   const stopped = { master: "Emergency stop: no force on the hand, and the tool stands.", slave: "The slave's emergency stop is set: it is cleared there." };
   const text = lost ?? ended ?? stopped[link.frame?.master.stopped_by] ?? about.note;
   if (text === banner.text && link.operates === banner.operates) return;
@@ -220,7 +222,7 @@ let session = null;
 link.addEventListener("about", () => {
   if (session !== null && link.about.session !== session) forget();
   session = link.about.session;
-  $("command").textContent = link.about.command ?? "console";
+  $("command").textContent = link.about.study ? "study" : link.about.command ?? "console";
   $("setting").textContent = link.about.setting ?? "";
   banner();
 });
