@@ -68,6 +68,8 @@ pub(super) fn run(
         return Err(Failure::usage("a blind comparison needs its console"));
     };
     desk.blindfold();
+    // messages of the hosts name schemes and networks
+    messages.keep();
     note(format_args!("study: {}", arguments.study.display()));
     comparison.show(&mut desk, None);
     while !stop.asked() {
