@@ -62,6 +62,8 @@ fn execute(command: Command) -> Result<(), Failure> {
         Command::Check(arguments) => commands::check::run(&arguments),
         Command::Report(arguments) => commands::report::run(&arguments),
         Command::Export(arguments) => commands::export::run(&arguments),
+        #[cfg(feature = "live")]
+        Command::Live(arguments) => commands::live::run(&arguments),
         Command::Reproduce(arguments) => commands::reproduce::run(&arguments),
         Command::Swarm(arguments) => commands::swarm::run(&arguments),
         Command::Sweep(arguments) => commands::sweep::run(&arguments),

@@ -30,6 +30,10 @@ pub(super) const REPORT: &str = include_str!("help/report.txt").trim_ascii_end()
 /// Examples of `mmt export`.
 pub(super) const EXPORT: &str = include_str!("help/export.txt").trim_ascii_end();
 
+/// Examples of `mmt live`.
+#[cfg(feature = "live")]
+pub(super) const LIVE: &str = include_str!("help/live.txt").trim_ascii_end();
+
 /// Examples of `mmt reproduce`.
 pub(super) const REPRODUCE: &str = include_str!("help/reproduce.txt").trim_ascii_end();
 

@@ -42,6 +42,8 @@ pub(crate) use console::ConsoleArguments;
 pub(crate) use device::{DeviceArguments, DeviceWords};
 pub(crate) use doctor::{DoctorArguments, ManArguments};
 pub(crate) use plant::PlantArguments;
+#[cfg(feature = "live")]
+pub(crate) use records::LiveArguments;
 pub(crate) use records::{CheckArguments, ExportArguments, ReplayArguments, ReportArguments};
 pub(crate) use reproduce::ReproduceArguments;
 pub(crate) use swarm::SwarmArguments;
@@ -85,6 +87,10 @@ pub(crate) enum Command {
     /// Tables of a recorded session: comma-separated values, one file a topic
     #[command(after_help = help::EXPORT)]
     Export(ExportArguments),
+    /// Show a session in Lichtblick, Foxglove or PlotJuggler while it runs: serves its record as it grows
+    #[cfg(feature = "live")]
+    #[command(after_help = help::LIVE)]
+    Live(LiveArguments),
     /// Reproduce the paper's figures, and go beyond them, in virtual time
     #[command(after_help = help::REPRODUCE, subcommand_required = true, arg_required_else_help = true)]
     Reproduce(ReproduceArguments),

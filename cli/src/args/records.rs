@@ -69,6 +69,18 @@ pub(crate) struct ReportArguments {
     pub(crate) json: bool,
 }
 
+/// Arguments of `mmt live`.
+#[cfg(feature = "live")]
+#[derive(Debug, Args)]
+pub(crate) struct LiveArguments {
+    /// The record that a running --record writes, or will write
+    #[arg(value_name = "FILE")]
+    pub(crate) file: PathBuf,
+    /// Port on 127.0.0.1; 0: any that is free
+    #[arg(long, value_name = "PORT", default_value_t = 8765)]
+    pub(crate) port: u16,
+}
+
 /// Arguments of `mmt export`.
 #[derive(Debug, Args)]
 pub(crate) struct ExportArguments {

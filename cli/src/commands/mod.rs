@@ -9,6 +9,8 @@ mod device;
 pub(crate) mod doctor;
 pub(crate) mod export;
 mod host;
+#[cfg(feature = "live")]
+pub(crate) mod live;
 pub(crate) mod manual;
 pub(crate) mod master;
 pub(crate) mod netem;

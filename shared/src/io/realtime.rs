@@ -109,13 +109,13 @@ fn set_fifo() -> io::Result<()> {
 }
 
 fn set_policy(policy: libc::c_int, priority: u8) -> io::Result<()> {
-    let parameters = libc::sched_param {
-        sched_priority: libc::c_int::from(priority),
-    };
+    // all that the kernel's sched_param holds
+    let priority = libc::c_int::from(priority);
     #[allow(unsafe_code, reason = "no safe wrapper of this call exists")]
-    // SAFETY: process 0 is the calling thread, and the kernel only reads `parameters`, which outlives the
-    // call.
-    let status = unsafe { libc::sched_setscheduler(0, policy, &raw const parameters) };
+    // SAFETY: process 0 is the calling thread, and the kernel only reads `priority`, which outlives the call. The system call
+    // itself, since the function of this name in musl only fails.
+    let status =
+        unsafe { libc::syscall(libc::SYS_sched_setscheduler, 0, policy, &raw const priority) };
     if status == 0 {
         Ok(())
     } else {

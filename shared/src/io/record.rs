@@ -37,7 +37,7 @@ use source::{Drain, Source};
 /// How long the thread rests when the rings are empty.
 const REST: Duration = Duration::from_millis(5);
 /// What is older than this is on the disk: so much a cut loses.
-const FLUSH: Duration = Duration::from_secs(1);
+const FLUSH: Duration = Duration::from_millis(200);
 /// How long the last messages may take to be written.
 const FINISH: Duration = Duration::from_secs(5);
 
