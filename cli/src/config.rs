@@ -9,6 +9,7 @@ use mmt_client::device::link::DeviceLinkConfig;
 use mmt_lab::layers::{Flag, Layers, Program};
 use mmt_lab::text_error::TextError;
 use mmt_lab::world::WorldConfig;
+use mmt_netem::LinkConfig;
 use mmt_server::environment::SceneConfig;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -39,6 +40,20 @@ impl Flags {
     ) -> Self {
         if let Some(value) = value {
             let flags = keys.iter().filter_map(|key| Flag::new(name, key, &value));
+            self.keys.extend(flags);
+        }
+        self
+    }
+
+    /// The same for the networks at these keys, `up` and `down`.
+    pub(crate) fn network(
+        mut self,
+        name: &'static str,
+        keys: &[&'static str],
+        network: Option<&LinkConfig>,
+    ) -> Self {
+        if let Some(network) = network {
+            let flags = keys.iter().map(|key| Flag::network(name, key, network));
             self.keys.extend(flags);
         }
         self

@@ -77,12 +77,14 @@ impl Program {
 }
 
 /// A key that the command line sets.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug)]
 pub struct Flag {
     name: &'static str,
     key: &'static str,
     /// In TOML.
     value: String,
+    /// The network itself, where the key is one: what it was read from may lie in files.
+    network: Option<LinkConfig>,
 }
 
 impl Flag {
@@ -90,7 +92,23 @@ impl Flag {
     #[must_use]
     pub fn new(name: &'static str, key: &'static str, value: &impl Serialize) -> Option<Self> {
         let value = toml::Value::try_from(value).ok()?.to_string();
-        Some(Self { name, key, value })
+        Some(Self {
+            name,
+            key,
+            value,
+            network: None,
+        })
+    }
+
+    /// The flag `name` sets the network at `key`, `up` or `down`.
+    #[must_use]
+    pub fn network(name: &'static str, key: &'static str, network: &LinkConfig) -> Self {
+        Self {
+            name,
+            key,
+            value: "\"none\"".to_owned(),
+            network: Some(network.clone()),
+        }
     }
 }
 
@@ -161,7 +179,19 @@ impl<'a> Layers<'a> {
 
     fn lay(&self, start: &WorldConfig, given: Spanned<DeTable>) -> Result<WorldConfig, TextError> {
         let length = self.file.len() + 1 + self.flags.len();
-        lay(start, given, length).map_err(|error| TextError::of(self.file, &error))
+        let laid = lay(start, given, length);
+        let mut config: WorldConfig = laid.map_err(|error| TextError::of(self.file, &error))?;
+        for flag in self.flags {
+            let home = match flag.key {
+                "up" => &mut config.up,
+                "down" => &mut config.down,
+                _ => continue,
+            };
+            if let Some(network) = &flag.network {
+                home.clone_from(network);
+            }
+        }
+        Ok(config)
     }
 
     /// Makes the world, and where that is refused finds the key to blame: the first one that is refused without the others.

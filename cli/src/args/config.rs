@@ -112,9 +112,9 @@ impl ShowArguments {
         };
         let flags = Flags::default()
             .seed(self.seed)
-            .set("--netem", netem, self.netem.as_ref())
-            .set("--netem-up", up, self.netem_up.as_ref())
-            .set("--netem-down", down, self.netem_down.as_ref())
+            .network("--netem", netem, self.netem.as_ref())
+            .network("--netem-up", up, self.netem_up.as_ref())
+            .network("--netem-down", down, self.netem_down.as_ref())
             .set("--mode", &["slave.mode"], self.mode)
             .set("--scheme", &["slave.trigger.scheme"], self.scheme)
             .set("--repeats", &["slave.repeats_ms"], self.repeats)
@@ -143,9 +143,9 @@ impl DemoArguments {
     pub(crate) fn flags(&self) -> Result<Flags, Failure> {
         let flags = Flags::default()
             .seed(self.seed)
-            .set("--netem", &["up", "down"], self.netem.as_ref())
-            .set("--netem-up", &["up"], self.netem_up.as_ref())
-            .set("--netem-down", &["down"], self.netem_down.as_ref())
+            .network("--netem", &["up", "down"], self.netem.as_ref())
+            .network("--netem-up", &["up"], self.netem_up.as_ref())
+            .network("--netem-down", &["down"], self.netem_down.as_ref())
             .set("--mode", &["slave.mode"], self.mode)
             .set("--scheme", &["slave.trigger.scheme"], self.scheme)
             .set("--repeats", &["slave.repeats_ms"], self.repeats)
@@ -164,7 +164,7 @@ impl SlaveArguments {
     pub(crate) fn flags(&self) -> Result<Flags, Failure> {
         let flags = Flags::default()
             .seed(self.seed)
-            .set("--netem", &["down"], self.netem.as_ref())
+            .network("--netem", &["down"], self.netem.as_ref())
             .set("--mode", &["slave.mode"], self.mode)
             .set("--scheme", &["slave.trigger.scheme"], self.scheme)
             .set("--repeats", &["slave.repeats_ms"], self.repeats)
@@ -178,7 +178,7 @@ impl MasterArguments {
     pub(crate) fn flags(&self) -> Flags {
         Flags::default()
             .seed(self.seed)
-            .set("--netem", &["up"], self.netem.as_ref())
+            .network("--netem", &["up"], self.netem.as_ref())
             .set("--architecture", &["architecture"], self.architecture)
             .set("--stiffness", &["stiffness_n_per_m"], self.stiffness)
             .set(

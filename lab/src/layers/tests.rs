@@ -90,12 +90,15 @@ fn the_default_file_has_every_key_with_unit_and_range() {
 #[test]
 fn each_value_says_whether_it_is_the_programs_the_files_or_a_flags() {
     let file = "seed = 5\n[slave.environment]\nmass_kg = 1.5\n[operator]\nhold_s = 0.5\n";
-    let flags = [Flag::new("--netem", "up", &"delay 9ms").unwrap()];
+    let network = "delay 9ms".parse().unwrap();
+    let flags = [Flag::network("--netem", "up", &network)];
     let origin = |key| known(Program::Master, file, &flags, key).origin;
     assert_eq!(origin("seed"), Origin::File(1));
     assert_eq!(origin("slave.seed"), Origin::File(1));
     assert_eq!(origin("slave.environment.mass_kg"), Origin::File(3));
     assert_eq!(origin("up"), Origin::Flag("--netem"));
+    let up = known(Program::Master, file, &flags, "up").value;
+    assert_eq!(up.as_deref(), Some("\"delay 9ms\""));
     assert_eq!(origin("down"), Origin::Default);
     let force = |key| known(Program::Master, file, &flags, key).in_force;
     assert!(force("operator.hold_s") && !force("slave.environment.mass_kg"));
