@@ -17,6 +17,7 @@ use crate::packet::{Departure, Packet};
 
 mod bottleneck;
 mod by_time;
+mod chances;
 mod codel;
 mod correlated;
 mod cross;
@@ -65,9 +66,11 @@ impl<T: Clone> Link<T> {
         let behind = (seed, LinkId { path, ..id });
         let next = config.then.as_deref();
         let next = next.map(|then| Box::new(Self::new(origin, then.clone(), seed, behind.1)));
+        let mut stages = Stages::new(seed, id, config.limit.packets);
+        stages.followed = next.is_some();
         Self {
             behind,
-            stages: Stages::new(seed, id, config.limit.packets),
+            stages,
             timeline: Timeline::new(origin, config),
             next,
         }
@@ -99,8 +102,8 @@ impl<T: Clone> Link<T> {
             if let Some(out) = next.poll_in_chain(comes.unwrap_or(now)) {
                 return Some(out);
             }
-            let came = self.stages.poll(&self.timeline, comes?)?;
-            next.stages.follow(&next.timeline, came);
+            let came = self.stages.poll_next(&self.timeline, comes?)?;
+            next.stages.receive(&next.timeline, came);
         }
     }
 
@@ -146,13 +149,14 @@ impl<T: Clone> Link<T> {
         self.stages.settle(&self.timeline, now);
         let then = config.then.as_deref().cloned();
         if let Some(next) = &mut self.next {
-            while let Some(came) = self.stages.poll(&self.timeline, now) {
-                next.stages.follow(&next.timeline, came);
+            while let Some(came) = self.stages.poll_next(&self.timeline, now) {
+                next.stages.receive(&next.timeline, came);
             }
             next.change(now, then.unwrap_or_default());
         } else if let Some(then) = then {
             let (seed, id) = self.behind;
             self.next = Some(Box::new(Self::new(self.timeline.origin, then, seed, id)));
+            self.stages.followed = true;
         }
         self.timeline = Timeline::new(self.timeline.origin, config);
     }

@@ -27,6 +27,12 @@ impl Substream {
         Self(rng)
     }
 
+    /// Goes to where `draws` numbers of 64 bits have been drawn, forwards or back.
+    pub fn seek(&mut self, draws: u64) {
+        // in words of 32 bits
+        self.0.set_word_pos(u128::from(draws) * 2);
+    }
+
     /// 64 random bits.
     pub fn bits(&mut self) -> u64 {
         self.0.next_u64()
@@ -74,6 +80,16 @@ mod tests {
         assert_ne!(first(1, "netem/up/loss", 0), first(2, "netem/up/loss", 0));
         assert_ne!(first(1, "netem/up/loss", 0), first(1, "netem/down/loss", 0));
         assert_ne!(first(1, "netem/up/loss", 0), first(1, "netem/up/loss", 1));
+    }
+
+    #[test]
+    fn a_draw_is_found_by_its_number() {
+        let mut stream = Substream::new(1, "netem/up/loss", 0);
+        let drawn: Vec<u64> = (0..300).map(|_| stream.bits()).collect();
+        for number in [299, 0, 1, 150, 31, 32, 33] {
+            stream.seek(number as u64);
+            assert_eq!(stream.bits(), drawn[number]);
+        }
     }
 
     #[test]

@@ -7,11 +7,10 @@ use std::time::Duration;
 use mmt_shared::time::Time;
 
 use super::bottleneck::{Bottleneck, ROOM};
-use super::by_time::ByTime;
-use super::correlated::ByPacket;
+use super::by_time::{ByTime, Lineage, Lost};
+use super::chances::{Chances, Coming, Lot, Way};
 use super::cross::Arrivals;
-use super::loss_model::LossModel;
-use super::propagation::{Propagation, Way};
+use super::propagation::Propagation;
 use super::streams::{Streams, substream};
 use super::timeline::Timeline;
 use crate::config::LinkConfig;
@@ -19,15 +18,16 @@ use crate::counters::LinkCounters;
 use crate::direction::LinkId;
 use crate::packet::{Departure, DropCause, Fate, Packet};
 
+mod lost;
 mod queueing;
 
 /// The packets on a link, the states of its stages, and the counts.
 #[derive(Clone, Debug)]
 pub(super) struct Stages<T> {
     streams: Streams,
-    loss: LossModel,
-    duplicating: ByPacket,
-    corrupting: ByPacket,
+    /// The draws of copies that an earlier link made.
+    streams_of_copies: Streams,
+    chances: Chances,
     arrivals: Arrivals,
     bottleneck: Bottleneck<Before<T>>,
     /// Packets before it without the cross traffic.
@@ -35,6 +35,11 @@ pub(super) struct Stages<T> {
     propagation: Propagation,
     /// What leaves at a known time, and what was dropped.
     out: BinaryHeap<Reverse<ByTime<T>>>,
+    /// What is lost, for the links behind this one, if there are any.
+    lost: BinaryHeap<Reverse<Lost>>,
+    pub(super) followed: bool,
+    /// Packets that came, those among them that were lost before.
+    came: u64,
     pub(super) in_flight: usize,
     bytes_in_flight: u64,
     pub(super) counters: LinkCounters,
@@ -46,6 +51,7 @@ struct Transit<T> {
     departure: Departure<T>,
     /// The how-manieth packet of this link it is; a link behind another one counts what comes to it.
     place: u64,
+    lineage: Lineage,
     ecn_capable: bool,
     /// The delay of the recorded path.
     replayed: Option<Duration>,
@@ -60,28 +66,30 @@ enum Before<T> {
     Cross(usize),
 }
 
-/// What chance does to a packet, or to its copy.
-#[derive(Clone, Copy, Debug)]
-struct Chances {
-    lost: bool,
-    marked: bool,
-    corrupted_bit: Option<u64>,
-    way: Way,
-}
+/// The draws of copies are those of a path of their own.
+const COPIES_PATH: u64 = 1 << 48;
 
 impl<T> Stages<T> {
     pub(super) fn new(seed: u64, id: LinkId, limit: u32) -> Self {
         let bursts = substream(id, seed, "netem/up/burst", "netem/down/burst");
         Self {
             streams: Streams::new(seed, id),
-            loss: LossModel::new(bursts),
-            duplicating: ByPacket::default(),
-            corrupting: ByPacket::default(),
+            streams_of_copies: Streams::new(
+                seed,
+                LinkId {
+                    path: id.path.wrapping_add(COPIES_PATH),
+                    ..id
+                },
+            ),
+            chances: Chances::new(bursts),
             arrivals: Arrivals::new(seed, id),
             bottleneck: Bottleneck::new(limit),
             waiting: 0,
             propagation: Propagation::new(seed, id),
             out: BinaryHeap::with_capacity(ROOM.min(limit as usize)),
+            lost: BinaryHeap::new(),
+            followed: false,
+            came: 0,
             in_flight: 0,
             bytes_in_flight: 0,
             counters: LinkCounters::default(),
@@ -107,7 +115,7 @@ impl<T> Stages<T> {
             },
             payload: packet.payload,
         };
-        self.take_in(timeline, departure, packet.ecn_capable);
+        self.take_in(timeline, departure, 0, packet.ecn_capable);
     }
 
     /// Takes in what left the link before this one. What that link dropped is only handed on.
@@ -117,101 +125,96 @@ impl<T> Stages<T> {
     {
         match before.departure.fate {
             Fate::Dropped(cause) => self.report(timeline, before.place, before.departure, cause),
-            Fate::Delivered { .. } => self.take_in(timeline, before.departure, before.ecn_capable),
+            Fate::Delivered { .. } => {
+                let lineage = before.lineage << 1;
+                self.take_in(timeline, before.departure, lineage, before.ecn_capable);
+            }
         }
     }
 
     /// Takes in a packet at the time when it is due here.
-    fn take_in(&mut self, timeline: &Timeline, departure: Departure<T>, ecn_capable: bool)
-    where
+    fn take_in(
+        &mut self,
+        timeline: &Timeline,
+        departure: Departure<T>,
+        lineage: Lineage,
+        ecn_capable: bool,
+    ) where
         T: Clone,
     {
         let (now, bytes) = (timeline.elapsed(departure.due), departure.bytes);
         while self.goes_on(timeline, now) {}
-        let settings = timeline.at(now);
-        let (chances, of_copy) = self.draw(settings, now, bytes, settings.ecn && ecn_capable);
+        let coming = Coming {
+            number: departure.number,
+            bytes,
+            ecn_capable,
+        };
+        let (lot, of_copy) = self.draw(timeline.at(now), now, coming, lineage);
         let itself = Transit {
             departure,
-            place: self.counters.offered.packets,
+            place: self.next_place(),
+            lineage,
             ecn_capable,
             replayed: None,
-            way: chances.way,
+            way: lot.way,
         };
         self.counters.offered.count(bytes);
-        let copy = of_copy.map(|chances| (itself.clone(), chances));
-        self.admit(timeline, now, itself, chances);
-        if let Some((mut copy, chances)) = copy {
+        let copy = of_copy.map(|lot| (itself.clone(), lot));
+        self.admit(timeline, now, itself, lot);
+        if let Some((mut copy, lot)) = copy {
             copy.departure.copy = true;
+            copy.lineage |= 1;
             self.counters.duplicated.count(bytes);
-            self.admit(timeline, now, copy, chances);
+            self.admit(timeline, now, copy, lot);
         }
     }
 
-    /// What chance does to a packet that is offered, and to its copy if it has one. Every effect draws for
-    /// every packet, whatever becomes of it, so that no effect moves the draws of another.
+    fn next_place(&mut self) -> u64 {
+        let place = self.came;
+        self.came = self.came.wrapping_add(1);
+        place
+    }
+
+    /// What chance does to a packet that comes. A copy that an earlier link made meets the states as they are, has
+    /// draws of its own, and leaves those of the packets alone.
     fn draw(
         &mut self,
         settings: &LinkConfig,
         now: Duration,
-        bytes: usize,
-        marks: bool,
-    ) -> (Chances, Option<Chances>) {
-        let (draws, number) = (self.streams.draw(), self.counters.offered.packets);
-        let loss = self.loss.draw(&settings.loss, number, now, &draws);
-        let way = self.propagation.draw(settings, &draws);
-        let hit = loss.is_lost();
-        let bit = |draw: f64| (draw * bytes as f64 * 8.0) as u64;
-        let corrupt = self.corrupting.happens(settings.corrupt, draws.corrupt) && bytes > 0;
-        let mut chances = Chances {
-            lost: hit && !marks,
-            marked: hit && marks,
-            corrupted_bit: corrupt.then(|| bit(draws.corrupted_bit)),
-            way,
-        };
-        let doubled = self
-            .duplicating
-            .happens(settings.duplicate, draws.duplicate);
-        if !doubled || !fits(settings, bytes) {
-            return (chances, None);
+        packet: Coming,
+        lineage: Lineage,
+    ) -> (Lot, Option<Lot>) {
+        if lineage == 0 {
+            let draws = self.streams.draw(packet.number);
+            return self.chances.draw(settings, now, packet, &draws);
         }
-        let hit = draws.copy_loss < loss.probability;
-        let corrupt = draws.copy_corrupt < settings.corrupt.probability.get() && bytes > 0;
-        let copy = Chances {
-            // as in tc, a packet that is both lost and copied passes once
-            lost: chances.lost || hit && !marks,
-            marked: chances.marked || hit && marks,
-            corrupted_bit: corrupt.then(|| bit(draws.copy_bit)),
-            way: Way {
-                share: draws.copy_delay,
-                ..way
-            },
-        };
-        chances.lost = false;
-        (chances, Some(copy))
+        let own = packet.number << Lineage::BITS | u64::from(lineage);
+        let draws = self.streams_of_copies.draw(own);
+        self.chances.clone().draw(settings, now, packet, &draws)
     }
 
     /// Puts a packet or a copy before the bottleneck, or drops it.
-    fn admit(
-        &mut self,
-        timeline: &Timeline,
-        now: Duration,
-        mut packet: Transit<T>,
-        chances: Chances,
-    ) {
-        let (settings, bytes) = (timeline.at(now), packet.departure.bytes);
-        packet.way = chances.way;
+    fn admit(&mut self, timeline: &Timeline, now: Duration, mut packet: Transit<T>, lot: Lot) {
+        let bytes = packet.departure.bytes;
+        packet.way = lot.way;
         if let Fate::Delivered {
             corrupted_bit,
             marked,
         } = &mut packet.departure.fate
         {
             // one bit at most is turned over, by whichever link of a chain does so first
-            *corrupted_bit = corrupted_bit.or(chances.corrupted_bit);
-            *marked |= chances.marked;
+            *corrupted_bit = corrupted_bit.or(lot.corrupted_bit);
+            *marked |= lot.marked;
         }
         let passes = self
-            .survives(settings, now, &mut packet, chances.lost)
-            .and_then(|()| self.finds_room(timeline, now, bytes));
+            .survives(timeline, now, &mut packet, lot.lost)
+            .and_then(|()| {
+                let room = self.finds_room(timeline, now, bytes);
+                if room.is_err() {
+                    self.pass_on_lost(packet.as_lost(timeline.time(now), false));
+                }
+                room
+            });
         match passes {
             Ok(weight) => {
                 self.in_flight = self.in_flight.saturating_add(1);
@@ -234,12 +237,12 @@ impl<T> Stages<T> {
     /// What happens to a packet on the way, whatever else is on the link.
     fn survives(
         &mut self,
-        settings: &LinkConfig,
+        timeline: &Timeline,
         now: Duration,
         packet: &mut Transit<T>,
         lost: bool,
     ) -> Result<(), DropCause> {
-        let bytes = packet.departure.bytes;
+        let (settings, bytes) = (timeline.at(now), packet.departure.bytes);
         let replayed = settings.replay.as_ref().map(|replay| replay.path.at(now));
         packet.replayed = replayed.flatten();
         let dropped = if !fits(settings, bytes) {
@@ -251,12 +254,13 @@ impl<T> Stages<T> {
         } else {
             return Ok(());
         };
-        // Without a bottleneck it is lost at the end of its way, where it keeps its place in the order: a loss
-        // moves no other packet.
-        if settings.rate.is_none() && self.bottleneck.len() == 0 && replayed != Some(None) {
-            self.propagation
-                .leave(settings, now, bytes, packet.replayed, packet.way);
-        }
+        let end = if replayed == Some(None) {
+            None
+        } else {
+            self.end_of_way(settings, now, bytes, packet.replayed, packet.way)
+        };
+        let due = timeline.time(end.unwrap_or(now));
+        self.pass_on_lost(packet.as_lost(due, end.is_some()));
         Err(dropped)
     }
 
@@ -274,16 +278,19 @@ impl<T> Stages<T> {
             self.out.push(Reverse(ByTime {
                 departure,
                 place,
+                lineage: 0,
                 ecn_capable: false,
             }));
         }
     }
 
-    /// When the next packet leaves, or left, by `now`.
+    /// When the next packet leaves, or left, by `now`, or goes on as one that is lost.
     pub(super) fn next_due(&mut self, timeline: &Timeline, now: Time) -> Option<Time> {
         self.advance(timeline, timeline.elapsed(now));
-        let Reverse(next) = self.out.peek()?;
-        Some(next.departure.due).filter(|due| *due <= now)
+        let out = self.out.peek().map(|Reverse(next)| next.departure.due);
+        let lost = self.lost.peek().map(|Reverse(next)| next.due);
+        let next = out.into_iter().chain(lost).min()?;
+        Some(next).filter(|due| *due <= now)
     }
 
     /// Nothing that is taken in from `now` on leaves before this.
@@ -296,7 +303,10 @@ impl<T> Stages<T> {
     }
 
     pub(super) fn poll(&mut self, timeline: &Timeline, now: Time) -> Option<ByTime<T>> {
-        self.next_due(timeline, now)?;
+        self.advance(timeline, timeline.elapsed(now));
+        self.out
+            .peek()
+            .filter(|Reverse(next)| next.departure.due <= now)?;
         let Reverse(next) = self.out.pop()?;
         let departure = &next.departure;
         if let Fate::Delivered { marked, .. } = departure.fate {
@@ -335,6 +345,6 @@ impl<T> Stages<T> {
 }
 
 /// Whether a packet is no larger than the MTU.
-fn fits(settings: &LinkConfig, bytes: usize) -> bool {
+pub(super) fn fits(settings: &LinkConfig, bytes: usize) -> bool {
     settings.mtu.is_none_or(|mtu| bytes <= mtu as usize)
 }

@@ -6,8 +6,8 @@ use crate::direction::{Direction, LinkId};
 
 /// The random substreams of a link.
 ///
-/// Each packet takes one draw from every stream, whatever the settings and whatever its fate, so that
-/// the n-th packet meets the same numbers under all settings of one seed.
+/// Each packet has its own draw of every stream, by its number, whatever the settings and whatever becomes of it
+/// or of others, so that the n-th packet meets the same numbers under all settings of one seed.
 #[derive(Clone, Debug)]
 pub(super) struct Streams {
     loss: Substream,
@@ -19,6 +19,8 @@ pub(super) struct Streams {
     reorder: Substream,
     copy: Substream,
     copy_corrupt: Substream,
+    /// The packet whose draws come next.
+    next: u64,
 }
 
 /// The draws of one packet, uniform in [0, 1).
@@ -58,10 +60,16 @@ impl Streams {
             reorder: stream("netem/up/reorder", "netem/down/reorder"),
             copy: stream("netem/up/copy", "netem/down/copy"),
             copy_corrupt: stream("netem/up/copybits", "netem/down/copybits"),
+            next: 0,
         }
     }
 
-    pub(super) fn draw(&mut self) -> Draws {
+    /// The draws of packet `number`.
+    pub(super) fn draw(&mut self, number: u64) -> Draws {
+        if number != self.next {
+            self.seek(number);
+        }
+        self.next = number.wrapping_add(1);
         Draws {
             loss: self.loss.uniform(),
             delay: self.delay.uniform(),
@@ -74,6 +82,26 @@ impl Streams {
             copy_delay: self.copy.uniform(),
             copy_corrupt: self.copy_corrupt.uniform(),
             copy_bit: self.copy_corrupt.uniform(),
+        }
+    }
+}
+
+impl Streams {
+    fn seek(&mut self, number: u64) {
+        for stream in [
+            &mut self.loss,
+            &mut self.delay,
+            &mut self.state,
+            &mut self.duplicate,
+            &mut self.corrupt,
+            &mut self.corrupted_bit,
+            &mut self.reorder,
+        ] {
+            stream.seek(number);
+        }
+        // two for each packet
+        for stream in [&mut self.copy, &mut self.copy_corrupt] {
+            stream.seek(number.saturating_mul(2));
         }
     }
 }

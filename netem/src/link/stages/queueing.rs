@@ -101,9 +101,13 @@ impl<T> Stages<T> {
             }
             Before::Cross(bytes) => return self.counters.cross.sent.count(bytes),
         };
+        if sent.dropped.is_some() {
+            self.pass_on_lost(packet.as_lost(timeline.time(sent.at), false));
+        }
         let Transit {
             mut departure,
             place,
+            lineage,
             ecn_capable,
             replayed,
             way,
@@ -130,6 +134,7 @@ impl<T> Stages<T> {
         self.out.push(Reverse(ByTime {
             departure,
             place,
+            lineage,
             ecn_capable,
         }));
     }

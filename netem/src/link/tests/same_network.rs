@@ -91,6 +91,25 @@ fn mixed(words: &str) -> Vec<Departure<()>> {
 }
 
 #[test]
+fn no_feature_of_a_link_moves_the_delays_of_a_link_behind_it() {
+    let first = "delay 9ms 4ms order free";
+    for delay in DELAYS {
+        let alone = mixed(&format!("{first}; then {delay}"));
+        for feature in FEATURES {
+            // copies keep the order and fill slots as their packets do: they are packets more
+            let unordered = delay.contains("free") && !delay.contains("slot");
+            if feature.starts_with("duplicate") && !unordered {
+                continue;
+            }
+            let both = mixed(&format!("{first} {feature}; then {delay}"));
+            let mut pairs = alone.iter().map(met).zip(both.iter().map(met));
+            let moved = pairs.find(|(alone, both)| both.is_ok() && both != alone);
+            assert_eq!(moved, None, "{first} {feature}; then {delay}");
+        }
+    }
+}
+
+#[test]
 fn no_feature_moves_the_delays_of_another() {
     for delay in DELAYS {
         let alone: Vec<Met> = mixed(delay).iter().map(met).collect();
@@ -158,6 +177,81 @@ fn raising_a_share_only_ever_adds() {
         let words = |percent| format!("delay 9ms 2ms corrupt {percent}% 20% {order}");
         let turned = Departure::is_corrupted;
         only_adds(&all(&words(2), &turned), &all(&words(5), &turned));
+    }
+}
+
+#[test]
+fn more_loss_on_a_link_only_ever_adds_whatever_follows() {
+    let adds = |few: &str, many: &str, then: &str| {
+        let lost = |words: &str| -> Vec<bool> {
+            let fates = mixed(&format!("{words}; then {then}"));
+            fates.iter().map(|fate| !fate.is_delivered()).collect()
+        };
+        only_adds(&lost(few), &lost(many));
+    };
+    let without_memory = [
+        "loss 3%",
+        "loss burst 3% 20ms",
+        "loss every 9",
+        "loss list 100-400",
+        "duplicate 20% loss 3%",
+    ];
+    let with_memory = [
+        "loss 3% 40%",
+        "loss gemodel 3% 30%",
+        "loss state 3% 30%",
+        "delay 5ms 2ms loss 3%; then delay 9ms 3ms reorder 10% loss 5% 50%",
+    ];
+    let free = "delay 9ms 4ms order free";
+    for (few, many) in [
+        (format!("{free} loss 1%"), format!("{free} loss 5%")),
+        (
+            format!("{free}; then loss 1%"),
+            format!("{free}; then loss 5%"),
+        ),
+        ("loss gemodel 1% 30%".into(), "loss gemodel 2% 30%".into()),
+    ] {
+        for then in without_memory.into_iter().chain(with_memory) {
+            adds(&few, &many, then);
+        }
+    }
+    // behind a bottleneck what is left comes earlier, to other states
+    for then in without_memory {
+        let first = "rate 100mbit delay 5ms";
+        adds(
+            &format!("{first} loss 1%"),
+            &format!("{first} loss 5%"),
+            then,
+        );
+    }
+}
+
+#[test]
+fn copies_of_an_earlier_link_meet_a_later_one_each_by_itself() {
+    let came = |words: &str| -> Vec<(u64, Time)> {
+        let packets = (0..N / 2).map(|packet| (Time::from_millis(packet), Packet::new(100, ())));
+        let out = with_copies(&mut link(words, 311, LinkId::UP), packets);
+        let out = out.iter().filter(|out| out.copy && out.is_delivered());
+        out.map(|out| (out.number, out.due)).collect()
+    };
+    for then in [
+        "delay 9ms 5ms order free loss 10%",
+        "delay 9ms 5ms 50% order free loss 10% 50%",
+        "delay 9ms 5ms order free duplicate 20%; then delay 9ms 5ms order free loss 3%",
+    ] {
+        let words = |first: &str| came(&format!("{first}; then {then}"));
+        let is_among = |few: &[(u64, Time)], many: &[(u64, Time)]| {
+            let many: std::collections::BTreeSet<_> = many.iter().collect();
+            let missing = few.iter().filter(|copy| !many.contains(copy)).count();
+            assert!(few.len() > 100 && many.len() > few.len(), "{then}");
+            assert_eq!(missing, 0, "of {}: {then}", few.len());
+        };
+        // what both have is the same; a lost packet that has a copy takes its place
+        is_among(
+            &words("duplicate 20% loss 40%"),
+            &words("duplicate 20% loss 1%"),
+        );
+        is_among(&words("duplicate 5%"), &words("duplicate 20%"));
     }
 }
 
