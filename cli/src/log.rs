@@ -12,6 +12,7 @@ use mmt_shared::clean::clean;
 use tracing::Metadata;
 use tracing::callsite::Identifier;
 use tracing_subscriber::EnvFilter;
+use tracing_subscriber::filter::LevelFilter;
 use tracing_subscriber::fmt::MakeWriter;
 
 use crate::failure::Failure;
@@ -143,10 +144,26 @@ impl Messages {
 }
 
 fn filter(words: &str) -> Result<EnvFilter, Failure> {
-    EnvFilter::try_new(words).map_err(|error| {
-        let what = format!("the environment variable {VARIABLE} is {words:?}: {error}");
+    let refused = |why: String| {
+        let what = format!("the environment variable {VARIABLE} is {words:?}: {why}");
         Failure::usage(what).remedy("set it to error, warn, info, debug or trace, or unset it")
-    })
+    };
+    if let Some(word) = words
+        .split(',')
+        .map(str::trim)
+        .find(|word| is_unknown(word))
+    {
+        return Err(refused(format!(
+            "{word:?} is neither a level nor a crate of mmt"
+        )));
+    }
+    EnvFilter::try_new(words).map_err(|error| refused(error.to_string()))
+}
+
+/// Whether a word that stands alone is a level that is mistyped: the filter takes it for a crate that is silent.
+fn is_unknown(word: &str) -> bool {
+    let stands_alone = !word.is_empty() && !word.contains(['=', '[', ' ', '"']);
+    stands_alone && !word.starts_with("mmt") && word.parse::<LevelFilter>().is_err()
 }
 
 /// One message while it is written.
@@ -253,11 +270,21 @@ mod tests {
     #[test]
     fn a_filter_that_is_none_is_refused_by_the_name_of_its_variable() {
         assert!(filter(DEFAULT).is_ok());
-        assert!(filter("debug").is_ok());
-        let failure = filter("mmt=loud").unwrap_err().to_string();
-        assert!(
-            failure.contains(VARIABLE) && failure.contains("what to do"),
-            "{failure}"
-        );
+        for words in [
+            "debug",
+            "",
+            "WARN",
+            "warn,mmt_client=debug",
+            "off, mmt_server",
+        ] {
+            assert!(filter(words).is_ok(), "{words}");
+        }
+        for words in ["mmt=loud", "debgu", "warn,verbose"] {
+            let failure = filter(words).unwrap_err().to_string();
+            assert!(
+                failure.contains(VARIABLE) && failure.contains("what to do"),
+                "{failure}"
+            );
+        }
     }
 }

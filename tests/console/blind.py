@@ -79,8 +79,12 @@ def check_part(tab, number, answer, shot):
     holds(f"part {number}: no frame of the other side", tab.frame["slave"] is None and tab.master["rtt_ms"] is None)
     there, here = tab.master["model"]["position"], tab.master["hip"]
     tab.drag([there[axis] - here[axis] for axis in (0, 1)], 1.5)
+    holds(f"part {number}: the remote object is not shown, nor its delay", tab.master["scene"] is None)
+    tab.page.keyboard.press("s")
     shot("part")
     tab.page.mouse.up()
+    tab.page.wait_for_timeout(300)
+    holds(f"part {number}: the hand is the person's alone", tab.master["person"]["driver"] == "pointer", tab.master["person"])
     tab.stage("question")
     holds(f"part {number} asks the owner's question", QUESTION in tab.page.inner_text("#study"))
     check_hidden(tab, f"question {number}")

@@ -29,7 +29,7 @@ struct Frame {
     slave: Option<SlaveLive>,
 }
 
-/// Of a session what the hand meets, and no more.
+/// Of a session what the hand meets, and no more: the remote object as last seen would show the delay.
 fn felt(master: &MasterLive) -> MasterLive {
     MasterLive {
         elapsed_s: master.elapsed_s,
@@ -38,7 +38,6 @@ fn felt(master: &MasterLive) -> MasterLive {
         hand_force: master.hand_force,
         model: master.model,
         footprint: master.footprint,
-        scene: master.scene,
         in_contact: master.in_contact,
         proxy: master.proxy,
         engaged: master.engaged,

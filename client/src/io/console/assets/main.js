@@ -211,7 +211,7 @@ const KEYS = { s: "driver", p: "pause", m: "sound", t: "theme", Escape: "stop" }
 document.addEventListener("keydown", (event) => {
   if (event.repeat || event.ctrlKey || event.metaKey || event.altKey || event.target.closest?.("select")) return;
   const id = KEYS[event.key];
-  if (id && !$(id).disabled) toggle[id]();
+  if (id && !$(id).disabled && !(id === "driver" && link.about.study)) toggle[id]();
 });
 
 link.addEventListener("frame", () => {
