@@ -38,10 +38,11 @@ class Device:
         self.state, self.force, self.hip, self.lost_up = 0, (0.0, 0.0, 0.0), (0.0, 0.0), 0
         self.heard = -math.inf
 
-    def send(self, position, velocity, buttons):
-        """A reading: m and m/s along the device's axes, a bit for each button."""
+    def send(self, position, velocity, buttons, stamp_ns=None):
+        """A reading: m and m/s along the device's axes, a bit for each button; when it was taken, if that is not now."""
         self.sequence += 1
-        head = HEAD.pack(b"MMTL", 1, 1, buttons, self.sequence, self.newest, time.monotonic_ns(), self.token)
+        stamp_ns = time.monotonic_ns() if stamp_ns is None else stamp_ns
+        head = HEAD.pack(b"MMTL", 1, 1, buttons, self.sequence, self.newest, stamp_ns, self.token)
         try:
             self.socket.send(head + READING.pack(*position, *velocity))
         except OSError:

@@ -333,3 +333,17 @@ fn a_hand_and_a_plant_in_cpp_meet_over_the_emulated_network() {
         assert_eq!(get(&slave, "/drops/plant_malformed"), 0.0, "{slave:#}");
     });
 }
+
+#[test]
+fn a_node_of_ros_2_has_its_topics_and_packets() {
+    // ROS itself is not there: a stand-in takes the messages' own definitions and encodes each as ROS 2 does
+    let Some(python) = python("a node of ROS 2", "rosbags") else {
+        return;
+    };
+    let mut command = Command::new(&python);
+    command.arg(root().join("tests/ros/check_node.py"));
+    command.env("PYTHONDONTWRITEBYTECODE", "1");
+    let ended = Running::start(command).unwrap().end(GENEROUS).unwrap();
+    assert!(ended.status.success(), "{:?} {}", ended.out, ended.err);
+    assert_eq!(ended.out.len(), 6, "{:?}", ended.out);
+}
