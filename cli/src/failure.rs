@@ -55,6 +55,11 @@ impl Failure {
         Self::new(Exit::Failed, what)
     }
 
+    /// A run that a person ended: `done` of `whole` files, experiments, … are done.
+    pub(crate) fn interrupted(done: usize, whole: usize, of_what: &str) -> Self {
+        Self::failed(format!("interrupted: {done} of {whole} {of_what} are done"))
+    }
+
     /// Adds what to do about it.
     pub(crate) fn remedy(mut self, remedy: impl fmt::Display) -> Self {
         self.remedy = Some(remedy.to_string());

@@ -64,7 +64,7 @@ fn execute(command: Command) -> Result<(), Failure> {
         Command::Export(arguments) => commands::export::run(&arguments),
         #[cfg(feature = "live")]
         Command::Live(arguments) => commands::live::run(&arguments),
-        Command::Reproduce(arguments) => commands::reproduce::run(&arguments),
+        Command::Reproduce(arguments) => commands::reproduce::run(arguments),
         Command::Swarm(arguments) => commands::swarm::run(&arguments),
         Command::Sweep(arguments) => commands::sweep::run(&arguments),
         Command::Doctor(arguments) => commands::doctor::run(&arguments),

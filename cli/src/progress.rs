@@ -2,8 +2,8 @@
 
 use indicatif::{ProgressBar, ProgressStyle};
 
-/// A bar that starts again for each piece of work.
-#[derive(Debug)]
+/// A bar that starts again for each piece of work. Copies are the same bar.
+#[derive(Clone, Debug)]
 pub(crate) struct Bar(ProgressBar);
 
 impl Bar {
@@ -23,6 +23,11 @@ impl Bar {
         }
         self.0.set_length(whole as u64);
         self.0.set_position(done as u64);
+    }
+
+    /// Takes it off the screen while `print` writes there.
+    pub(crate) fn step_aside<R>(&self, print: impl FnOnce() -> R) -> R {
+        self.0.suspend(print)
     }
 
     /// Takes it off the screen.

@@ -3,6 +3,8 @@
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{self, RecvTimeoutError, Sender};
+use std::time::Duration;
 
 use mmt_shared::io::emergency::EmergencyStop;
 use tokio::signal::unix::{SignalKind, signal};
@@ -10,6 +12,9 @@ use tokio::sync::watch;
 
 use crate::failure::{Failure, INTERRUPTED_TWICE};
 use crate::view::restore_terminal;
+
+/// Between two looks at whether a person asked for the end.
+const LOOK: Duration = Duration::from_millis(50);
 
 /// The wish that the run ends. Copies are the same wish.
 #[derive(Clone, Debug)]
@@ -108,6 +113,35 @@ impl Stop {
         self.asked.load(Ordering::Acquire)
     }
 
+    /// Does `work` on a thread of its own and hands what it sends to `take`, here and in order. Whether it was left
+    /// because a person asked for the end: it then goes on until the process ends, and nobody waits for it.
+    ///
+    /// # Errors
+    /// That of the work or of `take`. The system gives no thread.
+    pub(crate) fn until_asked<T: Send + 'static>(
+        &self,
+        work: impl FnOnce(Sender<T>) -> Result<(), Failure> + Send + 'static,
+        mut take: impl FnMut(T) -> Result<(), Failure>,
+    ) -> Result<bool, Failure> {
+        let (sender, receiver) = mpsc::channel();
+        let worker = std::thread::Builder::new().name("work".to_owned());
+        let worker = worker
+            .spawn(move || work(sender))
+            .map_err(|error| Failure::failed(format!("the system gives no thread: {error}")))?;
+        loop {
+            match receiver.recv_timeout(LOOK) {
+                Ok(done) => take(done)?,
+                Err(RecvTimeoutError::Timeout) if self.asked() => return Ok(true),
+                Err(RecvTimeoutError::Timeout) => {}
+                Err(RecvTimeoutError::Disconnected) => break,
+            }
+        }
+        match worker.join() {
+            Ok(ended) => ended.map(|()| false),
+            Err(panic) => std::panic::resume_unwind(panic),
+        }
+    }
+
     /// Turns true when the run shall end.
     pub(crate) fn receiver(&self) -> watch::Receiver<bool> {
         self.wanted.subscribe()
@@ -128,6 +162,8 @@ fn no_signals(error: std::io::Error) -> Failure {
 
 #[cfg(test)]
 mod tests {
+    use std::cell::Cell;
+
     use super::*;
 
     #[test]
@@ -138,5 +174,33 @@ mod tests {
         assert!(*receiver.borrow() && !stop.asked());
         stop.ask();
         assert!(*stop.receiver().borrow() && stop.asked());
+    }
+
+    #[test]
+    fn work_that_is_left_keeps_what_it_sent_and_work_that_ends_hands_over_its_error() {
+        let stop = Stop::new();
+        let taken = Cell::new(0);
+        let take = |number| {
+            taken.set(10 * taken.get() + number);
+            Ok(())
+        };
+        let work = |sender: Sender<u32>| {
+            sender.send(1).map_err(Failure::failed)?;
+            sender.send(2).map_err(Failure::failed)?;
+            Err(Failure::usage("no more"))
+        };
+        assert_eq!(stop.until_asked(work, take), Err(Failure::usage("no more")));
+        assert_eq!(taken.get(), 12);
+
+        let wish = stop.clone();
+        let endless = move |sender: Sender<u32>| {
+            sender.send(3).map_err(Failure::failed)?;
+            wish.ask();
+            loop {
+                std::thread::park();
+            }
+        };
+        assert_eq!(stop.until_asked(endless, take), Ok(true));
+        assert_eq!(taken.get(), 123);
     }
 }

@@ -4,6 +4,7 @@
 
 use mmt_shared::channel::rate_control::StretchMax;
 use mmt_shared::model::sample::HipSample;
+use mmt_shared::range::{OutOfRange, all_in_range};
 use mmt_shared::wire::{Architecture, SAMPLES_MAX, SampleBlock};
 use serde::{Deserialize, Serialize};
 
@@ -14,7 +15,7 @@ const SPACING_MAX: u32 = 4;
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct CommandConfig {
-    /// New samples in a command, 1 to 32; 0 counts as 1.
+    /// New samples in a command, 1 to 32.
     pub samples_per_command: u8,
     /// How many commands before it each command repeats the samples of, as far as 32 samples hold them.
     pub repeat_samples: u8,
@@ -48,6 +49,19 @@ impl CommandConfig {
         } else {
             self
         }
+    }
+
+    /// Checks the numbers; that of [`StretchMax`] is checked by its type.
+    ///
+    /// # Errors
+    /// Names the one that is out of range.
+    pub fn check(&self) -> Result<(), OutOfRange> {
+        let most = SAMPLES_MAX as f64;
+        let (news, repeats) = (self.samples_per_command, self.repeat_samples);
+        all_in_range([
+            ("samples per command", "", f64::from(news), (1.0, most)),
+            ("repeat samples", "", f64::from(repeats), (0.0, most - 1.0)),
+        ])
     }
 
     /// The most samples that a command can have.

@@ -67,7 +67,9 @@ impl Program {
     #[must_use]
     pub fn uses(self, key: &str) -> bool {
         let any = |tables: &[&str]| tables.iter().any(|table| within(key, table));
-        match self {
+        // a session has the coupling of its device, and its estimator starts from `slave.start`
+        let used = !any(&["slave.environment.coupling"]) && !key.ends_with(".prior");
+        used && match self {
             Self::Demo => !any(&["settings", "slave.plant"]),
             Self::Slave => any(&["seed", "slave", "down"]),
             Self::Master => !any(&["settings", "slave", "down"]),

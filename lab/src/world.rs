@@ -101,6 +101,7 @@ impl World {
         config: &WorldConfig,
         operator: impl FnOnce(View) -> Result<Operator, WorldError>,
     ) -> Result<Self, WorldError> {
+        config.commands().check()?;
         let device = DeviceProfile::default().used_with(config.stiffness_n_per_m, None)?;
         let settings = config.model_settings(device.coupling());
         let mut slave = Slave::with_settings(&config.slave(), settings)?;

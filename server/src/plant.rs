@@ -34,6 +34,21 @@ pub struct PlantConfig {
     pub acceleration_max_m_per_s2: f64,
 }
 
+impl PlantConfig {
+    /// Checks every number.
+    ///
+    /// # Errors
+    /// Names the one that is out of range or not a number.
+    pub(crate) fn check(&self) -> Result<(), OutOfRange> {
+        in_range(
+            "plant: acceleration_max",
+            "m/s^2",
+            self.acceleration_max_m_per_s2,
+            ACCELERATION_MAX_M_PER_S2,
+        )
+    }
+}
+
 impl Default for PlantConfig {
     fn default() -> Self {
         Self {
@@ -143,33 +158,24 @@ pub(crate) struct LinkedPlant {
 impl LinkedPlant {
     /// A plant that has not answered yet. `stand_in` is the configured object; the tool meets things with `coupling`, by
     /// itself or, if `is_stiff`, by the slave's compliance.
-    ///
-    /// # Errors
-    /// The acceleration is out of its range.
-    pub(crate) fn try_new(
+    pub(crate) fn new(
         config: PlantConfig,
         stand_in: Environment,
         coupling: Coupling,
         (speed_max_m_per_s, force_max_n): (f64, f64),
         is_stiff: bool,
-    ) -> Result<Self, OutOfRange> {
-        let most = config.acceleration_max_m_per_s2;
-        in_range(
-            "plant: acceleration_max",
-            "m/s²",
-            most,
-            ACCELERATION_MAX_M_PER_S2,
-        )?;
-        Ok(Self {
+    ) -> Self {
+        let acceleration_max = config.acceleration_max_m_per_s2;
+        Self {
             stand_in,
-            follower: Follower::new(speed_max_m_per_s, most),
+            follower: Follower::new(speed_max_m_per_s, acceleration_max),
             coupling,
             force_max_n,
             is_stiff,
             newest: None,
             image: None,
             command: None,
-        })
+        }
     }
 
     /// Puts the tool to a place, m: where the plant's tool is.

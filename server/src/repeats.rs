@@ -33,7 +33,7 @@ pub enum RepeatsError {
     Count(usize),
     /// A time out of range, or no time.
     #[error(
-        "'{0}' is not a time from {min} to {max} ms; write 'none', '10ms' or '10ms 30ms'",
+        "time '{0}' is outside the accepted range {min} to {max} ms; write 'none', '10ms' or '10ms 30ms'",
         min = AFTER_MS.0,
         max = AFTER_MS.1
     )]

@@ -101,7 +101,9 @@ impl Slave {
         config: &SlaveConfig,
         settings: ModelSettings,
     ) -> Result<Self, SlaveError> {
-        let coupling = settings.coupling;
+        config.plant.check()?;
+        config.trigger.check()?;
+        let coupling = settings.checked().map_err(SlaveError::Settings)?.coupling;
         let environment = EnvironmentConfig {
             coupling,
             ..config.environment

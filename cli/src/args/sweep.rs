@@ -7,7 +7,7 @@ use clap::Args;
 use mmt_lab::sweep::Shard;
 
 /// Arguments of `mmt sweep`.
-#[derive(Debug, Args)]
+#[derive(Clone, Debug, Args)]
 pub(crate) struct SweepArguments {
     /// The plan, TOML
     #[arg(value_name = "PLAN.toml")]

@@ -89,8 +89,10 @@ impl Desk {
         }))
     }
 
-    /// From now on shows what the hand meets and nothing of how it is made: no setting, no network, no number of either.
+    /// From now on shows what the hand meets and nothing of how it is made: no setting, no network, no number of either. The
+    /// hand is the person's.
     pub(super) fn blindfold(&mut self) {
+        self.console.refuse_script();
         self.blind = true;
         self.about.clear();
     }

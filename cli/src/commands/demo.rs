@@ -42,7 +42,7 @@ use setting::Setting;
 /// How long the slave may take to notice that the master has ended before it is asked to end as well.
 const FAREWELL: Duration = Duration::from_secs(3);
 /// Between two looks at a session that nobody is shown.
-const PATIENCE: Duration = Duration::from_millis(50);
+const LOOK: Duration = Duration::from_millis(50);
 
 /// Runs `mmt demo`.
 ///
@@ -67,9 +67,8 @@ pub(crate) fn run(arguments: &DemoArguments, messages: &Messages) -> Result<(), 
         dashboard && Screen::is_there(),
         stop.emergency(),
     )?;
-    let controlled = desk.is_some();
     let emulation = &arguments.emulation;
-    let emulation = Emulation::start(emulation, controlled, *seed, Some(up), Some(down))?;
+    let emulation = Emulation::start(emulation, desk.is_some(), *seed, Some(up), Some(down))?;
     let mut viewer = Viewer::new(Caption::default(), dashboard, messages, &stop);
     let ended = loop {
         let mut round = Round {
@@ -130,7 +129,6 @@ impl Round<'_> {
     fn session(&mut self) -> Result<Ended, Failure> {
         let config = self.setting.config()?;
         let arguments = &self.setting.arguments;
-        let mut caption = caption(arguments, &config);
         let transport = arguments.transport.choose()?;
         let (stop, stop_slave) = (Stop::new(), Stop::new());
         let (truth_from, truth_to) = truth::pair();
@@ -140,6 +138,7 @@ impl Round<'_> {
         let Ok(started) = started.recv() else {
             return slave.join().map(|_| None);
         };
+        let mut caption = caption(arguments, &config, &started.pairing);
         let mut options = master_options(
             arguments,
             transport,
@@ -171,16 +170,16 @@ impl Round<'_> {
             // copied first: a borrow that lives through the viewer's wait would stop the hosts' tasks
             let (slave_now, master_now) = (*started.live.borrow(), *master_live.borrow());
             if self.blind {
-                std::thread::sleep(PATIENCE);
+                std::thread::sleep(LOOK);
             } else {
                 let slave_now = Some(slave_now).filter(|slave| slave.connected);
                 self.viewer.look(slave_now, Some(master_now));
             }
             self.attend(&stop);
+            self.finish_unwatched(&master_now);
             if self.stop.asked() || self.again.is_some() {
                 stop.end();
             }
-            self.finish_unwatched(&master_now);
             if !master.is_running() {
                 let since = *master_ended.get_or_insert_with(Instant::now);
                 if since.elapsed() > FAREWELL {
@@ -227,9 +226,9 @@ impl Round<'_> {
         };
         while let Some(order) = desk.next_order() {
             match order {
+                Order::Study(_) => {}
                 // a participant steers nothing
                 _ if self.blind => {}
-                Order::Study(_) => {}
                 Order::End => stop.end(),
                 Order::Network(wish) => {
                     match self.setting.networks() {
@@ -266,7 +265,7 @@ fn operated_at(desk: &Desk, options: &mut MasterOptions, blind: bool) {
     }
 }
 
-fn caption(arguments: &DemoArguments, config: &WorldConfig) -> Caption {
+fn caption(arguments: &DemoArguments, config: &WorldConfig, pairing: &Pairing) -> Caption {
     let (slave, environment) = (&config.slave, &config.slave.environment);
     let m = environment.mass_kg;
     let c = environment.friction_coefficient * m * environment.gravity_m_per_s2;
@@ -287,6 +286,7 @@ fn caption(arguments: &DemoArguments, config: &WorldConfig) -> Caption {
         command: "demo",
         duration_s: Some(arguments.duration.as_secs_f64()),
         setting: format!("{mode}, {scheme}; {network}; seed {seed}"),
+        slave: pairing.address.to_string(),
         // of several bodies the one that is touched counts
         truth: (slave.scene.bodies.is_empty()).then_some([m, environment.damping_ns_per_m, c]),
     }

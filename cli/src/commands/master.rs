@@ -79,6 +79,7 @@ pub(crate) fn run(arguments: MasterArguments, messages: &Messages) -> Result<(),
         command: "master",
         duration_s: options.duration.map(|time| time.as_secs_f64()),
         setting: format!("slave at {}, {link}", options.pairing.address),
+        slave: options.pairing.address.to_string(),
         truth: None,
     };
     arguments.transport.warning().into_iter().for_each(note);

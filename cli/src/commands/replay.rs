@@ -2,7 +2,8 @@
 //!
 //! The kind of the files decides.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::sync::mpsc::Sender;
 
 use mmt_lab::replay::{ReplayConfig, replay};
 use mmt_lab::what_if::Otherwise;
@@ -13,16 +14,17 @@ use crate::failure::Failure;
 use crate::input::read_text;
 use crate::output::{print, print_json};
 use crate::progress::Bar;
+use crate::stop::Stop;
 
 mod document;
 mod session;
 
 use document::{Document, Replayed};
 
-/// Runs `mmt replay`.
+/// Runs `mmt replay`. Whoever asks for its end keeps the files that are done.
 ///
 /// # Errors
-/// A file cannot be read or is no recording; stdout cannot be written to.
+/// A file cannot be read or is no recording; stdout cannot be written to; the end was asked for before the last file.
 pub(crate) fn run(arguments: &ReplayArguments) -> Result<(), Failure> {
     if session::are_records(&arguments.files)? {
         return session::run(arguments);
@@ -44,24 +46,53 @@ pub(crate) fn run(arguments: &ReplayArguments) -> Result<(), Failure> {
     // All are read before the first is replayed: a slip in the last name costs no time.
     let paths = arguments.files.iter();
     let recordings: Vec<_> = paths
-        .map(|path| Ok((path, recording(path)?)))
+        .map(|path| Ok((path.clone(), recording(path)?)))
         .collect::<Result<_, Failure>>()?;
-    let (mut replayed, bar) = (Vec::new(), Bar::new());
-    for (path, recording) in &recordings {
-        let name = path.file_name().unwrap_or_default().to_string_lossy();
-        let mut progress = |done: usize, whole: usize| bar.show(&name, done, whole);
-        let report = replay(recording, &config, &mut progress);
-        bar.clear();
-        let file = path.display().to_string();
-        if !arguments.json {
-            print(format_args!("{file}\n{report}"))?;
-        }
-        replayed.push(Replayed { file, report });
-    }
+    let stop = Stop::on_signals()?;
+    let (bar, mut replayed) = (Bar::new(), Vec::new());
+    let shown = bar.clone();
+    let left = stop.until_asked(
+        move |done| {
+            every_recording(&recordings, &config, &bar, &done);
+            Ok(())
+        },
+        |of: Replayed| {
+            if !arguments.json {
+                shown.step_aside(|| print(format_args!("{}\n{}", of.file, of.report)))?;
+            }
+            replayed.push(of);
+            Ok(())
+        },
+    )?;
+    shown.clear();
+    let done = replayed.len();
     if arguments.json {
-        print_json(&Document::new(&config, replayed))?;
+        print_json(&Document::new(&config, replayed, left))?;
+    }
+    if left {
+        return Err(Failure::interrupted(done, arguments.files.len(), "files")
+            .remedy("what is printed is whole; give the other files again"));
     }
     Ok(())
+}
+
+/// Replays the recordings in their order and sends what each came to.
+fn every_recording(
+    recordings: &[(PathBuf, Recording)],
+    config: &ReplayConfig,
+    bar: &Bar,
+    done: &Sender<Replayed>,
+) {
+    for (path, recording) in recordings {
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        let mut progress = |done: usize, whole: usize| bar.show(&name, done, whole);
+        let report = replay(recording, config, &mut progress);
+        bar.clear();
+        let file = path.display().to_string();
+        if done.send(Replayed { file, report }).is_err() {
+            return;
+        }
+    }
 }
 
 fn recording(path: &Path) -> Result<Recording, Failure> {

@@ -1,6 +1,7 @@
 //! `mmt reproduce`: the experiments of `mmt_lab::experiments` on threads, with their files in a folder.
 
 use std::collections::BTreeMap;
+use std::sync::mpsc::Sender;
 
 use mmt_lab::experiment::findings::{ExperimentError, Section};
 use mmt_lab::io::{Folder, Runner};
@@ -10,9 +11,14 @@ use crate::args::ReproduceArguments;
 use crate::failure::Failure;
 use crate::output::{note, print, print_json};
 use crate::progress::Bar;
+use crate::stop::Stop;
 
-/// `manifest.json`: what was run, with what, and what came of it. Nothing in it depends on the machine or the hour.
-#[derive(Debug, Serialize)]
+/// The file that lists what was run.
+const MANIFEST: &str = "manifest.json";
+
+/// `manifest.json`: what was run, with what, and what came of it, after each experiment. Nothing in it depends on the
+/// machine or the hour.
+#[derive(Clone, Debug, Serialize)]
 struct Manifest {
     program: &'static str,
     version: &'static str,
@@ -21,11 +27,11 @@ struct Manifest {
     files: BTreeMap<String, String>,
 }
 
-/// Runs `mmt reproduce`.
+/// Runs `mmt reproduce`. Whoever asks for its end keeps the experiments that are done.
 ///
 /// # Errors
-/// The folder cannot be written to; stdout cannot be written to.
-pub(crate) fn run(arguments: &ReproduceArguments) -> Result<(), Failure> {
+/// The folder cannot be written to; stdout cannot be written to; the end was asked for before the last experiment.
+pub(crate) fn run(arguments: ReproduceArguments) -> Result<(), Failure> {
     let folder = Folder::open(&arguments.out).map_err(|error| {
         let what = format!(
             "cannot make the folder {}: {error}",
@@ -33,37 +39,68 @@ pub(crate) fn run(arguments: &ReproduceArguments) -> Result<(), Failure> {
         );
         Failure::usage(what).remedy("give another one with --out")
     })?;
+    let stop = Stop::on_signals()?;
+    let (json, out) = (arguments.json, arguments.out.display().to_string());
+    let wanted = arguments.chosen.experiments.len();
+    let mut last: Option<Manifest> = None;
     let bar = Bar::new();
+    let shown = bar.clone();
+    let left = stop.until_asked(
+        move |done| every_experiment(&arguments, folder, &bar, &done),
+        |manifest| {
+            if !json && let Some(section) = manifest.experiments.last() {
+                let tables = &section.findings.tables;
+                shown.step_aside(|| tables.iter().try_for_each(print))?;
+            }
+            last = Some(manifest);
+            Ok(())
+        },
+    )?;
+    shown.clear();
+    if json && let Some(manifest) = &last {
+        print_json(manifest)?;
+    }
+    if left {
+        let done = last.map_or(0, |manifest| manifest.experiments.len());
+        return Err(
+            Failure::interrupted(done, wanted, "experiments").remedy(format!(
+                "what is done is kept in {out}; give the names of the others"
+            )),
+        );
+    }
+    note(format_args!("files are in {out}"));
+    Ok(())
+}
+
+/// Runs the experiments in their order. After each the manifest is kept and sent.
+fn every_experiment(
+    arguments: &ReproduceArguments,
+    folder: Folder,
+    bar: &Bar,
+    done: &Sender<Manifest>,
+) -> Result<(), Failure> {
     let progress = |what: &str, done, whole| bar.show(what, done, whole);
     let runner = Runner::new(folder, arguments.jobs, &progress);
-    let mut experiments = Vec::new();
+    let mut manifest = Manifest {
+        program: "mmt",
+        version: env!("CARGO_PKG_VERSION"),
+        experiments: Vec::new(),
+        files: BTreeMap::new(),
+    };
     for experiment in &arguments.chosen.experiments {
         let section = experiment.reproduce(&runner, &arguments.request(experiment));
         bar.clear();
-        let section = section.map_err(explain)?;
-        if !arguments.json {
-            for table in &section.findings.tables {
-                print(table)?;
-            }
+        manifest.experiments.push(section.map_err(explain)?);
+        manifest.files = runner.folder().kept();
+        manifest.files.remove(MANIFEST);
+        let failed = |error| Failure::failed(format!("cannot write {MANIFEST}: {error}"));
+        let text = serde_json::to_string_pretty(&manifest).map_err(failed)?;
+        let kept = runner.keep(MANIFEST, format!("{text}\n").as_bytes());
+        kept.map_err(explain)?;
+        if done.send(manifest.clone()).is_err() {
+            break;
         }
-        experiments.push(section);
     }
-    let manifest = Manifest {
-        program: "mmt",
-        version: env!("CARGO_PKG_VERSION"),
-        experiments,
-        files: runner.folder().kept(),
-    };
-    let failed = |error| Failure::failed(format!("cannot write manifest.json: {error}"));
-    let text =
-        serde_json::to_string_pretty(&manifest).map_err(|error| failed(error.to_string()))?;
-    let kept = runner.keep("manifest.json", format!("{text}\n").as_bytes());
-    kept.map_err(explain)?;
-    if arguments.json {
-        print_json(&manifest)?;
-    }
-    let folder = runner.folder().path().display();
-    note(format_args!("files are in {folder}"));
     Ok(())
 }
 

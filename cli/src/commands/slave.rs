@@ -1,5 +1,6 @@
 //! `mmt slave`: the host with the object.
 
+use std::io::{self, IsTerminal as _};
 use std::net::SocketAddr;
 use std::sync::Arc;
 use std::sync::mpsc;
@@ -67,7 +68,7 @@ pub(crate) fn run(arguments: SlaveArguments, messages: &Messages) -> Result<(), 
     // If it could not start the reason is in the host.
     if let Ok(started) = started.recv() {
         print(&started.pairing)?;
-        note(waiting(&started.pairing, everywhere));
+        note(waiting(&started.pairing, everywhere, is_shown_anyway()));
         watch_sessions(&host, &started.live, messages, &stop);
     }
     let report = host.join()?.map(RunReport::from);
@@ -99,17 +100,27 @@ fn plugged_in(listen: SocketAddr, stop: &Stop) -> Result<Option<PlantHost>, Fail
     Ok(Some(plant))
 }
 
-/// What to do on the other host; the secret stands on stdout only. `everywhere`: it listens at every address of this host.
-fn waiting(pairing: &Pairing, everywhere: bool) -> String {
+/// Whether stdout, which has the secret, and stderr go to one terminal.
+fn is_shown_anyway() -> bool {
+    io::stdout().is_terminal() && io::stderr().is_terminal()
+}
+
+/// What to do on the other host. The secret stands on stdout only, unless it is `shown` anyway. `everywhere`: the slave
+/// listens at every address of this host.
+fn waiting(pairing: &Pairing, everywhere: bool, shown: bool) -> String {
     let address = &pairing.address;
-    let hint = "on its host: mmt master 'mmt://…', which is the line above";
+    let command = if shown {
+        format!("on its host run\n  mmt master '{pairing}'")
+    } else {
+        "on its host run mmt master with the pairing string, which stands on stdout".to_owned()
+    };
     let lost = matches!(&address.host, HostName::V4(v4) if v4.is_loopback());
     let remedy = if everywhere && lost {
-        "\nthis host has no route to others, so the line names 127.0.0.1: give --advertise ADDRESS, one that the master's host reaches"
+        "\nthis host has no interface for others, so the string names 127.0.0.1: give --advertise ADDRESS, one that the master's host reaches"
     } else {
         ""
     };
-    format!("waiting for a master at {address}; {hint}{remedy}")
+    format!("waiting for a master at {address}; {command}{remedy}")
 }
 
 /// Plain lines while a master is connected.
@@ -296,15 +307,18 @@ mod tests {
     }
 
     #[test]
-    fn a_slave_that_no_other_host_reaches_says_so_and_never_shows_the_secret() {
+    fn a_slave_that_no_other_host_reaches_says_so_and_only_a_terminal_shows_the_secret_twice() {
         let pairing = |host: &str| {
             let text = format!("mmt://{host}:4433?pin={0}&token={0}", "5a".repeat(32));
             text.parse::<Pairing>().unwrap()
         };
-        let lost = waiting(&pairing("127.0.0.1"), true);
+        let lost = waiting(&pairing("127.0.0.1"), true, false);
         assert!(lost.contains("--advertise"), "{lost}");
+        let robot = pairing("robot");
+        let shown = waiting(&robot, true, true);
+        assert!(shown.contains(&format!("mmt master '{robot}'")), "{shown}");
         for (host, everywhere) in [("127.0.0.1", false), ("192.0.2.7", true), ("robot", true)] {
-            let text = waiting(&pairing(host), everywhere);
+            let text = waiting(&pairing(host), everywhere, false);
             assert!(
                 !text.contains("--advertise") && !text.contains("5a5a"),
                 "{text}"

@@ -1,10 +1,12 @@
 //! `mmt sweep`: the rows of a plan on threads, with part files and the table of results in a folder.
 //!
-//! Whatever ends a run, the rows that are done stay: the same command goes on with the others.
+//! Whatever ends a run, the rows that are done stay: the same command goes on with the others. Rows under way when a person
+//! asks for the end are not waited for.
 
 mod summary;
 
 use std::fmt::Display;
+use std::sync::mpsc::Sender;
 
 use mmt_lab::io::{SweepDir, SweepError};
 use mmt_lab::layers::Program;
@@ -62,22 +64,19 @@ fn run_missing(
         .collect();
     let stop = Stop::on_signals()?;
     let bar = Bar::new();
-    let done = |done: usize| {
-        let what = if stop.asked() {
-            "ending after the rows under way"
-        } else {
-            "sweep"
-        };
-        bar.show(what, done, rows.len());
+    let (shown, wish) = (bar.clone(), stop.clone());
+    let (arguments, plan, dir) = (arguments.clone(), plan.clone(), dir.clone());
+    let every_row = move |_: Sender<()>| {
+        let done = |done: usize| bar.show("sweep", done, rows.len());
+        let ended = || wish.asked();
+        match dir.run(&plan, arguments.shard, &rows, arguments.jobs, ended, done) {
+            Ok(()) | Err(SweepError::Interrupted) => Ok(()),
+            Err(error) => Err(explain(error, &arguments)),
+        }
     };
-    let ended = || stop.asked();
-    let ran = dir.run(plan, arguments.shard, &rows, arguments.jobs, ended, done);
-    bar.clear();
-    match ran {
-        Ok(()) => Ok(false),
-        Err(SweepError::Interrupted) => Ok(true),
-        Err(error) => Err(explain(error, arguments)),
-    }
+    stop.until_asked(every_row, Ok)?;
+    shown.clear();
+    Ok(stop.asked())
 }
 
 /// Writes the table if every row is there, prints the state, and fails if rows are missing that should be there.

@@ -86,7 +86,7 @@ impl Viewer {
         if now >= self.next_line && !quiet {
             // after a pause of this process there is no burst of lines
             self.next_line = now + LINE;
-            note(line(&self.history));
+            note(line(&self.caption, &self.history));
         }
     }
 }

@@ -128,7 +128,7 @@ fn render_panels(frame: &mut Frame<'_>, area: Rect, caption: &Caption, history: 
     for (panel, area) in [
         (update_panel(history), updates),
         (model_panel(caption, &history.newest()), model),
-        (link_panel(&history.newest()), link),
+        (link_panel(caption, &history.newest()), link),
         (loop_panel(&history.newest()), loops),
     ] {
         frame.render_widget(panel, area);

@@ -4,13 +4,13 @@ use std::fmt::Write;
 
 use mmt_client::failsafe::LinkState;
 
-use super::{History, Snapshot};
+use super::{Caption, History, Snapshot};
 
 /// What is known now; a number that is not known is left out.
-pub(crate) fn line(history: &History) -> String {
+pub(crate) fn line(caption: &Caption, history: &History) -> String {
     let now = history.newest();
     if let Some(tried_s) = now.connecting_s {
-        return format!("connecting, {tried_s:.0} s");
+        return format!("connecting to {}, {tried_s:.0} s", caption.slave);
     }
     let mut text = format!("{:6.1} s", now.elapsed_s());
     let mut add = |label: &str, value: Option<f64>, decimals: usize, unit: &str| {

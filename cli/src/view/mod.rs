@@ -26,6 +26,8 @@ pub(crate) struct Caption {
     pub(crate) duration_s: Option<f64>,
     /// Mode, scheme, network in words.
     pub(crate) setting: String,
+    /// The slave that the master connects to, as HOST:PORT; empty where there is none.
+    pub(crate) slave: String,
     /// True m, b, c where this process knows them.
     pub(crate) truth: Option<[f64; 3]>,
 }

@@ -2,7 +2,7 @@
 
 use mmt_shared::model::update::Cause;
 use ratatui::text::Line;
-use ratatui::widgets::{Block, Paragraph};
+use ratatui::widgets::{Block, Paragraph, Wrap};
 
 use super::{Caption, History, Missing, Snapshot};
 
@@ -65,19 +65,18 @@ pub(super) fn model_panel(caption: &Caption, now: &Snapshot) -> Paragraph<'stati
 }
 
 /// Round trip, loss, what was not sent, state.
-pub(super) fn link_panel(now: &Snapshot) -> Paragraph<'static> {
+pub(super) fn link_panel(caption: &Caption, now: &Snapshot) -> Paragraph<'static> {
+    if let Some(tried_s) = now.connecting_s {
+        // a narrow panel breaks the line at its blank
+        let slave = format!("{}, {tried_s:.0} s", caption.slave);
+        return panel("link: connecting to", vec![slave]).wrap(Wrap { trim: true });
+    }
     let [up, down] = now.missing();
     let percent = |way: &Missing| shown(way.share.map(|share| share * 100.0), 1, " %");
     let unsent = |way: &Missing| shown(way.unsent.map(|n| n as f64), 0, "");
-    let state = match now.connecting_s {
-        Some(tried_s) => format!("link: connecting, {tried_s:.0} s"),
-        None => format!(
-            "link: {}",
-            now.master.map_or("-", |master| master.link.name())
-        ),
-    };
+    let state = now.master.map_or("-", |master| master.link.name());
     panel(
-        now.stopped().unwrap_or(state),
+        now.stopped().unwrap_or_else(|| format!("link: {state}")),
         vec![
             format!("round trip {}", shown(now.rtt_ms(), 1, " ms")),
             format!("{} up {}", up.name(), percent(&up)),

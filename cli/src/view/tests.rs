@@ -62,6 +62,7 @@ fn caption() -> Caption {
         command: "demo",
         duration_s: Some(20.0),
         setting: "recommended, useful 10% 150ms, each way delay 50ms".to_owned(),
+        slave: "192.0.2.7:4433".to_owned(),
         truth: Some([0.7, 3.0, 2.06]),
     }
 }
@@ -140,7 +141,7 @@ fn what_is_not_known_yet_is_a_dash_and_no_size_of_terminal_is_too_small() {
 fn the_plain_line_has_the_same_numbers_and_leaves_out_what_is_not_known() {
     let mut history = History::default();
     history.push(snapshot(1.0));
-    let text = line(&history);
+    let text = line(&caption(), &history);
     for part in [
         "1.0 s",
         "f_s 5.00 N",
@@ -153,7 +154,7 @@ fn the_plain_line_has_the_same_numbers_and_leaves_out_what_is_not_known() {
     ] {
         assert!(text.contains(part), "{part}: {text}");
     }
-    let text = line(&History::default());
+    let text = line(&caption(), &History::default());
     assert!(!text.contains("f_s") && !text.contains("link"), "{text}");
 }
 
@@ -161,9 +162,13 @@ fn the_plain_line_has_the_same_numbers_and_leaves_out_what_is_not_known() {
 fn before_the_session_begins_no_link_is_called_fresh() {
     let mut history = History::default();
     history.push(Snapshot::new(None, Some(MasterLive::default()), 3.2));
-    assert_eq!(line(&history), "connecting, 3 s");
+    assert_eq!(
+        line(&caption(), &history),
+        "connecting to 192.0.2.7:4433, 3 s"
+    );
     let shown = screen(100, 30, &history, &[]);
-    assert!(shown.contains("link: connecting, 3 s"), "{shown}");
+    assert!(shown.contains("link: connecting to"), "{shown}");
+    assert!(shown.contains("192.0.2.7:4433, 3 s"), "{shown}");
     assert!(!shown.contains("fresh"), "{shown}");
 }
 
@@ -174,7 +179,7 @@ fn an_emergency_stop_takes_the_place_of_the_links_state() {
     let slave = stopped.slave.as_mut().unwrap();
     slave.stopped_by = Some(Side::Slave);
     history.push(stopped);
-    for text in [line(&history), screen(100, 30, &history, &[])] {
+    for text in [line(&caption(), &history), screen(100, 30, &history, &[])] {
         assert!(text.contains("EMERGENCY STOP (slave)"), "{text}");
     }
 }
@@ -183,7 +188,7 @@ fn an_emergency_stop_takes_the_place_of_the_links_state() {
 fn what_a_sender_left_unsent_is_no_loss_of_the_path_and_without_its_count_nothing_is_called_loss() {
     let mut history = History::default();
     history.push(snapshot(1.0));
-    let text = line(&history);
+    let text = line(&caption(), &history);
     for part in [
         "loss up 1.1 %",
         "unsent up 12",
@@ -197,7 +202,7 @@ fn what_a_sender_left_unsent_is_no_loss_of_the_path_and_without_its_count_nothin
         slave: None,
         ..snapshot(1.0)
     });
-    let text = line(&alone);
+    let text = line(&caption(), &alone);
     assert!(
         text.contains("missing down 9.9 %") && !text.contains("loss down"),
         "{text}"

@@ -51,7 +51,7 @@ pub enum SweepError {
 }
 
 /// The folder of a sweep.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct SweepDir {
     path: PathBuf,
 }

@@ -37,8 +37,11 @@ const UNITS: [(&str, &str); 19] = [
 ];
 /// Before the range in the message of a number outside it.
 const RANGE: &str = "outside the accepted range ";
-/// Values that no number may have, of either sign: one of them is refused wherever there is a range.
-const IMPOSSIBLE: [&str; 4] = ["1e300", "-1e300", "9223372036854775807", "-1"];
+/// Before the words for what is accepted where a place is outside it.
+const PLACES: &str = "outside the accepted places: ";
+/// Values that no number may have, of either sign: one of them is refused wherever there is a range. The last are for small
+/// whole numbers, of which the others are none.
+const IMPOSSIBLE: [&str; 6] = ["1e300", "-1e300", "9223372036854775807", "-1", "255", "0"];
 
 /// Where a value comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -170,23 +173,22 @@ fn walk(
 fn accepted(whole: &WorldConfig, key: &str, value: Option<&toml::Value>) -> String {
     use toml::Value as V;
     let of = |value: &str| answer(whole, key, value);
-    let number = |numbers: usize| {
-        let list = |value: &str| format!("[{}]", vec![value; numbers].join(", "));
-        IMPOSSIBLE.into_iter().find_map(|value| {
-            let value = if numbers == 0 {
-                value.to_owned()
-            } else {
-                list(value)
-            };
-            range(&of(&value)?, unit_of(key))
-        })
+    let number = |numbers: Option<usize>| {
+        let answers = IMPOSSIBLE.into_iter().filter_map(|value| match numbers {
+            Some(numbers) => of(&format!("[{}]", vec![value; numbers.max(1)].join(", "))),
+            None => of(value),
+        });
+        let answers: Vec<String> = answers.collect();
+        let mut ranges = answers.iter().filter_map(|of| range(of, unit_of(key)));
+        let by_type = || answers.iter().find_map(|of| range_of_type(of));
+        ranges.next().or_else(by_type)
     };
     let accepted = match value {
         Some(V::Boolean(_)) => Some("true or false".to_owned()),
         Some(V::String(_)) => of("\"?\"").map(words),
-        Some(V::Integer(_) | V::Float(_)) => number(0),
+        Some(V::Integer(_) | V::Float(_)) => number(None),
         Some(V::Array(list)) if list.iter().all(|one| one.is_float() || one.is_integer()) => {
-            number(list.len())
+            number(Some(list.len()))
         }
         _ => None,
     };
@@ -195,11 +197,8 @@ fn accepted(whole: &WorldConfig, key: &str, value: Option<&toml::Value>) -> Stri
 
 /// The range of a message, of a number in this unit: what follows from the number may be refused before it.
 fn range(message: &str, unit: &str) -> Option<String> {
-    if message.ends_with("expected u8") {
-        return Some("0 to 255".to_owned());
-    }
-    if message.ends_with("expected u64") || message.ends_with("expected u32") {
-        return Some("a whole number from 0".to_owned());
+    if let Some((_, places)) = message.split_once(PLACES) {
+        return Some(places.to_owned());
     }
     let (_, rest) = message.split_once(RANGE)?;
     let mut words = rest.splitn(4, ' ');
@@ -208,9 +207,22 @@ fn range(message: &str, unit: &str) -> Option<String> {
     match found.strip_prefix(unit) {
         Some("") => Some(format!("{min} to {max}")),
         Some(_) if unit.is_empty() => Some(format!("{min} to {max} {found}")),
-        Some(more) if more.starts_with(' ') => Some(format!("{min} to {max}")),
+        Some(more) if more.starts_with([' ', ';']) => Some(format!("{min} to {max}")),
         _ => None,
     }
+}
+
+/// The range of a number's type, where a message names no other.
+fn range_of_type(message: &str) -> Option<String> {
+    let types = [
+        ("u8", "0 to 255"),
+        ("u32", "0 to 4294967295"),
+        ("u64", "a whole number from 0"),
+    ];
+    let mut named = types
+        .into_iter()
+        .filter(|(name, _)| message.ends_with(&format!("expected {name}")));
+    named.next().map(|(_, range)| range.to_owned())
 }
 
 /// What the checks say to a value of a key; none if they take it.

@@ -61,7 +61,15 @@ fn line(text: &mut String, key: &Known, demo: &Known, stays: bool) {
     let name = key.key.rsplit('.').next().unwrap_or_default();
     let mark = if stays { "" } else { "# " };
     let value = key.value.as_deref().unwrap_or("(left out)");
-    let in_unit = format!("{} {}", key.accepted, key.unit);
+    let is_range = key
+        .accepted
+        .starts_with(|first: char| first == '-' || first.is_ascii_digit());
+    let unit = if is_range || key.accepted.is_empty() {
+        key.unit
+    } else {
+        ""
+    };
+    let in_unit = format!("{} {unit}", key.accepted);
     let mut words = vec![in_unit.trim().to_owned()];
     if let Some(demo) = demo
         .value

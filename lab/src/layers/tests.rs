@@ -62,7 +62,7 @@ fn the_default_file_has_every_key_with_unit_and_range() {
     let text = template(Mode::Recommended).unwrap();
     for line in [
         "mass_kg = 0.7  # 0.05 to 50 kg",
-        "samples_per_command = 10  # 0 to 255",
+        "samples_per_command = 10  # 1 to 32",
         "# up = \"none\"",
         "# [settings]",
         "[slave.environment]",
@@ -84,6 +84,40 @@ fn the_default_file_has_every_key_with_unit_and_range() {
     }
     for left_out in ["slave.tool_compliance", "slave.environment.contact"] {
         assert!(known.contains(left_out), "{left_out}");
+    }
+}
+
+#[test]
+fn every_number_of_the_default_file_has_a_range_and_none_below_it_is_taken() {
+    for mode in MODES {
+        let flags = of_mode(mode);
+        for known in layers(Program::Sweep, "", &flags).known().unwrap() {
+            let value = known.value.as_deref().unwrap_or_default();
+            let is_number = value.starts_with(|first: char| first.is_ascii_digit() || first == '[');
+            assert!(
+                !is_number || !known.in_force || value == "[]" || !known.accepted.is_empty(),
+                "{} = {value} has no range",
+                known.key
+            );
+        }
+    }
+    for (key, value) in [
+        ("slave.trigger.force_floor_n", "0"),
+        ("slave.trigger.contact.on_n", "-1"),
+        ("slave.trigger.contact.off_n", "0.2"),
+        ("slave.plant.acceleration_max_m_per_s2", "-1"),
+        ("settings.smoothing.in-time.tau_s", "-1"),
+    ] {
+        let (table, name) = key.rsplit_once('.').unwrap();
+        let text = format!("[{table}]\n{name} = {value}\n");
+        let error = layers(Program::Sweep, &text, &[])
+            .config()
+            .unwrap_err()
+            .to_string();
+        assert!(
+            error.contains("line 2") && error.contains("accepted range"),
+            "{key}: {error}"
+        );
     }
 }
 

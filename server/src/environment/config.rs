@@ -2,7 +2,7 @@
 
 use mmt_shared::model::contact::Coupling;
 use mmt_shared::model::geometry::{Face, Pose, Vec2};
-use mmt_shared::model::params::{GRAVITY, ModelParams, ParamsError, WORKSPACE_M};
+use mmt_shared::model::params::{DAMPING_NS_PER_M, GRAVITY, ModelParams, ParamsError, WORKSPACE_M};
 use mmt_shared::range::{OutOfRange, in_range};
 use serde::{Deserialize, Serialize};
 
@@ -12,7 +12,7 @@ use super::terrain::{GroundPatch, PATCHES_MAX, Ripple, Terrain};
 use super::wall::{ANGLE_RAD, Wall};
 
 /// Accepted side l, m: the accepted face offsets of the local model, doubled.
-const SIDE_M: (f64, f64) = (0.02, 2.0);
+pub(crate) const SIDE_M: (f64, f64) = (0.02, 2.0);
 /// Accepted friction coefficient mu: rubber on rubber stays below 2.
 const FRICTION_COEFFICIENT: (f64, f64) = (0.0, 5.0);
 /// Accepted rotational damping, N m s.
@@ -106,7 +106,9 @@ pub enum EnvironmentError {
     #[error("environment: {0}")]
     Outline(#[from] OutlineError),
     /// The centre of mass lies outside the footprint.
-    #[error("environment: centre of mass ({x}, {y}) m is not inside the footprint")]
+    #[error(
+        "environment: centre of mass ({x}, {y}) m is outside the accepted places: inside the footprint"
+    )]
     CentreOfMass {
         /// x of what it was, m.
         x: f64,
@@ -189,6 +191,7 @@ impl EnvironmentConfig {
         let g = self.gravity_m_per_s2;
         in_range("friction coefficient", "", mu, FRICTION_COEFFICIENT)?;
         in_range("static ratio", "", self.static_ratio, STATIC_RATIO)?;
+        in_range("damping", "N s/m", self.damping_ns_per_m, DAMPING_NS_PER_M)?;
         in_range("rotational damping", "N m s", b_r, ROTATIONAL_DAMPING_NMS)?;
         in_range("gravity", "m/s^2", g, GRAVITY_M_PER_S2)?;
         for coupling in [self.coupling, self.real_contact()] {

@@ -22,6 +22,7 @@ mod wall;
 mod world;
 
 pub use bounded::{Bounded, TooLong};
+pub(crate) use config::SIDE_M;
 pub use config::{EnvironmentConfig, EnvironmentError};
 pub use outline::{OutlineError, Shape, VERTICES_MAX};
 pub use scene::{BodyConfig, SceneConfig};

@@ -14,6 +14,8 @@ use mmt_shared::io::socket;
 use mmt_shared::io::transport::{CLOSE_FINISHED, Endpoint, Listener};
 use mmt_shared::model::contact::Coupling;
 use mmt_shared::pairing::{Address, Host, Pairing};
+use nix::ifaddrs::{InterfaceAddress, getifaddrs};
+use nix::net::if_::InterfaceFlags;
 use tokio::sync::{mpsc, watch};
 use tokio::time::timeout;
 
@@ -175,7 +177,7 @@ impl SlaveHost {
 fn host_of(address: IpAddr) -> Host {
     let address = address.to_canonical();
     match if address.is_unspecified() {
-        address_towards_the_world().unwrap_or(Ipv4Addr::LOCALHOST.into())
+        address_for_others().unwrap_or(Ipv4Addr::LOCALHOST.into())
     } else {
         address
     } {
@@ -184,13 +186,31 @@ fn host_of(address: IpAddr) -> Host {
     }
 }
 
-/// The address that this machine would use towards the world, if it has a route there; no packet is sent to find out.
-pub fn address_towards_the_world() -> Option<IpAddr> {
+/// The address by which other hosts reach this one: the one that it would use towards the world, without a route there
+/// that of an interface. No packet is sent to find out. None if this host has no interface for others.
+pub fn address_for_others() -> Option<IpAddr> {
     // Documentation addresses (RFC 5737, RFC 3849): routed like any other, and nobody's.
     let v4 = local_address_towards((Ipv4Addr::UNSPECIFIED, 0), (Ipv4Addr::new(192, 0, 2, 1), 9));
     let world = Ipv6Addr::new(0x2001, 0xdb8, 0, 0, 0, 0, 0, 1);
     let v6 = || local_address_towards((Ipv6Addr::UNSPECIFIED, 0), (world, 9));
-    v4.or_else(v6)
+    v4.or_else(v6).or_else(address_of_an_interface)
+}
+
+/// The first address of an interface that is up and for others, IPv4 before IPv6; a link-local IPv6 address, which names no
+/// interface, is none.
+fn address_of_an_interface() -> Option<IpAddr> {
+    let interfaces = getifaddrs().ok()?;
+    let up = interfaces.filter(|interface| {
+        let flags = interface.flags;
+        flags.contains(InterfaceFlags::IFF_UP) && !flags.contains(InterfaceFlags::IFF_LOOPBACK)
+    });
+    let address = |of: InterfaceAddress| {
+        let storage = of.address?;
+        let v4 = storage.as_sockaddr_in().map(|v4| IpAddr::V4(v4.ip()));
+        let v6 = storage.as_sockaddr_in6().map(|v6| v6.ip());
+        v4.or(v6.filter(|v6| !v6.is_unicast_link_local()).map(IpAddr::V6))
+    };
+    up.filter_map(address).min_by_key(IpAddr::is_ipv6)
 }
 
 fn local_address_towards(from: impl Into<SocketAddr>, to: impl Into<SocketAddr>) -> Option<IpAddr> {

@@ -39,7 +39,7 @@ use serde::Serialize;
 use crate::slave::SlaveConfig;
 
 pub use context::SlaveHostError;
-pub use host::{SlaveHost, address_towards_the_world};
+pub use host::{SlaveHost, address_for_others};
 use plant_link::PlantHost;
 
 /// Name and version of this program, as it gives them to the other side.

@@ -166,8 +166,7 @@ fn a_tool_that_gives_by_itself_is_rendered_as_penetration() {
     let limits = (0.6, 15.0);
     for (is_stiff, given) in [(false, 0.0015), (true, 0.0)] {
         let stand_in = Environment::try_new(EnvironmentConfig::default()).unwrap();
-        let mut plant =
-            LinkedPlant::try_new(linked().plant, stand_in, coupling, limits, is_stiff).unwrap();
+        let mut plant = LinkedPlant::new(linked().plant, stand_in, coupling, limits, is_stiff);
         plant.take(Time::ZERO, &answer());
         let met = plant.meet(Time::ZERO, Vec2::zeros(), Vec2::zeros());
         assert!((met.sensed.tool.x - 0.1 - given).abs() < 1e-12);

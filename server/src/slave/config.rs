@@ -150,6 +150,9 @@ pub enum SlaveError {
     /// A number of play-out, of the estimator or of the tool's force is wrong.
     #[error(transparent)]
     OutOfRange(#[from] OutOfRange),
+    /// A number of the local model's settings is not accepted.
+    #[error("local model: {0}")]
+    Settings(ParamsError),
     /// The start model's numbers are not accepted.
     #[error("start model: {0}")]
     Start(#[from] ParamsError),

@@ -8,11 +8,13 @@ use mmt_shared::model::contact::Coupling;
 use mmt_shared::model::geometry::{BoxFootprint, Pose};
 use mmt_shared::model::params::{ModelParams, inertia_of_square};
 use mmt_shared::model::settings::Mode;
+use mmt_shared::range::in_range;
 use mmt_shared::time::Time;
 use serde::{Deserialize, Serialize};
 
 use super::config::{SlaveConfig, SlaveError};
 use crate::contact::Contact;
+use crate::environment::SIDE_M;
 use crate::estimator::{Estimate, Estimator, EstimatorConfig, Measured, OBSTACLE_N, Seen};
 use crate::pose_observer::{Felt, ObserverConfig, PoseObserver};
 
@@ -65,6 +67,7 @@ impl ObjectEstimate {
         let start = config.start;
         let mbc = [start.mass_kg, start.damping_ns_per_m, start.friction_n];
         let [m, b, c] = mbc;
+        in_range("start model: side", "m", start.side_m, SIDE_M)?;
         let estimator = config
             .estimator
             .unwrap_or_else(|| EstimatorConfig::of_mode(config.mode, coupling))

@@ -18,7 +18,7 @@ pub(super) fn of_config(
     if config.plant.link {
         let limits = (speed_max_m_per_s, config.tool_force_max_n);
         let is_stiff = config.tool_compliance.is_some();
-        let plant = LinkedPlant::try_new(config.plant, environment, coupling, limits, is_stiff)?;
+        let plant = LinkedPlant::new(config.plant, environment, coupling, limits, is_stiff);
         return Ok(Plant::Linked(Box::new(plant)));
     }
     Ok(Plant::World {

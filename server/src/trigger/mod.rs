@@ -5,11 +5,13 @@
 //! counts after a debounce and is sent again at intervals, not at every sample; a lost contact is sent
 //! once. Every update, whatever its cause, resets the timer.
 
+mod config;
 mod contact;
 mod input;
 mod metric;
 mod scheme;
 
+pub use config::TriggerConfig;
 pub use contact::{ContactConfig, ContactDetector};
 pub use input::TriggerInput;
 pub use metric::MismatchMetric;
@@ -18,10 +20,8 @@ pub use scheme::{Scheme, SchemeError};
 use std::time::Duration;
 
 use mmt_shared::model::params::ModelParams;
-use mmt_shared::model::settings::Mode;
 use mmt_shared::model::update::Cause;
 use mmt_shared::time::{TICK_S, Time};
-use serde::{Deserialize, Serialize};
 
 /// The shortest time between two updates of the scheme `useful`.
 const USEFUL_GAP: Duration = Duration::from_millis(10);
@@ -40,62 +40,6 @@ const NOISE_DEVIATIONS: f64 = 3.5;
 const ESTIMATE_DEVIATIONS: f64 = 5.0;
 /// And so may a turn of fewer standard deviations of the force's direction.
 const TURN_DEVIATIONS: f64 = 2.0;
-
-/// The trigger's settings.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct TriggerConfig {
-    /// When updates are sent.
-    pub scheme: Scheme,
-    /// What Delta bounds.
-    pub metric: MismatchMetric,
-    /// Whether the timer of `hybrid` runs in free space as well; that of `useful` never does.
-    pub timer_in_free_space: bool,
-    /// Whether an update that only the timer asked for carries the object's pose, as every update of section IV-A does
-    /// ("both geometry and impedance"). If not, it carries the pose and the velocity of the shadow, and renews the
-    /// parameters alone.
-    pub timer_carries_pose: bool,
-    /// Least force that (12) divides by, N.
-    pub force_floor_n: f64,
-    /// Whether a box that sticks can be mismatched: its force is whatever friction holds.
-    pub judge_sticking: bool,
-    /// How long only one side must be in contact before it counts.
-    pub mismatch_debounce: Duration,
-    /// How often a contact mismatch that lasts is sent again.
-    pub mismatch_repeat: Duration,
-    /// Thresholds of contact.
-    pub contact: ContactConfig,
-}
-
-impl TriggerConfig {
-    /// The settings of a mode. Paper: hybrid at its best point (10 %, 150 ms), floor F_min = 0.04 N.
-    /// Recommended: `useful` with the same numbers, floor 0.3 N.
-    #[must_use]
-    pub fn of_mode(mode: Mode) -> Self {
-        let (delta, t_update) = (0.10, Duration::from_millis(150));
-        let (scheme, force_floor_n, judge_sticking) = match mode {
-            Mode::Paper => (Scheme::Hybrid { delta, t_update }, 0.04, true),
-            Mode::Recommended => (Scheme::Useful { delta, t_update }, 0.3, false),
-        };
-        Self {
-            scheme,
-            metric: MismatchMetric::Force,
-            timer_in_free_space: true,
-            timer_carries_pose: true,
-            force_floor_n,
-            judge_sticking,
-            mismatch_debounce: Duration::from_millis(10),
-            mismatch_repeat: Duration::from_millis(50),
-            contact: ContactConfig::default(),
-        }
-    }
-}
-
-impl Default for TriggerConfig {
-    fn default() -> Self {
-        Self::of_mode(Mode::Recommended)
-    }
-}
 
 /// Only one side is in contact.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -4,6 +4,7 @@ use mmt_shared::model::geometry::Vec2;
 
 use super::*;
 use mmt_shared::model::contact::Coupling;
+use mmt_shared::model::settings::Mode;
 use mmt_shared::rng::Substream;
 
 fn params(m: f64, c: f64) -> ModelParams {

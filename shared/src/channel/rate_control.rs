@@ -43,7 +43,7 @@ pub struct StretchMax(f64);
 
 /// Why a number is no greatest stretch.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error("'{0}' is not a greatest stretch from {min} to {max}; 1 is off", min = STRETCH_MAX.0, max = STRETCH_MAX.1)]
+#[error("greatest stretch '{0}' is outside the accepted range {min} to {max}; 1 is off", min = STRETCH_MAX.0, max = STRETCH_MAX.1)]
 pub struct StretchMaxError(String);
 
 impl StretchMax {

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use super::table::{Row, after, count, estimate, number, row, section, share};
+use super::table::{Cell, Row, after, count, estimate, number, row, section, share};
 use super::{LoopReport, RunReport};
 
 /// The share of skipped ticks from which on the numbers are the host's as well.
@@ -16,8 +16,18 @@ impl<C> fmt::Display for Brief<'_, C> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let report = self.0;
         writeln!(f, "{}", report.head())?;
-        section(f, &report.verdict(), report.ten())
+        let rows = report.ten().into_iter().map(|(label, cells)| {
+            let has_number = |cell: &Cell| cell.as_deref().is_some_and(|text| !is_zero(text));
+            (label, cells.into_iter().filter(has_number).collect())
+        });
+        section(f, &report.verdict(), rows.collect())
     }
+}
+
+/// Whether the only number in a text is zero.
+fn is_zero(text: &str) -> bool {
+    let mut digits = text.chars().filter(char::is_ascii_digit).peekable();
+    digits.peek().is_some() && digits.all(|digit| digit == '0')
 }
 
 /// The share of its ticks that a loop skipped.

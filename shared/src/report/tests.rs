@@ -302,6 +302,7 @@ fn the_table_shows_what_is_known_and_leaves_out_what_is_not() {
 #[test]
 fn the_brief_is_a_sentence_and_ten_lines_and_a_spoilt_run_says_so_first() {
     let mut sound = full();
+    sound.passivity.energy_injected_j = 0.002.into();
     for way in [&mut sound.emulation.up, &mut sound.emulation.down] {
         way.degraded = Some(false);
     }
@@ -317,6 +318,14 @@ fn the_brief_is_a_sentence_and_ten_lines_and_a_spoilt_run_says_so_first() {
         lines
             .iter()
             .all(|line| line.len() <= 110 && line.is_ascii()),
+        "{shown}"
+    );
+    sound.passivity.energy_injected_j = 0.0.into();
+    sound.link.loss_up = 0.0.into();
+    let shown = Brief(&sound).to_string();
+    assert!(!shown.contains("energy"), "{shown}");
+    assert!(
+        !shown.contains("up 0.0 %") && shown.contains("down 1.2 %"),
         "{shown}"
     );
     let mut slow = full();

@@ -17,6 +17,7 @@ use crate::harness::process::{PROGRAM, Running};
 mod bench;
 mod doctor;
 mod hostile;
+mod interrupted;
 mod manual;
 mod netem;
 mod raw_udp;

@@ -6,7 +6,7 @@ use std::fmt::Write;
 use super::{document, finish, mmt, start};
 
 /// A recording of pushes along +x of a block that takes 2 N, each 1 cm long.
-fn recording(pushes: u32) -> String {
+pub(super) fn recording(pushes: u32) -> String {
     let mut text = format!("{pushes}\n");
     for push in 0..pushes {
         let (from, to) = (10.0 * f64::from(push), 10.0 * f64::from(push + 1));

@@ -11,7 +11,7 @@ use mmt_shared::wire::Ending;
 use serde_json::{Value, json};
 
 use super::study::{Answer, Condition, Participant, Study};
-use super::{PATIENCE, Round, Setting};
+use super::{LOOK, Round, Setting};
 use crate::args::DemoArguments;
 use crate::commands::console::Desk;
 use crate::commands::device::Device;
@@ -83,7 +83,7 @@ pub(super) fn run(
                 comparison.show(&mut desk, None);
             }
             Some(_) => {}
-            None => std::thread::sleep(PATIENCE),
+            None => std::thread::sleep(LOOK),
         }
     }
     let results = arguments.study.join("results.csv");

@@ -5,7 +5,7 @@ use std::path::Path;
 use std::thread;
 use std::time::Duration;
 
-use mmt_server::io::address_towards_the_world;
+use mmt_server::io::address_for_others;
 use mmt_shared::io::clock::Clock;
 use mmt_shared::io::realtime::{self, Obtained, RealTime};
 use mmt_shared::io::ticker::{Ticker, TickerReport};
@@ -167,12 +167,12 @@ fn buffers(rmem_max: Option<&str>) -> Finding {
 
 fn address() -> Finding {
     let subject = "own address";
-    match address_towards_the_world() {
+    match address_for_others() {
         Some(address) => Finding::fit(subject, address),
         None => Finding::of(
             subject,
             Verdict::Advised,
-            "no route to other hosts",
+            "no interface for other hosts",
             "a slave here needs --advertise ADDRESS, one that the master's host reaches",
         ),
     }

@@ -40,15 +40,15 @@ struct Section {
 }
 
 impl Document {
-    /// The document of these replays, all run by `config`.
-    pub(super) fn new(config: &ReplayConfig, replayed: Vec<Replayed>) -> Self {
+    /// The document of these replays, all run by `config`; `left` if a person asked for the end before the last.
+    pub(super) fn new(config: &ReplayConfig, replayed: Vec<Replayed>, left: bool) -> Self {
         let configuration = Configuration {
             files: replayed.iter().map(|one| one.file.clone()).collect(),
             replay: *config,
         };
         let mut run = RunReport::new("replay", configuration);
         run.seed = Some(config.seed);
-        run.ending = Some("finished");
+        run.ending = Some(if left { "interrupted" } else { "finished" });
         let sum = |of: fn(&ReplayReport) -> f64| replayed.iter().map(|one| of(&one.report)).sum();
         let (duration_s, contact_s): (f64, f64) = (
             sum(|report| report.duration_s),

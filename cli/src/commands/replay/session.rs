@@ -1,6 +1,7 @@
 //! Recorded sessions, run again to the same bits.
 
 use std::path::{Path, PathBuf};
+use std::sync::mpsc::Sender;
 
 use mmt_lab::again::{AgainError, RanAgain, SessionsAgain};
 use mmt_lab::what_if::{Otherwise, RecordedRun, WhatIfError};
@@ -10,6 +11,7 @@ use serde::Serialize;
 use crate::args::ReplayArguments;
 use crate::failure::Failure;
 use crate::output::{print, print_json};
+use crate::stop::Stop;
 
 /// A record that ran again, as the document shows it.
 #[derive(Debug, Serialize)]
@@ -75,20 +77,34 @@ pub(super) fn run(arguments: &ReplayArguments) -> Result<(), Failure> {
     if otherwise != Otherwise::default() {
         return what_if(arguments, &otherwise);
     }
-    let mut records = Vec::new();
-    for path in &arguments.files {
-        let record = again(path).map_err(|error| failure(path, &error))?;
+    let (mut records, files) = (Vec::new(), arguments.files.clone());
+    let every_file = move |done: Sender<Record>| {
+        for path in &files {
+            let record = again(path).map_err(|error| failure(path, &error))?;
+            if done.send(record).is_err() {
+                break;
+            }
+        }
+        Ok(())
+    };
+    let left = Stop::on_signals()?.until_asked(every_file, |record| {
         if !arguments.json {
             show(&record)?;
         }
         records.push(record);
-    }
+        Ok(())
+    })?;
+    let done = records.len();
     if arguments.json {
         print_json(&Document {
             version: env!("CARGO_PKG_VERSION"),
             command: "replay",
             records,
         })?;
+    }
+    if left {
+        return Err(Failure::interrupted(done, arguments.files.len(), "records")
+            .remedy("what is printed is whole; give the other records again"));
     }
     Ok(())
 }

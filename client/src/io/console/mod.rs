@@ -28,7 +28,7 @@ use rtrb::{Consumer, Producer, RingBuffer};
 use tokio::sync::{mpsc, watch};
 use tokio::time::{MissedTickBehavior, interval};
 
-use crate::operator::pointer::HandEvent;
+use crate::operator::pointer::{Driver, HandEvent};
 use admission::{Admission, Refusal, Ticket};
 use assets::{Assets, PAGE};
 pub use message::{NetworkWish, Order, SessionWish, StudyWish};
@@ -79,6 +79,8 @@ struct Stage {
     source: Option<Source>,
     events: Option<Producer<HandEvent>>,
     operator: Option<u64>,
+    /// Whether the script never gets the hand.
+    no_script: bool,
     viewers: usize,
     viewers_ever: u64,
 }
@@ -171,6 +173,11 @@ impl Console {
         self.shared.about.send_replace(about.into());
     }
 
+    /// From now on no page gives the hand to the script.
+    pub fn refuse_script(&self) {
+        self.shared.stage().no_script = true;
+    }
+
     /// Gives the loop an event; lost where no loop runs.
     pub fn give(&self, event: HandEvent) {
         self.shared.stage().give(event);
@@ -196,6 +203,9 @@ impl Shared {
 impl Stage {
     /// A full ring is a loop that stands: what is lost ends as silence, which releases the hand.
     fn give(&mut self, event: HandEvent) {
+        if self.no_script && event == HandEvent::Drive(Driver::Scripted) {
+            return;
+        }
         if let Some(events) = &mut self.events {
             let _ = events.push(event);
         }
@@ -273,4 +283,32 @@ async fn socket(
 
 fn refuse(refusal: Refusal) -> Response {
     (StatusCode::FORBIDDEN, refusal.to_string()).into_response()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn where_the_script_is_refused_no_message_gives_it_the_hand() {
+        let (events, mut to_loop) = RingBuffer::new(4);
+        let mut stage = Stage {
+            events: Some(events),
+            ..Stage::default()
+        };
+        stage.give(HandEvent::Drive(Driver::Scripted));
+        stage.no_script = true;
+        stage.give(HandEvent::Drive(Driver::Scripted));
+        stage.give(HandEvent::Drive(Driver::Pointer));
+        stage.give(HandEvent::Pause(true));
+        let given: Vec<_> = std::iter::from_fn(|| to_loop.pop().ok()).collect();
+        assert_eq!(
+            given,
+            [
+                HandEvent::Drive(Driver::Scripted),
+                HandEvent::Drive(Driver::Pointer),
+                HandEvent::Pause(true)
+            ]
+        );
+    }
 }
