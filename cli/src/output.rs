@@ -2,6 +2,7 @@
 
 use std::fmt::Display;
 use std::io::{self, ErrorKind, Write};
+use std::path::Path;
 use std::time::Duration;
 
 use mmt_shared::report::{Brief, RunReport};
@@ -48,6 +49,25 @@ pub(crate) fn print_report<C: Serialize>(
     } else {
         print(Brief(report))
     }
+}
+
+/// Makes the folder that a command writes to, if it is not there.
+///
+/// # Errors
+/// It cannot be made.
+pub(crate) fn make_folder(folder: &Path) -> Result<(), Failure> {
+    std::fs::create_dir_all(folder).map_err(|error| {
+        let what = format!("cannot make the folder {}: {error}", folder.display());
+        Failure::usage(what).remedy("give another one with --out")
+    })
+}
+
+/// The failure of a command that could not write a file to its folder; `what` names the file and the reason.
+pub(crate) fn unwritten(folder: &Path, what: impl Display) -> Failure {
+    Failure::failed(what).remedy(format!(
+        "check the folder {}: is the disk full, may you write there?",
+        folder.display()
+    ))
 }
 
 fn print_to(out: &mut impl Write, data: impl Display) -> Result<(), Failure> {

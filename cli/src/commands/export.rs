@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
-use std::fs::{File, create_dir_all};
+use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
@@ -13,7 +13,7 @@ use mmt_shared::record::table::{Row, row};
 
 use crate::args::ExportArguments;
 use crate::failure::Failure;
-use crate::output::{note, print};
+use crate::output::{self, make_folder, note, print};
 
 /// A table being written.
 struct Sheet {
@@ -36,6 +36,7 @@ enum Error {
 /// # Errors
 /// The record cannot be read, or a table cannot be written.
 pub(crate) fn run(arguments: &ExportArguments) -> Result<(), Failure> {
+    make_folder(&arguments.out)?;
     let mut sheets = BTreeMap::new();
     let ended = export(&arguments.file, &arguments.out, &mut sheets);
     let finished = sheets.values_mut().try_for_each(|sheet: &mut Sheet| {
@@ -43,7 +44,7 @@ pub(crate) fn run(arguments: &ExportArguments) -> Result<(), Failure> {
         flushed.map_err(|source| unwritten(&sheet.path, source))
     });
     let ended = ended.and_then(|ended| finished.map(|()| ended));
-    let ended = ended.map_err(|error| failure(&arguments.file, error))?;
+    let ended = ended.map_err(|error| failure(arguments, error))?;
     for sheet in sheets.values() {
         print(format_args!(
             "{}: {} rows",
@@ -58,7 +59,6 @@ pub(crate) fn run(arguments: &ExportArguments) -> Result<(), Failure> {
 }
 
 fn export(record: &Path, out: &Path, sheets: &mut BTreeMap<String, Sheet>) -> Result<Ended, Error> {
-    create_dir_all(out).map_err(|source| unwritten(out, source))?;
     let mut hand = Hand::default();
     read(record, |topic, message| -> Result<(), Error> {
         let broken = |why| RecordError::Message {
@@ -140,14 +140,12 @@ fn unwritten(path: &Path, source: io::Error) -> Error {
     Error::Table { path, source }
 }
 
-fn failure(record: &Path, error: Error) -> Failure {
+fn failure(arguments: &ExportArguments, error: Error) -> Failure {
     match error {
         Error::Record(why) => {
-            let what = format!("the record {}: {why}", record.display());
+            let what = format!("the record {}: {why}", arguments.file.display());
             Failure::usage(what).remedy("give a file that mmt made with --record")
         }
-        error @ Error::Table { .. } => {
-            Failure::failed(error).remedy("give --out a folder that can be written, with room")
-        }
+        error @ Error::Table { .. } => output::unwritten(&arguments.out, error),
     }
 }

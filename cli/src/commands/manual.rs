@@ -7,7 +7,7 @@ use clap_complete::Shell;
 
 use crate::args::{Arguments, ManArguments};
 use crate::failure::Failure;
-use crate::output::{note, print};
+use crate::output::{make_folder, note, print, unwritten};
 
 /// Runs `mmt completions`.
 ///
@@ -25,11 +25,8 @@ pub(crate) fn completions(shell: Shell) -> Result<(), Failure> {
 /// The folder cannot be made or a page cannot be written.
 pub(crate) fn pages(arguments: &ManArguments) -> Result<(), Failure> {
     let folder = &arguments.out;
-    let failed = |error| {
-        let what = format!("cannot write the pages to {}: {error}", folder.display());
-        Failure::failed(what)
-    };
-    std::fs::create_dir_all(folder).map_err(failed)?;
+    let failed = |error| unwritten(folder, format!("cannot write a page: {error}"));
+    make_folder(folder)?;
     let mut command = Arguments::command().disable_help_subcommand(true);
     command.build();
     let mut written = 0;

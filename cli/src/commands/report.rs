@@ -10,7 +10,7 @@ use serde_json::{Map, Value};
 
 use crate::args::ReportArguments;
 use crate::failure::Failure;
-use crate::output::{note, print, print_json};
+use crate::output::{make_folder, note, print, print_json, unwritten};
 
 /// The report as one document.
 #[derive(Serialize)]
@@ -80,18 +80,16 @@ fn take(report: &mut RecordReport, path: &Path) -> Result<Ended, RecordError> {
 
 /// Writes every table and figure.
 fn keep(findings: &Findings, out: &Path) -> Result<(), Failure> {
-    let unwritten = |error: std::io::Error| {
-        Failure::failed(format!("cannot write to {}: {error}", out.display()))
-            .remedy("give --out a folder that can be written, with room")
-    };
-    let folder = Folder::open(out).map_err(unwritten)?;
+    make_folder(out)?;
+    let failed = |error: std::io::Error| unwritten(out, format!("cannot write: {error}"));
+    let folder = Folder::open(out).map_err(failed)?;
     for (name, table) in findings.tables.iter().chain(&findings.forces) {
-        folder.keep(name, &table.to_csv()).map_err(unwritten)?;
+        folder.keep(name, &table.to_csv()).map_err(failed)?;
     }
     for (name, figure) in &findings.figures {
         let drawn = figure.draw();
         let svg = drawn.map_err(|why| Failure::failed(format!("cannot draw {name}: {why}")))?;
-        folder.keep(name, svg.as_bytes()).map_err(unwritten)?;
+        folder.keep(name, svg.as_bytes()).map_err(failed)?;
     }
     Ok(())
 }

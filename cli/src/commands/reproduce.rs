@@ -1,6 +1,7 @@
 //! `mmt reproduce`: the experiments of `mmt_lab::experiments` on threads, with their files in a folder.
 
 use std::collections::BTreeMap;
+use std::path::Path;
 use std::sync::mpsc::Sender;
 
 use mmt_lab::experiment::findings::{ExperimentError, Section};
@@ -9,7 +10,7 @@ use serde::Serialize;
 
 use crate::args::ReproduceArguments;
 use crate::failure::Failure;
-use crate::output::{note, print, print_json};
+use crate::output::{make_folder, note, print, print_json, unwritten};
 use crate::progress::Bar;
 use crate::stop::Stop;
 
@@ -32,13 +33,8 @@ struct Manifest {
 /// # Errors
 /// The folder cannot be written to; stdout cannot be written to; the end was asked for before the last experiment.
 pub(crate) fn run(arguments: ReproduceArguments) -> Result<(), Failure> {
-    let folder = Folder::open(&arguments.out).map_err(|error| {
-        let what = format!(
-            "cannot make the folder {}: {error}",
-            arguments.out.display()
-        );
-        Failure::usage(what).remedy("give another one with --out")
-    })?;
+    make_folder(&arguments.out)?;
+    let folder = Folder::open(&arguments.out).map_err(|error| unwritten(&arguments.out, error))?;
     let stop = Stop::on_signals()?;
     let (json, out) = (arguments.json, arguments.out.display().to_string());
     let wanted = arguments.chosen.experiments.len();
@@ -87,16 +83,17 @@ fn every_experiment(
         experiments: Vec::new(),
         files: BTreeMap::new(),
     };
+    let explained = |error| explain(error, &arguments.out);
     for experiment in &arguments.chosen.experiments {
         let section = experiment.reproduce(&runner, &arguments.request(experiment));
         bar.clear();
-        manifest.experiments.push(section.map_err(explain)?);
+        manifest.experiments.push(section.map_err(explained)?);
         manifest.files = runner.folder().kept();
         manifest.files.remove(MANIFEST);
         let failed = |error| Failure::failed(format!("cannot write {MANIFEST}: {error}"));
         let text = serde_json::to_string_pretty(&manifest).map_err(failed)?;
         let kept = runner.keep(MANIFEST, format!("{text}\n").as_bytes());
-        kept.map_err(explain)?;
+        kept.map_err(explained)?;
         if done.send(manifest.clone()).is_err() {
             break;
         }
@@ -104,14 +101,12 @@ fn every_experiment(
     Ok(())
 }
 
-fn explain(error: ExperimentError) -> Failure {
+fn explain(error: ExperimentError, out: &Path) -> Failure {
     match error {
         ExperimentError::Physics(_) => {
             Failure::usage(error).remedy("change --mass, --side, --mu or --damping")
         }
-        ExperimentError::Keep { .. } => {
-            Failure::failed(error).remedy("check the folder given with --out: is the disk full?")
-        }
+        ExperimentError::Keep { .. } => unwritten(out, error),
         _ => Failure::failed(format!("the experiment failed: {error}")),
     }
 }

@@ -16,7 +16,7 @@ use crate::args::SweepArguments;
 use crate::config::{ConfigFile, Flags};
 use crate::failure::Failure;
 use crate::input::read_text;
-use crate::output::{print, print_json};
+use crate::output::{make_folder, print, print_json, unwritten};
 use crate::progress::Bar;
 use crate::stop::Stop;
 
@@ -42,6 +42,7 @@ pub(crate) fn run(arguments: &SweepArguments) -> Result<(), Failure> {
         let what = format!("there is no folder {}", arguments.out.display());
         return Err(Failure::usage(what).remedy("give the folder of the shards with --out"));
     }
+    make_folder(&arguments.out)?;
     let explained = |error| explain(error, arguments);
     let dir = SweepDir::open(&arguments.out).map_err(explained)?;
     let before = dir.results(&plan).map_err(explained)?;
@@ -122,10 +123,10 @@ fn explain(error: SweepError, arguments: &SweepArguments) -> Failure {
         SweepError::Part(_) => Failure::usage(error).remedy(
             "give another folder with --out, or remove that file if its rows are not wanted",
         ),
-        SweepError::File { .. } => Failure::failed(error).remedy(format!(
-            "check the folder {}: is the disk full, may you write there? What is done is kept",
-            arguments.out.display()
-        )),
+        SweepError::File { path, why } => {
+            let what = format!("cannot read or write {}: {why}", path.display());
+            unwritten(&arguments.out, what)
+        }
         SweepError::Trial { .. } | SweepError::Interrupted => Failure::failed(error),
     }
 }

@@ -83,6 +83,35 @@ fn a_wrong_trace_or_record_is_refused_with_its_line() {
 }
 
 #[test]
+fn the_same_mistake_has_the_same_code_and_sentence_in_every_command() {
+    let home = tempfile::tempdir().unwrap();
+    std::fs::write(
+        home.path().join("plan.toml"),
+        "duration_s = 5\nseeds = { first = 1, count = 1 }\n",
+    )
+    .unwrap();
+    std::fs::write(home.path().join("file"), "no folder").unwrap();
+    let commands = [
+        &["reproduce", "fig5"][..],
+        &["sweep", "plan.toml"],
+        &["man"],
+    ];
+    let folder = [
+        "cannot make the folder file/under: Not a directory",
+        "give another one with --out",
+    ];
+    for command in commands {
+        let arguments = [command, &["--out", "file/under"]].concat();
+        complains(&super::mmt(&home, &arguments).output().unwrap(), 2, &folder);
+    }
+    for command in &commands[..2] {
+        let arguments = [command, &["--jobs", "0"][..]].concat();
+        let parts = ["invalid value '0' for '--jobs <N>': number would be zero"];
+        complains(&super::mmt(&home, &arguments).output().unwrap(), 2, &parts);
+    }
+}
+
+#[test]
 fn a_wrong_pairing_string_is_refused_without_showing_its_secret() {
     let whole = pairing();
     let cut = &whole[..whole.len() - 1];
