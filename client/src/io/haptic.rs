@@ -169,7 +169,7 @@ impl HapticLoop {
         self.ticks = self.ticks.saturating_add(1);
         self.skipped = self.skipped.saturating_add(tick.skipped);
         self.receive(side);
-        self.handle_events();
+        self.handle_events(stamp);
         let releases = self.consider_end(side.is_stopped());
         let view = self.end.update_model();
         let stops = self.emergency.is_set();
@@ -226,18 +226,21 @@ impl HapticLoop {
     }
 
     /// Where a device is plugged in it is the one hand.
-    fn handle_events(&mut self) {
+    fn handle_events(&mut self, now: Time) {
+        let has_device = self.device.is_some();
         let others = self.events.iter_mut();
         let others = others.flat_map(|events| std::iter::from_fn(|| events.pop().ok()));
-        for event in others.take(EVENTS_PER_TICK) {
-            if self.device.is_none() || !event.is_of_the_hand() {
-                self.operator.handle(self.elapsed, event);
-            }
-        }
+        let others = others.take(EVENTS_PER_TICK);
+        let others = others.filter(|event| !has_device || !event.is_of_the_hand());
         let device = self.device.iter_mut();
         let device = device.flat_map(|device| std::iter::from_fn(|| device.next()));
-        for event in device.take(EVENTS_PER_TICK) {
+        for event in others.chain(device.take(EVENTS_PER_TICK)) {
             self.operator.handle(self.elapsed, event);
+            if let Some(record) = &mut self.record
+                && let Some(reading) = record::reading(now, &event)
+            {
+                record.read(reading);
+            }
         }
     }
 

@@ -2,11 +2,12 @@
 
 use mmt_shared::io::clock::Clock;
 use mmt_shared::io::record::{
-    RecordSink, RecordWriter, Recorder, Shown, TickAbout, Ticked, Topics, Wall,
+    HandReading, RecordSink, RecordWriter, Recorder, Shown, TickAbout, Ticked, Topics, Wall,
 };
-use mmt_shared::model::geometry::{Pose, Twist};
+use mmt_shared::model::geometry::{Pose, Twist, Vec2};
 use mmt_shared::record::messages::{MasterTick as TickMessage, Stamp};
 use mmt_shared::record::ros::Standard;
+use mmt_shared::time::Time;
 use mmt_shared::wire::Side;
 use serde::Serialize;
 
@@ -14,6 +15,7 @@ use super::MasterLive;
 use crate::again::MasterSetting;
 use crate::end::MasterGiven;
 use crate::master::MasterTick;
+use crate::operator::pointer::HandEvent;
 
 /// Where a haptic loop leaves its record.
 pub type MasterSink = RecordSink<MasterGiven, MasterTick>;
@@ -43,6 +45,21 @@ pub(super) fn shown(live: &MasterLive, twist: Twist) -> Shown {
         up: live.up,
         down: live.down,
     }
+}
+
+/// What a record has of what a person does: each reading, and when the hand lets go; none of what steers the run.
+pub(super) fn reading(at: Time, event: &HandEvent) -> Option<HandReading> {
+    let (own_s, point, held) = match event {
+        HandEvent::Press(sample) | HandEvent::Move(sample) => (sample.page_s, sample.at, true),
+        HandEvent::Release => (f64::NAN, Vec2::repeat(f64::NAN), false),
+        _ => return None,
+    };
+    Some(HandReading {
+        at,
+        own_s,
+        point,
+        held,
+    })
 }
 
 /// The master's topics.

@@ -28,7 +28,7 @@ use crate::wire::Side;
 pub use file::RecordWriter;
 pub use read::{Ended, RecordError, is_record, read};
 pub use shown::Shown;
-pub use sink::{RecordSink, Ticked};
+pub use sink::{HandReading, RecordSink, Ticked};
 pub use source::{TickAbout, Topics};
 
 use sink::ROOM;

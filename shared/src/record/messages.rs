@@ -14,6 +14,9 @@ use crate::wire::{STREAM_MESSAGE_MAX, StreamMessage};
 
 pub use super::field::Stamp;
 
+#[cfg(test)]
+mod tests;
+
 /// What stands between the definition of a message and those that it uses.
 const SEPARATOR: &str =
     "================================================================================\n";
@@ -151,6 +154,21 @@ messages! {
         link: String,
         /// Digest of all that the session gave before this tick's datagrams.
         digest: u64,
+    }
+    /// A reading of a person's hand as it came, before anything is made of it.
+    Reading {
+        /// When the master took it.
+        stamp: Stamp,
+        /// Number of the session in the record.
+        session: u32,
+        /// When it was taken, by the clock of the page or the device, s; NaN when the hand lets go.
+        own_s: f64,
+        /// Where the pointer or the device was, m, world; NaN when the hand lets go.
+        x_m: f64,
+        /// The same.
+        y_m: f64,
+        /// Whether the hand holds.
+        held: bool,
     }
     /// A tick of the slave: what it was given and what it gave.
     SlaveTick {
@@ -306,43 +324,5 @@ impl Session {
             setting: json(serde_json::to_string(setting)),
             configuration: json(serde_json::to_string(configuration)),
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn link() -> Link {
-        Link {
-            stamp: Stamp(1_700_000_000_000_000_007),
-            session: 1,
-            rtt_ms: f64::from_bits(0x3fb9_9999_9999_999a),
-            up_expected: 2,
-            up_received: 1,
-            down_expected: 4,
-            down_received: 3,
-        }
-    }
-
-    #[test]
-    fn a_message_reads_back_to_the_same_bits_and_a_shorter_one_is_refused() {
-        let mut out = CdrWriter::default();
-        link().write(out.begin());
-        assert_eq!(Link::read(out.message()), Ok(link()));
-        let short = out.message().len() - 1;
-        let short = out.message().get(..short).unwrap();
-        assert!(matches!(Link::read(short), Err(CdrError::Short { .. })));
-    }
-
-    #[test]
-    fn a_schema_has_a_line_a_field_and_the_time_that_it_uses() {
-        let text = schema::<Link>();
-        assert!(
-            text.starts_with("builtin_interfaces/Time stamp\nuint32 session\nfloat64 rtt_ms\n")
-        );
-        assert!(text.ends_with(TIME), "{text}");
-        assert_eq!(Link::NAME, "mmt_msgs/msg/Link");
-        assert_eq!(link().cells().len(), Link::FIELDS.len());
     }
 }

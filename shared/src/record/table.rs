@@ -2,7 +2,7 @@
 
 use super::cdr::CdrError;
 use super::messages::{
-    Arrival, Link, Loop, MasterTick, Message, Packet, Parameters, Session, SlaveTick,
+    Arrival, Link, Loop, MasterTick, Message, Packet, Parameters, Reading, Session, SlaveTick,
 };
 
 /// A row of a table of comma-separated values.
@@ -19,6 +19,7 @@ pub fn row(topic: &str, message: &[u8]) -> Option<Result<Row, CdrError>> {
     let (side, what) = topic.strip_prefix('/')?.split_once('/')?;
     Some(match (side, what) {
         ("master", "ticks") => of::<MasterTick>(message),
+        ("master", "readings") => of::<Reading>(message),
         ("slave", "ticks") => of::<SlaveTick>(message),
         ("master" | "slave", "session") => of::<Session>(message),
         ("master" | "slave", "arrivals") => of::<Arrival>(message),

@@ -5,20 +5,25 @@ use std::ops::ControlFlow;
 use mmt_shared::channel::datagram_channel::DatagramChannel;
 use mmt_shared::io::emergency::EmergencyStop;
 use mmt_shared::io::loop_thread::{self, ARRIVALS_PER_TICK, LoopHandle, LoopSide};
+use mmt_shared::io::record::{RecordError, Recorder, read};
 use mmt_shared::io::schedule::Tick;
 use mmt_shared::io::truth::{self, TruthReceiver};
 use mmt_shared::metrics::PoseError;
 use mmt_shared::model::geometry::Pose;
 use mmt_shared::model::update::Update;
+use mmt_shared::record::messages::{Message as _, Reading};
 use mmt_shared::time::Time;
 use mmt_shared::wire::{DATAGRAM_MAX, Side};
 
 use super::fake::{state, welcome_for};
 use super::*;
+use crate::again::MasterSetting;
 use crate::end::MasterEnd;
 use crate::io::haptic::HapticLoop;
+use crate::io::record;
 use crate::limiter::{ForceLimiter, RAMP_TICKS};
 use crate::master::Master;
+use crate::operator::pointer::{HandEvent, PointerSample};
 
 const COUPLING: Coupling = Coupling {
     stiffness_n_per_m: 1000.0,
@@ -291,4 +296,59 @@ async fn a_model_that_breaks_releases_the_hand_fails_the_session_and_is_counted(
             .pose
             .is_finite()
     );
+}
+
+#[tokio::test]
+async fn each_reading_of_a_hand_is_recorded_as_it_came() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("hand.mcap");
+    let recorder = Recorder::create(&path).unwrap();
+    let setting = MasterSetting {
+        began: Time::ZERO,
+        welcome: welcome_for(COUPLING),
+        architecture: Architecture::Mmt,
+        limits: DeviceProfile::default().limits(),
+        commands: CommandConfig::default(),
+    };
+    let record = record::begin(&recorder, Clock::start(), &setting, &());
+    let (mut hand, events) = rtrb::RingBuffer::new(8);
+    let mut ticked = pressing(None);
+    ticked.haptic = ticked.haptic.recorded(record);
+    ticked.haptic = ticked.haptic.operated_through(Some(events));
+    let sample = |page_s, x| PointerSample {
+        page_s,
+        at: Vec2::new(x, -0.25),
+    };
+    let pressed = sample(812.25, 0.125);
+    // two within one tick, as a mouse of more than 1 kHz sends them
+    let moved = [sample(812.2505, 0.1255), sample(812.251, 0.126)];
+    let all = [
+        HandEvent::Clock(812.0),
+        HandEvent::Press(pressed),
+        HandEvent::Move(moved[0]),
+        HandEvent::Move(moved[1]),
+    ];
+    all.into_iter().for_each(|event| hand.push(event).unwrap());
+    assert!(ticked.tick(0).is_continue());
+    hand.push(HandEvent::Release).unwrap();
+    assert!(ticked.tick(1).is_continue());
+    assert_eq!(recorder.finish().error, None);
+    let mut found = Vec::new();
+    let keep = |topic: &str, message: &[u8]| -> Result<(), RecordError> {
+        if topic == "/master/readings" {
+            found.push(Reading::read(message).unwrap());
+        }
+        Ok(())
+    };
+    read(&path, keep).unwrap();
+    let came = found.iter().map(|of| (of.own_s, of.x_m, of.y_m, of.held));
+    let held = |of: PointerSample| (of.page_s, of.at.x, of.at.y, true);
+    let wanted = [held(pressed), held(moved[0]), held(moved[1])];
+    assert_eq!(came.take(3).collect::<Vec<_>>(), wanted);
+    let [press, _, last, release] = &found[..] else {
+        panic!("{found:?}");
+    };
+    assert!(!release.held && release.x_m.is_nan() && release.own_s.is_nan());
+    assert_eq!(press.stamp, last.stamp);
+    assert_eq!(release.stamp.0 - press.stamp.0, 1_000_000);
 }

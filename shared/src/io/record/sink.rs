@@ -8,6 +8,7 @@ use rtrb::{Consumer, Producer, RingBuffer};
 use super::shown::Shown;
 use crate::io::loop_thread::Frame;
 use crate::io::schedule::Tick;
+use crate::model::geometry::Vec2;
 use crate::time::Time;
 
 /// Entries that may wait for the thread: at 2000 a second, four seconds in which a disk stands.
@@ -26,6 +27,19 @@ pub struct Ticked<G, D> {
     pub done: D,
 }
 
+/// A reading of a person's hand as it came, before anything is made of it.
+#[derive(Clone, Copy, Debug)]
+pub struct HandReading {
+    /// When the loop took it.
+    pub at: Time,
+    /// When it was taken, by the clock of the page or the device, s; NaN when the hand lets go.
+    pub own_s: f64,
+    /// Where the pointer or the device was, m, world; NaN when the hand lets go.
+    pub point: Vec2,
+    /// Whether the hand holds.
+    pub held: bool,
+}
+
 /// What a loop left.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Entry<G, D> {
@@ -33,6 +47,7 @@ pub(super) enum Entry<G, D> {
     Ticked { index: u64, tick: Ticked<G, D> },
     Sent(Frame),
     Shown { at: Time, shown: Shown },
+    Read(HandReading),
 }
 
 /// The loop's side of a record. It never waits or allocates; what finds no room is counted.
@@ -78,6 +93,11 @@ impl<G, D> RecordSink<G, D> {
     /// Keeps what is shown of the session at `at`.
     pub fn shown(&mut self, at: Time, shown: Shown) {
         self.keep(Entry::Shown { at, shown });
+    }
+
+    /// Keeps a reading of the hand.
+    pub fn read(&mut self, reading: HandReading) {
+        self.keep(Entry::Read(reading));
     }
 
     fn count(&mut self) -> u64 {

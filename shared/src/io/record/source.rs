@@ -10,7 +10,7 @@ use super::sink::{Entry, Ticked};
 use super::{ROOM, Wall};
 use crate::io::loop_thread::Frame;
 use crate::record::digest::RunDigest;
-use crate::record::messages::{Arrival, Loop, Session, Stamp};
+use crate::record::messages::{Arrival, Loop, Reading, Session, Stamp};
 use crate::record::packet::PacketWatch;
 use crate::wire::Side;
 
@@ -108,6 +108,19 @@ impl<T: Topics> Source<T> {
             Entry::Shown { at, shown } => {
                 let stamp = self.wall.stamp(*at);
                 self.names.put(stamp, self.session.session, shown, out);
+            }
+            Entry::Read(reading) => {
+                let stamp = self.wall.stamp(reading.at);
+                let message = Reading {
+                    stamp,
+                    session: self.session.session,
+                    own_s: reading.own_s,
+                    x_m: reading.point.x,
+                    y_m: reading.point.y,
+                    held: reading.held,
+                };
+                // only the master has a hand
+                out.put("/master/readings", stamp, &message);
             }
         }
     }
