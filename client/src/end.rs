@@ -152,7 +152,7 @@ impl MasterEnd {
         MasterHalf {
             session,
             updates: ReceivedUpdates {
-                applied: Some(master.applied().into()),
+                applied: Some(master.applied().iter().sum()),
                 dropped: Some(named(drops.by_name())),
                 age_ms: (&counts.age).into(),
             },

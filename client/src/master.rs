@@ -11,7 +11,7 @@ use mmt_shared::model::geometry::{Pose, Vec2};
 use mmt_shared::model::local_model::{LocalModel, Rendered};
 use mmt_shared::model::sample::{ForceCounts, HipCounts, HipSample};
 use mmt_shared::model::tool::{HandPort, Tool};
-use mmt_shared::model::update::Update;
+use mmt_shared::model::update::{Cause, Update};
 use mmt_shared::time::{TICK_S, Time};
 use mmt_shared::wire::{Architecture, Welcome};
 
@@ -61,7 +61,7 @@ pub struct Master {
     /// By how much the HIP is elsewhere than the device, m ([`LocalModel::carry`]).
     offset: Vec2,
     bad_readings: u64,
-    applied: u32,
+    applied: [u64; Cause::ALL.len()],
     frozen: u32,
 }
 
@@ -89,7 +89,7 @@ impl Master {
             reading: Vec2::zeros(),
             offset: Vec2::zeros(),
             bad_readings: 0,
-            applied: 0,
+            applied: [0; Cause::ALL.len()],
             frozen: 0,
         }
     }
@@ -114,8 +114,8 @@ impl Master {
         self.bad_readings
     }
 
-    /// Updates that reached the model.
-    pub fn applied(&self) -> u32 {
+    /// Updates that reached the model, by cause.
+    pub fn applied(&self) -> [u64; Cause::ALL.len()] {
         self.applied
     }
 
@@ -184,7 +184,9 @@ impl Master {
         let alive = self.link < LinkState::Released;
         if alive {
             self.model.apply(update);
-            self.applied = self.applied.saturating_add(1);
+            if let Some(count) = self.applied.get_mut(update.cause.number()) {
+                *count += 1;
+            }
         } else {
             self.frozen = self.frozen.saturating_add(1);
         }

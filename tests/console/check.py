@@ -146,6 +146,27 @@ def check_hand(tab):
     holds("and yields packets", sum(tab.frame["slave"]["updates"]) > sent)
 
 
+def check_layout(tab):
+    before = tab.page.viewport_size
+    for width in [360, 1010, 1280, 3840]:
+        tab.page.set_viewport_size({"width": width, "height": 800})
+        tab.page.wait_for_timeout(200)
+        wide = "[document.documentElement, document.querySelector('.facts')].map((of) => of.scrollWidth - of.clientWidth)"
+        over = tab.page.evaluate(wide)
+        holds(f"nothing is cut off at {width} px", max(over) <= 0, over)
+    tab.page.set_viewport_size(before)
+    # the mouse stays on the page: the middle of the scene to its lower right
+    tab.drag([0.34, -0.28], 2.0)
+    lens = tab.page.locator(".lens.up")
+    for _ in range(3):
+        if lens.count():
+            break
+        tab.page.mouse.up()
+        tab.drag([0.34, -0.28], 2.0)
+    holds("the lens gives way to the hand", lens.count() == 1, tab.master["hip"])
+    tab.page.mouse.up()
+
+
 def check_observer(context, address, tab):
     other = Tab(context, address)
     other.until("a picture for the second tab", lambda: other.frame)
@@ -229,6 +250,7 @@ def main():
                 tab = Tab(context, address.geturl())
                 check_admission(address)
                 check_hand(tab)
+                check_layout(tab)
                 check_observer(context, address.geturl(), tab)
                 check_controls(tab)
                 check_stop(tab)

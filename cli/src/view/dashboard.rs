@@ -1,4 +1,5 @@
-//! The dashboard: charts of the forces and the scene above, panels of numbers below, messages at the bottom.
+//! The dashboard: the scene in the left half of the screen; in the right one charts of the forces, as far as there is room,
+//! and the numbers; messages at the bottom.
 
 use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect};
@@ -6,18 +7,19 @@ use ratatui::style::{Color, Modifier, Style};
 use ratatui::text::{Line, Span};
 use ratatui::widgets::{Block, Paragraph, Sparkline};
 
-use super::panels::{link_panel, loop_panel, model_panel, update_panel};
+use super::panels;
 use super::scene::render_scene;
 use super::screen::MESSAGES_MAX;
 use super::{Caption, History, Snapshot};
 
-/// Height of a panel of numbers, lines.
-const PANEL_HEIGHT: u16 = 10;
-/// Widths of the panels; the last one takes what is left.
-const UPDATES_WIDTH: u16 = 25;
-const MODEL_WIDTH: u16 = 32;
-/// Width of the scene beside the charts.
-const SCENE_WIDTH: u16 = 30;
+/// A terminal of fewer lines has one line of head.
+const LOW: u16 = 20;
+/// A terminal of fewer columns has no place for who touches: the forces show it.
+const NARROW: u16 = 75;
+/// Lines of the terminal for one of a message.
+const LINES_PER_MESSAGE: u16 = 10;
+/// The least height of a chart, lines: its title and the bars.
+const CHART_HEIGHT: u16 = 2;
 /// The least full scale of a force chart, N: noise shall not fill it.
 const SCALE_MIN_N: f64 = 1.0;
 
@@ -26,13 +28,9 @@ type Reading = fn(&Snapshot) -> Option<f64>;
 
 /// The charts: name, what is drawn, colour.
 const CHARTS: [(&str, Reading, Color); 3] = [
-    ("|f_s|  measured at the slave", Snapshot::f_s, Color::Green),
-    ("|f_m|  rendered by the master", Snapshot::f_m, Color::Cyan),
-    (
-        "|error|  f_s - f_m of one sample",
-        Snapshot::error,
-        Color::Red,
-    ),
+    ("|f_s| slave", Snapshot::f_s, Color::Green),
+    ("|f_m| master", Snapshot::f_m, Color::Cyan),
+    ("|error|", Snapshot::error, Color::Red),
 ];
 
 /// Draws everything.
@@ -42,28 +40,22 @@ pub(crate) fn render(
     history: &History,
     messages: &[String],
 ) {
-    let below = if messages.is_empty() {
-        0
-    } else {
-        MESSAGES_MAX as u16
-    };
-    let rows = Layout::vertical([
-        Constraint::Length(2),
-        Constraint::Min(6),
-        Constraint::Length(PANEL_HEIGHT),
-        Constraint::Length(below),
-    ]);
-    let [head, charts, panels, bottom] = rows.areas(frame.area());
+    let area = frame.area();
+    let head = if area.height < LOW { 1 } else { 2 };
+    let shown = (messages.len().min(MESSAGES_MAX) as u16).min(area.height / LINES_PER_MESSAGE);
+    let rows = [
+        Constraint::Length(head),
+        Constraint::Min(0),
+        Constraint::Length(shown),
+    ];
+    let [head, middle, bottom] = Layout::vertical(rows).areas(area);
+    let halves = [Constraint::Fill(1), Constraint::Fill(1)];
+    let [left, right] = Layout::horizontal(halves).areas(middle);
     render_head(frame, head, caption, &history.newest());
-    let [charts, scene] =
-        Layout::horizontal([Constraint::Min(0), Constraint::Length(SCENE_WIDTH)]).areas(charts);
-    render_charts(frame, charts, history);
-    render_scene(frame, scene, history.newest().master.as_ref());
-    render_panels(frame, panels, caption, history);
-    let lines: Vec<Line<'_>> = messages
-        .iter()
-        .map(|text| Line::from(text.as_str()))
-        .collect();
+    render_scene(frame, left, history.newest().master.as_ref());
+    render_numbers(frame, right, caption, history);
+    let newest = messages.iter().rev().take(usize::from(shown)).rev();
+    let lines: Vec<Line<'_>> = newest.map(|text| Line::from(text.as_str())).collect();
     frame.render_widget(Paragraph::new(lines), bottom);
 }
 
@@ -77,18 +69,47 @@ fn render_head(frame: &mut Frame<'_>, area: Rect, caption: &Caption, now: &Snaps
         Some(false) => format!("   {side} free"),
         None => String::new(),
     };
+    let wide = area.width >= NARROW;
+    let master = now.master.filter(|_| wide).map(|master| master.in_contact);
+    let slave = now.slave.filter(|_| wide).map(|slave| slave.in_contact);
     let first = Line::from(vec![
         Span::styled(format!("mmt {}", caption.command), bold),
         Span::raw(format!("   {:.1}{of} s", now.elapsed_s())),
-        Span::raw(contact(
-            "master",
-            now.master.map(|master| master.in_contact),
-        )),
-        Span::raw(contact("slave", now.slave.map(|slave| slave.in_contact))),
+        Span::raw(contact("master", master)),
+        Span::raw(contact("slave", slave)),
         Span::styled("   q ends, space stops", Style::new().fg(Color::DarkGray)),
     ]);
     let second = Line::from(caption.setting.as_str()).style(Style::new().fg(Color::DarkGray));
     frame.render_widget(Paragraph::new(vec![first, second]), area);
+}
+
+/// The numbers, and above them the charts where there is room; else the forces in a line.
+fn render_numbers(frame: &mut Frame<'_>, area: Rect, caption: &Caption, history: &History) {
+    let now = history.newest();
+    let about = |updates: Vec<String>| {
+        let lines = [panels::link(caption, &now), panels::model(caption, &now)];
+        let lines = lines.into_iter().flatten().chain(updates);
+        lines.chain([panels::haptic_loop(&now)]).collect()
+    };
+    let words = || panels::updates_in_words(history, usize::from(area.width));
+    let room = area
+        .height
+        .saturating_sub(CHARTS.len() as u16 * CHART_HEIGHT);
+    let mut lines: Vec<String> = about(panels::updates(history));
+    if lines.len() > usize::from(room) {
+        lines = about(words());
+    }
+    let has_charts = lines.len() <= usize::from(room);
+    if !has_charts {
+        lines.insert(0, panels::forces(&now));
+    }
+    let parts = [Constraint::Fill(1), Constraint::Length(lines.len() as u16)];
+    let [charts, numbers] = Layout::vertical(parts).areas(area);
+    if has_charts {
+        render_charts(frame, charts, history);
+    }
+    let lines: Vec<Line<'_>> = lines.into_iter().map(Line::from).collect();
+    frame.render_widget(Paragraph::new(lines), numbers);
 }
 
 fn render_charts(frame: &mut Frame<'_>, area: Rect, history: &History) {
@@ -101,7 +122,7 @@ fn render_charts(frame: &mut Frame<'_>, area: Rect, history: &History) {
     for ((name, of, colour), area) in CHARTS.into_iter().zip(areas.iter()) {
         let now = history.newest();
         let value = of(&now).map_or_else(|| "-".to_owned(), |n| format!("{n:.2} N"));
-        let title = format!("{name}: {value}   (full scale {scale_n:.1} N)");
+        let title = format!("{name} {value}  (of {scale_n:.1} N)");
         let data = history.last(wide, of).into_iter().map(centinewtons);
         let chart = Sparkline::default()
             .block(Block::new().title(title))
@@ -115,22 +136,4 @@ fn render_charts(frame: &mut Frame<'_>, area: Rect, history: &History) {
 /// The chart wants whole numbers; the cast saturates.
 fn centinewtons(force_n: Option<f64>) -> Option<u64> {
     force_n.map(|force| (force * 100.0) as u64)
-}
-
-fn render_panels(frame: &mut Frame<'_>, area: Rect, caption: &Caption, history: &History) {
-    let [updates, model, right] = Layout::horizontal([
-        Constraint::Length(UPDATES_WIDTH),
-        Constraint::Length(MODEL_WIDTH),
-        Constraint::Min(0),
-    ])
-    .areas(area);
-    let [link, loops] = Layout::vertical([Constraint::Length(6), Constraint::Fill(1)]).areas(right);
-    for (panel, area) in [
-        (update_panel(history), updates),
-        (model_panel(caption, &history.newest()), model),
-        (link_panel(caption, &history.newest()), link),
-        (loop_panel(&history.newest()), loops),
-    ] {
-        frame.render_widget(panel, area);
-    }
 }

@@ -51,7 +51,7 @@ impl History {
             .iter()
             .find(|then| newest.elapsed_s() - then.elapsed_s() <= RATE_WINDOW_S)?;
         let seconds = newest.elapsed_s() - from.elapsed_s();
-        let (now, then) = (newest.slave?.updates, from.slave?.updates);
+        let (now, then) = (newest.updates()?, from.updates()?);
         let mut rates = [0.0; Cause::ALL.len()];
         for (rate, (now, then)) in rates.iter_mut().zip(now.into_iter().zip(then)) {
             *rate = now.saturating_sub(then) as f64 / seconds;

@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use mmt_client::failsafe::LinkState;
 
-use super::{Caption, History, Snapshot};
+use super::{Caption, History};
 
 /// What is known now; a number that is not known is left out.
 pub(crate) fn line(caption: &Caption, history: &History) -> String {
@@ -22,7 +22,8 @@ pub(crate) fn line(caption: &Caption, history: &History) -> String {
     add("f_s", now.f_s(), 2, " N");
     add("f_m", now.f_m(), 2, " N");
     add("error", now.error(), 2, " N");
-    add("updates", sent(&now), 0, "");
+    let updates = now.updates().map(|by_cause| by_cause.iter().sum::<u64>());
+    add("updates", updates.map(|n| n as f64), 0, "");
     add(
         "rate",
         history.rates_hz().map(|rates| rates.iter().sum()),
@@ -36,12 +37,9 @@ pub(crate) fn line(caption: &Caption, history: &History) -> String {
         let unsent = missing.unsent.filter(|n| *n > 0).map(|n| n as f64);
         add(&format!("unsent {way}"), unsent, 0, "");
     }
-    add(
-        "mass",
-        now.slave.map(|slave| mass(slave.estimate)),
-        3,
-        " kg",
-    );
+    let in_use = now.master.map(|master| master.params);
+    let model = now.slave.map(|slave| slave.estimate).or(in_use);
+    add("mass", model.map(|[mass, _, _]| mass), 3, " kg");
     add(
         "pushes",
         now.master
@@ -58,15 +56,4 @@ pub(crate) fn line(caption: &Caption, history: &History) -> String {
         let _ = write!(text, "  link {}", state.name());
     }
     text
-}
-
-fn mass([mass, _, _]: [f64; 3]) -> f64 {
-    mass
-}
-
-/// Updates sent, or applied where only the master is known.
-fn sent(now: &Snapshot) -> Option<f64> {
-    let sent = now.slave.map(|slave| slave.updates.iter().sum());
-    let applied = now.master.map(|master| master.updates_applied);
-    sent.or(applied).map(|count: u64| count as f64)
 }

@@ -11,6 +11,7 @@ mod screen;
 use mmt_client::io::MasterLive;
 use mmt_server::io::SlaveLive;
 use mmt_shared::channel::peer::Loss;
+use mmt_shared::model::update::Cause;
 
 pub(crate) use dashboard::render;
 pub(crate) use history::History;
@@ -70,9 +71,12 @@ impl Snapshot {
         master.or(slave).unwrap_or(0.0)
     }
 
-    /// |f_s|, N.
+    /// |f_s|, N; where only the master is here that of the newest scene, which is as old as the scene.
     fn f_s(&self) -> Option<f64> {
-        self.slave.map(|slave| slave.f_s.norm())
+        let shown = self.master.and_then(|master| master.scene);
+        let here = self.slave.map(|slave| slave.f_s);
+        here.or(shown.map(|scene| scene.force))
+            .map(|f_s| f_s.norm())
     }
 
     /// |f_m|, N: as the master renders it, or else as the slave's shadow computes it.
@@ -84,6 +88,12 @@ impl Snapshot {
     /// |f_s − f_m|, N, both of the same HIP sample: what the slave's trigger sees.
     fn error(&self) -> Option<f64> {
         self.slave.map(|slave| (slave.f_s - slave.f_shadow).norm())
+    }
+
+    /// Updates sent, by cause; applied, where only the master is here.
+    fn updates(&self) -> Option<[u64; Cause::ALL.len()]> {
+        let applied = self.master.map(|master| master.updates_applied);
+        self.slave.map(|slave| slave.updates).or(applied)
     }
 
     /// Median round trip, ms.

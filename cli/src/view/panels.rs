@@ -1,15 +1,8 @@
-//! The dashboard's panels of numbers. What is not known is a dash.
+//! The dashboard's numbers, each section in lines of at most 30 columns. What is not known is a dash.
 
 use mmt_shared::model::update::Cause;
-use ratatui::text::Line;
-use ratatui::widgets::{Block, Paragraph, Wrap};
 
 use super::{Caption, History, Missing, Snapshot};
-
-fn panel(title: impl Into<String>, lines: Vec<String>) -> Paragraph<'static> {
-    let lines: Vec<Line<'_>> = lines.into_iter().map(Line::from).collect();
-    Paragraph::new(lines).block(Block::bordered().title(title.into()))
-}
 
 /// A number with a unit, or a dash.
 fn shown(value: Option<f64>, decimals: usize, unit: &str) -> String {
@@ -19,82 +12,119 @@ fn shown(value: Option<f64>, decimals: usize, unit: &str) -> String {
     )
 }
 
-/// Updates by cause: so far and per second.
-pub(super) fn update_panel(history: &History) -> Paragraph<'static> {
-    let now = history.newest();
-    let rates = history.rates_hz();
-    let counts = now.slave.map(|slave| slave.updates);
-    let row = |(index, cause): (usize, Cause)| {
-        let rate = rates.and_then(|rates| rates.get(index).copied());
-        let count = counts.and_then(|counts| counts.get(index).copied());
-        let count = count.map_or_else(|| "-".to_owned(), |count| count.to_string());
-        let name = cause.name();
-        let name = name.strip_suffix("_contact").unwrap_or(name);
-        let name = name.replace('_', " ");
-        format!("{name:12}{count:>5}{:>6}", shown(rate, 1, ""))
+/// State of the link, round trip; what does not arrive and what was not sent, each way.
+pub(super) fn link(caption: &Caption, now: &Snapshot) -> Vec<String> {
+    if let Some(tried_s) = now.connecting_s {
+        let slave = format!("{}, {tried_s:.0} s", caption.slave);
+        return vec!["link: connecting to".to_owned(), slave];
+    }
+    let state = now.master.map_or("-", |master| master.link.name());
+    let state = now.stopped().unwrap_or_else(|| format!("link: {state}"));
+    let way = |(name, way): (&str, &Missing)| {
+        let share = shown(way.share.map(|share| share * 100.0), 1, " %");
+        let unsent = shown(way.unsent.map(|n| n as f64), 0, "");
+        format!("{name:5}{} {share}, unsent {unsent}", way.name())
     };
-    let mut lines: Vec<String> = Cause::ALL.into_iter().enumerate().map(row).collect();
-    let applied = now.master.map(|master| master.updates_applied as f64);
-    lines.push(format!("{:12}{:>5}", "applied", shown(applied, 0, "")));
-    panel("updates ─── sent per s", lines)
+    let missing = now.missing();
+    let ways = ["up", "down"].into_iter().zip(&missing).map(way);
+    let state = format!("{state}  rtt {}", shown(now.rtt_ms(), 1, " ms"));
+    std::iter::once(state).chain(ways).collect()
 }
 
-/// m, b, c: estimated, true, in use; pushes.
-pub(super) fn model_panel(caption: &Caption, now: &Snapshot) -> Paragraph<'static> {
+/// m, b, c: estimated, true, in use; the force on the hand, pushes.
+pub(super) fn model(caption: &Caption, now: &Snapshot) -> Vec<String> {
     let estimate = now.slave.map(|slave| slave.estimate);
     let in_use = now.master.map(|master| master.params);
     let mut lines = vec![format!(
-        "{:8}{:>8}{:>7}{:>7}",
-        "", "estimate", "truth", "master"
+        "{:7}{:>9}{:>7}{:>7}",
+        "model", "estimate", "truth", "master"
     )];
     for (index, label) in ["m kg", "b N s/m", "c N"].into_iter().enumerate() {
         let of = |values: Option<[f64; 3]>| {
             shown(values.and_then(|values| values.get(index).copied()), 3, "")
         };
         let (estimate, truth, in_use) = (of(estimate), of(caption.truth), of(in_use));
-        lines.push(format!("{label:8}{estimate:>8}{truth:>7}{in_use:>7}"));
+        lines.push(format!("{label:7}{estimate:>9}{truth:>7}{in_use:>7}"));
     }
-    let hand = now.master.map(|master| master.hand_force.norm());
+    let hand = shown(now.master.map(|master| master.hand_force.norm()), 2, " N");
     let pushes = now.master.and_then(|master| master.pushes);
-    lines.push(format!("force on the hand {:>8}", shown(hand, 2, " N")));
-    lines.push(format!(
-        "pushes            {:>8}",
-        shown(pushes.map(|n| n as f64), 0, "")
-    ));
-    panel("model", lines)
+    let pushes = shown(pushes.map(|n| n as f64), 0, "");
+    lines.push(format!("hand {hand}   pushes {pushes}"));
+    lines
 }
 
-/// Round trip, loss, what was not sent, state.
-pub(super) fn link_panel(caption: &Caption, now: &Snapshot) -> Paragraph<'static> {
-    if let Some(tried_s) = now.connecting_s {
-        // a narrow panel breaks the line at its blank
-        let slave = format!("{}, {tried_s:.0} s", caption.slave);
-        return panel("link: connecting to", vec![slave]).wrap(Wrap { trim: true });
+/// Forces and their difference, where no chart has them.
+pub(super) fn forces(now: &Snapshot) -> String {
+    let [f_s, f_m] = [now.f_s(), now.f_m()].map(|force| shown(force, 2, ""));
+    let error = shown(now.error(), 2, " N");
+    format!("f_s {f_s} f_m {f_m} error {error}")
+}
+
+/// Updates by cause, a line each: how many so far, and per second.
+pub(super) fn updates(history: &History) -> Vec<String> {
+    let now = history.newest();
+    let (counts, rates) = (now.updates(), history.rates_hz());
+    let row = |cause: Cause| {
+        let count = counts.and_then(|counts| counts.get(cause.number()).copied());
+        let rate = rates.and_then(|rates| rates.get(cause.number()).copied());
+        let count = shown(count.map(|n| n as f64), 0, "");
+        format!("{:12}{count:>7}{:>7}", short(cause), shown(rate, 1, ""))
+    };
+    let head = format!("{:12}{:>7}{:>7}", title(&now), "so far", "per s");
+    let lines = std::iter::once(head).chain(Cause::ALL.into_iter().map(row));
+    lines.chain(now.slave.map(|_| applied(&now))).collect()
+}
+
+/// Updates in words, in lines of this width, for a terminal that has no room for a table: those causes that there were.
+pub(super) fn updates_in_words(history: &History, width: usize) -> Vec<String> {
+    let now = history.newest();
+    let counts = now.updates().unwrap_or_default();
+    let rate = history.rates_hz().map(|rates| rates.iter().sum());
+    let all: u64 = counts.iter().sum();
+    let rate = shown(rate, 1, "");
+    let mut words = vec![format!("{} {all}", title(&now)), format!("{rate} per s")];
+    let by_cause = Cause::ALL.into_iter().zip(counts);
+    let there = by_cause.filter(|(_, count)| *count > 0);
+    words.extend(there.map(|(cause, count)| format!("{} {count}", short(cause))));
+    words.extend(now.slave.map(|_| applied(&now)));
+    let mut lines: Vec<String> = Vec::new();
+    for word in words {
+        match lines.last_mut() {
+            Some(line) if line.len() + ", ,".len() + word.len() <= width => {
+                *line += ", ";
+                *line += &word;
+            }
+            _ => lines.push(word),
+        }
     }
-    let [up, down] = now.missing();
-    let percent = |way: &Missing| shown(way.share.map(|share| share * 100.0), 1, " %");
-    let unsent = |way: &Missing| shown(way.unsent.map(|n| n as f64), 0, "");
-    let state = now.master.map_or("-", |master| master.link.name());
-    panel(
-        now.stopped().unwrap_or_else(|| format!("link: {state}")),
-        vec![
-            format!("round trip {}", shown(now.rtt_ms(), 1, " ms")),
-            format!("{} up {}", up.name(), percent(&up)),
-            format!("{} down {}", down.name(), percent(&down)),
-            format!("unsent up {} down {}", unsent(&up), unsent(&down)),
-        ],
-    )
+    lines
+}
+
+/// What the counts of updates are of.
+fn title(now: &Snapshot) -> &'static str {
+    if now.slave.is_some() {
+        "updates"
+    } else {
+        "applied"
+    }
+}
+
+fn applied(now: &Snapshot) -> String {
+    let applied = now.master.map(|master| master.updates_applied);
+    let applied = applied.map(|by_cause| by_cause.iter().sum::<u64>() as f64);
+    format!("applied {}", shown(applied, 0, ""))
+}
+
+fn short(cause: Cause) -> String {
+    let name = cause.name();
+    let name = name.strip_suffix("_contact").unwrap_or(name);
+    name.replace('_', " ")
 }
 
 /// The haptic loop.
-pub(super) fn loop_panel(now: &Snapshot) -> Paragraph<'static> {
+pub(super) fn haptic_loop(now: &Snapshot) -> String {
     let late = now.master.map(|master| master.lateness_p99_us);
     let skipped = now.master.map(|master| master.skipped as f64);
-    panel(
-        "haptic loop",
-        vec![
-            format!("lateness p99 {}", shown(late, 0, " us")),
-            format!("skipped {}", shown(skipped, 0, "")),
-        ],
-    )
+    let (late, skipped) = (shown(late, 0, " us"), shown(skipped, 0, ""));
+    format!("lateness p99 {late}, skipped {skipped}")
 }

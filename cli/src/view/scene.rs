@@ -11,12 +11,14 @@ use ratatui::style::{Color, Style};
 use ratatui::symbols::Marker;
 use ratatui::text::{Line, Span};
 use ratatui::widgets::Block;
-use ratatui::widgets::canvas::{Canvas, Context, Line as Stroke};
+use ratatui::widgets::canvas::{Canvas, Context, Line as Stroke, Points};
 
 /// Half of the width that is shown, m: the box and the way to any of its faces.
 const HALF_WIDTH_M: f64 = 0.45;
 /// A cell of a terminal is about twice as high as it is wide.
 const CELL_HEIGHT: f64 = 2.0;
+/// Between two dots of the ghost's outline, cells.
+const DOTS_GAP: f64 = 1.5;
 const MODEL: Color = Color::Cyan;
 const HIP: Color = Color::White;
 const GHOST: Color = Color::DarkGray;
@@ -38,11 +40,12 @@ pub(super) fn render_scene(frame: &mut Frame<'_>, area: Rect, master: Option<&Ma
                 return;
             };
             if let Some(scene) = &master.scene {
-                outline(context, &scene.object, &sides, GHOST);
+                let gap_m = 2.0 * HALF_WIDTH_M * DOTS_GAP / f64::from(area.width.max(1));
+                dots(context, &corners(&scene.object, &sides), gap_m);
                 mark(context, scene.tool, "+", GHOST);
             }
             context.layer();
-            outline(context, &master.model, &sides, MODEL);
+            outline(context, &corners(&master.model, &sides));
             mark(context, master.hip, "o", HIP);
         });
     frame.render_widget(canvas, area);
@@ -51,17 +54,18 @@ pub(super) fn render_scene(frame: &mut Frame<'_>, area: Rect, master: Option<&Ma
 /// Which is which.
 fn title(master: Option<&MasterLive>) -> Line<'static> {
     let ghost = match master.and_then(|master| master.scene_age_s) {
-        Some(age_s) => format!("remote {:.0} ms ago", age_s * 1e3),
-        None => "remote -".to_owned(),
+        Some(age_s) => format!("┄ remote {:.0} ms ago", age_s * 1e3),
+        None => "┄ remote -".to_owned(),
     };
     Line::from(vec![
-        Span::styled("model now", Style::new().fg(MODEL)),
+        Span::styled("─ model", Style::new().fg(MODEL)),
         Span::raw("  "),
         Span::styled(ghost, Style::new().fg(GHOST)),
     ])
 }
 
-fn outline(context: &mut Context<'_>, pose: &Pose, sides: &BoxFootprint, colour: Color) {
+/// The corners of a body, in order.
+fn corners(pose: &Pose, sides: &BoxFootprint) -> [Vec2; 4] {
     let BoxFootprint {
         east,
         north,
@@ -74,10 +78,29 @@ fn outline(context: &mut Context<'_>, pose: &Pose, sides: &BoxFootprint, colour:
         (-west, -south),
         (east, -south),
     ];
-    let corners = corners.map(|(x, y)| pose.position + rotate(pose.angle, Vec2::new(x, y)));
-    let next = corners.iter().cycle().skip(1);
-    for (from, to) in corners.iter().zip(next) {
-        context.draw(&Stroke::new(from.x, from.y, to.x, to.y, colour));
+    corners.map(|(x, y)| pose.position + rotate(pose.angle, Vec2::new(x, y)))
+}
+
+fn edges(corners: &[Vec2; 4]) -> impl Iterator<Item = (&Vec2, &Vec2)> {
+    corners.iter().zip(corners.iter().cycle().skip(1))
+}
+
+fn outline(context: &mut Context<'_>, corners: &[Vec2; 4]) {
+    for (from, to) in edges(corners) {
+        context.draw(&Stroke::new(from.x, from.y, to.x, to.y, MODEL));
+    }
+}
+
+/// The outline in dots this far apart, m: without colours too it is not the model's.
+fn dots(context: &mut Context<'_>, corners: &[Vec2; 4], gap_m: f64) {
+    for (from, to) in edges(corners) {
+        let count = ((to - from).norm() / gap_m).ceil().max(1.0);
+        let at = |n: u32| from + (to - from) * (f64::from(n) / count);
+        let places: Vec<(f64, f64)> = (0..count as u32).map(at).map(|at| (at.x, at.y)).collect();
+        context.draw(&Points {
+            coords: &places,
+            color: GHOST,
+        });
     }
 }
 

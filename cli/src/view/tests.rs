@@ -28,7 +28,7 @@ fn snapshot(elapsed_s: f64) -> Snapshot {
         elapsed_s,
         f_m: Vec2::new(0.0, 2.5),
         params: [0.699, 2.9, 2.05],
-        updates_applied: 20,
+        updates_applied: [7, 10, 0, 1, 2, 0],
         pushes: Some(3),
         link: LinkState::Late,
         footprint: Some(BoxFootprint::square(0.4)),
@@ -88,23 +88,20 @@ fn the_dashboard_shows_every_label_and_number_on_a_small_terminal() {
         "master free",
         "q ends, space stops",
         "recommended",
-        "model now",
-        "remote 210 ms ago",
+        "─ model",
+        "┄ remote 210 ms ago",
         "|f_s|",
         "5.00 N",
         "|f_m|",
         "2.50 N",
         "|error|",
         "0.50 N",
-        "deadband",
-        "timer",
-        "master only",
-        "slave only",
-        "contact lost",
-        "every sample",
-        "11",
-        "applied",
-        "20",
+        "updates 21",
+        "deadband 7",
+        "timer 11",
+        "slave only 1",
+        "contact lost 2",
+        "applied 20",
         "per s",
         "estimate",
         "truth",
@@ -117,14 +114,70 @@ fn the_dashboard_shows_every_label_and_number_on_a_small_terminal() {
         "pushes",
         "link: late",
         "101.5 ms",
-        "loss up 1.1 %",
-        "loss down 0.9 %",
-        "unsent up 12 down 100",
+        "up   loss 1.1 %, unsent 12",
+        "down loss 0.9 %, unsent 100",
         "lateness p99 63 us",
         "skipped 4",
         "a message",
     ] {
         assert!(shown.contains(part), "{part}\n{shown}");
+    }
+}
+
+#[test]
+fn half_of_the_screen_is_the_scene_and_a_low_and_narrow_one_without_colours_has_every_number() {
+    let mut history = History::default();
+    (0..100_u32).for_each(|tick| history.push(snapshot(f64::from(tick) * 0.05)));
+    let shown = screen(60, 15, &history, &["a message".to_owned()]);
+    let lines: Vec<Vec<char>> = shown.lines().map(|line| line.chars().collect()).collect();
+    let right = |line: &Vec<char>| line.iter().skip(31).take(30).collect::<String>();
+    let numbers: Vec<String> = lines.iter().map(right).collect();
+    let numbers = numbers.join("\n");
+    for part in [
+        "f_s 5.00 f_m 2.50 error 0.50 N",
+        "link: late  rtt 101.5 ms",
+        "up   loss 1.1 %, unsent 12",
+        "down loss 0.9 %, unsent 100",
+        "m kg       0.701  0.700  0.699",
+        "hand 0.00 N   pushes 3",
+        "updates 21, 0.0 per s",
+        "deadband 7, timer 11",
+        "slave only 1, contact lost 2",
+        "applied 20",
+    ] {
+        assert!(numbers.contains(part), "{part}\n{shown}");
+    }
+    assert!(shown.contains("of 20 s   q ends, space stops"), "{shown}");
+    assert!(shown.contains("a message"), "{shown}");
+    // on a large one the updates are a table
+    let large = screen(100, 40, &history, &[]);
+    assert!(large.contains("deadband          7    0.0"), "{large}");
+    assert!(large.contains("|f_m| master 2.50 N  (of 5.0 N)"), "{large}");
+}
+
+#[test]
+fn a_master_alone_shows_what_came_from_the_slave() {
+    let mut history = History::default();
+    let of_both = snapshot(1.0);
+    let force = Vec2::new(0.0, 4.5);
+    let scene = of_both
+        .master
+        .unwrap()
+        .scene
+        .map(|scene| Scene { force, ..scene });
+    let master = of_both.master.map(|master| MasterLive { scene, ..master });
+    history.push(Snapshot::new(None, master, 1.0));
+    let shown = screen(80, 24, &history, &[]);
+    for part in [
+        "|f_s| slave 4.50 N",
+        "applied      so far",
+        "timer            10",
+    ] {
+        assert!(shown.contains(part), "{part}\n{shown}");
+    }
+    let text = line(&caption(), &history);
+    for part in ["f_s 4.50 N", "updates 20", "mass 0.699 kg"] {
+        assert!(text.contains(part), "{part}: {text}");
     }
 }
 

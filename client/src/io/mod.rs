@@ -33,6 +33,7 @@ use mmt_shared::io::transport::Transport;
 use mmt_shared::io::truth::TruthReceiver;
 use mmt_shared::model::geometry::{BoxFootprint, Pose, Vec2};
 use mmt_shared::model::tool::Scene;
+use mmt_shared::model::update::Cause;
 use mmt_shared::pairing::Pairing;
 use mmt_shared::range::OutOfRange;
 use mmt_shared::report::MasterSession;
@@ -200,8 +201,8 @@ pub struct MasterLive {
     pub person: Option<PersonLive>,
     /// What the newest applied update found wrong in the model.
     pub change: Option<Change>,
-    /// Updates applied.
-    pub updates_applied: u64,
+    /// Updates applied, by cause.
+    pub updates_applied: [u64; Cause::ALL.len()],
     /// Pushes completed.
     pub pushes: Option<u64>,
     /// The link.

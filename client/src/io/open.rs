@@ -8,6 +8,7 @@ use mmt_netem::LinkId;
 use mmt_netem::io::socket::{EmulatedSocket, SocketMeter};
 use mmt_shared::io::congestion::RateCap;
 use mmt_shared::io::connect::ConnectError;
+use mmt_shared::io::farewell::FAREWELL_WAIT;
 use mmt_shared::io::quic::Traffic;
 use mmt_shared::io::socket;
 use mmt_shared::io::stream::{read_frame, write_message};
@@ -36,7 +37,7 @@ pub(super) struct Timeouts {
     pub(super) connect: Duration,
     /// For the hello to be taken, and for its answer.
     pub(super) welcome: Duration,
-    /// For the slave's farewell.
+    /// For the slave's farewell, beyond the round trip.
     pub(super) farewell: Duration,
     /// For the last packets.
     pub(super) idle: Duration,
@@ -48,7 +49,7 @@ pub(super) const TIMEOUTS: Timeouts = Timeouts {
     lookup: Duration::from_secs(10),
     connect: Duration::from_secs(10),
     welcome: Duration::from_secs(10),
-    farewell: Duration::from_secs(1),
+    farewell: FAREWELL_WAIT,
     idle: Duration::from_secs(1),
 };
 

@@ -4,7 +4,9 @@ use std::pin::{Pin, pin};
 use std::sync::PoisonError;
 
 use mmt_shared::io::clock::Clock;
-use mmt_shared::io::farewell::{FarewellError, ReceivedFarewell, receive_farewell, send_farewell};
+use mmt_shared::io::farewell::{
+    FarewellError, ReceivedFarewell, farewell_wait, receive_farewell, send_farewell,
+};
 use mmt_shared::io::loop_thread;
 use mmt_shared::io::network_task::{Event, NetworkTask, asked_to_stop};
 use mmt_shared::io::stream::delivered;
@@ -149,9 +151,10 @@ pub(super) async fn operate(
     let why = haptic.why.or(session.why).unwrap_or(SessionEnd::Stopped);
     tracing::info!("the session ends: {why}");
     if session.task.is_connected() {
-        let deadline = Instant::now() + timeouts.farewell;
+        let wait = farewell_wait(&connected.connection, timeouts.farewell);
+        let deadline = Instant::now() + wait;
         let half = half(&haptic, &session.task, &connected, duration);
-        let sent = send_farewell(&mut send, why.ending(), &half, timeouts.farewell).await;
+        let sent = send_farewell(&mut send, why.ending(), &half, wait).await;
         if let Err(error) = sent {
             tracing::warn!(%error, "the farewell did not reach the slave");
         }

@@ -226,6 +226,24 @@ async fn a_slave_that_ends_first_gets_the_masters_farewell() {
 }
 
 #[tokio::test]
+async fn the_slaves_farewell_may_take_a_round_trip_that_is_longer_than_the_wait() {
+    let fake = Fake::new();
+    let mut options = scripted(&fake);
+    options.netem = "delay 500ms".parse().unwrap();
+    let timeouts = Timeouts {
+        farewell: Duration::from_millis(100),
+        ..TIMEOUTS
+    };
+    let mut master = start(options, timeouts);
+    let mut slave = Session::welcomed(&fake).await;
+    slave.serve().await;
+    slave.say_farewell(Ending::Finished, totals()).await;
+    let report = master.end().await.unwrap();
+    assert_eq!(report.ending, Some("finished"));
+    assert_eq!(report.updates.sent.sent, Some(9), "the slave's half is in");
+}
+
+#[tokio::test]
 async fn a_silent_slave_releases_the_hand_and_what_it_counted_stays_unknown() {
     let fake = Fake::new();
     let mut options = scripted(&fake);

@@ -11,7 +11,8 @@ use mmt_netem::io::socket::SocketCounters;
 use mmt_shared::channel::peer::NumbersSpent;
 use mmt_shared::io::clock::Clock;
 use mmt_shared::io::farewell::{
-    FAREWELL_WAIT, FarewellError, ReceivedFarewell, answer, receive_farewell, send_farewell,
+    FAREWELL_WAIT, FarewellError, ReceivedFarewell, answer, farewell_wait, receive_farewell,
+    send_farewell,
 };
 use mmt_shared::io::loop_thread::{self, LoopSide};
 use mmt_shared::io::network_task::{Event, NetworkTask, WAITING_MAX};
@@ -257,7 +258,8 @@ impl Session<'_> {
     {
         let nothing = SlaveHalf::default();
         let report = own.unwrap_or(&nothing);
-        let sent = send_farewell(&mut self.send, ending, report, FAREWELL_WAIT).await;
+        let wait = farewell_wait(&self.connection, FAREWELL_WAIT);
+        let sent = send_farewell(&mut self.send, ending, report, wait).await;
         let theirs = async {
             match end {
                 End::Farewell(theirs) => Some(*theirs),
@@ -267,7 +269,7 @@ impl Session<'_> {
                 _ => farewell.await.ok(),
             }
         };
-        let theirs = answer(theirs, self.connection.closed(), sleep(FAREWELL_WAIT)).await;
+        let theirs = answer(theirs, self.connection.closed(), sleep(wait)).await;
         self.connection
             .close(CLOSE_FINISHED, b"the session is over");
         theirs

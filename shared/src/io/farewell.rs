@@ -8,11 +8,19 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 
 use super::stream::{ReadFrameError, WriteFrameError, read_frame, write_message};
-use super::transport::{ReadError, RecvStream, SendStream};
+use super::transport::{Connection, ReadError, RecvStream, SendStream};
 use crate::wire::{DecodeError, Ending, Farewell, Kind, STREAM_MESSAGE_MAX, Side, StreamMessage};
 
-/// How long each side waits for the other's farewell and close after its own farewell (docs/protocol.md, section 2).
+/// How long each side waits for the other's farewell and close after its own farewell, beyond the round trip
+/// (docs/protocol.md, section 2).
 pub const FAREWELL_WAIT: Duration = Duration::from_secs(1);
+/// The longest round trip that is waited for: a way that has become worse than that is as good as gone.
+const ROUND_TRIP_MAX: Duration = Duration::from_secs(4);
+
+/// How long to wait for the other's farewell over this connection: `least`, and the round trip that it needs.
+pub fn farewell_wait(connection: &Connection, least: Duration) -> Duration {
+    least + connection.round_trip().min(ROUND_TRIP_MAX)
+}
 
 /// The other side's farewell.
 #[derive(Clone, Debug, PartialEq)]

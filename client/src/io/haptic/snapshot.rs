@@ -29,7 +29,7 @@ impl HapticLoop {
             stopped_by: self.end.stopped_by(),
             person: self.operator.person().map(PersonLive::from),
             change: self.end.change().copied(),
-            updates_applied: u64::from(master.applied()),
+            updates_applied: master.applied(),
             pushes: self.operator.pushes_completed(),
             link: done.link,
             scene: self.end.scene().copied(),

@@ -293,7 +293,7 @@ proptest! {
                 environment.set_friction(draw.uniform_in(0.05, 0.8)).unwrap();
             }
             world.step();
-            applied = world.master().applied();
+            applied = world.master().applied().iter().sum();
         }
         let outcome = world.outcome();
         prop_assert!(applied > 0, "no update was applied");

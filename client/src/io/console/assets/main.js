@@ -136,11 +136,10 @@ function write({ master, slave }) {
   $("late").textContent = shown(master.lateness_p99_us, 0, "µs");
   const off = slave?.footprint ? norm([0, 1].map((axis) => master.model.position[axis] - slave.truth.position[axis])) * 1000 : null;
   $("off").textContent = shown(off, 1, "mm");
-  const units = ["kg", "N s/m", "N"];
   [...$("params").tBodies[0].rows].forEach((row, index) => {
-    row.cells[1].textContent = shown(master.params[index], 2, units[index]);
-    row.cells[2].textContent = slave ? shown(slave.estimate[index], 2, units[index]) : "–";
-    row.cells[3].textContent = link.about.truth ? shown(link.about.truth[index], 2, units[index]) : "–";
+    row.cells[1].textContent = shown(master.params[index], 2, "");
+    row.cells[2].textContent = slave ? shown(slave.estimate[index], 2, "") : "–";
+    row.cells[3].textContent = link.about.truth ? shown(link.about.truth[index], 2, "") : "–";
   });
   const stretched = master.proxy ? Math.hypot(master.hip[0] - master.proxy[0], master.hip[1] - master.proxy[1]) * 1000 : null;
   $("lens-label").textContent = stretched === null ? "no touch" : `spring ${stretched.toFixed(1)} mm`;

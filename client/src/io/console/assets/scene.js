@@ -4,6 +4,8 @@
 const SHOWN_M = 0.86;
 /** How long an arrow of 1 N is, m. */
 const ARROW_M_PER_N = 0.022;
+/** What the lens takes of a corner of the scene, px. */
+const LENS_ROOM = 190;
 /** The lens shows this much, m. */
 const LENS_M = 0.009;
 const TRAIL_S = 3;
@@ -81,8 +83,17 @@ export class Scene {
     if (master.proxy) this.#spring(c, hip, at(master.proxy), this.colours.model, 4);
     this.#arrow(c, master.proxy ? at(master.proxy) : hip, master.f_m, this.colours.model, -7);
     this.#hand(c, hip, master);
+    this.#away(c, hip, w, h);
     this.#scaleBar(c, w, h);
     this.#lens(master);
+    this.#giveWay(hip, w, h);
+  }
+
+  /** The lens stands at the lower right, at the upper right while the hand is there. */
+  #giveWay([x, y], w, h) {
+    const up = this.lens.parentElement.classList;
+    const room = up.contains("up") ? LENS_ROOM + 40 : LENS_ROOM;
+    up.toggle("up", x > w - room && y > h - room);
   }
 
   #follow(target, seconds, held, w, h) {
@@ -192,6 +203,21 @@ export class Scene {
     c.globalAlpha = master.in_contact ? 0.8 : 0.25;
     c.stroke();
     c.globalAlpha = 1;
+  }
+
+  /** A hand out of the picture is pointed to from the edge. */
+  #away(c, [x, y], w, h) {
+    const edge = [Math.min(Math.max(x, 16), w - 16), Math.min(Math.max(y, 16), h - 16)];
+    if (x >= 0 && y >= 0 && x <= w && y <= h) return;
+    c.save();
+    c.translate(...edge);
+    c.rotate(Math.atan2(y - edge[1], x - edge[0]));
+    c.beginPath();
+    c.moveTo(10, 0); c.lineTo(-6, -7); c.lineTo(-6, 7);
+    c.closePath();
+    c.fillStyle = this.colours.model;
+    c.fill();
+    c.restore();
   }
 
   /** The force on the object: its tip is where it acts, beside the other one's. */
