@@ -5,7 +5,7 @@
 
 use std::path::Path;
 
-use mmt_client::device::link::DeviceLinkConfig;
+use mmt_client::device::link::{DeviceFile, DeviceKind, DeviceLinkConfig};
 use mmt_lab::layers::{Flag, Layers, Program};
 use mmt_lab::text_error::TextError;
 use mmt_lab::world::WorldConfig;
@@ -123,13 +123,19 @@ pub(crate) fn configuration(
     ConfigFile::read(path)?.with(program, flags, |layers| layers.config())
 }
 
-/// The device of a file that is to be plugged in, if there is one.
+/// The device of this kind that is to be plugged in, with what a file says of it, if there is one.
 ///
 /// # Errors
-/// The file cannot be read, is no TOML, or is no device.
-pub(crate) fn device_config(path: Option<&Path>) -> Result<DeviceLinkConfig, Failure> {
-    path.map_or(Ok(DeviceLinkConfig::default()), |path| {
+/// The file cannot be read, is no TOML, or is no device of this kind.
+pub(crate) fn device_config(
+    kind: DeviceKind,
+    path: Option<&Path>,
+) -> Result<DeviceLinkConfig, Failure> {
+    let file = path.map_or(Ok(DeviceFile::default()), |path| {
         read(path, "the device", "docs/plugs.md")
+    });
+    file?.device(kind).map_err(|error| {
+        Failure::usage(error).remedy("change that key in --device-config, or the device")
     })
 }
 

@@ -1,10 +1,16 @@
 //! Device profiles: what a haptic device can do and how its room maps to the world.
 //!
 //! k_p is per world metre. With a scale s (x_world = s x_device) the hand feels s k_p, and a device's
-//! stiffness limit applies to that. No profile may exceed its device's limits. A device of somebody else's is plugged in
-//! through `link`.
+//! stiffness limit applies to that. No profile may exceed its device's limits. A device is plugged in through `link`, or, where it
+//! has a protocol of its own, through `inverse3` or `two_diy`; whatever its protocol, one `hand` engages it.
 
+#[cfg(test)]
+mod conformance;
+mod hand;
+pub mod inverse3;
 pub mod link;
+pub mod pantograph;
+pub mod two_diy;
 
 use mmt_shared::model::contact::Coupling;
 use mmt_shared::range::{OutOfRange, in_range};
@@ -117,7 +123,7 @@ impl DeviceProfile {
     /// As [`Self::used_with`].
     pub fn plugged_in(config: &DeviceLinkConfig) -> Result<Self, DeviceError> {
         let profile = Self {
-            name: "link",
+            name: config.kind.name(),
             stiffness_n_per_m: config.stiffness_n_per_m,
             stiffness_max_n_per_m: config.stiffness_max_n_per_m,
             force_max_n: config.force_max_n,

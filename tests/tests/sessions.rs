@@ -1,5 +1,6 @@
 //! What is promised of sessions in real time: one at a time, because each wants two cores.
 
+mod devices;
 mod harness;
 mod independent_client;
 mod live;

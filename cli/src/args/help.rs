@@ -46,6 +46,15 @@ pub(super) const SWEEP: &str = include_str!("help/sweep.txt").trim_ascii_end();
 /// Examples of `mmt config`.
 pub(super) const CONFIG: &str = include_str!("help/config.txt").trim_ascii_end();
 
+/// Examples of `mmt device`.
+pub(super) const DEVICE: &str = include_str!("help/device.txt").trim_ascii_end();
+
+/// Examples of `mmt device list`.
+pub(super) const DEVICE_LIST: &str = include_str!("help/device-list.txt").trim_ascii_end();
+
+/// Examples of `mmt device test`.
+pub(super) const DEVICE_TEST: &str = include_str!("help/device-test.txt").trim_ascii_end();
+
 /// Examples of `mmt completions`.
 pub(super) const COMPLETIONS: &str = include_str!("help/completions.txt").trim_ascii_end();
 

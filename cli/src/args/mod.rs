@@ -39,7 +39,10 @@ pub(crate) use bench::{
 };
 pub(crate) use config::{ConfigArguments, ConfigCommand, ShowArguments};
 pub(crate) use console::ConsoleArguments;
-pub(crate) use device::{DeviceArguments, DeviceWords};
+pub(crate) use device::{
+    DeviceArguments, DeviceListArguments, DeviceTestArguments, DeviceWords, DevicesArguments,
+    DevicesCommand, PlugWords,
+};
 pub(crate) use doctor::{DoctorArguments, ManArguments};
 pub(crate) use plant::PlantArguments;
 #[cfg(feature = "live")]
@@ -103,6 +106,9 @@ pub(crate) enum Command {
     /// Is this host fit for a 1 kHz loop, and does a slave answer?
     #[command(after_help = help::DOCTOR)]
     Doctor(DoctorArguments),
+    /// Haptic devices that can be plugged in: what is there, and does it do
+    #[command(after_help = help::DEVICE, subcommand_required = true, arg_required_else_help = true)]
+    Device(DevicesArguments),
     /// Every key of a configuration: its default, its unit, what is accepted, and where its value comes from
     #[command(after_help = help::CONFIG, subcommand_required = true, arg_required_else_help = true)]
     Config(ConfigArguments),

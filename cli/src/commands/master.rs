@@ -239,9 +239,10 @@ fn operator(
     };
     match &arguments.operator {
         OperatorWords::Trace(_) | OperatorWords::Pointer
-            if arguments.device.device == DeviceWords::Link =>
+            if matches!(arguments.device.device, DeviceWords::PluggedIn(_)) =>
         {
-            let what = "--device link is the hand itself: no other operator goes with it";
+            let what =
+                "a device that is plugged in is the hand itself: no other operator goes with it";
             Err(Failure::usage(what).remedy("leave --operator out"))
         }
         OperatorWords::Trace(path) => Ok(OperatorChoice::Trace {

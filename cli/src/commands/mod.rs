@@ -5,7 +5,7 @@ pub(crate) mod check;
 pub(crate) mod config;
 mod console;
 pub(crate) mod demo;
-mod device;
+pub(crate) mod device;
 pub(crate) mod doctor;
 pub(crate) mod export;
 mod host;

@@ -18,7 +18,7 @@ use mmt_shared::model::geometry::Vec2;
 use mmt_shared::time::Time;
 use rtrb::Consumer;
 
-use super::device_link::DevicePort;
+use super::device::DevicePort;
 use super::record::{self, MasterSink};
 use super::{MasterLive, SessionEnd};
 use crate::device::link::HandOutput;
@@ -233,7 +233,7 @@ impl HapticLoop {
         let others = others.take(EVENTS_PER_TICK);
         let others = others.filter(|event| !has_device || !event.is_of_the_hand());
         let device = self.device.iter_mut();
-        let device = device.flat_map(|device| std::iter::from_fn(|| device.next()));
+        let device = device.flat_map(|device| std::iter::from_fn(|| device.event()));
         for event in others.chain(device.take(EVENTS_PER_TICK)) {
             self.operator.handle(self.elapsed, event);
             if let Some(record) = &mut self.record

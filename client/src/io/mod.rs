@@ -9,7 +9,7 @@
 )]
 
 pub mod console;
-pub mod device_link;
+pub mod device;
 mod end;
 mod error;
 pub mod haptic;
@@ -51,7 +51,7 @@ use crate::operator::scripted::{Scripted, ScriptedConfig, View};
 use crate::operator::trace::Trace;
 use crate::path::PathRecorder;
 
-use device_link::DevicePort;
+use device::DevicePort;
 pub use end::SessionEnd;
 pub use error::MasterHostError;
 pub use resume::ResumeFile;
@@ -103,13 +103,14 @@ impl OperatorChoice {
         }
     }
 
+    /// What it is called; of a device that is plugged in its own name belongs behind it.
     fn name(&self) -> &str {
         match self {
             Self::Scripted(_) => "scripted",
             Self::Trace { name, .. } => name,
             Self::Person {
                 device: Some(_), ..
-            } => "device link",
+            } => "device",
             Self::Person {
                 driver: Driver::Scripted,
                 ..
@@ -250,7 +251,7 @@ pub struct MasterConfiguration {
     pub transport: &'static str,
     /// The device.
     pub device: DeviceProfile,
-    /// `scripted`, `scripted or pointer`, `pointer`, `device link` or the trace's name.
+    /// `scripted`, `scripted or pointer`, `pointer`, `device link`, `device inverse3`, `device 2diy` or the trace's name.
     pub operator: String,
     /// The scripted operator's numbers.
     pub scripted: Option<ScriptedConfig>,

@@ -42,7 +42,17 @@ impl From<&MasterOptions> for MasterConfiguration {
             slave: options.pairing.address.to_string(),
             transport: options.transport.name(),
             device: options.device,
-            operator: options.operator.name().to_owned(),
+            operator: match (&options.operator, options.operator.name()) {
+                (
+                    OperatorChoice::Person {
+                        device: Some(_), ..
+                    },
+                    name,
+                ) => {
+                    format!("{name} {}", options.device.name())
+                }
+                (_, name) => name.to_owned(),
+            },
             scripted: match &options.operator {
                 OperatorChoice::Scripted(config)
                 | OperatorChoice::Person {

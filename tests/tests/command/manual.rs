@@ -2,7 +2,7 @@
 
 use super::mmt;
 
-const COMMANDS: [&str; 15] = [
+const COMMANDS: [&str; 16] = [
     "demo",
     "slave",
     "master",
@@ -15,6 +15,7 @@ const COMMANDS: [&str; 15] = [
     "swarm",
     "sweep",
     "doctor",
+    "device",
     "config",
     "completions",
     "bench",
@@ -48,4 +49,5 @@ fn each_command_has_a_page_with_its_options() {
     }
     assert!(page("mmt-slave.1").contains("listen"));
     assert!(page("mmt-netem-report.1").contains("json"));
+    assert!(page("mmt-device-test.1").contains("Examples"));
 }

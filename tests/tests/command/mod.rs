@@ -15,6 +15,7 @@ use serde_json::Value;
 use crate::harness::process::{PROGRAM, Running};
 
 mod bench;
+mod device;
 mod doctor;
 mod hostile;
 mod interrupted;

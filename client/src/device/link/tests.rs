@@ -1,5 +1,6 @@
 //! What a device that is plugged in is promised, and what is promised of it.
 
+use mmt_shared::model::geometry::Vec2;
 use mmt_shared::plug::NotTaken;
 
 use super::*;
