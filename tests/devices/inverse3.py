@@ -15,6 +15,7 @@ import json
 import math
 import socket
 import struct
+import threading
 import time
 
 from emulated import Hand, Log, arguments
@@ -219,20 +220,29 @@ def main():
     service = Service(options, log)
     listener = socket.create_server(("127.0.0.1", options.port))
     print(f"inverse3: 127.0.0.1:{listener.getsockname()[1]}", flush=True)
-    try:
+    ended = threading.Event()
+
+    def attend(client):
+        client.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        was_a_socket = True
+        with client:
+            try:
+                was_a_socket = answer(client, service)
+            except (Gone, OSError, ValueError, KeyError):
+                pass
+        # whoever goes takes its force along
+        service.commanded = -math.inf if was_a_socket else service.commanded
+        if options.once and was_a_socket and log.taken:
+            ended.set()
+
+    def accept():
         while True:
-            client, _ = listener.accept()
-            client.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-            was_a_socket = True
-            with client:
-                try:
-                    was_a_socket = answer(client, service)
-                except (Gone, OSError, ValueError, KeyError):
-                    pass
-            # whoever goes takes its force along
-            service.commanded = -math.inf
-            if options.once and was_a_socket and log.taken:
-                break
+            threading.Thread(target=attend, args=(listener.accept()[0],), daemon=True).start()
+
+    threading.Thread(target=accept, daemon=True).start()
+    try:
+        while not ended.wait(0.2):
+            pass
     except KeyboardInterrupt:
         pass
     log.show()

@@ -82,7 +82,7 @@ impl Plugged {
 
     /// A millisecond in which `come` may bring something; then the loop ticks and the device gets its answer.
     fn step(&mut self, come: impl FnOnce(&mut dyn Rig, Time, &mut dyn FnMut(HandEvent))) {
-        self.now = self.now + Duration::from_millis(1);
+        self.now += Duration::from_millis(1);
         self.events.clear();
         let Self { rig, events, .. } = self;
         come(&mut **rig, self.now, &mut |event| events.push(event));
@@ -295,7 +295,7 @@ fn the_end_of_the_loop_leaves_no_force_on_any_device() {
         let mut plugged = Plugged::pushing(rig);
         let (name, place) = (plugged.rig.name(), plugged.place(0.0, 0.0));
         // the session is over: its port gives this
-        plugged.now = plugged.now + Duration::from_millis(1);
+        plugged.now += Duration::from_millis(1);
         let now = plugged.now;
         plugged.rig.reading(now, place, true, &mut |_| ());
         let acts = plugged.rig.acts(now, &HandOutput::default());

@@ -103,18 +103,19 @@ impl TwoDiy {
         filled(bytes)
     }
 
-    /// Takes in what came in answer to torques, whole, and gives what the hand does by it.
-    pub fn handle(&mut self, now: Time, answer: &[u8], mut give: impl FnMut(HandEvent)) {
+    /// Takes in what came in answer to torques, and gives what the hand does by it. Of several answers the last is the newest: a
+    /// board that was late answers all that it was asked.
+    pub fn handle(&mut self, now: Time, answers: &[u8], mut give: impl FnMut(HandEvent)) {
         self.hand.hear(now, &mut give);
-        let Some((&ID, numbers)) = answer
-            .split_first()
-            .filter(|_| answer.len() == ANSWER_BYTES)
-        else {
+        let (whole, rest) = answers.as_chunks::<ANSWER_BYTES>();
+        let newest = whole.split_last().filter(|_| rest.is_empty());
+        let Some(([ID, numbers @ ..], late)) = newest else {
             self.counts.malformed += 1;
             self.lose(give);
             return;
         };
         self.counts.taken += 1;
+        self.counts.late += late.len() as u64;
         let [second, first] = singles::<2>(numbers);
         let degrees = [first, second];
         let can_be = degrees.iter().all(|angle| angle.abs() <= ANGLE_MAX_DEG);
@@ -257,7 +258,7 @@ mod tests {
         let whole = answer(5, [150.0, 20.0]);
         for bad in [
             &whole[..8],
-            &[&whole[..], &[0]].concat(),
+            &[&whole[..], &[5]].concat(),
             &answer(6, [150.0, 20.0]),
             &[],
         ] {

@@ -306,7 +306,7 @@ impl Rig for Board {
             &Self::answer(5, [f64::NAN, degrees[1]]),
             &Self::answer(5, [degrees[0], f64::INFINITY]),
             &whole[..5],
-            &[&whole[..], &whole[..]].concat(),
+            &[&whole[..], &whole[..3]].concat(),
             &Self::answer(7, degrees),
             &Self::answer(5, stretched),
         ];

@@ -18,6 +18,8 @@ const ANSWER: Duration = Duration::from_millis(20);
 const PATIENCE: Duration = Duration::from_millis(500);
 /// A board that has said nothing for so long is set up anew: it may have been off.
 const SILENCE: Duration = Duration::from_secs(1);
+/// Answers that are read at once: those of a board that was late.
+const ANSWERS_MAX: usize = 16;
 /// Between two attempts to open the port.
 const RETRY: Duration = Duration::from_millis(500);
 
@@ -58,25 +60,24 @@ fn exchange(
     set_up(port, device)?;
     let mut ticker = Ticker::new(clock, TICK);
     let mut heard = clock.now();
-    // one byte more: an answer that is too long is seen to be
-    let mut answer = [0; ANSWER_BYTES + 1];
+    let mut room = [0; ANSWERS_MAX * ANSWER_BYTES];
     while !shared.has_ended() {
         ticker.wait();
         port.drain()?;
         let torques = device.torques(clock.now(), &shared.cell.load());
         port.write(&torques, PATIENCE)?;
-        let (whole, more) = answer.split_at_mut(ANSWER_BYTES);
-        let mut came = port.read(whole, clock, ANSWER)?;
+        let (first, more) = room.split_at_mut(ANSWER_BYTES);
+        let mut came = port.read(first, clock, ANSWER)?;
         if came == ANSWER_BYTES {
             came += port.read(more, clock, Duration::ZERO)?;
         }
         let now = clock.now();
-        let answer = answer.get(..came).unwrap_or_default();
+        let answers = room.get(..came).unwrap_or_default();
         shared.take(now, |give| {
-            if answer.is_empty() {
+            if answers.is_empty() {
                 device.miss(now, give);
             } else {
-                device.handle(now, answer, give);
+                device.handle(now, answers, give);
             }
             (device.seen(), *device.counts())
         });
