@@ -56,7 +56,8 @@ def hold(true, what, *numbers):
 def said(device, client, version, place_mm, peak_n, more):
     asked = math.hypot(*FORCE)
     hold(abs(peak_n - asked) < 0.01, f"{device}, {client}: force", peak_n)
-    print(f"  {device:16}{client + " " + version:17} place within {place_mm:.2f} mm, {asked:.2f} N asked for and {peak_n:.2f} N at the tool{more}")
+    client = f"{client} {version}"
+    print(f"  {device:16}{client:17} place within {place_mm:.2f} mm, {asked:.2f} N asked for and {peak_n:.2f} N at the tool{more}")
 
 
 def by_the_vendors_python(geometry):
