@@ -203,18 +203,16 @@ fn a_hand_at_a_device_of_its_own_protocol_pushes_the_box_over_the_emulated_netwo
             let motion = [&motion[..], &["--rest", "3"]].concat();
             let (emulator, at) = emulator(&python, program, &motion);
             let identity = place.path().join("identity");
+            let record = place.path().join("hand.mcap");
+            let record = record.to_str().unwrap();
             let network = ["--netem", "delay 20ms loss 1%"];
             let slave = ["slave", "--listen", "127.0.0.1:0", "--once", "--json"];
             let identity = ["--identity", identity.to_str().unwrap()];
             let mut slave = Running::mmt(&[&slave[..], &identity, &network].concat()).unwrap();
             let pairing = slave.wait_for_line(GENEROUS, |line| line.starts_with("mmt://"));
             let pairing = pairing.unwrap();
-            let master = [
-                "master",
-                &pairing,
-                "--json",
-                "--duration",
-                "8s",
+            let options = ["--json", "--duration", "8s", "--record", record];
+            let at = [
                 "--device",
                 device,
                 "--device-at",
@@ -222,6 +220,7 @@ fn a_hand_at_a_device_of_its_own_protocol_pushes_the_box_over_the_emulated_netwo
                 "--device-config",
                 &file,
             ];
+            let master = [&["master", &pairing][..], &options, &at].concat();
             let master = Running::mmt(&[&master[..], &network].concat()).unwrap();
             let master = document(&master.end(GENEROUS).unwrap(), 0);
             let slave = document(&slave.end(GENEROUS).unwrap(), 1);
@@ -239,6 +238,11 @@ fn a_hand_at_a_device_of_its_own_protocol_pushes_the_box_over_the_emulated_netwo
             assert!(peak > 0.2 && peak <= most * 1.000_1, "{what}");
             assert_eq!(get(&seen, "/force_last_n/0").abs(), 0.0, "{what}");
             assert_eq!(seen["refused"], Value::Array(Vec::new()), "{what}");
+            // its readings are inputs: the session runs again to the same bits without the device
+            let again = Running::mmt(&["replay", record, "--json"]).unwrap();
+            let again = document(&again.end(GENEROUS).unwrap(), 0);
+            let ticks = get(&again, "/records/0/sessions/0/ticks");
+            assert!(ticks > 1000.0, "{again:#}");
         }
     });
 }

@@ -84,6 +84,9 @@ impl DeviceArguments {
             None if self.device_config.is_some() => {
                 needs("--device-config", "--device link, inverse3 or 2diy")
             }
+            None if self.device_insecure => {
+                needs("--device-insecure", "--device link, inverse3 or 2diy")
+            }
             None | Some(DeviceKind::Inverse3 | DeviceKind::TwoDiy)
                 if self.device_listen.is_some() =>
             {

@@ -90,8 +90,10 @@ struct Gauge {
     last: Option<Time>,
     readings: u64,
     interval: Histogram,
-    /// Arrival less stamp of each, ns; the least is the fastest.
-    delays: Vec<i128>,
+    /// How much later than the fastest before it each came by its stamp.
+    late: Histogram,
+    /// Least arrival less stamp, ns.
+    fastest: Option<i128>,
     range: [(f64, f64); 3],
     speed_max: f64,
     buttons: u16,
@@ -104,7 +106,8 @@ impl Gauge {
             last: None,
             readings: 0,
             interval: Histogram::default(),
-            delays: Vec::new(),
+            late: Histogram::default(),
+            fastest: None,
             range: [(f64::INFINITY, f64::NEG_INFINITY); 3],
             speed_max: 0.0,
             buttons: 0,
@@ -124,24 +127,17 @@ impl Gauge {
         self.first = self.first.or(Some(*at));
         self.last = Some(*at);
         self.readings += 1;
-        self.delays
-            .push(i128::from(at.as_nanos()) - i128::from(*stamp_ns));
+        let delay = i128::from(at.as_nanos()) - i128::from(*stamp_ns);
+        let fastest = self.fastest.map_or(delay, |fastest| fastest.min(delay));
+        self.fastest = Some(fastest);
+        let late = u64::try_from(delay - fastest).unwrap_or(u64::MAX);
+        self.late.record(Duration::from_nanos(late));
         for ((least, most), metres) in self.range.iter_mut().zip(place) {
             (*least, *most) = (least.min(*metres), most.max(*metres));
         }
         let speed = velocity.iter().map(|v| v * v).sum::<f64>().sqrt();
         self.speed_max = self.speed_max.max(speed);
         self.buttons |= buttons;
-    }
-
-    fn lateness(&self) -> Histogram {
-        let mut late = Histogram::default();
-        let least = self.delays.iter().min().copied().unwrap_or_default();
-        for delay in &self.delays {
-            let nanos = u64::try_from(delay - least).unwrap_or(u64::MAX);
-            late.record(Duration::from_nanos(nanos));
-        }
-        late
     }
 }
 
@@ -225,7 +221,7 @@ pub(super) fn run(arguments: &DeviceTestArguments) -> Result<(), Failure> {
         duration_s: 0.0,
         rate_hz: 0.0,
         interval_ms: (&gauge.interval).into(),
-        late_ms: (&gauge.lateness()).into(),
+        late_ms: (&gauge.late).into(),
         place_min_m: gauge.range.map(|(least, _)| least),
         place_max_m: gauge.range.map(|(_, most)| most),
         speed_max_m_per_s: gauge.speed_max,

@@ -75,3 +75,53 @@ impl DeviceFile {
         })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_kind_of_device_has_its_own_keys_and_refuses_those_of_another() {
+        let dialect = DeviceFile {
+            dialect: Some(Dialect::Values),
+            ..DeviceFile::default()
+        };
+        let version = DeviceFile {
+            version: Some(Version::Two),
+            ..DeviceFile::default()
+        };
+        assert!(dialect.device(DeviceKind::Inverse3).is_ok());
+        for (file, kind, key) in [
+            (dialect, DeviceKind::Link, "dialect"),
+            (dialect, DeviceKind::TwoDiy, "dialect"),
+            (version, DeviceKind::Inverse3, "version"),
+        ] {
+            let refused = file.device(kind).unwrap_err();
+            assert!(matches!(refused, DeviceLinkError::OfAnother { key: k, .. } if k == key));
+        }
+        let two = version.device(DeviceKind::TwoDiy).unwrap();
+        assert_eq!(two.centre_m, [0.0, 0.09, 0.0]);
+        assert_eq!(
+            DeviceFile::default().device(DeviceKind::TwoDiy),
+            Ok(DeviceLinkConfig::of(DeviceKind::TwoDiy))
+        );
+        let button = DeviceLinkConfig {
+            hold: Hold::Button,
+            ..two
+        };
+        assert_eq!(button.check(), Err(DeviceLinkError::NoButton));
+        for bad in [f64::NAN, 0.0, 1e9] {
+            let torque_max_nm = bad;
+            assert!(
+                DeviceLinkConfig {
+                    torque_max_nm,
+                    ..two
+                }
+                .check()
+                .is_err()
+            );
+            let centre_m = [0.0, 0.0, if bad == 0.0 { 2.0 } else { bad }];
+            assert!(DeviceLinkConfig { centre_m, ..two }.check().is_err());
+        }
+    }
+}

@@ -8,6 +8,8 @@ mod inverse3;
 mod link;
 pub mod ports;
 mod serial;
+#[cfg(test)]
+mod tests;
 mod two_diy;
 
 use std::io;
