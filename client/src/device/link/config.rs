@@ -137,12 +137,13 @@ pub struct DeviceLinkConfig {
     pub kind: DeviceKind,
     /// Which of the device's axes are the world's x and y. Default x and y; of a 2DIY -x and -y, whose y comes towards the hand.
     pub axes: [Axis; 2],
-    /// Where the middle of its workspace is, m, device. Default its origin; of an Inverse3 and a 2DIY the middle of their reach.
+    /// Where the middle of its workspace is, m, device. Default its origin; of an Inverse3 the place of the
+    /// vendor's own example, of a 2DIY the middle of its reach.
     pub centre_m: [f64; 3],
     /// World metres for a metre of the device. Default 1.
     pub scale: f64,
     /// Side of the square about the middle that it may be in, m. Default 1: more than a desktop device has. Of an Inverse3 0.2,
-    /// of a 2DIY 0.1: what their arms reach.
+    /// chosen with room to spare, of a 2DIY 0.1: all of the force acts there.
     pub workspace_m: f64,
     /// Greatest speed of the device, m/s: a reading that is further from the one before is nonsense. Default 5.
     pub speed_max_m_per_s: f64,

@@ -4,6 +4,7 @@ use std::fs::File;
 use std::io::{Read, Write};
 use std::net::TcpListener;
 use std::os::fd::AsFd;
+use std::path::Path;
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread;
 use std::time::Duration;
@@ -28,9 +29,9 @@ fn config(kind: DeviceKind) -> DeviceLinkConfig {
     }
 }
 
-/// An Inverse Service for one client; a button that is down from the tenth frame on. Hands over each force.
-fn service() -> (SocketAddr, Receiver<f64>) {
-    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+/// An Inverse Service for one client and so many frames; a button that is down from the tenth on. Hands over each force.
+fn service(at: SocketAddr, frames: u32) -> (SocketAddr, Receiver<f64>) {
+    let listener = TcpListener::bind(at).unwrap();
     let at = listener.local_addr().unwrap();
     let (forces, asked) = channel();
     thread::spawn(move || {
@@ -41,7 +42,7 @@ fn service() -> (SocketAddr, Receiver<f64>) {
         page.write_all(version.as_bytes()).unwrap();
         drop(page);
         let mut socket = tungstenite::accept(listener.accept().unwrap().0).unwrap();
-        for frame in 0_u32.. {
+        for frame in 0..frames {
             let down = frame > 10;
             let text = serde_json::json!({
                 "inverse3": [{"device_id": "1", "state": {"cursor_position": {"x": 0.0, "y": -0.12, "z": 0.15}}}],
@@ -61,12 +62,13 @@ fn service() -> (SocketAddr, Receiver<f64>) {
     (at, asked)
 }
 
-/// A 2DIY that stands still. Hands over the torque of motor 1 in each frame.
-fn board() -> (PathBuf, Receiver<f64>) {
+/// A 2DIY that stands still for so many frames, behind a link of this path. Hands over the torque of motor 1 in each frame.
+fn board(at: &Path, frames: u32) -> Receiver<f64> {
     let master = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY).unwrap();
     grantpt(&master).unwrap();
     unlockpt(&master).unwrap();
-    let path = PathBuf::from(ptsname(&master, Vec::new()).unwrap().into_string().unwrap());
+    let name = ptsname(&master, Vec::new()).unwrap();
+    let path = PathBuf::from(name.into_string().unwrap());
     // held open, so that reads wait for whoever comes; raw before anybody comes
     let slave = File::options().read(true).write(true).open(&path).unwrap();
     let mut settings = tcgetattr(slave.as_fd()).unwrap();
@@ -83,14 +85,19 @@ fn board() -> (PathBuf, Receiver<f64>) {
         let mut answer = [5; ANSWER_BYTES];
         answer[1..].copy_from_slice(degrees.map(f32::to_le_bytes).as_flattened());
         let mut frame = [0; TORQUES_BYTES];
-        while port.read_exact(&mut frame).is_ok() {
+        for _ in 0..frames {
+            if port.read_exact(&mut frame).is_err() {
+                return;
+            }
             let first = f32::from_le_bytes(frame[6..].try_into().unwrap());
             if torques.send(first.into()).is_err() || port.write_all(&answer).is_err() {
                 return;
             }
         }
     });
-    (path, asked)
+    let _ = std::fs::remove_file(at);
+    std::os::unix::fs::symlink(path, at).unwrap();
+    asked
 }
 
 /// Ticks a loop that pushes until the device is told to.
@@ -109,21 +116,20 @@ fn pushed(port: &mut DevicePort, asked: &Receiver<f64>) {
     panic!("no force came to the device");
 }
 
+const ANYWHERE: &str = "127.0.0.1:0";
+
 /// Both devices, each until the first force.
-fn pushing() -> Vec<(DeviceHost, DevicePort, Receiver<f64>)> {
-    let (service, service_asked) = service();
-    let (board, board_asked) = board();
+fn pushing(place: &Path) -> Vec<(DeviceHost, DevicePort, Receiver<f64>)> {
+    let (service, service_asked) = service(ANYWHERE.parse().unwrap(), u32::MAX);
+    let port = place.join("port");
+    let board_asked = board(&port, u32::MAX);
     let both = [
         (
             DeviceAddress::Inverse3(service),
             DeviceKind::Inverse3,
             service_asked,
         ),
-        (
-            DeviceAddress::TwoDiy(board),
-            DeviceKind::TwoDiy,
-            board_asked,
-        ),
+        (DeviceAddress::TwoDiy(port), DeviceKind::TwoDiy, board_asked),
     ];
     let started = both.into_iter().map(|(at, kind, asked)| {
         let host = DeviceHost::start(&at, config(kind)).unwrap();
@@ -136,7 +142,8 @@ fn pushing() -> Vec<(DeviceHost, DevicePort, Receiver<f64>)> {
 
 #[test]
 fn the_end_of_the_process_leaves_no_force_though_the_loop_was_pushing() {
-    for (host, port, asked) in pushing() {
+    let place = tempfile::tempdir().unwrap();
+    for (host, port, asked) in pushing(place.path()) {
         let address = host.address().to_owned();
         drop(host);
         // the board is held open by its test: its last frame is the newest
@@ -151,7 +158,8 @@ fn the_end_of_the_process_leaves_no_force_though_the_loop_was_pushing() {
 
 #[test]
 fn the_end_of_a_session_leaves_no_force_while_the_device_goes_on() {
-    for (host, port, asked) in pushing() {
+    let place = tempfile::tempdir().unwrap();
+    for (host, port, asked) in pushing(place.path()) {
         drop(port);
         // what was asked for before, and the one that was under way, may push; then nothing does
         let before = asked.try_iter().count();
@@ -159,6 +167,30 @@ fn the_end_of_a_session_leaves_no_force_while_the_device_goes_on() {
         let still = frames[2..].iter().all(|newtons| *newtons == 0.0);
         assert!(still, "{} after {before}: {frames:?}", host.address());
     }
+}
+
+#[test]
+fn a_service_and_a_port_that_go_and_come_back_are_pushed_again_after_a_new_grip() {
+    let (at, asked) = service(ANYWHERE.parse().unwrap(), 500);
+    let host = DeviceHost::start(&DeviceAddress::Inverse3(at), config(DeviceKind::Inverse3));
+    let host = host.unwrap();
+    let mut port = host.port();
+    pushed(&mut port, &asked);
+    while asked.recv().is_ok() {}
+    let (_, again) = service(at, u32::MAX);
+    pushed(&mut port, &again);
+
+    let place = tempfile::tempdir().unwrap();
+    let path = place.path().join("port");
+    // it rests for a second before it is held
+    let asked = board(&path, 3000);
+    let at = DeviceAddress::TwoDiy(path.clone());
+    let host = DeviceHost::start(&at, config(DeviceKind::TwoDiy)).unwrap();
+    let mut port = host.port();
+    pushed(&mut port, &asked);
+    while asked.recv().is_ok() {}
+    let again = board(&path, u32::MAX);
+    pushed(&mut port, &again);
 }
 
 #[test]
