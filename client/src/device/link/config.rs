@@ -168,7 +168,7 @@ pub struct DeviceLinkConfig {
     pub dialect: Dialect,
     /// Which 2DIY it is. Default 3.
     pub version: Version,
-    /// Greatest torque of a motor of a 2DIY, Nm. Default 0.3: 3 N in the middle of its reach. The vendor states none.
+    /// Greatest torque of a motor of a 2DIY, Nm. Default 0.3: 3 N take at most 0.24 in its workspace. The vendor states none.
     pub torque_max_nm: f64,
 }
 
