@@ -69,6 +69,7 @@ fn trigger(criterion: &mut Criterion) {
         noise_n: 0.0,
         slave_in_contact: true,
         shadow_in_contact: true,
+        hip_stands: false,
         sticking: false,
         speed: 0.16,
         acceleration: 0.2,

@@ -281,6 +281,7 @@ impl Slave {
     pub fn tick(&mut self, now: Time) -> Option<SlaveTick> {
         let before = self.playout.played_hip();
         let played = self.playout.advance(now)?;
+        let hip_stands = self.playout.played_hip() == before;
         let played = self.tool.step(before, played);
         self.tool_at = played.hip;
         let (back, rate) = self.compliance.step(self.tool.port().held());
@@ -298,9 +299,9 @@ impl Slave {
         self.follow_master(played.stamp);
         self.reference.take_echo(played.force);
         self.errors.push(&contact, played.force);
-        let input = self
-            .reference
-            .input(&contact, &self.object, &self.shadow, held_back);
+        let input =
+            self.reference
+                .input(&contact, &self.object, &self.shadow, held_back, hip_stands);
         let cause = self.trigger.step(now, &input);
         let f_shadow = self.shadow.rendered().force;
         Some(SlaveTick {

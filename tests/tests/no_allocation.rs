@@ -300,6 +300,7 @@ impl Parts {
             noise_n: 0.0,
             slave_in_contact: met.in_contact,
             shadow_in_contact: rendered.in_contact(),
+            hip_stands: false,
             sticking: estimate.sticking,
             speed: estimate.speed,
             acceleration: estimate.acceleration,

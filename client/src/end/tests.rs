@@ -216,7 +216,7 @@ fn session(
     until: u64,
     stands_still: Range<u64>,
     way: impl Fn(bool, u64) -> Option<u64>,
-) -> Vec<(LinkState, u32, f64)> {
+) -> Vec<(LinkState, u64, f64)> {
     let mut end = end(CommandConfig::default(), Architecture::Mmt);
     let mut slave = DatagramChannel::new(Side::Slave, Time::ZERO);
     let (mut ups, mut downs) = (Vec::new(), Vec::new());
@@ -265,7 +265,7 @@ fn session(
 }
 
 /// Over a path of 20 ms each way whose way up, or down, carries nothing from `lost_from` ms on.
-fn outage(up: bool, lost_from: u64) -> Vec<(LinkState, u32, f64)> {
+fn outage(up: bool, lost_from: u64) -> Vec<(LinkState, u64, f64)> {
     session(lost_from + 1500, 0..0, |is_up, ms| {
         (is_up != up || ms < lost_from).then_some(20)
     })

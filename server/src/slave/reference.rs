@@ -51,13 +51,15 @@ impl ForceReference {
         }
     }
 
-    /// The trigger's input. `held_back` says whether the limit of the tool's force keeps the tool from the HIP.
+    /// The trigger's input. `held_back` says whether the limit of the tool's force keeps the tool from the HIP, `hip_stands`
+    /// whether the HIP is where it was a sample before.
     pub(super) fn input(
         &mut self,
         contact: &Contact,
         object: &ObjectEstimate,
         shadow: &Shadow,
         held_back: bool,
+        hip_stands: bool,
     ) -> TriggerInput {
         let (f_m, shadow_in_contact) = self.model_force(contact, shadow, held_back);
         let [f_s, f_m] = self.average([contact.force, f_m], contact.averaged);
@@ -69,6 +71,7 @@ impl ForceReference {
             noise_n: contact.noise_n / (contact.averaged as f64).sqrt(),
             slave_in_contact: contact.in_contact,
             shadow_in_contact,
+            hip_stands,
             // a model that does not stand where the object does is a mismatch although the object sticks
             sticking: estimate.sticking
                 && estimate.holding.is_none_or(|c| model.params.c() > 0.5 * c),

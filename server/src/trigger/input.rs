@@ -16,6 +16,8 @@ pub struct TriggerInput {
     pub slave_in_contact: bool,
     /// Whether the HIP touches the shadow.
     pub shadow_in_contact: bool,
+    /// Whether the HIP is where it was a sample before, to the bit: a hand that was let go.
+    pub hip_stands: bool,
     /// Whether the object does not move although it is pushed.
     pub sticking: bool,
     /// Speed of the object along the push, m/s.

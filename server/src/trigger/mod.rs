@@ -2,8 +2,8 @@
 //!
 //! Pure, and only of what it is given. Rules that the paper leaves open: (12) is evaluated while both
 //! sides are in contact, with the force divided by no less than a floor; a contact that only one side has
-//! counts after a debounce and is sent again at intervals, not at every sample; a lost contact is sent
-//! once. Every update, whatever its cause, resets the timer.
+//! counts after a debounce and is sent again at intervals, not at every sample, and ever more rarely while the HIP stands; a
+//! lost contact is sent once. Every update, whatever its cause, resets the timer.
 
 mod config;
 mod contact;
@@ -41,12 +41,17 @@ const ESTIMATE_DEVIATIONS: f64 = 5.0;
 /// And so may a turn of fewer standard deviations of the force's direction.
 const TURN_DEVIATIONS: f64 = 2.0;
 
+/// A contact mismatch that lasts while the HIP stands is sent again ever more rarely, up to this: nobody feels it.
+const REPEAT_MAX: Duration = Duration::from_secs(1);
+
 /// Only one side is in contact.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Mismatch {
     cause: Cause,
     since: Time,
     sent: Option<Time>,
+    /// From one update to the next.
+    repeat: Duration,
 }
 
 /// Decides, sample by sample.
@@ -133,17 +138,24 @@ impl Trigger {
             cause,
             since: now,
             sent: None,
+            repeat: self.config.mismatch_repeat,
         };
-        let mismatch = self
-            .mismatch
-            .filter(|old| old.cause == cause)
-            .unwrap_or(fresh);
+        let old = self.mismatch.filter(|old| old.cause == cause);
+        let mut mismatch = old.unwrap_or(fresh);
+        if !input.hip_stands {
+            mismatch.repeat = fresh.repeat;
+        }
         let due = match mismatch.sent {
             None => now >= mismatch.since + self.config.mismatch_debounce,
-            Some(sent) => now >= sent + self.config.mismatch_repeat,
+            Some(sent) => now >= sent + mismatch.repeat,
         };
-        let sent = if due { Some(now) } else { mismatch.sent };
-        self.mismatch = Some(Mismatch { sent, ..mismatch });
+        if due {
+            if mismatch.sent.is_some() {
+                mismatch.repeat = (mismatch.repeat * 2).min(REPEAT_MAX.max(fresh.repeat));
+            }
+            mismatch.sent = Some(now);
+        }
+        self.mismatch = Some(mismatch);
         if due {
             Some(cause)
         } else {

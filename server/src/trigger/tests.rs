@@ -19,6 +19,7 @@ fn input(f_s: f64, f_m: f64) -> TriggerInput {
         noise_n: 0.0,
         slave_in_contact: true,
         shadow_in_contact: true,
+        hip_stands: false,
         sticking: false,
         speed: 0.15,
         acceleration: 0.1,
@@ -148,6 +149,31 @@ fn a_contact_of_one_side_counts_after_the_debounce_and_is_told_again_at_interval
             .collect();
         assert_eq!(told, [10, 60, 110]);
     }
+}
+
+#[test]
+fn a_contact_of_one_side_that_lasts_while_the_hip_stands_is_told_ever_more_rarely_until_the_hip_moves()
+ {
+    let mut trigger = trigger("useful 10% 150ms", Mode::Recommended);
+    let stands = TriggerInput {
+        shadow_in_contact: false,
+        hip_stands: true,
+        ..input(0.4, 0.0)
+    };
+    let mut told = |from: u64, to: u64, one: &TriggerInput| -> Vec<u64> {
+        (from..to)
+            .filter(|n| trigger.step(Time::from_millis(*n), one).is_some())
+            .collect()
+    };
+    assert_eq!(
+        told(0, 4000, &stands),
+        [10, 60, 160, 360, 760, 1560, 2560, 3560]
+    );
+    let moves = TriggerInput {
+        hip_stands: false,
+        ..stands
+    };
+    assert_eq!(told(4000, 4120, &moves), [4000, 4050, 4100]);
 }
 
 #[test]
