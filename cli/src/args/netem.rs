@@ -139,6 +139,9 @@ pub(crate) struct NetemReportArguments {
     /// A record made with --record
     #[arg(value_name = "FILE")]
     pub(crate) file: PathBuf,
+    /// Print all numbers, and bars of the delays, the bursts of loss and the packets in flight
+    #[arg(long, conflicts_with = "json")]
+    pub(crate) full: bool,
     /// Print everything as one JSON document: the numbers, delay histogram, loss bursts, queue
     #[arg(long)]
     pub(crate) json: bool,

@@ -205,19 +205,29 @@ fn wait(
                 note(what);
             }
         }
-        if !refused && relay.snapshot().refused.packets > 0 {
-            refused = true;
-            let most = arguments.clients;
-            show.messages.show(&format!(
-                "a master was turned away: there are {most} already (--clients), or no socket is to be had"
-            ));
-        }
+        refused = refused || warn_of_refused(relay, arguments, show.messages);
         let left = duration.map(|duration| duration.saturating_sub(began.elapsed()));
         let patience = left.map_or(CHECK_EVERY, |left| left.min(CHECK_EVERY));
         if show.look(relay, patience) {
             stop.ask();
         }
     }
+    // one that came since the last look counts as well
+    if !refused {
+        warn_of_refused(relay, arguments, show.messages);
+    }
+}
+
+/// Shows that a master was turned away, if one was; whether one was.
+fn warn_of_refused(relay: &RelayHandle, arguments: &NetemArguments, messages: &Messages) -> bool {
+    let refused = relay.snapshot().refused.packets > 0;
+    if refused {
+        let most = arguments.clients;
+        messages.show(&format!(
+            "a master was turned away: there are {most} already (--clients), or no socket is to be had"
+        ));
+    }
+    refused
 }
 
 /// Where a run shows what it does: the gauge, if there is a terminal for it, and messages.

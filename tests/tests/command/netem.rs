@@ -318,10 +318,23 @@ fn a_record_is_compared_with_the_settings_it_was_made_with() {
     assert!(up["achieved"]["mean_ms"].as_f64().unwrap() >= 20.0);
     assert!((up["configured"]["mean_ms"].as_f64().unwrap() - 20.0).abs() < 1e-6);
 
-    let output = mmt(&home, &["netem", "report", file]).output().unwrap();
-    let text = String::from_utf8(output.stdout).unwrap();
+    let output = mmt(&home, &["netem", "report", file, "--full"]);
+    let text = String::from_utf8(output.output().unwrap().stdout).unwrap();
     assert!(
         text.contains("configured") && text.contains("lost in a row"),
+        "{text}"
+    );
+    let output = mmt(&home, &["netem", "report", file]).output().unwrap();
+    let text = String::from_utf8(output.stdout).unwrap();
+    for part in [
+        "up   delay 20ms loss list 3\n",
+        "10.0 % were dropped (20.0 ms and 10.0 % by the settings); down nothing came.\n",
+        "  dropped, %                  10.000      10.000           -           -\n",
+    ] {
+        assert!(text.contains(part), "{part} in:\n{text}");
+    }
+    assert!(
+        !text.contains("reordered") && text.lines().count() < 18,
         "{text}"
     );
 }

@@ -45,8 +45,10 @@ pub(super) fn run(arguments: &NetemReportArguments) -> Result<(), Failure> {
     let report = RecordReport::of_file(&arguments.file)?;
     if arguments.json {
         print_json(&report)
-    } else {
+    } else if arguments.full {
         print(&report)
+    } else {
+        print(Brief(&report))
     }
 }
 
@@ -93,13 +95,71 @@ fn offers(entries: &[Entry], direction: Direction) -> Vec<(Time, usize)> {
     mine.iter().map(offer).collect()
 }
 
+/// A report in a sentence and ten lines, without what is zero.
+struct Brief<'a>(&'a RecordReport);
+
+impl fmt::Display for Brief<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let report = self.0;
+        let ways = [("up", &report.up), ("down", &report.down)];
+        writeln!(f, "{}", report.head())?;
+        for (name, way) in ways {
+            writeln!(f, "{name:4} {}", way.words)?;
+        }
+        writeln!(f)?;
+        if report.degraded {
+            writeln!(f, "{DEGRADED}")?;
+        }
+        writeln!(f, "{}\n", report.verdict())?;
+        let columns = ["up, set", "up", "down, set", "down"].map(|name| format!("{name:>12}"));
+        writeln!(f, "  {:22}{}", "", columns.concat())?;
+        let [up, down] = ways.map(|(_, way)| way.rows());
+        for ((label, decimals, up), (_, _, down)) in up.into_iter().zip(down) {
+            let cell = |value: Option<f64>| {
+                value.map_or_else(|| "-".to_owned(), |value| format!("{value:.decimals$}"))
+            };
+            let cells = [up, down].concat().into_iter().map(cell);
+            let cells: Vec<String> = cells.collect();
+            let has_number = |cell: &String| cell.chars().any(|digit| ('1'..='9').contains(&digit));
+            if cells.iter().any(has_number) {
+                let cells: String = cells.iter().map(|cell| format!("{cell:>12}")).collect();
+                writeln!(f, "  {label:22}{cells}")?;
+            }
+        }
+        Ok(())
+    }
+}
+
+impl RecordReport {
+    fn head(&self) -> String {
+        let (command, version, seed) = (self.command, self.version, self.heading.seed);
+        format!("mmt {command} {version}, seed {seed}")
+    }
+
+    /// What came of the settings, in a sentence.
+    fn verdict(&self) -> String {
+        let ways = [("Up", &self.up), ("down", &self.down)].map(|(name, way)| {
+            let seen = &way.achieved;
+            if seen.offered.packets == 0 {
+                return format!("{name} nothing came");
+            }
+            let (ms, percent) = (seen.mean_ms, 100.0 * seen.loss);
+            let set = way.configured.as_ref().map_or_else(String::new, |set| {
+                let dropped = 100.0 * (set.loss + set.queue_drops + set.over_limit);
+                format!(
+                    " ({:.1} ms and {dropped:.1} % by the settings)",
+                    set.mean_ms
+                )
+            });
+            format!("{name} a packet took {ms:.1} ms and {percent:.1} % were dropped{set}")
+        });
+        format!("{}.", ways.join("; "))
+    }
+}
+
 impl fmt::Display for RecordReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        writeln!(
-            f,
-            "mmt {} {}, seed {}",
-            self.command, self.version, self.heading.seed
-        )?;
+        writeln!(f, "{}", self.head())?;
         for (name, direction) in [("up", &self.up), ("down", &self.down)] {
             writeln!(f, "\n{name}: {}", direction.words)?;
             direction.fmt(f)?;
@@ -108,6 +168,55 @@ impl fmt::Display for RecordReport {
             write!(f, "\n{DEGRADED}")?;
         }
         Ok(())
+    }
+}
+
+/// Label, decimals; what the settings make, and what came of them.
+type Row = (&'static str, usize, [Option<f64>; 2]);
+
+impl DirectionReport {
+    /// What a network does to packets.
+    fn effects(&self) -> Vec<Row> {
+        let seen = &self.achieved;
+        let there = seen.offered.packets > 0;
+        let row = |label, set: fn(&Effect) -> Option<f64>, achieved: f64| {
+            let set = self.configured.as_ref().and_then(set);
+            (label, 3, [set, there.then_some(achieved)])
+        };
+        // what a full queue drops has runs that the effect does not count
+        let burst = |e: &Effect| (e.queue_drops + e.over_limit == 0.0).then_some(e.burst_packets);
+        vec![
+            row("mean delay, ms", |e| Some(e.mean_ms), seen.mean_ms),
+            row("standard deviation, ms", |e| Some(e.sd_ms), seen.sd_ms),
+            row("p99, ms", |e| Some(e.p99_ms), seen.p99_ms),
+            row(
+                "dropped, %",
+                |e| Some(100.0 * (e.loss + e.queue_drops + e.over_limit)),
+                100.0 * seen.loss,
+            ),
+            row("burst, packets", burst, seen.burst_packets),
+            row(
+                "reordered, %",
+                |e| Some(100.0 * e.reordered),
+                100.0 * seen.reordered,
+            ),
+        ]
+    }
+
+    /// The rows that most people want.
+    fn rows(&self) -> Vec<Row> {
+        let seen = &self.achieved;
+        let [_, p99, _] = seen.lateness_us;
+        let most = seen.queue.iter().map(|(_, most)| *most).max();
+        let counted = |label, decimals, value| (label, decimals, [None, Some(value)]);
+        let mut rows = vec![
+            counted("packets offered", 0, seen.offered.packets as f64),
+            counted("packets a second", 1, seen.rate_hz),
+        ];
+        rows.extend(self.effects());
+        rows.push(counted("most in flight", 0, f64::from(most.unwrap_or(0))));
+        rows.push(counted("released late p99, us", 0, p99));
+        rows
     }
 }
 
@@ -126,29 +235,12 @@ impl fmt::Display for DirectionReport {
             writeln!(f, "  dropped ({cause}) {packets}")?;
         }
         writeln!(f, "  {:22} {:>12} {:>12}", "", "configured", "achieved")?;
-        type Number = (&'static str, fn(&Effect) -> Option<f64>, f64);
-        // what a full queue drops has runs that the effect does not count
-        let burst = |e: &Effect| (e.queue_drops + e.over_limit == 0.0).then_some(e.burst_packets);
-        let rows: [Number; 6] = [
-            ("mean delay, ms", |e| Some(e.mean_ms), seen.mean_ms),
-            ("standard deviation, ms", |e| Some(e.sd_ms), seen.sd_ms),
-            ("p99, ms", |e| Some(e.p99_ms), seen.p99_ms),
-            (
-                "dropped, %",
-                |e| Some(100.0 * (e.loss + e.queue_drops + e.over_limit)),
-                100.0 * seen.loss,
-            ),
-            ("burst, packets", burst, seen.burst_packets),
-            (
-                "reordered, %",
-                |e| Some(100.0 * e.reordered),
-                100.0 * seen.reordered,
-            ),
-        ];
-        for (label, configured, achieved) in rows {
-            let configured = self.configured.as_ref().and_then(configured);
-            let shown = configured.map_or_else(|| "-".to_owned(), |value| format!("{value:.3}"));
-            writeln!(f, "  {label:22} {shown:>12} {achieved:>12.3}")?;
+        for (label, _, [configured, achieved]) in self.effects() {
+            let shown = |value: Option<f64>| {
+                value.map_or_else(|| "-".to_owned(), |value| format!("{value:.3}"))
+            };
+            let (configured, achieved) = (shown(configured), shown(achieved));
+            writeln!(f, "  {label:22} {configured:>12} {achieved:>12}")?;
         }
         let [p50, p99, max] = seen.lateness_us;
         writeln!(

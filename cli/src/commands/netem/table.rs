@@ -65,7 +65,9 @@ impl NetemReport {
     fn rest(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let counters = &self.counters;
         let (up, down) = (counters.up.in_flight, counters.down.in_flight);
-        writeln!(f, "{:20} {up:>12} {:>12} {down:>12}", "in flight", "")?;
+        if up > 0 || down > 0 {
+            writeln!(f, "{:20} {up:>12} {:>12} {down:>12}", "in flight", "")?;
+        }
         writeln!(f, "\nclients met          {:>12}", counters.clients_met)?;
         for (label, count) in [
             ("refused", counters.refused.packets),
