@@ -133,9 +133,17 @@ impl<'a> Layers<'a> {
     /// # Errors
     /// What is wrong with the file, with line and caret: no TOML, an unknown key, a value that a run refuses.
     pub fn config(&self) -> Result<WorldConfig, TextError> {
+        self.config_from(Start::Live)
+    }
+
+    /// The configuration over a start that is not the program's own: of experiments.
+    ///
+    /// # Errors
+    /// As [`Layers::config`].
+    pub fn config_from(&self, start: Start) -> Result<WorldConfig, TextError> {
         let given = self.given()?;
-        let config = self.laid(&given)?;
-        self.check(&given, &config)?;
+        let config = self.laid(start, &given)?;
+        self.check(start, &given, &config)?;
         Ok(match self.seed {
             Some(seed) => config.seeded(seed),
             None => config,
@@ -156,8 +164,8 @@ impl<'a> Layers<'a> {
         Ok(given)
     }
 
-    fn laid(&self, given: &Spanned<DeTable>) -> Result<WorldConfig, TextError> {
-        let start = beginning(Start::Live, given);
+    fn laid(&self, start: Start, given: &Spanned<DeTable>) -> Result<WorldConfig, TextError> {
+        let start = beginning(start, given);
         if self.program != Program::Demo {
             return self.lay(&start, given.clone());
         }
@@ -197,7 +205,12 @@ impl<'a> Layers<'a> {
     }
 
     /// Makes the world, and where that is refused finds the key to blame: the first one that is refused without the others.
-    fn check(&self, given: &Spanned<DeTable>, config: &WorldConfig) -> Result<(), TextError> {
+    fn check(
+        &self,
+        start: Start,
+        given: &Spanned<DeTable>,
+        config: &WorldConfig,
+    ) -> Result<(), TextError> {
         let Err(error) = self.attempt(config) else {
             return Ok(());
         };
@@ -206,7 +219,7 @@ impl<'a> Layers<'a> {
         let refused = leaves.into_iter().find(|(key, value)| {
             let mut alone = DeTable::new();
             lay_at(&mut alone, key, &value.span(), (*value).clone());
-            let config = self.laid(&Spanned::new(0..0, alone));
+            let config = self.laid(start, &Spanned::new(0..0, alone));
             config.is_ok_and(|config| self.attempt(&config).is_err())
         });
         let Some((_, value)) = refused else {

@@ -4,8 +4,10 @@
 //! trial, so that trials may run in any order on any number of threads.
 
 mod recovery;
+mod running;
 
 pub use recovery::Recovery;
+pub use running::Running;
 
 use std::time::Duration;
 
@@ -19,7 +21,7 @@ use mmt_shared::report::TrueForce;
 use mmt_shared::time::TICK_S;
 use serde::{Deserialize, Serialize};
 
-use crate::world::{Traffic, World, WorldConfig, WorldError, WorldTick};
+use crate::world::{Given, Traffic, World, WorldConfig, WorldError, WorldTick};
 use recovery::Watch;
 
 /// The first second of contact is the opening: the model starts wrong there.
@@ -178,35 +180,17 @@ impl Trial {
         self.run_in(World::along(&self.config, hand.clone())?)
     }
 
-    fn run_in(&self, mut world: World) -> Result<Measured, TrialError> {
-        let mut run = Counters::default();
-        for _ in 0..self.duration.as_millis() {
-            let tick = world.step();
-            run.take(&tick, self.traced);
-            self.change_if_due(&mut world, &mut run)?;
+    fn run_in(&self, world: World) -> Result<Measured, TrialError> {
+        let mut running = Running::of(self, world);
+        while !running.is_over() {
+            running.step(Given::default())?;
         }
-        Ok(run.measured(&world))
-    }
-
-    fn change_if_due(&self, world: &mut World, run: &mut Counters) -> Result<(), TrialError> {
-        let Some(change) = self.change.filter(|_| run.watch.is_none()) else {
-            return Ok(());
-        };
-        let pushes = world.operator().pushes_completed().unwrap_or_default();
-        if pushes != change.after_pushes {
-            run.push_contact_s = 0.0;
-        }
-        if run.push_contact_s <= 0.0 || run.push_contact_s < change.contact_s {
-            return Ok(());
-        }
-        change.to.apply(world.environment_mut())?;
-        run.watch = Some(Watch::default());
-        Ok(())
+        Ok(running.into_measured())
     }
 }
 
 /// What is counted while a trial runs.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 struct Counters {
     contact_s: f64,
     /// Contact in the current push, s.

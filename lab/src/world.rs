@@ -14,9 +14,9 @@ use mmt_client::operator::Operator;
 use mmt_client::operator::scripted::{Picture, Scripted, View};
 use mmt_client::operator::trace::Trace;
 use mmt_netem::link::LinkId;
-use mmt_netem::{Link, Packet};
+use mmt_netem::{Direction, Link, Packet};
 use mmt_server::end::{SlaveEnd, SlaveGiven};
-use mmt_server::slave::{Slave, SlaveTick};
+use mmt_server::slave::{Slave, SlaveTick, Substitutes};
 use mmt_shared::metrics::{PoseError, Staleness};
 use mmt_shared::model::geometry::Vec2;
 use mmt_shared::pairing::Token;
@@ -28,16 +28,21 @@ use crate::check::SessionChecks;
 
 mod config;
 mod datagram;
+mod given;
 mod measures;
 mod outcome;
+mod packets;
 pub(crate) mod picture;
 mod plant;
 mod slave_clock;
 
 pub use config::{WorldConfig, WorldError};
+pub use given::Given;
 pub use outcome::{Outcome, Traffic};
+pub use packets::WorldPacket;
 
 use datagram::Datagram;
+use packets::Packets;
 use picture::{DelayedPicture, scene};
 use slave_clock::SlaveClock;
 
@@ -72,6 +77,8 @@ pub struct World {
     staleness: Staleness,
     pose: PoseError,
     log: Sha256,
+    /// Kept where somebody asks for them.
+    packets: Option<Box<Packets>>,
     /// They see every tick of every test, and of runs that ask for it.
     checks: Box<SessionChecks>,
     judges: bool,
@@ -146,6 +153,7 @@ impl World {
             staleness: Staleness::default(),
             pose: PoseError::default(),
             log: Sha256::new(),
+            packets: None,
         })
     }
 
@@ -162,11 +170,16 @@ impl World {
     /// by then, the slave's tick. On a perfect network a sample is played in the tick it was taken in,
     /// and an update is applied in the next.
     pub fn step(&mut self) -> WorldTick {
+        self.step_given(Given::default())
+    }
+
+    /// The same with what somebody else does in the place of the world's own.
+    pub fn step_given(&mut self, given: Given<'_>) -> WorldTick {
         self.now += TICK;
         self.deliver_down();
-        let master = self.master_tick();
+        let master = self.master_tick(given.hip);
         self.deliver_up();
-        let slave = self.slave_tick();
+        let slave = self.slave_tick(given.slave);
         self.log_tick(&master, slave.as_ref());
         WorldTick {
             now: self.now,
@@ -176,7 +189,7 @@ impl World {
     }
 
     fn deliver_down(&mut self) {
-        while let Some(packet) = self.down.poll_delivered(self.now) {
+        while let Some(packet) = self.next(Direction::Down) {
             // QUIC drops what does not authenticate
             if !packet.is_corrupted() {
                 self.master
@@ -194,10 +207,8 @@ impl World {
         }
     }
 
-    fn master_tick(&mut self) -> MasterTick {
-        let elapsed = self.now.saturating_since(Time::ZERO + TICK);
-        let view = self.seen();
-        let reading = self.operator.step(elapsed, &view, self.hand_force);
+    fn master_tick(&mut self, hip: Option<Vec2>) -> MasterTick {
+        let reading = hip.unwrap_or_else(|| self.operated_hip());
         let tick = self.master.tick(self.now, reading);
         self.hand_force = tick.hand_force;
         if self.judges {
@@ -216,9 +227,19 @@ impl World {
             if self.judges {
                 self.checks.up(self.now, datagram.bytes());
             }
+            if let Some(packets) = &mut self.packets {
+                packets.left(Direction::Up, self.now, datagram.bytes());
+            }
             self.up.offer(self.now, Packet::new(length, datagram));
         }
         tick
+    }
+
+    /// Where the world's own operator has the HIP now, m.
+    fn operated_hip(&mut self) -> Vec2 {
+        let elapsed = self.now.saturating_since(Time::ZERO + TICK);
+        let view = self.seen();
+        self.operator.step(elapsed, &view, self.hand_force)
     }
 
     /// What the operator sees; contact is felt, not seen.
@@ -236,7 +257,7 @@ impl World {
     }
 
     fn deliver_up(&mut self) {
-        while let Some(packet) = self.up.poll_delivered(self.now) {
+        while let Some(packet) = self.next(Direction::Up) {
             if !packet.is_corrupted() {
                 let arrived = self.slave_clock.at(packet.due);
                 self.slave.handle_datagram(arrived, packet.payload.bytes());
@@ -247,9 +268,9 @@ impl World {
         }
     }
 
-    fn slave_tick(&mut self) -> Option<SlaveTick> {
+    fn slave_tick(&mut self, others: Substitutes<'_>) -> Option<SlaveTick> {
         let now = self.slave_clock.at(self.now);
-        let tick = self.slave.tick(now);
+        let tick = self.slave.tick_with(now, others);
         if self.judges {
             let given = SlaveGiven {
                 stops: false,
@@ -276,6 +297,9 @@ impl World {
             let datagram = Datagram { bytes, length };
             if self.judges {
                 self.checks.down(now, datagram.bytes());
+            }
+            if let Some(packets) = &mut self.packets {
+                packets.left(Direction::Down, self.now, datagram.bytes());
             }
             self.down.offer(self.now, Packet::new(length, datagram));
         }

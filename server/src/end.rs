@@ -15,7 +15,7 @@ use mmt_shared::wire::{Architecture, Command, Hello, Message, Side};
 
 use crate::plant::{PlantAnswer, PlantCommand};
 use crate::repeats::{Repeating, Repeats};
-use crate::slave::{Memory, Slave, SlaveConfig, SlaveError, SlaveTick};
+use crate::slave::{Memory, Slave, SlaveConfig, SlaveError, SlaveTick, Substitutes};
 
 mod half;
 mod transmit;
@@ -276,10 +276,15 @@ impl SlaveEnd {
 
     /// One sample period; `now` is the tick's deadline. None before the first HIP sample is due.
     pub fn tick(&mut self, now: Time) -> Option<SlaveTick> {
+        self.tick_with(now, Substitutes::default())
+    }
+
+    /// The same with stages of somebody else's.
+    pub fn tick_with(&mut self, now: Time, others: Substitutes<'_>) -> Option<SlaveTick> {
         self.consider_disengaging(now);
         let stands = self.stopped_by().is_some() || self.disengaged;
         self.slave.hold_tool(stands);
-        let tick = self.slave.tick(now)?;
+        let tick = self.slave.tick_with(now, others)?;
         self.counts.updates.tick(tick.in_contact);
         if let Some(update) = tick.update {
             let overtaken = self.update.replace(update).is_some();

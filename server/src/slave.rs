@@ -10,14 +10,14 @@ use mmt_shared::model::params::ModelState;
 use mmt_shared::model::sample::{ForceCounts, HipSample};
 use mmt_shared::model::settings::ModelSettings;
 use mmt_shared::model::tool::{HandPort, Scene, Tool};
-use mmt_shared::model::update::{Cause, Update};
+use mmt_shared::model::update::Update;
 use mmt_shared::report::TrueForce;
 use mmt_shared::time::Time;
 
-use crate::contact::{Contact, ContactStage};
+use crate::contact::ContactStage;
 use crate::environment::{Environment, EnvironmentConfig};
 use crate::estimator::Estimate;
-use crate::playout::{Played, PlayoutBuffer, PlayoutConfig};
+use crate::playout::{PlayoutBuffer, PlayoutConfig};
 use crate::pose_observer::PoseObserver;
 use crate::shadow::Shadow;
 use crate::tool::ToolDrive;
@@ -32,10 +32,12 @@ mod memory;
 mod object;
 mod plant;
 mod reference;
+mod tick;
 mod update_builder;
 
 pub use config::{SlaveConfig, SlaveError, StartModel};
 pub use memory::Memory;
+pub use tick::{OtherEstimator, OtherScheme, Substitutes};
 
 use force_errors::ForceErrors;
 use object::ObjectEstimate;
@@ -275,74 +277,6 @@ impl Slave {
             tool: tick.tool,
             force: tick.f_s,
         }
-    }
-
-    /// One sample period. None before the first HIP sample is due.
-    pub fn tick(&mut self, now: Time) -> Option<SlaveTick> {
-        let before = self.playout.played_hip();
-        let played = self.playout.advance(now)?;
-        let hip_stands = self.playout.played_hip() == before;
-        let played = self.tool.step(before, played);
-        self.tool_at = played.hip;
-        let (back, rate) = self.compliance.step(self.tool.port().held());
-        let tool = played.hip - back;
-        let mut contact = self.contact.step(now, tool, played.velocity - rate);
-        // the spring of the tool is part of the contact that the model renders
-        contact.tool += back;
-        self.tool.measured(contact.force);
-        let held_back = self.tool.is_held_back();
-        if self.object.follow_body(&contact) {
-            // the master has the body that was touched before
-            self.trigger.repeat(Cause::SlaveOnlyContact);
-        }
-        self.object.step(now, &contact, held_back);
-        self.follow_master(played.stamp);
-        self.reference.take_echo(played.force);
-        self.errors.push(&contact, played.force);
-        let input =
-            self.reference
-                .input(&contact, &self.object, &self.shadow, held_back, hip_stands);
-        let cause = self.trigger.step(now, &input);
-        let f_shadow = self.shadow.rendered().force;
-        Some(SlaveTick {
-            stamp: played.stamp,
-            tool,
-            f_s: contact.force,
-            true_force: contact.true_force,
-            f_shadow,
-            f_m: played.force,
-            in_contact: contact.in_contact,
-            truth: contact.truth,
-            update: cause.and_then(|cause| self.update(cause, &played, &contact)),
-        })
-    }
-
-    /// The shadow takes the samples up to the one that is played; a lost update is sent again.
-    fn follow_master(&mut self, stamp: Time) {
-        let playout = &self.playout;
-        let on_grid = playout.sample_before(stamp).unwrap_or(stamp);
-        let lost = self
-            .shadow
-            .step(on_grid, stamp, |stamp| playout.hip_at(stamp));
-        if let Some(cause) = lost {
-            self.trigger.repeat(cause);
-        }
-    }
-
-    /// Makes the update and applies it to the shadow, as the master will. None where what was found is not of numbers.
-    fn update(&mut self, cause: Cause, played: &Played, contact: &Contact) -> Option<Update> {
-        let touch = self.reference.model(&self.shadow).rendered().touch;
-        if let (Cause::MasterOnlyContact, Some(touch)) = (cause, touch) {
-            self.object.observer.retract_face(played.hip, touch.face);
-        }
-        self.reference.take_update(contact.force);
-        let model = self.shadow.ahead();
-        let (stamp, in_contact) = (played.stamp, contact.in_contact);
-        let update = self
-            .updates
-            .step(cause, stamp, in_contact, &self.object, model)?;
-        self.shadow.send(&update);
-        Some(update)
     }
 }
 

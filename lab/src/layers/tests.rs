@@ -221,3 +221,23 @@ fn a_demo_without_a_file_has_its_network_and_a_play_out_for_it() {
         ("delay 5ms", 11.0)
     );
 }
+
+#[test]
+fn a_start_that_is_not_the_programs_own_lies_below_the_file_and_is_checked_like_it() {
+    let over = |start, file| {
+        let layers = Layers {
+            program: Program::Sweep,
+            file,
+            flags: &[],
+            seed: None,
+        };
+        layers.config_from(start)
+    };
+    let paper = over(Start::PaperExperiment, "slave.mode = \"paper\"").unwrap();
+    let scheme = "hybrid 10% 150ms".parse().unwrap();
+    assert_eq!(paper, crate::setting::paper_world(Mode::Paper, scheme));
+    let live = over(Start::Live, "slave.mode = \"paper\"").unwrap();
+    assert_ne!(paper.samples_per_command, live.samples_per_command);
+    let wrong = over(Start::PaperExperiment, "seed = 2\noperator.push_speed = -1");
+    assert!(wrong.unwrap_err().to_string().starts_with("line 2"));
+}

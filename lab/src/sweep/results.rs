@@ -150,20 +150,29 @@ impl Results {
         (1..=plan.rows()).filter(|row| !self.rows.contains_key(row))
     }
 
-    /// The table of results as CSV (RFC 4180, lines end with LF): `row`, a column per key of the axes, `seed`, what
-    /// was measured; none while rows are missing.
+    /// The rows that are done, in their order, below the names of their columns: `row`, a column per key of the axes, `seed`,
+    /// what was measured.
     #[must_use]
-    pub fn to_csv(&self, plan: &Plan) -> Option<Vec<u8>> {
+    pub fn table(&self, plan: &Plan) -> (Vec<String>, Vec<Vec<String>>) {
         let head = std::iter::once("row").chain(plan.keys()).chain(["seed"]);
         let head = head.map(str::to_owned);
-        let header: Vec<String> = head.chain(measured_keys().map(str::to_owned)).collect();
-        let record = |number: u64| {
-            let (row, result) = (plan.row(number)?, self.rows.get(&number)?);
+        let header = head.chain(measured_keys().map(str::to_owned)).collect();
+        let record = |(number, result): (&u64, &RowResult)| {
+            let row = plan.row(*number)?;
             let place = std::iter::once(number.to_string()).chain(row.values);
             let place = place.chain([row.seed.to_string()]);
             Some(place.chain(result.measured.iter().cloned()).collect())
         };
-        let records: Option<Vec<Vec<String>>> = (1..=plan.rows()).map(record).collect();
-        Some(csv_of(std::iter::once(header).chain(records?)))
+        (header, self.rows.iter().filter_map(record).collect())
+    }
+
+    /// The same as CSV (RFC 4180, lines end with LF); none while rows are missing.
+    #[must_use]
+    pub fn to_csv(&self, plan: &Plan) -> Option<Vec<u8>> {
+        if self.missing(plan).next().is_some() {
+            return None;
+        }
+        let (header, records) = self.table(plan);
+        Some(csv_of(std::iter::once(header).chain(records)))
     }
 }

@@ -297,6 +297,7 @@ fn parts_make_the_same_bytes_however_the_rows_are_cut() {
     let mut shards = Results::default();
     for shard in ["3/3", "1/3", "2/3"] {
         assert_eq!(shards.to_csv(&plan), None, "before {shard}");
+        assert_eq!(shards.table(&plan).1.len() as u64, shards.done());
         let shard: Shard = shard.parse().unwrap();
         let rows = (1..=12).rev().filter(|row| shard.has(*row));
         shards.add_part(&plan, "b", &part(&plan, rows)).unwrap();

@@ -61,3 +61,15 @@ fn a_change_to_an_impossible_object_is_an_error() {
     let error = impossible.run().unwrap_err().to_string();
     assert!(error.starts_with("change: environment: "), "{error}");
 }
+
+#[test]
+fn a_trial_that_is_stepped_from_outside_comes_to_the_same_and_its_packets_change_nothing() {
+    let link = "delay 20ms 5ms loss 5%".parse().unwrap();
+    let trial = Trial::new(WorldConfig::over(link).seeded(2), Duration::from_secs(6));
+    let mut running = Running::try_new(&trial).unwrap().with_packets();
+    while !running.is_over() {
+        running.step(Given::default()).unwrap();
+    }
+    assert_eq!(running.measured(), trial.run().unwrap());
+    assert!(!running.world().packets().is_empty());
+}

@@ -10,6 +10,7 @@ use mmt_shared::model::settings::Mode;
 use mmt_shared::pairing::Token;
 
 mod estimation;
+mod given;
 mod shapes;
 
 /// The default network: 50 ms ± 5 ms each way, 1 % loss.

@@ -145,8 +145,9 @@ impl ObjectEstimate {
         self.observer = PoseObserver::new(self.observer_config, pose, found.footprint);
     }
 
-    /// One tick. `held_back` says whether the limit of the tool's force keeps the tool from the HIP.
-    pub(super) fn step(&mut self, now: Time, contact: &Contact, held_back: bool) {
+    /// One tick; what the estimator was given. `held_back` says whether the limit of the tool's force keeps the tool from
+    /// the HIP.
+    pub(super) fn step(&mut self, now: Time, contact: &Contact, held_back: bool) -> Measured {
         let observer = &mut self.observer;
         observer.step(
             now,
@@ -164,7 +165,7 @@ impl ObjectEstimate {
         }
         // as wide as the learned faces; the paper's never change
         let side = observer.footprint().mean_side();
-        let estimate = self.estimator.step(&Measured {
+        let measured = Measured {
             tool: contact.tool,
             force: contact.force,
             force_noise_n: contact.noise_n,
@@ -175,8 +176,20 @@ impl ObjectEstimate {
                 body_turning: observer.body_rate(),
                 side,
             }),
-        });
-        match self.accept(&estimate, side, held_back) {
+        };
+        let estimate = self.estimator.step(&measured);
+        self.take(self.accept(&estimate, side, held_back));
+        measured
+    }
+
+    /// Takes m (kg), b (N s/m) and c (N) of somebody else's in the place of the estimator's, if they are accepted.
+    pub(super) fn replace(&mut self, [m, b, c]: [f64; 3]) {
+        let side = self.observer.footprint().mean_side();
+        self.take(self.params_of(m, b, c, side));
+    }
+
+    fn take(&mut self, params: Option<ModelParams>) {
+        match params {
             Some(params) => self.params = params,
             None => self.refused += 1,
         }
@@ -191,6 +204,10 @@ impl ObjectEstimate {
             Some(holding) => holding,
             None => estimate.c,
         };
+        self.params_of(m, b, c, side)
+    }
+
+    fn params_of(&self, m: f64, b: f64, c: f64, side: f64) -> Option<ModelParams> {
         let e = c * self.observer.friction_radius();
         ModelParams::try_new(m, b, c, inertia_of_square(m, side), e, &self.coupling).ok()
     }

@@ -1,6 +1,7 @@
 //! The promises of `slave`.
 
 use crate::environment::BodyConfig;
+use crate::estimator::Measured;
 use crate::tool::force::TOOL_FORCE_MAX_N;
 use mmt_shared::model::sample::HipCounts;
 use mmt_shared::model::settings::Mode;
@@ -229,5 +230,50 @@ fn what_a_session_leaves_is_where_the_next_one_begins() {
         assert_ne!(next.estimate().c, config.start.friction_n, "it has learnt");
         assert_eq!(next.state().pose(), next.environment().pose());
         assert_eq!(next.memory(), memory, "nothing has happened since");
+    }
+}
+
+/// The parameters of the updates of two seconds in which an estimator of somebody else's finds this.
+fn params_sent_with(found: Option<[f64; 3]>) -> (Vec<[f64; 3]>, u64) {
+    let mut config = SlaveConfig::of_mode(Mode::Recommended);
+    config.trigger.scheme = Scheme::EverySample;
+    let mut slave = Slave::try_new(&config, Coupling::for_stiffness(1000.0)).unwrap();
+    let (mut now, mut sent) = (Time::ZERO, Vec::new());
+    for _ in 0..100 {
+        now += TICK;
+        let sample = HipSample {
+            stamp: now,
+            ..HipSample::default()
+        };
+        slave.handle_sample(now, &sample, 0);
+        let mut estimator = |_: Time, _: &Measured| found;
+        let others = Substitutes {
+            estimator: Some(&mut estimator),
+            scheme: None,
+        };
+        let update = slave.tick_with(now, others).and_then(|tick| tick.update);
+        sent.extend(update.map(|update| {
+            let params = update.state.params();
+            [params.m(), params.b(), params.c()]
+        }));
+    }
+    (sent, slave.refused_estimates())
+}
+
+#[test]
+fn an_estimator_of_somebody_else_is_what_the_master_gets_if_it_is_accepted() {
+    let theirs = [1.25, 4.0, 3.0];
+    let (own, refused) = params_sent_with(None);
+    assert!(own.len() > 50 && refused == 0, "{} {refused}", own.len());
+    let (sent, refused) = params_sent_with(Some(theirs));
+    assert!(sent.iter().all(|params| *params == theirs), "{sent:?}");
+    assert!(sent.len() == own.len() && refused == 0);
+    for wrong in [[-1.0, 4.0, 3.0], [f64::NAN, 4.0, 3.0], [1.0, 1e9, 3.0]] {
+        let (sent, refused) = params_sent_with(Some(wrong));
+        assert_eq!(
+            (sent, refused),
+            (own.clone(), own.len() as u64),
+            "{wrong:?}"
+        );
     }
 }

@@ -105,13 +105,33 @@ impl Trigger {
 
     /// Whether an update is to be sent now, and why. An answer counts as sent.
     pub fn step(&mut self, now: Time, input: &TriggerInput) -> Option<Cause> {
+        self.decide(now, input, |own| own.due(now, input))
+    }
+
+    /// The same under a scheme of somebody else's, whose answer to this input is `asked`. A contact that only one side has, or
+    /// that has ended, and what was lost are sent as under every scheme, and come before it.
+    pub fn step_by(
+        &mut self,
+        now: Time,
+        input: &TriggerInput,
+        asked: Option<Cause>,
+    ) -> Option<Cause> {
+        self.decide(now, input, |_| asked)
+    }
+
+    fn decide(
+        &mut self,
+        now: Time,
+        input: &TriggerInput,
+        scheme: impl FnOnce(&mut Self) -> Option<Cause>,
+    ) -> Option<Cause> {
         self.began.get_or_insert(now);
         if input.both_in_contact() {
             self.accumulated_error += self.expected_correction(input) * TICK_S;
         }
         let cause = self
             .geometry(now, input)
-            .or_else(|| self.due(now, input))
+            .or_else(|| scheme(self))
             .or(self.repeat);
         if cause.is_some() {
             self.last = Some((now, input.params));

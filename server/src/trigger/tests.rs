@@ -422,3 +422,28 @@ fn useful_says_where_a_held_face_is_once_a_period_while_the_force_is_wrong() {
     assert_eq!(sent(&mut trigger, 0.8, 1, 500), [150, 300, 450]);
     assert_eq!(sent(&mut trigger, 0.95, 500, 1000), [0; 0]);
 }
+
+#[test]
+fn a_scheme_of_somebody_else_decides_alone_but_for_contact_and_loss() {
+    let mut trigger = trigger("every-sample", Mode::Paper);
+    let mut at = (0..).map(Time::from_millis);
+    let mut now = || at.next().unwrap();
+    let (alike, asked) = (input(2.0, 2.0), Some(Cause::Deadband));
+    assert_eq!(trigger.step(now(), &alike), Some(Cause::EverySample));
+    assert_eq!(trigger.step_by(now(), &input(2.0, 9.0), None), None);
+    assert_eq!(trigger.step_by(now(), &alike, asked), asked);
+    trigger.repeat(Cause::Timer);
+    assert_eq!(
+        trigger.step_by(now(), &alike, None),
+        Some(Cause::Timer),
+        "lost"
+    );
+    let apart = TriggerInput {
+        slave_in_contact: false,
+        shadow_in_contact: false,
+        ..alike
+    };
+    let lost = trigger.step_by(now(), &apart, asked);
+    assert_eq!(lost, Some(Cause::ContactLost));
+    assert_eq!(trigger.step_by(now(), &apart, asked), asked);
+}

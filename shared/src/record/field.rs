@@ -16,6 +16,23 @@ impl Stamp {
     }
 }
 
+/// The value of a field, for whoever has columns of their own.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Value {
+    /// A number; NaN where it is not known.
+    Number(f64),
+    /// A whole number, or ns since 1970.
+    Whole(u64),
+    /// Yes or no.
+    Truth(bool),
+    /// Words.
+    Text(String),
+    /// Bytes.
+    Bytes(Vec<u8>),
+    /// A 3 by 3 matrix, row by row.
+    Matrix([f64; 9]),
+}
+
 /// What a field can be.
 pub(super) trait Field: Sized {
     /// Its type in a schema.
@@ -29,6 +46,8 @@ pub(super) trait Field: Sized {
     fn read(input: &mut CdrReader<'_>) -> Result<Self, CdrError>;
     /// Its cell in a table of comma-separated values.
     fn cell(&self) -> String;
+    /// Its value.
+    fn value(self) -> Value;
 }
 
 macro_rules! numbers {
@@ -46,6 +65,10 @@ macro_rules! numbers {
 
             fn cell(&self) -> String {
                 self.to_string()
+            }
+
+            fn value(self) -> Value {
+                Value::Whole(u64::from(self))
             }
         }
     )* };
@@ -71,6 +94,10 @@ impl Field for f64 {
             self.to_string()
         }
     }
+
+    fn value(self) -> Value {
+        Value::Number(self)
+    }
 }
 
 impl Field for bool {
@@ -86,6 +113,10 @@ impl Field for bool {
 
     fn cell(&self) -> String {
         self.to_string()
+    }
+
+    fn value(self) -> Value {
+        Value::Truth(self)
     }
 }
 
@@ -107,6 +138,10 @@ impl Field for String {
             self.clone()
         }
     }
+
+    fn value(self) -> Value {
+        Value::Text(self)
+    }
 }
 
 impl Field for Vec<u8> {
@@ -122,6 +157,10 @@ impl Field for Vec<u8> {
 
     fn cell(&self) -> String {
         hex::encode(self)
+    }
+
+    fn value(self) -> Value {
+        Value::Bytes(self)
     }
 }
 
@@ -143,6 +182,10 @@ impl Field for [f64; 9] {
     fn cell(&self) -> String {
         self.map(|value| value.cell()).join(" ").trim().to_owned()
     }
+
+    fn value(self) -> Value {
+        Value::Matrix(self)
+    }
 }
 
 impl Field for Stamp {
@@ -161,6 +204,10 @@ impl Field for Stamp {
 
     fn cell(&self) -> String {
         self.0.to_string()
+    }
+
+    fn value(self) -> Value {
+        Value::Whole(self.0)
     }
 }
 

@@ -12,7 +12,7 @@ use super::field::Field;
 use crate::time::Time;
 use crate::wire::{STREAM_MESSAGE_MAX, StreamMessage};
 
-pub use super::field::Stamp;
+pub use super::field::{Stamp, Value};
 
 #[cfg(test)]
 mod tests;
@@ -38,6 +38,8 @@ pub trait Message: Sized {
     fn read(message: &[u8]) -> Result<Self, CdrError>;
     /// Its row in a table of comma-separated values.
     fn cells(&self) -> Vec<String>;
+    /// The values of its fields, in their order.
+    fn values(self) -> Vec<Value>;
 }
 
 /// The schema of a flat message, as `ros2msg`.
@@ -74,6 +76,10 @@ macro_rules! messages {
 
             fn cells(&self) -> Vec<String> {
                 vec![$(self.$field.cell()),*]
+            }
+
+            fn values(self) -> Vec<Value> {
+                vec![$(Field::value(self.$field)),*]
             }
         }
     )* };
