@@ -1,0 +1,30 @@
+"""What the tests share: the program `mmt`, and a record that it made."""
+
+import os
+import pathlib
+import subprocess
+
+import pytest
+
+# 50 ms each way with jitter and loss
+WAN = {"up": "delay 50ms 5ms loss 2%", "down": "delay 50ms 5ms loss 2%"}
+
+
+@pytest.fixture(scope="session")
+def program() -> str:
+    """The program to compare with; `.ci/python` names it."""
+    found = os.environ.get("MMT")
+    if not found:
+        pytest.fail("the environment variable MMT has to name the program mmt")
+    return found
+
+
+@pytest.fixture(scope="session")
+def recorded(program: str, tmp_path_factory: pytest.TempPathFactory) -> pathlib.Path:
+    """A session of two seconds over a real network on this machine."""
+    record = tmp_path_factory.mktemp("record") / "run.mcap"
+    subprocess.run(
+        [program, "demo", "--duration", "2s", "--no-console", "--record", str(record)],
+        check=True, capture_output=True, stdin=subprocess.DEVNULL,
+    )
+    return record
