@@ -9,6 +9,7 @@ use mmt_shared::model::geometry::Vec2;
 use mmt_shared::time::TICK;
 use pyo3::exceptions::{PyAttributeError, PyValueError};
 use pyo3::prelude::*;
+use pyo3::sync::PyOnceLock;
 use pyo3::types::PyDict;
 
 use crate::arrays::{column, numbers, of_known};
@@ -19,6 +20,8 @@ use crate::ticks::{Arrays, Ticks};
 
 /// Milliseconds between two looks at whether somebody wants the end.
 const BLOCK: u32 = 1000;
+/// Milliseconds that there is room for from the start: ten minutes.
+const ROOM_MAX: usize = 600_000;
 
 /// A run in virtual time as arrays of numpy, a row a millisecond (N rows).
 ///
@@ -37,7 +40,9 @@ const BLOCK: u32 = 1000;
 pub(crate) struct Run {
     arrays: Vec<(&'static str, Py<PyAny>)>,
     updates: Vec<u8>,
+    update: PyOnceLock<Py<PyAny>>,
     packets: Vec<WorldPacket>,
+    table: PyOnceLock<Py<PyAny>>,
     measured: Measured,
     parameters_true: [f64; 3],
     config: String,
@@ -63,8 +68,9 @@ macro_rules! arrays {
 
             /// The cause of the update that the slave decided on in this sample, "" for none; (N,), words.
             #[getter]
-            fn update<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-                of_known(py, &causes(), self.updates.clone())
+            fn update(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
+                let made = || Ok::<_, PyErr>(of_known(py, &causes(), self.updates.clone())?.unbind());
+                Ok(self.update.get_or_try_init(py, made)?.clone_ref(py))
             }
 
             /// m, b, c of the object at the end, kg, N s/m, N; (3,).
@@ -78,8 +84,9 @@ macro_rules! arrays {
             /// number, else 0), cause (of an update), repeat (whether it repeats an earlier one), bytes, sent (s), arrived (s, NaN if
             /// it did not), fate ("delivered", "corrupted", "loss", "outage", "mtu", "queue", "codel", "limit", "under_way").
             #[getter]
-            fn packets<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-                table(py, &self.packets)
+            fn packets(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
+                let made = || Ok::<_, PyErr>(table(py, &self.packets)?.unbind());
+                Ok(self.table.get_or_try_init(py, made)?.clone_ref(py))
             }
 
             /// What the run came to, the measured columns of a sweep (docs/sweep.md); None where a measure has no meaning.
@@ -211,7 +218,8 @@ pub(crate) fn run(
         Some(_) => return Err(PyValueError::new_err("give hip or operator, not both")),
     };
     let mut running = running.map_err(|error| refused(&error))?.with_packets();
-    let mut ticks = Ticks::default();
+    let room = usize::try_from(trial.duration.as_millis()).unwrap_or(ROOM_MAX);
+    let mut ticks = Ticks::with_room(room.min(ROOM_MAX));
     if callbacks.are_none() {
         while !running.is_over() {
             let block = || block(&mut running, &mut ticks);
@@ -221,7 +229,8 @@ pub(crate) fn run(
     } else {
         called(py, &callbacks, &mut running, &mut ticks)?;
     }
-    finished(py, &trial, &running, ticks)
+    let packets = running.take_packets();
+    finished(py, &trial, &running, (ticks, packets))
 }
 
 /// The way of these samples.
@@ -267,7 +276,12 @@ fn called(
 }
 
 /// What it came to.
-fn finished(py: Python<'_>, trial: &Trial, running: &Running, ticks: Ticks) -> PyResult<Run> {
+fn finished(
+    py: Python<'_>,
+    trial: &Trial,
+    running: &Running,
+    (ticks, packets): (Ticks, Vec<WorldPacket>),
+) -> PyResult<Run> {
     let world = running.world();
     let truth = world.slave().environment().truth();
     let Arrays { named, updates } = ticks.arrays(py)?;
@@ -275,7 +289,9 @@ fn finished(py: Python<'_>, trial: &Trial, running: &Running, ticks: Ticks) -> P
     Ok(Run {
         arrays: named,
         updates,
-        packets: world.packets().to_vec(),
+        update: PyOnceLock::new(),
+        packets,
+        table: PyOnceLock::new(),
         measured: running.measured(),
         parameters_true: [truth.m(), truth.b(), truth.c()],
         config: config.map_err(|error| PyValueError::new_err(error.to_string()))?,

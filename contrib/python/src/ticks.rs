@@ -11,7 +11,6 @@ use crate::arrays::{column, rows};
 const UNKNOWN: Vec2 = Vec2::new(f64::NAN, f64::NAN);
 
 /// The columns; of vectors the components of a row follow each other.
-#[derive(Default)]
 pub(crate) struct Ticks {
     time: Vec<f64>,
     hip: Vec<f64>,
@@ -48,6 +47,34 @@ fn params(into: &mut Vec<f64>, params: &ModelParams) {
 }
 
 impl Ticks {
+    /// No tick yet, with room for so many.
+    pub(crate) fn with_room(ticks: usize) -> Self {
+        let (numbers, vectors) = (
+            || Vec::with_capacity(ticks),
+            || Vec::with_capacity(2 * ticks),
+        );
+        let triples = || Vec::with_capacity(3 * ticks);
+        Self {
+            time: numbers(),
+            hip: vectors(),
+            f_m: vectors(),
+            hand_force: vectors(),
+            touching: Vec::with_capacity(ticks),
+            pose_model: triples(),
+            parameters_model: triples(),
+            stamp: numbers(),
+            tool: vectors(),
+            f_s: vectors(),
+            f_s_true: vectors(),
+            f_shadow: vectors(),
+            f_m_played: vectors(),
+            in_contact: Vec::with_capacity(ticks),
+            pose_true: triples(),
+            parameters_estimate: triples(),
+            update: Vec::with_capacity(ticks),
+        }
+    }
+
     /// A tick, after which the world is as it is.
     pub(crate) fn push(&mut self, world: &World, tick: &WorldTick) {
         let (master, model) = (&tick.master, world.master().model());

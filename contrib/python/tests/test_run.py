@@ -34,6 +34,7 @@ def test_a_row_is_a_millisecond_in_every_array(wan):
         assert getattr(wan, name).shape == (rows,) and getattr(wan, name).dtype == np.bool_
     assert wan.parameters_true.shape == (3,)
     assert "mmt.Run of" in repr(wan)
+    assert wan.hip is wan.hip and wan.packets is wan.packets and wan.update is wan.update
 
 
 def test_the_arrays_are_what_the_metrics_say(wan):

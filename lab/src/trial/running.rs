@@ -3,7 +3,7 @@
 use mmt_client::operator::trace::Trace;
 
 use super::{Change, Counters, Measured, Trial, TrialError, Watch};
-use crate::world::{Given, World, WorldTick};
+use crate::world::{Given, World, WorldPacket, WorldTick};
 
 /// A trial on its way.
 pub struct Running {
@@ -47,6 +47,11 @@ impl Running {
     pub fn with_packets(self) -> Self {
         let world = self.world.with_packets();
         Self { world, ..self }
+    }
+
+    /// Those datagrams, handed out ([`World::take_packets`]).
+    pub fn take_packets(&mut self) -> Vec<WorldPacket> {
+        self.world.take_packets()
     }
 
     /// The world.

@@ -103,4 +103,10 @@ impl World {
         let packets = self.packets.as_ref();
         packets.map_or(&[], |packets| &packets.packets)
     }
+
+    /// The same, handed out; from now on none is kept.
+    pub fn take_packets(&mut self) -> Vec<WorldPacket> {
+        let packets = self.packets.take();
+        packets.map_or_else(Vec::new, |packets| packets.packets)
+    }
 }
