@@ -106,7 +106,7 @@ fn a_packet_whose_copy_comes_through_has_come() {
         (lost, world.packets().len())
     };
     let (lost, of) = fates("delay 10ms loss 30%");
-    let (lost_twice, of_copied) = fates("delay 10ms loss 30% duplicate 100%");
+    let (lost_twice, of_copied) = fates("delay 5ms duplicate 100%; then delay 5ms loss 30%");
     assert!(10 * lost > 2 * of, "{lost} of {of}");
     assert!(
         10 * lost_twice < 2 * of_copied,
