@@ -2,6 +2,7 @@
 
 import os
 import pathlib
+import signal
 import subprocess
 
 import pytest
@@ -17,6 +18,14 @@ def program() -> str:
     if not found:
         pytest.fail("the environment variable MMT has to name the program mmt")
     return found
+
+
+@pytest.fixture
+def interruptible():
+    """Ctrl-C is heard: a shell in the background has its commands ignore it."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
 
 
 @pytest.fixture(scope="session")

@@ -105,8 +105,9 @@ def test_what_is_wrong_is_said(tmp_path):
         mmt.sweep(PLAN.replace("0.9", "0.8"), tmp_path)
 
 
+@pytest.mark.usefixtures("interruptible")
 def test_ctrl_c_keeps_what_is_done(tmp_path):
-    long = PLAN.replace("count = 2", "count = 10000")
+    long = PLAN.replace("count = 2", "count = 500")
     timer = threading.Timer(1.5, signal.raise_signal, [signal.SIGINT])
     timer.start()
     with pytest.raises(KeyboardInterrupt):
@@ -115,5 +116,5 @@ def test_ctrl_c_keeps_what_is_done(tmp_path):
     (part,) = (tmp_path / "rows").iterdir()
     done = [line for line in part.read_text().splitlines() if line[0].isdigit()]
     assert done
-    table = mmt.sweep(PLAN.replace("count = 2", "count = 10000"), tmp_path, shard="80000/80000", jobs=1)
+    table = mmt.sweep(PLAN.replace("count = 2", "count = 500"), tmp_path, shard="4000/4000", jobs=1)
     assert len(done) <= len(table["row"]) <= len(done) + 1
