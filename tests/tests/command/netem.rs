@@ -318,7 +318,7 @@ fn a_record_is_compared_with_the_settings_it_was_made_with() {
     assert!(up["achieved"]["mean_ms"].as_f64().unwrap() >= 20.0);
     assert!((up["configured"]["mean_ms"].as_f64().unwrap() - 20.0).abs() < 1e-6);
 
-    let output = mmt(&home, &["netem", "report", file, "--full"]);
+    let mut output = mmt(&home, &["netem", "report", file, "--full"]);
     let text = String::from_utf8(output.output().unwrap().stdout).unwrap();
     assert!(
         text.contains("configured") && text.contains("lost in a row"),
