@@ -39,10 +39,9 @@ mod slave_clock;
 pub use config::{WorldConfig, WorldError};
 pub use given::Given;
 pub use outcome::{Outcome, Traffic};
-pub use packets::WorldPacket;
+pub use packets::{WorldPacket, WorldPackets};
 
 use datagram::Datagram;
-use packets::Packets;
 use picture::{DelayedPicture, scene};
 use slave_clock::SlaveClock;
 
@@ -78,7 +77,7 @@ pub struct World {
     pose: PoseError,
     log: Sha256,
     /// Kept where somebody asks for them.
-    packets: Option<Box<Packets>>,
+    packets: Option<Box<WorldPackets>>,
     /// They see every tick of every test, and of runs that ask for it.
     checks: Box<SessionChecks>,
     judges: bool,

@@ -4,7 +4,7 @@ use mmt_client::operator::trace::Trace;
 use mmt_lab::sweep::columns;
 use mmt_lab::table::Cell;
 use mmt_lab::trial::{Measured, Running, Trial, TrialError};
-use mmt_lab::world::{Given, WorldPacket, WorldTick};
+use mmt_lab::world::{Given, WorldPackets, WorldTick};
 use mmt_shared::model::geometry::Vec2;
 use mmt_shared::time::TICK;
 use pyo3::exceptions::{PyAttributeError, PyValueError};
@@ -41,7 +41,7 @@ pub(crate) struct Run {
     arrays: Vec<(&'static str, Py<PyAny>)>,
     updates: Vec<u8>,
     update: PyOnceLock<Py<PyAny>>,
-    packets: Vec<WorldPacket>,
+    packets: WorldPackets,
     table: PyOnceLock<Py<PyAny>>,
     measured: Measured,
     parameters_true: [f64; 3],
@@ -85,7 +85,7 @@ macro_rules! arrays {
             /// it did not), fate ("delivered", "corrupted", "loss", "outage", "mtu", "queue", "codel", "limit", "under_way").
             #[getter]
             fn packets(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
-                let made = || Ok::<_, PyErr>(table(py, &self.packets)?.unbind());
+                let made = || Ok::<_, PyErr>(table(py, &self.packets.read())?.unbind());
                 Ok(self.table.get_or_try_init(py, made)?.clone_ref(py))
             }
 
@@ -280,7 +280,7 @@ fn finished(
     py: Python<'_>,
     trial: &Trial,
     running: &Running,
-    (ticks, packets): (Ticks, Vec<WorldPacket>),
+    (ticks, packets): (Ticks, WorldPackets),
 ) -> PyResult<Run> {
     let world = running.world();
     let truth = world.slave().environment().truth();

@@ -39,11 +39,11 @@ pub(crate) struct Arrays {
 }
 
 fn pose(into: &mut Vec<f64>, pose: &Pose) {
-    into.extend([pose.position.x, pose.position.y, pose.angle]);
+    into.extend_from_slice(&[pose.position.x, pose.position.y, pose.angle]);
 }
 
 fn params(into: &mut Vec<f64>, params: &ModelParams) {
-    into.extend([params.m(), params.b(), params.c()]);
+    into.extend_from_slice(&[params.m(), params.b(), params.c()]);
 }
 
 impl Ticks {
@@ -79,25 +79,28 @@ impl Ticks {
     pub(crate) fn push(&mut self, world: &World, tick: &WorldTick) {
         let (master, model) = (&tick.master, world.master().model());
         self.time.push(tick.now.as_secs_f64());
-        self.hip.extend(master.sample.hip.metres().iter());
-        self.f_m.extend(master.felt.iter());
-        self.hand_force.extend(master.hand_force.iter());
+        self.hip
+            .extend_from_slice(master.sample.hip.metres().as_slice());
+        self.f_m.extend_from_slice(master.felt.as_slice());
+        self.hand_force
+            .extend_from_slice(master.hand_force.as_slice());
         self.touching.push(master.rendered.in_contact());
         pose(&mut self.pose_model, &model.state().pose);
         params(&mut self.parameters_model, &model.state().params);
         let estimate = world.slave().estimate();
         self.parameters_estimate
-            .extend([estimate.m, estimate.b, estimate.c]);
+            .extend_from_slice(&[estimate.m, estimate.b, estimate.c]);
         let Some(slave) = &tick.slave else {
             self.push_no_slave();
             return;
         };
         self.stamp.push(slave.stamp.as_secs_f64());
-        self.tool.extend(slave.tool.iter());
-        self.f_s.extend(slave.f_s.iter());
-        self.f_s_true.extend(slave.true_force.iter());
-        self.f_shadow.extend(slave.f_shadow.iter());
-        self.f_m_played.extend(slave.f_m.unwrap_or(UNKNOWN).iter());
+        self.tool.extend_from_slice(slave.tool.as_slice());
+        self.f_s.extend_from_slice(slave.f_s.as_slice());
+        self.f_s_true.extend_from_slice(slave.true_force.as_slice());
+        self.f_shadow.extend_from_slice(slave.f_shadow.as_slice());
+        self.f_m_played
+            .extend_from_slice(slave.f_m.unwrap_or(UNKNOWN).as_slice());
         self.in_contact.push(slave.in_contact);
         pose(&mut self.pose_true, &slave.truth);
         let cause = slave.update.map(|update| update.cause.number() + 1);
@@ -119,10 +122,10 @@ impl Ticks {
             &mut self.f_m_played,
         ];
         for vector in vectors {
-            vector.extend(UNKNOWN.iter());
+            vector.extend_from_slice(UNKNOWN.as_slice());
         }
         self.in_contact.push(false);
-        self.pose_true.extend([f64::NAN; 3]);
+        self.pose_true.extend_from_slice(&[f64::NAN; 3]);
         self.update.push(0);
     }
 

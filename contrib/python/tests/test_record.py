@@ -24,26 +24,32 @@ def by_rosbags(path: pathlib.Path) -> dict[str, list]:
     return found
 
 
+def plain(value) -> str:
+    """A value in words that are equal for equal bits."""
+    if hasattr(value, "nanosec"):
+        return repr(value.sec * 10**9 + value.nanosec)
+    if isinstance(value, np.ndarray):
+        value = bytes(value) if value.dtype == np.uint8 else value.tolist()
+    return repr(value)
+
+
+def rows(columns: dict[str, list]) -> list[tuple[str, ...]]:
+    """Rows in one order: that of the file is not that of the stamps, by which rosbags goes."""
+    return sorted(zip(*([plain(value) for value in column] for column in columns.values())))
+
+
 def test_every_column_is_what_rosbags_reads(recorded):
     record, theirs = mmt.read(recorded), by_rosbags(recorded)
     assert not record.cut_off
     assert set(record.topics) == set(theirs)
     assert {"/master/ticks", "/slave/ticks", "/master/packets", "/slave/arrivals"} <= set(theirs)
-    compared = 0
     for topic, messages in theirs.items():
-        columns = record[topic]
-        for name in set(columns) - {"time", "stamp"}:
-            values = [getattr(message, name) for message in messages]
-            if isinstance(columns[name], list):
-                assert columns[name] == [bytes(value) for value in values], (topic, name)
-            elif columns[name].dtype.kind == "U":
-                assert list(columns[name]) == values, (topic, name)
-            else:
-                assert np.array_equal(columns[name], np.array(values), equal_nan=columns[name].dtype.kind == "f"), (topic, name)
-            compared += len(values)
-        stamps = [message.stamp.sec * 10**9 + message.stamp.nanosec for message in messages]
-        assert list(columns["stamp"]) == stamps
-    assert compared > 50_000
+        names = [name for name in record[topic] if name != "time"]
+        listed = {name: record[topic][name] for name in names}
+        own = {name: column if isinstance(column, list) else column.tolist() for name, column in listed.items()}
+        other = {name: [getattr(message, name) for message in messages] for name in names}
+        assert len(messages) > 0 and rows(own) == rows(other), topic
+    assert len(theirs["/master/ticks"]) > 100
 
 
 def test_times_begin_with_the_record(recorded):

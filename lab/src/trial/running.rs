@@ -3,7 +3,7 @@
 use mmt_client::operator::trace::Trace;
 
 use super::{Change, Counters, Measured, Trial, TrialError, Watch};
-use crate::world::{Given, World, WorldPacket, WorldTick};
+use crate::world::{Given, World, WorldPackets, WorldTick};
 
 /// A trial on its way.
 pub struct Running {
@@ -50,7 +50,7 @@ impl Running {
     }
 
     /// Those datagrams, handed out ([`World::take_packets`]).
-    pub fn take_packets(&mut self) -> Vec<WorldPacket> {
+    pub fn take_packets(&mut self) -> WorldPackets {
         self.world.take_packets()
     }
 

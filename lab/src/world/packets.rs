@@ -21,35 +21,60 @@ pub struct WorldPacket {
     pub end: Option<End>,
 }
 
-/// The datagrams in the order of sending.
-#[derive(Debug)]
-pub(super) struct Packets {
-    watches: [PacketWatch; 2],
-    packets: Vec<WorldPacket>,
+/// The datagrams in the order of sending, as they were: nobody reads them before they are asked for.
+#[derive(Debug, Default)]
+pub struct WorldPackets {
+    kept: Vec<Kept>,
+    /// Their bytes, one after the other.
+    bytes: Vec<u8>,
     /// Of each direction the places of its datagrams, by the number of the offer.
     places: [Vec<usize>; 2],
 }
 
-impl Packets {
-    fn new() -> Self {
-        Self {
-            watches: [Side::Master, Side::Slave].map(|side| PacketWatch::new(side, 1)),
-            packets: Vec::new(),
-            places: [Vec::new(), Vec::new()],
-        }
+/// A datagram as it was.
+#[derive(Debug)]
+struct Kept {
+    direction: Direction,
+    sent: Time,
+    length: usize,
+    end: Option<End>,
+}
+
+impl WorldPackets {
+    /// Each with its content.
+    #[must_use]
+    pub fn read(&self) -> Vec<WorldPacket> {
+        let [mut up, mut down] = [Side::Master, Side::Slave].map(|side| PacketWatch::new(side, 1));
+        let mut rest = self.bytes.as_slice();
+        let kept = self.kept.iter().map(|kept| {
+            let (bytes, behind) = rest.split_at_checked(kept.length).unwrap_or_default();
+            rest = behind;
+            let watch = match kept.direction {
+                Direction::Up => &mut up,
+                Direction::Down => &mut down,
+            };
+            WorldPacket {
+                packet: watch.sent(Stamp::default(), bytes),
+                sent: kept.sent,
+                end: kept.end,
+            }
+        });
+        kept.collect()
     }
 
     /// An end hands over a datagram.
     pub(super) fn left(&mut self, direction: Direction, now: Time, bytes: &[u8]) {
-        let ([up, down], [ups, downs]) = (&mut self.watches, &mut self.places);
-        let (watch, places) = match direction {
-            Direction::Up => (up, ups),
-            Direction::Down => (down, downs),
+        let [ups, downs] = &mut self.places;
+        let places = match direction {
+            Direction::Up => ups,
+            Direction::Down => downs,
         };
-        places.push(self.packets.len());
-        self.packets.push(WorldPacket {
-            packet: watch.sent(Stamp::default(), bytes),
+        places.push(self.kept.len());
+        self.bytes.extend_from_slice(bytes);
+        self.kept.push(Kept {
+            direction,
             sent: now,
+            length: bytes.len(),
             end: None,
         });
     }
@@ -63,7 +88,7 @@ impl Packets {
         };
         let number = usize::try_from(departure.number).unwrap_or(usize::MAX);
         let place = places.get(number).copied();
-        if let Some(packet) = place.and_then(|place| self.packets.get_mut(place)) {
+        if let Some(packet) = place.and_then(|place| self.kept.get_mut(place)) {
             // of an offer that was lost a copy may still come
             if !matches!(packet.end, Some(End::Sent { .. })) {
                 packet.end = Some(Entry::of(direction, departure).end);
@@ -93,20 +118,20 @@ impl World {
     /// The same, keeping every datagram from now on.
     #[must_use]
     pub fn with_packets(mut self) -> Self {
-        self.packets = Some(Box::new(Packets::new()));
+        self.packets = Some(Box::default());
         self
     }
 
     /// The datagrams in the order of sending; none where they are not kept.
     #[must_use]
-    pub fn packets(&self) -> &[WorldPacket] {
+    pub fn packets(&self) -> Vec<WorldPacket> {
         let packets = self.packets.as_ref();
-        packets.map_or(&[], |packets| &packets.packets)
+        packets.map_or_else(Vec::new, |packets| packets.read())
     }
 
     /// The same, handed out; from now on none is kept.
-    pub fn take_packets(&mut self) -> Vec<WorldPacket> {
+    pub fn take_packets(&mut self) -> WorldPackets {
         let packets = self.packets.take();
-        packets.map_or_else(Vec::new, |packets| packets.packets)
+        packets.map_or_else(WorldPackets::default, |packets| *packets)
     }
 }

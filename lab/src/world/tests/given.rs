@@ -57,12 +57,13 @@ fn every_packet_has_its_cause_and_its_fate_as_the_link_counted_them() {
     let config = over("delay 50ms 5ms loss 5%", 3);
     let mut world = World::try_new(&config).unwrap().with_packets();
     world.run(Duration::from_secs(10), |_| {});
+    let all = world.packets();
     for (n, (direction, link)) in [("up", &world.up), ("down", &world.down)]
         .into_iter()
         .enumerate()
     {
-        let packets = world.packets().iter();
-        let of = packets.filter(|packet| packet.packet.direction == direction);
+        let of = all.iter();
+        let of = of.filter(|packet| packet.packet.direction == direction);
         let of: Vec<_> = of.collect();
         let counters = link.counters();
         let ended = |is: fn(&End) -> bool| {
@@ -86,8 +87,8 @@ fn every_packet_has_its_cause_and_its_fate_as_the_link_counted_them() {
         }
     }
     let causes = |cause: Cause| {
-        let packets = world.packets().iter();
-        let of = packets.filter(|packet| packet.packet.cause == cause.name());
+        let of = all.iter();
+        let of = of.filter(|packet| packet.packet.cause == cause.name());
         of.filter(|packet| packet.packet.fate == "sent").count() as u64
     };
     let updates = world.outcome().updates;
@@ -101,9 +102,10 @@ fn a_packet_whose_copy_comes_through_has_come() {
         let config = over(words, 3);
         let mut world = World::try_new(&config).unwrap().with_packets();
         world.run(Duration::from_secs(4), |_| {});
-        let ends = world.packets().iter().filter_map(|packet| packet.end);
+        let all = world.packets();
+        let ends = all.iter().filter_map(|packet| packet.end);
         let lost = ends.filter(|end| matches!(end, End::Dropped(_))).count();
-        (lost, world.packets().len())
+        (lost, all.len())
     };
     let (lost, of) = fates("delay 10ms loss 30%");
     let (lost_twice, of_copied) = fates("delay 5ms duplicate 100%; then delay 5ms loss 30%");
