@@ -41,8 +41,8 @@ pub(crate) fn vector(given: &Bound<'_, PyAny>, what: &str) -> PyResult<Vec2> {
 ///
 /// time: stamp of the HIP sample, s. f_s: measured force on the object, (x, y), N. f_m: force of the master's model, as the
 /// slave knows it, (x, y), N. noise_n: standard deviation of f_s per axis where it is more than the default sensor's, else 0, N.
-/// slave_in_contact, shadow_in_contact: whether the tool touches the object, and the HIP the master's model. sticking: whether
-/// the object stands although it is pushed. speed, acceleration: of the object along the push, m/s and m/s^2. force_deviation:
+/// slave_in_contact, shadow_in_contact: whether the tool touches the object, and the HIP the master's model. hip_stands:
+/// whether the HIP is where it was a sample before. sticking: whether the object stands although it is pushed. speed, acceleration: of the object along the push, m/s and m/s^2. force_deviation:
 /// standard deviation of the force that the estimate predicts, N. parameters: (m, b, c) that an update would carry, kg, N s/m, N.
 /// shift: by how much it would move the master's object, (x, y), m. turn: by how much it would turn it, rad.
 #[pyclass(frozen, get_all, module = "mmt")]
@@ -53,6 +53,7 @@ pub(crate) struct TriggerInput {
     noise_n: f64,
     slave_in_contact: bool,
     shadow_in_contact: bool,
+    hip_stands: bool,
     sticking: bool,
     speed: f64,
     acceleration: f64,
@@ -72,6 +73,7 @@ impl TriggerInput {
             noise_n: input.noise_n,
             slave_in_contact: input.slave_in_contact,
             shadow_in_contact: input.shadow_in_contact,
+            hip_stands: input.hip_stands,
             sticking: input.sticking,
             speed: input.speed,
             acceleration: input.acceleration,
