@@ -27,11 +27,14 @@ pub(crate) struct ToolDrive {
     held_back: bool,
     port: ToolPort,
     force: ToolForce,
+    /// No farther than this from the origin, m.
+    reach_m: f64,
 }
 
 impl ToolDrive {
-    pub(crate) fn new(port: ToolPort, force: ToolForce) -> Self {
+    pub(crate) fn new(port: ToolPort, force: ToolForce, reach_m: f64) -> Self {
         Self {
+            reach_m,
             own: None,
             passive: false,
             held_back: false,
@@ -109,6 +112,7 @@ impl ToolDrive {
         } else {
             free
         };
+        let way = self.within_reach(tool, way);
         let velocity = way / period_s;
         self.port.moved(way);
         self.force.moved(velocity, held);
@@ -121,6 +125,16 @@ impl ToolDrive {
             velocity,
             force: played.force.filter(|_| !self.held_back),
             ..played
+        }
+    }
+
+    /// The part of a way from `tool` (m) that leads no farther out of reach, whatever pushes the tool there.
+    fn within_reach(&self, tool: Vec2, way: Vec2) -> Vec2 {
+        let (most, far) = (self.reach_m.max(tool.norm()), (tool + way).norm());
+        if far > most {
+            (tool + way) * (most / far) - tool
+        } else {
+            way
         }
     }
 
@@ -151,7 +165,7 @@ mod tests {
     fn drive() -> ToolDrive {
         let coupling = Coupling::for_stiffness(1000.0);
         let force = ToolForce::try_new(15.0, coupling).unwrap();
-        ToolDrive::new(ToolPort::new(0.01, 0.6), force)
+        ToolDrive::new(ToolPort::new(0.01, 0.6), force, 2.0)
     }
 
     fn played(x: f64, stands: bool) -> Played {
@@ -186,6 +200,20 @@ mod tests {
         drive.measured(Vec2::zeros());
         let before = at(&mut drive, true);
         assert!(at(&mut drive, false) > before, "it may follow again");
+    }
+
+    #[test]
+    fn a_tool_at_its_reach_gives_way_along_it_and_not_beyond() {
+        let mut drive = drive();
+        drive.begin_at(Vec2::new(2.0, 0.0), Vec2::zeros());
+        let mut at = Vec2::zeros();
+        for _ in 0..100 {
+            // what is out there draws the tool outwards and along
+            drive.measured(Vec2::new(-26.0, -26.0));
+            at = drive.step(None, played(2.0, true)).hip;
+            assert!(at.norm() <= 2.0 + 1e-12, "{} m", at.norm());
+        }
+        assert!(at.y > 1e-3, "{at}");
     }
 
     #[test]

@@ -267,6 +267,14 @@ impl SlaveChecks {
                 && contact.damping_ns_per_m <= self.about.coupling.damping_ns_per_m
         });
         let sensor = &config.sensing;
+        let scene = &config.scene;
+        // what stops the object at once costs the damping of its speed for a tick: nobody can know before
+        let meets = scene.bodies.len() > 1 || !scene.walls.is_empty();
+        let stop = if meets || config.environment.wall.is_some() {
+            self.about.coupling.damping_ns_per_m * self.speed()
+        } else {
+            0.0
+        };
         // a sensor that lags is no judge of the last milliseconds
         if !known || sensor.force_lag_ms > 0.0 {
             return;
@@ -275,7 +283,7 @@ impl SlaveChecks {
             sensor.force_drift_n_per_s * now.saturating_since(self.about.began).as_secs_f64();
         let errors = sensor.force_bias_n + drift + 6.0 * sensor.force_noise_n;
         let gain = sensor.force_gain.min(1.0);
-        let most = (config.tool_force_max_n * (1.0 + FORCE_SHARE) + errors) / gain;
+        let most = (config.tool_force_max_n * (1.0 + FORCE_SHARE) + errors) / gain + stop;
         let force = done.true_force.norm();
         self.verdict
             .judge(Invariant::ToolForce, now, force <= most, || {
