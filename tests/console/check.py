@@ -223,7 +223,10 @@ def take_shots(browser, address, place):
             viewport = {"width": size[0], "height": size[1]}
             context = browser.new_context(viewport=viewport, device_scale_factor=scale, color_scheme=theme)
             tab = Tab(context, address)
-            tab.until("a push", lambda: tab.master["elapsed_s"] > 11 and tab.master["in_contact"])
+            tab.until("the first picture", lambda: tab.master["footprint"])
+            # the charts are full
+            full = tab.master["elapsed_s"] + 11
+            tab.until("a push", lambda: tab.master["elapsed_s"] > full and tab.master["in_contact"])
             tab.page.wait_for_timeout(500)
             tab.page.screenshot(path=f"{place}/console-{name}-{theme}.png")
             context.close()
