@@ -26,6 +26,9 @@ use crate::harness::{alone, root};
 
 /// For what takes seconds; the host may be busy.
 const GENEROUS: Duration = Duration::from_secs(120);
+/// How much more than the host asked for may act at the tool: torques are those of where the arms were when the host read them,
+/// and a busy host does that late.
+const MOVED: f64 = 1.05;
 /// Every device that is emulated: its name on the command line, its program, and the words for its versions.
 const EMULATED: [(&str, &str, &[&str]); 4] = [
     ("inverse3", "inverse3.py", &["--version", "3.5.0.0"]),
@@ -141,7 +144,7 @@ fn each_device_of_its_own_protocol_is_read_and_pulled_gently_and_let_go_at_the_e
             assert!(get(&found, "/held_s") > 0.2, "{what}");
             assert!(get(&found, "/force_peak_n") <= 0.5, "{what}");
             let peak = get(&seen, "/force_peak_n");
-            assert!(peak > 0.2 && peak < 0.501, "{what}");
+            assert!(peak > 0.2 && peak < 0.5 * MOVED, "{what}");
             for newtons in seen["force_last_n"].as_array().unwrap() {
                 assert_eq!(newtons.as_f64().map(f64::abs), Some(0.0), "{what}");
             }
@@ -167,7 +170,7 @@ fn garbage_and_silence_of_a_device_end_in_no_force_and_it_goes_on() {
                 "the silence: {what}"
             );
             assert!(get(&found, "/readings") >= 100.0, "{what}");
-            assert!(get(&seen, "/force_peak_n") < 0.501, "{what}");
+            assert!(get(&seen, "/force_peak_n") < 0.5 * MOVED, "{what}");
             assert_eq!(seen["refused"], Value::Array(Vec::new()), "{what}");
             let last = get(&seen, "/force_last_n/0");
             assert_eq!(last.abs(), 0.0, "{what}");
@@ -194,7 +197,7 @@ fn a_hand_at_a_device_of_its_own_protocol_pushes_the_box_over_the_emulated_netwo
                 "2diy",
                 "two_diy.py",
                 "silence_ms = 120.0\nscale = 3.3\n",
-                3.0,
+                3.0 * MOVED,
                 ["--start=0.064,0.09", "--goal=-0.026,0.09"],
             ),
         ] {
