@@ -123,7 +123,7 @@ pub(crate) fn configuration(
     ConfigFile::read(path)?.with(program, flags, |layers| layers.config())
 }
 
-/// The device of this kind that is to be plugged in, with what a file says of it, if there is one.
+/// The device of this kind that is to be plugged in, with the keys of a file, if there is one.
 ///
 /// # Errors
 /// The file cannot be read, is no TOML, or is no device of this kind.

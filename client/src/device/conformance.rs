@@ -229,7 +229,7 @@ fn silence_of_any_device_lets_the_hand_go_and_leaves_no_force() {
         assert!(plugged.held(), "{name}: a few lost ones are nothing");
         plugged.nothing(2);
         assert!(!plugged.held(), "{name}");
-        // a device at the link gets no packet then; one that is asked is told so
+        // a device at the link gets no packet then; one that is asked gets zero
         let told = plugged.config.kind != DeviceKind::Link;
         assert!(!(told && plugged.pushed()), "{name}: at once");
         plugged.nothing(250);

@@ -10,7 +10,7 @@ use std::time::Duration;
 use mmt_shared::model::geometry::Vec2;
 use mmt_shared::time::Time;
 
-use super::link::{DeviceLinkConfig, DeviceLinkError, Hold};
+use super::link::config::{DeviceLinkConfig, DeviceLinkError, Hold};
 use crate::operator::pointer::{HandEvent, PointerSample};
 
 /// A loop of which no tick has been seen for so long is taken for gone: no force.

@@ -3,7 +3,7 @@
 //! Pure: packets in, what the hand does ([`HandEvent`]) out, and a packet with the force for each that was taken
 //! (`docs/plugs.md`). Its readings go through the same clock map, resampling, clutch and release as those of a pointer.
 
-mod config;
+pub(super) mod config;
 mod file;
 #[cfg(test)]
 mod tests;

@@ -84,14 +84,17 @@ impl fmt::Display for Document {
             (None, Some(version)) => {
                 writeln!(f, "inverse3  Inverse Service {version} at {service}")?
             }
-            (None, None) => writeln!(f, "inverse3  something at {service} that says no version")?,
+            (None, None) => writeln!(
+                f,
+                "inverse3  something at {service} that reports no version"
+            )?,
         }
         if self.two_diy.ports.is_empty() {
             return write!(f, "2diy      no serial port of a USB device");
         }
         for (n, port) in self.two_diy.ports.iter().enumerate() {
             let end = if n == 0 { "" } else { "\n" };
-            let product = port.product.as_deref().unwrap_or("says nothing of itself");
+            let product = port.product.as_deref().unwrap_or("reports no name");
             let board = if port.looks_like_a_board {
                 ", looks like the board"
             } else {

@@ -25,7 +25,7 @@ use crate::failure::{Exit, Failure};
 use crate::output::{note, print, print_json};
 use crate::stop::Stop;
 
-/// A device that is asked, and says nothing for so long, is not there.
+/// A device that is asked, and sends nothing for so long, is not there.
 const PATIENCE: Duration = Duration::from_secs(10);
 /// Readings a second below which a device is unfit, and below which there is advice.
 const RATES_HZ: (f64, f64) = (500.0, 900.0);
@@ -271,7 +271,7 @@ impl Document {
         } else if rate < good {
             advise(
                 "advised",
-                "mmt doctor says what keeps a loop from 1000 Hz".to_owned(),
+                "mmt doctor reports what keeps a loop from 1000 Hz".to_owned(),
             );
         }
         if counts.taken > 0 && counts.nonsense * 2 > counts.taken {
