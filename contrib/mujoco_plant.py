@@ -18,7 +18,7 @@ import sys
 import mujoco
 import numpy
 
-from plant import Plug, serve
+from plant import Plant, serve
 
 SUBSTEPS = 2
 OBJECTS = {
@@ -137,7 +137,7 @@ def main():
     arguments.add_argument("--sensor-hz", type=float, default=20.0, help="corner frequency of the force sensor's own filter")
     arguments.add_argument("--seconds", type=float, default=math.inf, help="how long")
     options = arguments.parse_args()
-    world, plug = World(options), Plug(options.address)
+    world, plug = World(options), Plant(options.address)
     begin = world.pose()
     try:
         serve(plug, world, options.seconds)

@@ -4,7 +4,7 @@
     mmt slave --listen 127.0.0.1:0 --plant link         # prints: plant: udp://127.0.0.1:PORT?token=…
     python3 plant.py 'udp://127.0.0.1:PORT?token=…'
 
-Nothing but the standard library. The class Plug is what a robot or a simulator needs; the class Block is the simplest object that
+Nothing but the standard library. The class Plant is what a robot or a simulator needs; the class Block is the simplest object that
 shows how it is used. With `mmt bench plant --plant link` the same program runs in lock-step, as fast as it computes.
 """
 
@@ -27,7 +27,7 @@ SILENCE_S = 0.020
 Command = collections.namedtuple("Command", "tool velocity stiffness damping force_max begins held periods")
 
 
-class Plug:
+class Plant:
     """One end of the link: take commands, send what was measured."""
 
     def __init__(self, address):
@@ -143,7 +143,7 @@ def main():
     arguments.add_argument("address", help="as mmt printed it after “plant: ”")
     arguments.add_argument("--seconds", type=float, default=math.inf, help="how long")
     options = arguments.parse_args()
-    serve(Plug(options.address), Block(), options.seconds)
+    serve(Plant(options.address), Block(), options.seconds)
 
 
 if __name__ == "__main__":

@@ -20,7 +20,7 @@ from rclpy.time import Time
 from std_msgs.msg import Bool
 
 from hand import ENGAGED, Device
-from plant import Plug
+from plant import Plant
 
 # a robot of which nothing came for so long is not there: mmt then holds the tool and takes the force from the hand
 SILENCE_S = 0.050
@@ -59,7 +59,7 @@ class PlantNode(Node):
         address = self.declare_parameter("plant", "").value
         self.frame = self.declare_parameter("frame", "world").value
         self.height_m = self.declare_parameter("height_m", 0.0).value
-        self.plug, self.lock = Plug(address), threading.Lock()
+        self.plug, self.lock = Plant(address), threading.Lock()
         self.tool = self.seen = None
         self.force, self.speed, self.heard_s = (0.0, 0.0), Speed(2), -math.inf
         self.command = self.create_publisher(PoseStamped, "~/tool_command", qos_profile_sensor_data)

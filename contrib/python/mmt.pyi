@@ -9,10 +9,13 @@ import numpy.typing as npt
 
 __version__: str
 __all__ = [
+    "Command",
     "Departure",
+    "Device",
     "Env",
     "Link",
     "Measured",
+    "Plant",
     "Record",
     "Run",
     "TriggerInput",
@@ -266,3 +269,71 @@ class Env:
     ) -> tuple[_Numbers, dict[str, Any]]: ...
     def step(self, action: npt.ArrayLike | dict[str, Any]) -> tuple[_Numbers, float, bool, bool, dict[str, Any]]: ...
     def close(self) -> None: ...
+
+@final
+class Device:
+    def __new__(cls, address: str) -> Device: ...
+    def send(self, position: _Three, velocity: _Three = ..., buttons: int = 0, stamp_ns: int | None = None) -> None: ...
+    def receive(self) -> _Triple: ...
+    @property
+    def force(self) -> _Triple:
+        """On the hand along the device's axes, N."""
+    @property
+    def hip(self) -> _Pair:
+        """The HIP in the world, m."""
+    @property
+    def state(self) -> int:
+        """Bits: session, held, in contact, emergency stop, slave late, refused."""
+    @property
+    def sequence(self) -> int:
+        """Readings sent."""
+    @property
+    def received(self) -> int:
+        """Forces that came."""
+    @property
+    def lost_up(self) -> int:
+        """Readings that never came."""
+    @property
+    def lost_down(self) -> int:
+        """Forces that never came."""
+
+@final
+class Command:
+    @property
+    def tool(self) -> _Pair:
+        """Where the tool has to be, m."""
+    @property
+    def velocity(self) -> _Pair:
+        """m/s."""
+    @property
+    def stiffness(self) -> float:
+        """k_p, N/m."""
+    @property
+    def damping(self) -> float:
+        """k_d, N s/m."""
+    @property
+    def force_max(self) -> float:
+        """N."""
+    @property
+    def begins(self) -> bool:
+        """A session begins."""
+    @property
+    def held(self) -> bool:
+        """An emergency stop is set."""
+    @property
+    def periods(self) -> int:
+        """Of 1 ms since the command before."""
+
+@final
+class Plant:
+    def __new__(cls, address: str) -> Plant: ...
+    def command(self, wait_s: float) -> Command | None: ...
+    def answer(
+        self, tool: _Two, velocity: _Two, force: _Two, pose: _Three | None = None, image_age_s: float = 0.0
+    ) -> None: ...
+    @property
+    def received(self) -> int:
+        """Commands that came."""
+    @property
+    def lost(self) -> int:
+        """Commands that never came."""

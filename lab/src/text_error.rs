@@ -3,6 +3,8 @@
 use std::fmt;
 use std::ops::Range;
 
+use mmt_shared::spelling;
+
 /// Why a plan or a configuration cannot be used.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub struct TextError {
@@ -59,25 +61,7 @@ impl TextError {
 fn meant(message: &str) -> Option<&str> {
     let mut words = message.split('`').skip(1).step_by(2);
     let wrong = words.next().filter(|_| message.starts_with("unknown "))?;
-    let near = words.map(|word| (distance(wrong, word), word));
-    let (distance, word) = near.min_by_key(|(distance, _)| *distance)?;
-    (distance <= 1 + wrong.len() / 4).then_some(word)
-}
-
-/// Letters to insert, leave out or exchange to make one word of the other (Levenshtein).
-fn distance(from: &str, to: &str) -> usize {
-    let mut row: Vec<usize> = (0..=to.chars().count()).collect();
-    for (n, letter) in from.chars().enumerate() {
-        let (mut corner, mut left) = (n, n + 1);
-        let mut next = vec![left];
-        for (other, above) in to.chars().zip(row.iter().skip(1)) {
-            left = (corner + usize::from(letter != other)).min(above.min(&left) + 1);
-            corner = *above;
-            next.push(left);
-        }
-        row = next;
-    }
-    row.last().copied().unwrap_or_default()
+    spelling::meant(wrong, words)
 }
 
 impl Place {
@@ -131,6 +115,5 @@ mod tests {
         );
         assert_eq!(meant("unknown field `colour`, expected `mass_kg`"), None);
         assert_eq!(meant("invalid type: `a`, expected `b`"), None);
-        assert_eq!((distance("", "abc"), distance("kitten", "sitting")), (3, 3));
     }
 }

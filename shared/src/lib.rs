@@ -20,6 +20,7 @@ pub mod record;
 pub mod recording;
 pub mod report;
 pub mod rng;
+pub mod spelling;
 pub mod stats;
 pub mod time;
 pub mod wire;

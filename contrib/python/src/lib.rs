@@ -1,4 +1,5 @@
-//! The Python package `mmt`: Python's values become the lab's types, and what the lab computes becomes arrays.
+//! The Python package `mmt`: Python's values become the lab's types, and what the lab computes becomes arrays; and a client of both
+//! plugs of the live programs.
 //!
 //! Nothing is computed here. Long calls let other threads of Python run, and end at Ctrl-C. Times are seconds of the model's
 //! clock, lengths metres, forces newtons, angles radians.
@@ -16,13 +17,14 @@ mod config;
 mod env;
 mod link;
 mod packets;
+mod plug;
 mod record;
 mod run;
 mod sweep;
 mod ticks;
 
-/// Model-mediated teleoperation: runs in exact virtual time as arrays, sweeps, records, the emulated link by itself, and an
-/// environment for operators, estimators and update schemes of one's own.
+/// Model-mediated teleoperation: runs in exact virtual time as arrays, sweeps, records, the emulated link by itself, an
+/// environment for operators, estimators and update schemes of one's own, and a device or a plant at a live session.
 ///
 /// Times are seconds of the model's clock, lengths metres, forces newtons, angles radians. A configuration is the text of a
 /// file in TOML as `default_config` makes it, a path to such a file, or a dict of the same keys, nested or with dots.
@@ -36,6 +38,8 @@ mod mmt {
     use crate::env::Env;
     #[pymodule_export]
     use crate::link::{Departure, Link};
+    #[pymodule_export]
+    use crate::plug::{Command, Device, Plant};
     #[pymodule_export]
     use crate::record::{Record, read};
     #[pymodule_export]

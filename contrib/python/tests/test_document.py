@@ -14,7 +14,7 @@ def test_every_example_of_the_document_runs(recorded, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     shutil.copy(recorded, "run.mcap")
     examples = re.findall(r"^```python\n(.*?)^```", DOCUMENT.read_text(), re.DOTALL | re.MULTILINE)
-    assert len(examples) == 6
+    assert len(examples) == 7
     names: dict[str, object] = {}
     for example in examples:
         exec(compile(example, str(DOCUMENT), "exec"), names)

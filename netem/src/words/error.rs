@@ -2,9 +2,11 @@
 
 use std::fmt;
 
+use mmt_shared::spelling;
+
 /// A text that is no link: which word, where, and what would have been right.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{}, column {column}: {reason}", Shown(.word))]
+#[error("{}, column {column}: {reason}{}", Shown(.word), Meant(.word, .reason))]
 pub struct ParseError {
     /// The word; empty if the text ended too early.
     pub word: String,
@@ -73,5 +75,21 @@ impl fmt::Display for Shown<'_> {
         let head: String = self.0.chars().take(40).collect();
         let more = if head.len() < self.0.len() { "…" } else { "" };
         write!(f, "{head:?}{more}")
+    }
+}
+
+/// Of the words that would have been right the one that this one nearly is.
+struct Meant<'a>(&'a str, &'a Reason);
+
+impl fmt::Display for Meant<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self(wrong, Reason::Expected { expected }) = self else {
+            return Ok(());
+        };
+        let words = expected.split(", ").flat_map(|words| words.split(" or "));
+        match spelling::meant(wrong, words) {
+            Some(meant) => write!(f, "; did you mean {meant}?"),
+            None => Ok(()),
+        }
     }
 }

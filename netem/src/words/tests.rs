@@ -165,6 +165,14 @@ fn an_error_tells_the_word_its_column_and_what_was_expected() {
         ("loss 0.000000001%", 6, "0.000000001%", "0.0000001%"),
         ("loss half", 6, "half", "a percentage"),
         ("lag 5ms", 1, "lag", "delay, loss"),
+        ("dealy 5ms", 1, "dealy", "; did you mean delay?"),
+        ("preset 5g-dwn", 8, "5g-dwn", "; did you mean 5g-down?"),
+        (
+            "delay 5ms 1ms distribution norml",
+            28,
+            "norml",
+            "; did you mean normal?",
+        ),
         ("order random", 7, "random", "fifo or free"),
         ("limit 0", 7, "0", "1 to 1000000"),
         (

@@ -3,6 +3,7 @@
 use crate::environment::BodyConfig;
 use crate::estimator::Measured;
 use crate::tool::force::TOOL_FORCE_MAX_N;
+use crate::trigger::TriggerInput;
 use mmt_shared::model::sample::HipCounts;
 use mmt_shared::model::settings::Mode;
 use mmt_shared::time::TICK;
@@ -92,6 +93,39 @@ impl Driven {
             self.updates.extend(tick.update);
         }
     }
+}
+
+#[test]
+fn the_trigger_knows_whether_the_hip_stands() {
+    let mut driven = Driven::new(Mode::Recommended, vec![cube(0.0, 0.7, false)]);
+    let mut stands = |hip: Vec2| {
+        driven.now += TICK;
+        let sample = HipSample {
+            stamp: driven.now,
+            hip: HipCounts::nearest(hip),
+            ..HipSample::default()
+        };
+        driven.slave.handle_sample(driven.now, &sample, 0);
+        let mut seen = None;
+        let mut look = |_: Time, input: &TriggerInput| {
+            seen = Some(input.hip_stands);
+            None
+        };
+        let scheme = Substitutes {
+            scheme: Some(&mut look),
+            ..Substitutes::default()
+        };
+        driven.slave.tick_with(driven.now, scheme);
+        seen
+    };
+    let mut along = |steps: i32, step_m: f64, from_m: f64| -> Vec<bool> {
+        let hips = (0..steps).map(|n| Vec2::new(from_m + f64::from(n) * step_m, 0.0));
+        hips.filter_map(&mut stands).skip(100).collect()
+    };
+    let moves = along(300, -1e-4, -0.3);
+    assert!(moves.len() > 100 && moves.iter().all(|stands| !stands));
+    let rests = along(300, 0.0, -0.33);
+    assert!(rests.len() > 100 && rests.iter().all(|stands| *stands));
 }
 
 fn cube(y: f64, mass_kg: f64, fixed: bool) -> BodyConfig {

@@ -320,11 +320,17 @@ impl fmt::Display for Document {
             "held         {:.1} s, force up to {:.2} N, buttons {:#06b}",
             self.held_s, self.force_peak_n, self.buttons
         )?;
-        writeln!(
-            f,
-            "dropped      lost {}, late {}, malformed {}, nonsense {}",
-            drops.lost, drops.late, drops.malformed, drops.nonsense
-        )?;
+        let drops = [
+            ("lost", drops.lost),
+            ("late", drops.late),
+            ("malformed", drops.malformed),
+            ("nonsense", drops.nonsense),
+        ];
+        let dropped = drops.iter().filter(|(_, count)| *count > 0);
+        let dropped: Vec<_> = dropped.map(|(name, n)| format!("{name} {n}")).collect();
+        if !dropped.is_empty() {
+            writeln!(f, "dropped      {}", dropped.join(", "))?;
+        }
         write!(f, "verdict      {}", self.verdict)?;
         for advice in &self.advice {
             write!(f, "\n             what to do: {advice}")?;
