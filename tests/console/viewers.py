@@ -67,7 +67,7 @@ def main():
     for _ in range(ROUNDS):
         for viewers, runs in found.items():
             runs.append(run(sys.argv[1], viewers))
-    print(f"$ tests/console/viewers.py\nCPU time of a haptic tick, medians of {ROUNDS} runs of {LENGTH_S} s each")
+    print(f"CPU time of a haptic tick, medians of {ROUNDS} runs of {LENGTH_S} s each")
     for viewers, runs in found.items():
         p50, p99, read_bytes = (median(column) for column in zip(*runs))
         print(f"  viewers {viewers:2}    p50 {p50:5.1f} us   p99 {p99:5.1f} us   {read_bytes / 1e6 / LENGTH_S:4.2f} MB/s read")
