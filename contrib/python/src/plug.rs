@@ -1,6 +1,7 @@
 //! `mmt.Device` and `mmt.Plant`: a device and a plant in Python, plugged into a master and a slave (docs/plugs.md).
 
 use std::net::{Ipv4Addr, Ipv6Addr, SocketAddr, ToSocketAddrs, UdpSocket};
+use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use mmt_shared::plug::{
@@ -310,26 +311,32 @@ impl Command {
 /// socket can be had.
 #[pyclass(module = "mmt")]
 pub(crate) struct Plant {
-    end: End,
+    // one thread may look on while another waits
+    end: Mutex<End>,
+}
+
+impl Plant {
+    fn with<T: Send>(&self, py: Python<'_>, act: impl FnOnce(&mut End) -> T + Send) -> T {
+        py.detach(|| act(&mut self.end.lock().unwrap_or_else(PoisonError::into_inner)))
+    }
 }
 
 #[pymethods]
 impl Plant {
     #[new]
     fn new(address: &str) -> PyResult<Self> {
-        let end = End::connect(address)?;
+        let end = Mutex::new(End::connect(address)?);
         Ok(Self { end })
     }
 
     /// The newest command, which is waited for so long, s, 0 to 10; None if none came. Releases the GIL.
-    fn command(&mut self, py: Python<'_>, wait_s: f64) -> PyResult<Option<Command>> {
+    fn command(&self, py: Python<'_>, wait_s: f64) -> PyResult<Option<Command>> {
         if !(0.0..=WAIT_MAX_S).contains(&wait_s) {
             let what = format!("wait_s is {wait_s}; it must be 0 to {WAIT_MAX_S} s");
             return Err(PyValueError::new_err(what));
         }
         let wait = Duration::from_secs_f64(wait_s);
-        let end = &mut self.end;
-        Ok(py.detach(|| newest(end, wait)))
+        Ok(self.with(py, |end| newest(end, wait)))
     }
 
     /// Sends what was measured, at the latest 20 ms after the last.
@@ -339,7 +346,7 @@ impl Plant {
     /// Raises ValueError where a number is not finite.
     #[pyo3(signature = (tool, velocity, force, pose=None, image_age_s=0.0))]
     fn answer(
-        &mut self,
+        &self,
         py: Python<'_>,
         tool: [f64; 2],
         velocity: [f64; 2],
@@ -356,28 +363,31 @@ impl Plant {
         let numbers = [&tool[..], &velocity, &force, &pose, &age].concat();
         let numbers = numbers.into_iter().map(f64::to_le_bytes);
         let stamp_ns = monotonic_ns(py)?;
-        self.end
-            .send::<PLANT_BYTES, 8>(PlugKind::Answer, flags, stamp_ns, numbers);
+        self.with(py, |end| {
+            end.send::<PLANT_BYTES, 8>(PlugKind::Answer, flags, stamp_ns, numbers);
+        });
         Ok(())
     }
 
     /// Commands that came.
     #[getter]
-    fn received(&self) -> u64 {
-        self.end.received
+    fn received(&self, py: Python<'_>) -> u64 {
+        self.with(py, |end| end.received)
     }
 
     /// Commands that never came.
     #[getter]
-    fn lost(&self) -> u64 {
-        self.end.lost
+    fn lost(&self, py: Python<'_>) -> u64 {
+        self.with(py, |end| end.lost)
     }
 
-    fn __repr__(&self) -> String {
-        let End {
-            sequence, received, ..
-        } = self.end;
-        format!("<mmt.Plant: {received} received, {sequence} sent>")
+    fn __repr__(&self, py: Python<'_>) -> String {
+        self.with(py, |end| {
+            let End {
+                sequence, received, ..
+            } = end;
+            format!("<mmt.Plant: {received} received, {sequence} sent>")
+        })
     }
 }
 
