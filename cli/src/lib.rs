@@ -69,6 +69,7 @@ fn execute(command: Command) -> Result<(), Failure> {
         Command::Sweep(arguments) => commands::sweep::run(&arguments),
         Command::Doctor(arguments) => commands::doctor::run(&arguments),
         Command::Device(arguments) => commands::device::run(&arguments),
+        Command::Identity(arguments) => commands::identity::run(&arguments),
         Command::Config(arguments) => commands::config::run(&arguments),
         Command::Completions { shell } => commands::manual::completions(shell),
         Command::Man(arguments) => commands::manual::pages(&arguments),

@@ -312,7 +312,7 @@ end
 
 local function hello(r)
     r.tree:add(fields.token, r:take(32))
-    r:choice("role", { "operator" })
+    r:choice("role", { "operator", "observer" })
     if r:choice("claim", { "if_free", "resume", "take_over" }) == "resume" then
         r.tree:add(fields.resume, r:take(32))
     end
@@ -338,7 +338,7 @@ local function welcome(r)
 end
 
 local function refused(r)
-    return " " .. r:choice("refusal", { "busy", "wrong_token", "bad_hello", "ending" })
+    return " " .. r:choice("refusal", { "busy", "wrong_token", "bad_hello", "ending", "wrong_role" })
 end
 
 -- The report is opaque: its bytes are for whoever prints it.

@@ -7,12 +7,16 @@
 mod secret;
 #[cfg(test)]
 mod tests;
+mod tokens;
 
 use std::fmt;
 use std::net::{Ipv4Addr, Ipv6Addr};
 use std::str::FromStr;
 
 pub use secret::{HexError, Pin, SECRET_BYTES, Token};
+pub use tokens::{
+    Created, NamedToken, TOKEN_LINE, TOKENS_MAX, TokenName, TokenNameError, Tokens, TokensError,
+};
 
 const SCHEME: &str = "mmt://";
 const PORT_RULE: &str = "a number from 1 to 65535";

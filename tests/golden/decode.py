@@ -185,7 +185,7 @@ def claim(r):
 
 
 def hello(r):
-    return {"token": r.take(32).hex(), "role": r.choice(["operator"]), **claim(r), **coupling(r),
+    return {"token": r.take(32).hex(), "role": r.choice(["operator", "observer"]), **claim(r), **coupling(r),
             "samples_per_command": r.u8(), "architecture": r.choice(["mmt", "tdpa"]), "scene_hz": r.u8(),
             "hip": r.floats("hip", 2), "program": r.text()}
 
@@ -200,7 +200,7 @@ def welcome(r):
 
 
 def refused(r):
-    return {"refusal": r.choice(["busy", "wrong_token", "bad_hello", "ending"])}
+    return {"refusal": r.choice(["busy", "wrong_token", "bad_hello", "ending", "wrong_role"])}
 
 
 def farewell(r):

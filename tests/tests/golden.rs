@@ -156,9 +156,8 @@ fn of_stream_message(message: &StreamMessage<'_>) -> Decoded {
     let fields = match message {
         StreamMessage::Hello(hello) => {
             assert_eq!(hello.accept(), Ok(*hello));
-            let Role::Operator = hello.role;
             let mut fields = json!({
-                "token": hello.token.reveal().to_string(), "role": "operator",
+                "token": hello.token.reveal().to_string(), "role": hello.role.name(),
                 "stiffness_n_per_m": hello.coupling.stiffness_n_per_m,
                 "damping_ns_per_m": hello.coupling.damping_ns_per_m,
                 "samples_per_command": hello.samples_per_command,
@@ -182,6 +181,7 @@ fn of_stream_message(message: &StreamMessage<'_>) -> Decoded {
                 Refusal::WrongToken => "wrong_token",
                 Refusal::BadHello => "bad_hello",
                 Refusal::Ending => "ending",
+                Refusal::WrongRole => "wrong_role",
             };
             json!({ "refusal": name })
         }

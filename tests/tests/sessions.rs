@@ -2,6 +2,7 @@
 
 mod devices;
 mod harness;
+mod identity;
 mod independent_client;
 mod live;
 mod plugs;

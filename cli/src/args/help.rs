@@ -55,6 +55,18 @@ pub(super) const DEVICE_LIST: &str = include_str!("help/device-list.txt").trim_a
 /// Examples of `mmt device test`.
 pub(super) const DEVICE_TEST: &str = include_str!("help/device-test.txt").trim_ascii_end();
 
+/// Examples of `mmt identity`.
+pub(super) const IDENTITY: &str = include_str!("help/identity.txt").trim_ascii_end();
+
+/// Examples of `mmt identity list`.
+pub(super) const IDENTITY_LIST: &str = include_str!("help/identity-list.txt").trim_ascii_end();
+
+/// Examples of `mmt identity rotate`.
+pub(super) const IDENTITY_ROTATE: &str = include_str!("help/identity-rotate.txt").trim_ascii_end();
+
+/// Examples of `mmt identity revoke`.
+pub(super) const IDENTITY_REVOKE: &str = include_str!("help/identity-revoke.txt").trim_ascii_end();
+
 /// Examples of `mmt completions`.
 pub(super) const COMPLETIONS: &str = include_str!("help/completions.txt").trim_ascii_end();
 

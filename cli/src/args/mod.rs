@@ -6,6 +6,7 @@ mod console;
 mod device;
 mod doctor;
 mod help;
+mod identity;
 mod netem;
 mod plant;
 mod records;
@@ -44,6 +45,9 @@ pub(crate) use device::{
     DevicesCommand, PlugWords,
 };
 pub(crate) use doctor::{DoctorArguments, ManArguments};
+pub(crate) use identity::{
+    IdentityArguments, IdentityCommand, IdentityListArguments, RevokeArguments, RotateArguments,
+};
 pub(crate) use plant::PlantArguments;
 #[cfg(feature = "live")]
 pub(crate) use records::LiveArguments;
@@ -109,6 +113,9 @@ pub(crate) enum Command {
     /// Haptic devices that can be plugged in: what is there, and does it do
     #[command(after_help = help::DEVICE, subcommand_required = true, arg_required_else_help = true)]
     Device(DevicesArguments),
+    /// Who may operate a slave, and who may look on: its tokens
+    #[command(after_help = help::IDENTITY, subcommand_required = true, arg_required_else_help = true)]
+    Identity(IdentityArguments),
     /// Every key of a configuration: its default, its unit, what is accepted, and where its value comes from
     #[command(after_help = help::CONFIG, subcommand_required = true, arg_required_else_help = true)]
     Config(ConfigArguments),
@@ -250,7 +257,7 @@ pub(crate) struct SlaveArguments {
     /// Seed of sensors and network [default: the file's, else 1]
     #[arg(long, value_name = "N")]
     pub(crate) seed: Option<u64>,
-    /// Directory that keeps certificate, key and token [default: $XDG_STATE_HOME/mmt]
+    /// Directory that keeps certificate, key and tokens (mmt identity) [default: $XDG_STATE_HOME/mmt]
     #[arg(long, value_name = "DIR")]
     pub(crate) identity: Option<PathBuf>,
     /// What carries the session.

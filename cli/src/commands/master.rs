@@ -304,6 +304,7 @@ fn host_failure(error: &MasterHostError) -> Failure {
         )
         | E::Busy { .. }
         | E::WrongToken { .. }
+        | E::WrongRole { .. }
         | E::BadHello { .. }
         | E::Ending { .. }
         | E::Unexpected { .. }

@@ -9,6 +9,7 @@ pub(crate) mod device;
 pub(crate) mod doctor;
 pub(crate) mod export;
 mod host;
+pub(crate) mod identity;
 #[cfg(feature = "live")]
 pub(crate) mod live;
 pub(crate) mod manual;

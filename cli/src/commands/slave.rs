@@ -2,6 +2,7 @@
 
 use std::io::{self, IsTerminal as _};
 use std::net::SocketAddr;
+use std::path::Path;
 use std::sync::Arc;
 use std::sync::mpsc;
 use std::time::Duration;
@@ -15,7 +16,7 @@ use mmt_server::io::{
 };
 use mmt_shared::clean::clean;
 use mmt_shared::io::emergency::EmergencyStop;
-use mmt_shared::io::identity_file::{default_directory, load_or_create};
+use mmt_shared::io::identity_file::{advertise, load_or_create};
 use mmt_shared::io::plug_socket::PlugSocketError;
 use mmt_shared::pairing::{Host as HostName, Pairing};
 use mmt_shared::report::RunReport;
@@ -24,6 +25,7 @@ use tokio::runtime::Runtime;
 use tokio::sync::watch;
 
 use super::host::{Host, spawn};
+use super::identity;
 use super::netem::wrap::{Emulation, effect};
 use super::record::Record;
 use super::viewer::Viewer;
@@ -43,7 +45,8 @@ const PLANT_WAIT: Duration = Duration::from_millis(100);
 /// # Errors
 /// Wrong input, an address that cannot be had, a host that failed.
 pub(crate) fn run(arguments: SlaveArguments, messages: &Messages) -> Result<(), Failure> {
-    let mut options = options(&arguments)?;
+    let directory = identity::directory(arguments.identity.as_deref())?;
+    let mut options = options(&arguments, &directory)?;
     let record = Record::start(arguments.record.as_deref())?;
     options.record = record.recorder();
     let (netem, seed) = (Some(&options.netem), options.netem_seed);
@@ -67,6 +70,7 @@ pub(crate) fn run(arguments: SlaveArguments, messages: &Messages) -> Result<(), 
     let (host, started) = start(options, arguments.advertise, stop.receiver())?;
     // If it could not start the reason is in the host.
     if let Ok(started) = started.recv() {
+        keep_address(&directory, &started.pairing);
         print(&started.pairing)?;
         note(waiting(&started.pairing, everywhere, is_shown_anyway()));
         watch_sessions(&host, &started.live, messages, &stop);
@@ -174,22 +178,25 @@ pub(super) fn start(
     Ok((spawn("slave", work)?, receiver))
 }
 
-fn options(arguments: &SlaveArguments) -> Result<SlaveOptions, Failure> {
+/// Keeps where the slave is reached for `mmt identity rotate`, which has to be told where this fails.
+fn keep_address(directory: &Path, pairing: &Pairing) {
+    if let Err(error) = advertise(directory, &pairing.address) {
+        tracing::debug!("mmt identity rotate will need --address: {error}");
+    }
+}
+
+fn options(arguments: &SlaveArguments, directory: &Path) -> Result<SlaveOptions, Failure> {
     let path = arguments.config.as_deref();
     let world = configuration(Program::Slave, path, &arguments.flags()?)?;
     let mut config = world.slave;
     config.plant.link = arguments.plant.is_linked(config.plant.link);
-    let directory = match &arguments.identity {
-        Some(directory) => directory.clone(),
-        None => default_directory().map_err(Failure::usage)?,
-    };
     let transport = arguments.transport.choose()?;
     let permitted = transport.permit(arguments.listen);
     permitted.map_err(Failure::usage)?;
     Ok(SlaveOptions {
         transport,
         listen: arguments.listen,
-        identity: load_or_create(&directory).map_err(Failure::usage)?,
+        identity: load_or_create(directory).map_err(Failure::usage)?,
         netem_seed: world.seed,
         config,
         netem: world.down,
@@ -225,6 +232,8 @@ fn host_failure(error: &SlaveHostError) -> Failure {
         SlaveHostError::Slave(_) => {
             Failure::usage(error).remedy("change that number in the configuration")
         }
+        SlaveHostError::NoOperator => Failure::usage(error)
+            .remedy("`mmt identity rotate` makes one; give it the same --identity"),
         SlaveHostError::Insecure(_) => Failure::usage(error),
         SlaveHostError::Netem(_) => Failure::usage(error).remedy("change --netem"),
         // what a master wrote may stand in it
@@ -252,7 +261,7 @@ mod tests {
             &identity,
         ];
         match Arguments::parse_from(all.iter().chain(words)).command {
-            Command::Slave(arguments) => options(&arguments).unwrap(),
+            Command::Slave(arguments) => options(&arguments, home.path()).unwrap(),
             _ => panic!("not a slave"),
         }
     }

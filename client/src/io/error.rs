@@ -119,9 +119,18 @@ pub enum MasterHostError {
     /// The token is wrong.
     #[error(
         "the slave at {address} does not know the token of this pairing string: copy the line that \
-         `mmt slave` printed last"
+         `mmt slave` or `mmt identity rotate` printed last; it may have been replaced or revoked since"
     )]
     WrongToken {
+        /// The slave.
+        address: SocketAddr,
+    },
+    /// The token is an observer's.
+    #[error(
+        "the slave at {address} lets the token of this pairing string look on and not operate: ask its owner for an \
+         operator's (`mmt identity rotate --name NAME --role operator`)"
+    )]
+    WrongRole {
         /// The slave.
         address: SocketAddr,
     },

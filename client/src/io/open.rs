@@ -261,5 +261,6 @@ fn refused(refusal: Refusal, address: SocketAddr, hello: &Hello) -> MasterHostEr
             stiffness_n_per_m: hello.coupling.stiffness_n_per_m,
         },
         Refusal::Ending => MasterHostError::Ending { address },
+        Refusal::WrongRole => MasterHostError::WrongRole { address },
     }
 }

@@ -1,6 +1,6 @@
 //! The acceptor: who connects is judged here, beside the session that may be going on.
 //!
-//! The order is the protocol's: token, ranges, whether another master operates. Who is refused gets the reason and is
+//! The order is the protocol's: token, role, ranges, whether another master operates. Who is refused gets the reason and is
 //! counted; nobody waits for anybody else. No session begins here.
 
 use std::net::SocketAddr;
@@ -9,13 +9,16 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
+use mmt_shared::io::identity_file::{Granted, TokenList};
 use mmt_shared::io::stream::{ReadFrameError, delivered, read_frame, write_message};
 use mmt_shared::io::transport::{
     CLOSE_FINISHED, CLOSE_NO_HELLO, CLOSE_NOT_A_HELLO, Connection, ConnectionError, Handshake,
     Listener, RecvStream, SendStream,
 };
-use mmt_shared::pairing::Token;
-use mmt_shared::wire::{DecodeError, Hello, Refusal, STREAM_MESSAGE_MAX, Side, StreamMessage};
+use mmt_shared::pairing::{Token, TokenName};
+use mmt_shared::wire::{
+    DecodeError, Hello, Refusal, Role, STREAM_MESSAGE_MAX, Side, StreamMessage,
+};
 use tokio::sync::{mpsc, watch};
 use tokio::task::JoinSet;
 use tokio::time::timeout;
@@ -35,6 +38,8 @@ pub(super) struct Admitted {
     pub(super) send: SendStream,
     pub(super) receive: RecvStream,
     pub(super) hello: Hello,
+    /// Whose token it has.
+    pub(super) name: TokenName,
     pub(super) lease: Lease,
 }
 
@@ -45,6 +50,7 @@ pub(super) struct Refusals {
     pub(super) wrong_token: AtomicU64,
     pub(super) bad_hello: AtomicU64,
     pub(super) ending: AtomicU64,
+    pub(super) wrong_role: AtomicU64,
     /// Handshakes that failed, other versions included.
     pub(super) handshake: AtomicU64,
     /// Connected, and then no hello that can be read.
@@ -56,7 +62,7 @@ pub(super) struct Refusals {
 /// What the judges share.
 #[derive(Clone)]
 pub(super) struct Acceptor {
-    token: Token,
+    tokens: TokenList,
     crowd: Crowd,
     leases: Leases,
     refusals: Arc<Refusals>,
@@ -84,13 +90,13 @@ enum HandshakeError {
 impl Acceptor {
     /// An acceptor that hands admitted masters to the receiver, one at a time.
     pub(super) fn new(
-        token: Token,
+        tokens: TokenList,
         refusals: Arc<Refusals>,
         stop: watch::Receiver<bool>,
     ) -> (Self, mpsc::Receiver<Admitted>) {
         let (admitted, receiver) = mpsc::channel(1);
         let acceptor = Self {
-            token,
+            tokens,
             crowd: Crowd::default(),
             leases: Leases::new(),
             refusals,
@@ -186,15 +192,17 @@ impl Acceptor {
         hello: &Hello,
     ) {
         let address = connection.remote_address();
-        // whoever has the token is no stranger any more
-        let stranger = (hello.token != self.token).then_some(place);
-        match self.verdict(address, hello).await {
-            Ok((hello, lease)) => {
+        let granted = self.tokens.grants(&hello.token).await;
+        // whoever has a token is no stranger any more
+        let stranger = granted.is_none().then_some(place);
+        match self.verdict(address, hello, granted).await {
+            Ok((hello, name, lease)) => {
                 let admitted = Admitted {
                     connection,
                     send,
                     receive,
                     hello,
+                    name,
                     lease,
                 };
                 // Nobody takes it if the host has just ended; dropping it closes the connection.
@@ -207,6 +215,7 @@ impl Acceptor {
                     Refusal::WrongToken => &self.refusals.wrong_token,
                     Refusal::BadHello => &self.refusals.bad_hello,
                     Refusal::Ending => &self.refusals.ending,
+                    Refusal::WrongRole => &self.refusals.wrong_role,
                 });
                 let refused = refuse(&connection, send, refusal);
                 match stranger {
@@ -220,9 +229,16 @@ impl Acceptor {
         }
     }
 
-    async fn verdict(&self, address: SocketAddr, hello: &Hello) -> Result<(Hello, Lease), Refusal> {
-        if hello.token != self.token {
-            return Err(Refusal::WrongToken);
+    async fn verdict(
+        &self,
+        address: SocketAddr,
+        hello: &Hello,
+        granted: Option<Granted>,
+    ) -> Result<(Hello, TokenName, Lease), Refusal> {
+        let Granted { name, role } = granted.ok_or(Refusal::WrongToken)?;
+        if hello.role == Role::Observer || !role.permits(hello.role) {
+            tracing::warn!("{address} has the token {name}, of an {}", role.name());
+            return Err(Refusal::WrongRole);
         }
         let hello = hello.accept().map_err(|error| {
             tracing::warn!("the hello of {address}: {error}");
@@ -236,7 +252,7 @@ impl Acceptor {
             Refusal::Busy
         })?;
         let lease = self.leases.claim(&hello.claim, resume).await;
-        lease.map_or(Err(Refusal::Busy), |lease| Ok((hello, lease)))
+        lease.map_or(Err(Refusal::Busy), |lease| Ok((hello, name, lease)))
     }
 }
 

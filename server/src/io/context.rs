@@ -42,6 +42,9 @@ pub enum SlaveHostError {
     /// QUIC cannot start.
     #[error("cannot start QUIC: {0}")]
     Endpoint(#[from] EndpointError),
+    /// Nobody could operate it.
+    #[error("the identity has no token of an operator")]
+    NoOperator,
     /// The configuration's numbers are not accepted.
     #[error("the slave's configuration: {0}")]
     Slave(#[from] SlaveError),
@@ -78,7 +81,7 @@ impl Context {
     }
 
     /// Who was turned away since the host was started, by name.
-    pub(super) fn refusals(&self) -> [(&'static str, u64); 8] {
+    pub(super) fn refusals(&self) -> [(&'static str, u64); 9] {
         let read = |counter: &AtomicU64| counter.load(Ordering::Relaxed);
         let refusals = &self.refusals;
         [
@@ -86,6 +89,7 @@ impl Context {
             ("masters_wrong_token", read(&refusals.wrong_token)),
             ("masters_bad_hello", read(&refusals.bad_hello)),
             ("masters_ending", read(&refusals.ending)),
+            ("masters_wrong_role", read(&refusals.wrong_role)),
             ("masters_no_hello", read(&refusals.no_hello)),
             ("masters_crowded", read(&refusals.crowded)),
             ("handshakes_failed", read(&refusals.handshake)),

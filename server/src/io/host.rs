@@ -8,6 +8,7 @@ use mmt_netem::io::socket::EmulatedSocket;
 use mmt_netem::link::LinkId;
 use mmt_shared::io::clock::Clock;
 use mmt_shared::io::congestion::RateCap;
+use mmt_shared::io::identity_file::TokenList;
 use mmt_shared::io::network_task::asked_to_stop;
 use mmt_shared::io::quic::Traffic;
 use mmt_shared::io::socket;
@@ -43,6 +44,7 @@ pub struct SlaveHost {
     endpoint: Endpoint,
     address: SocketAddr,
     pairing: Pairing,
+    pub(super) tokens: TokenList,
     pub(super) context: Context,
     once: bool,
 }
@@ -51,10 +53,13 @@ impl SlaveHost {
     /// Listens. Call it inside of a tokio runtime with I/O and time.
     ///
     /// # Errors
-    /// The configuration is not accepted, the address cannot be listened on, the identity is unusable.
+    /// The configuration is not accepted, the address cannot be listened on, the identity is unusable or has no token of an
+    /// operator.
     pub fn bind(options: SlaveOptions) -> Result<Self, SlaveHostError> {
         options.transport.permit(options.listen)?;
         Slave::try_new(&options.config, Coupling::for_stiffness(TRIAL_STIFFNESS))?;
+        let own = options.identity.tokens().of_operator();
+        let own = own.ok_or(SlaveHostError::NoOperator)?.token;
         let unusable = |source| SlaveHostError::Socket {
             address: options.listen,
             source,
@@ -73,7 +78,7 @@ impl SlaveHost {
                 port: address.port(),
             },
             pin: options.identity.pin(),
-            token: *options.identity.token(),
+            token: own,
         };
         let context = Context {
             clock: Clock::start(),
@@ -93,6 +98,7 @@ impl SlaveHost {
             endpoint,
             address,
             pairing,
+            tokens: TokenList::of(&options.identity),
             context,
             once: options.once,
         })
@@ -124,8 +130,8 @@ impl SlaveHost {
         mut stop: watch::Receiver<bool>,
         live: Arc<watch::Sender<SlaveLive>>,
     ) -> Result<Option<SlaveReport>, SlaveHostError> {
-        let (token, refusals) = (self.pairing.token, Arc::clone(&self.context.refusals));
-        let (acceptor, masters) = Acceptor::new(token, refusals, stop.clone());
+        let (tokens, refusals) = (self.tokens.clone(), Arc::clone(&self.context.refusals));
+        let (acceptor, masters) = Acceptor::new(tokens, refusals, stop.clone());
         let listener = Arc::clone(&self.context.listener);
         let (served, ()) = tokio::join!(
             async {

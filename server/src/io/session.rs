@@ -22,6 +22,7 @@ use mmt_shared::io::transport::{
     CLOSE_FINISHED, CLOSE_TAKEN_OVER, Connection, RecvStream, SendStream,
 };
 use mmt_shared::model::contact::Coupling;
+use mmt_shared::pairing::TokenName;
 use mmt_shared::report::{MasterHalf, SlaveHalf};
 use mmt_shared::wire::{Ending, Hello, Label, Refusal, Side, StreamMessage, Welcome};
 use tokio::sync::watch;
@@ -99,6 +100,7 @@ pub(super) async fn serve_with(
         mut send,
         receive,
         hello,
+        name,
         lease,
     } = admitted;
     let clock = context.clock;
@@ -125,7 +127,7 @@ pub(super) async fn serve_with(
         );
         return Ok(None);
     }
-    announce(&connection, &hello);
+    announce(&connection, &name, &hello);
     let mut slave_loop = SlaveLoop::new(end, context.take_truth(), context.emergency.clone());
     let plant = context.plant.as_ref().map(PlantHost::port);
     slave_loop = slave_loop.plugged_into(plant);
@@ -177,7 +179,7 @@ async fn welcome(
     write_message(send, &welcome, WRITE_WAIT).await
 }
 
-fn announce(connection: &Connection, hello: &Hello) {
+fn announce(connection: &Connection, name: &TokenName, hello: &Hello) {
     let (address, program) = (connection.remote_address(), hello.program);
     let architecture = hello.architecture.name();
     let Coupling {
@@ -185,7 +187,7 @@ fn announce(connection: &Connection, hello: &Hello) {
         damping_ns_per_m,
     } = hello.coupling;
     tracing::info!(
-        "{address} operates ({program}, {architecture}, device of {stiffness_n_per_m} N/m and {damping_ns_per_m} N s/m)"
+        "{address} operates as {name} ({program}, {architecture}, device of {stiffness_n_per_m} N/m and {damping_ns_per_m} N s/m)"
     );
 }
 

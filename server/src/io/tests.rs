@@ -1,6 +1,7 @@
 //! The host from outside, over loopback: sessions, refusals, endings.
 
 mod crowd;
+mod identity;
 mod lease;
 mod master;
 mod opening;
@@ -205,7 +206,7 @@ async fn a_panic_of_the_thread_ends_the_session_as_failed_and_is_an_error() {
     let (stop, mut stopped) = watch::channel(false);
     let context = &host.context;
     let (acceptor, mut masters) = Acceptor::new(
-        host.pairing(None).token,
+        host.tokens.clone(),
         Arc::clone(&context.refusals),
         stop.subscribe(),
     );

@@ -1,7 +1,9 @@
-//! The slave's identity: a self-signed Ed25519 certificate, its key and the token, and their text form.
+//! The slave's identity: a self-signed Ed25519 certificate, its key and the tokens, and their text form.
 //!
 //! Ed25519 because its signatures have one size and are deterministic. The text holds secrets: only
 //! `identity_file` writes it.
+
+use std::time::SystemTime;
 
 use ring::hmac;
 use rustls::pki_types::pem::PemObject;
@@ -10,12 +12,12 @@ use rustls::pki_types::{
 };
 use rustls::server::ParsedCertificate;
 
+use super::identity_file::Kept;
 use super::secret::NoRandomness;
-use crate::pairing::{HexError, Pin, Token};
+use crate::pairing::{Created, Pin, TOKEN_LINE, Token, Tokens, TokensError};
 
 /// Name that the certificate carries; nobody checks it, the pin is what counts.
 const CERTIFICATE_NAME: &str = "mmt-slave";
-const TOKEN_LINE: &str = "token: ";
 const PREAMBLE: &str =
     "The identity of an mmt slave: whoever can read this file can pose as it and operate it.";
 
@@ -41,21 +43,23 @@ pub enum ParseError {
         /// Why.
         why: String,
     },
-    /// The token is no token.
-    #[error("its token {0}")]
-    Token(#[from] HexError),
+    /// The tokens are none.
+    #[error(transparent)]
+    Tokens(#[from] TokensError),
     /// Certificate and key are not of one pair.
     #[error("its certificate belongs to another key")]
     Mismatch,
 }
 
-/// A key, the certificate that carries it, and the token.
+/// A key, the certificate that carries it, and the tokens.
 #[derive(Debug)]
 pub struct Identity {
     key: PrivatePkcs8KeyDer<'static>,
     certificate: CertificateDer<'static>,
     pin: Pin,
-    token: Token,
+    tokens: Tokens,
+    /// Where it is kept, if it is.
+    kept: Option<Kept>,
 }
 
 impl Identity {
@@ -72,10 +76,10 @@ impl Identity {
         let pair = rcgen::KeyPair::generate_for(&rcgen::PKCS_ED25519)?;
         let parameters = rcgen::CertificateParams::new(vec![CERTIFICATE_NAME.to_owned()])?;
         let certificate = parameters.self_signed(&pair)?;
-        let token = Token::generate()?;
+        let tokens = Tokens::first(Token::generate()?, created_now());
         let text = format!(
-            "{PREAMBLE}\n{TOKEN_LINE}{}\n{}{}",
-            token.reveal(),
+            "{PREAMBLE}\n{}{}{}",
+            tokens.reveal(),
             pair.serialize_pem(),
             certificate.pem(),
         );
@@ -83,7 +87,8 @@ impl Identity {
             pin: Pin::of_public_key(&rcgen::PublicKeyData::subject_public_key_info(&pair)),
             certificate: certificate.der().clone(),
             key: pair.into(),
-            token,
+            tokens,
+            kept: None,
         };
         Ok((identity, text))
     }
@@ -91,10 +96,7 @@ impl Identity {
     /// An identity from its text.
     pub(super) fn parse(text: &str) -> Result<Self, ParseError> {
         let unreadable = |part, why: String| ParseError::Unreadable { part, why };
-        let token = text
-            .lines()
-            .find_map(|line| line.strip_prefix(TOKEN_LINE))
-            .ok_or_else(|| unreadable("token", format!("no line begins with `{TOKEN_LINE}`")))?;
+        let tokens = Tokens::read(text)?;
         let key = PrivatePkcs8KeyDer::from_pem_slice(text.as_bytes())
             .map_err(|error| unreadable("private key", error.to_string()))?;
         let certificate = CertificateDer::from_pem_slice(text.as_bytes())
@@ -108,10 +110,22 @@ impl Identity {
         }
         Ok(Self {
             pin: Pin::of_public_key(&public_key),
-            token: token.trim_end().parse()?,
+            tokens,
             key,
             certificate,
+            kept: None,
         })
+    }
+
+    /// The same, kept there.
+    pub(super) fn kept_in(mut self, kept: Kept) -> Self {
+        self.kept = Some(kept);
+        self
+    }
+
+    /// Where it is kept, if it is.
+    pub(super) fn kept(&self) -> Option<&Kept> {
+        self.kept.as_ref()
     }
 
     /// What a master pins.
@@ -119,9 +133,9 @@ impl Identity {
         self.pin
     }
 
-    /// What a master proves itself with.
-    pub fn token(&self) -> &Token {
-        &self.token
+    /// What masters prove themselves with.
+    pub fn tokens(&self) -> &Tokens {
+        &self.tokens
     }
 
     /// The certificate, for the handshake.
@@ -145,6 +159,26 @@ impl Identity {
         }
         derived
     }
+}
+
+/// This moment, for a token that is made now. A host whose clock stands before 1970 makes its tokens in 1970.
+pub(super) fn created_now() -> Created {
+    let since = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH);
+    Created::at(since.unwrap_or_default().as_secs())
+}
+
+/// The text of an identity with these tokens in the place of its own; all else stays as it is.
+pub(super) fn with_tokens(text: &str, tokens: &Tokens) -> String {
+    let others = text.lines().filter(|line| !line.starts_with(TOKEN_LINE));
+    let (mut all, mut lines) = (String::new(), tokens.reveal());
+    for line in others {
+        if line.starts_with("-----BEGIN") {
+            all.push_str(&std::mem::take(&mut lines));
+        }
+        all.push_str(line);
+        all.push('\n');
+    }
+    all
 }
 
 /// The public key in a certificate, as `SubjectPublicKeyInfo` in DER.
@@ -172,7 +206,7 @@ mod tests {
         assert_eq!(read.pin(), made.pin());
         assert_eq!(read.key(), made.key());
         assert_eq!(read.certificate(), made.certificate());
-        assert_eq!(read.token(), made.token());
+        assert_eq!(read.tokens(), made.tokens());
         assert_eq!(read.derive("a"), made.derive("a"));
     }
 
@@ -192,7 +226,7 @@ mod tests {
             Identity::ephemeral().unwrap(),
         );
         assert_ne!(a.pin(), b.pin());
-        assert_ne!(a.token(), b.token());
+        assert_ne!(a.tokens(), b.tokens());
         assert_ne!(a.derive("reset"), b.derive("reset"));
         assert_ne!(a.derive("reset"), a.derive("connection id"));
     }
@@ -201,15 +235,27 @@ mod tests {
     fn text_with_a_part_missing_or_foreign_is_refused_by_name_of_the_part() {
         let (_, text) = Identity::generate().unwrap();
         let (_, other) = Identity::generate().unwrap();
-        assert!(parse_error("").contains("token"));
+        assert!(parse_error("").contains("private key"));
         assert!(parse_error(&text.replace("PRIVATE", "PUBLIC")).contains("private key"));
         assert!(parse_error(&text.replace("CERTIFICATE", "SOMETHING")).contains("certificate"));
         let (mine, theirs) = (text.find("-----BEGIN CERT"), other.find("-----BEGIN CERT"));
         let mixed = format!("{}{}", &text[..mine.unwrap()], &other[theirs.unwrap()..]);
         assert!(parse_error(&mixed).contains("another key"));
-        let (key_at, long) = (text.find("token: ").unwrap() + 7, "token: zz");
+        let (token, key) = (text.find("token: ").unwrap(), text.find("-----").unwrap());
         let mut bad_token = text.clone();
-        bad_token.replace_range(key_at - 7..key_at + 2, long);
+        bad_token.replace_range(token..key, &format!("token: {}\n", "z".repeat(64)));
         assert!(parse_error(&bad_token).contains("hexadecimal"));
+    }
+
+    #[test]
+    fn other_tokens_leave_key_and_certificate_as_they_are() {
+        let (made, text) = Identity::generate().unwrap();
+        let nobody = Identity::parse(&with_tokens(&text, &Tokens::default())).unwrap();
+        assert_eq!(nobody.tokens(), &Tokens::default());
+        assert_eq!((nobody.pin(), nobody.key()), (made.pin(), made.key()));
+        let theirs = Tokens::first(Token::new([5; 32]), Created::at(0));
+        let again = Identity::parse(&with_tokens(&text, &theirs)).unwrap();
+        assert_eq!(again.tokens(), &theirs);
+        assert_eq!(with_tokens(&text, made.tokens()), text);
     }
 }

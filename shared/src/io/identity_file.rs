@@ -1,8 +1,13 @@
-//! Where a slave keeps its identity: one file, created whole or not at all, readable by its owner alone,
+//! Where a slave keeps its identity: one file, written whole or not at all, readable by its owner alone,
 //! and never used once others could read it.
 
+mod change;
+#[cfg(test)]
+mod tests;
+mod token_list;
+
 use std::ffi::OsString;
-use std::fs::{DirBuilder, File};
+use std::fs::{DirBuilder, File, Metadata};
 use std::io::{self, Read, Write};
 use std::os::unix::fs::{DirBuilderExt, MetadataExt};
 use std::path::{Path, PathBuf};
@@ -10,6 +15,10 @@ use std::path::{Path, PathBuf};
 use tempfile::NamedTempFile;
 
 use super::identity::{GenerateError, Identity, ParseError};
+use crate::pairing::TokensError;
+
+pub use change::{Changed, advertise, advertised, revoke, rotate};
+pub use token_list::{Granted, TokenList};
 
 /// Name of the file in its directory.
 pub const FILE_NAME: &str = "identity.pem";
@@ -65,6 +74,71 @@ pub enum IdentityError {
     /// No identity could be made.
     #[error(transparent)]
     Generate(#[from] GenerateError),
+    /// There is none to be changed.
+    #[error(
+        "there is no identity in {directory}: `mmt slave` makes one when it first starts; if it is elsewhere, give its \
+         directory with --identity DIR"
+    )]
+    None {
+        /// Where it was looked for.
+        directory: PathBuf,
+    },
+    /// A change that its tokens do not take.
+    #[error("{path}: {source}")]
+    Unchanged {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: TokensError,
+    },
+    /// No token has this name.
+    #[error("{path} has no token of the name {name}; its tokens are: {known}")]
+    NoSuchToken {
+        /// The file.
+        path: PathBuf,
+        /// The name.
+        name: String,
+        /// The names that there are.
+        known: String,
+    },
+}
+
+/// What tells one state of the file from the next: it is replaced, never written over, and hands that edit it change its time.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Seen {
+    device: u64,
+    inode: u64,
+    bytes: u64,
+    mode: u32,
+    changed_s: i64,
+    changed_ns: i64,
+}
+
+impl Seen {
+    fn of(metadata: &Metadata) -> Self {
+        Self {
+            device: metadata.dev(),
+            inode: metadata.ino(),
+            bytes: metadata.len(),
+            mode: metadata.mode(),
+            changed_s: metadata.ctime(),
+            changed_ns: metadata.ctime_nsec(),
+        }
+    }
+}
+
+/// Where an identity is kept, and the state of the file that it was read from.
+#[derive(Clone, Debug)]
+pub(super) struct Kept {
+    path: PathBuf,
+    seen: Seen,
+}
+
+/// An identity as it was found.
+struct Found {
+    identity: Identity,
+    text: String,
+    metadata: Metadata,
 }
 
 /// The directory used when none is given: `$XDG_STATE_HOME/mmt`, or else `~/.local/state/mmt`.
@@ -84,12 +158,26 @@ pub fn default_directory() -> Result<PathBuf, IdentityError> {
 pub fn load_or_create(directory: &Path) -> Result<Identity, IdentityError> {
     let path = directory.join(FILE_NAME);
     if let Some(found) = load(&path)? {
-        return Ok(found);
+        return Ok(found.identity);
     }
     let (_, text) = Identity::generate()?;
     create(directory, &path, &text)?;
     // Read back what is there: another process may have been first, and then its identity counts.
-    load(&path)?.ok_or_else(|| file_error("read", &path, io::ErrorKind::NotFound.into()))
+    let found = load(&path)?;
+    let found = found.ok_or_else(|| file_error("read", &path, io::ErrorKind::NotFound.into()))?;
+    Ok(found.identity)
+}
+
+/// The identity kept in `directory`, and the path of its file.
+///
+/// # Errors
+/// There is none, or [`load_or_create`] would refuse it.
+pub fn load_existing(directory: &Path) -> Result<(Identity, PathBuf), IdentityError> {
+    let path = directory.join(FILE_NAME);
+    let found = load(&path)?.ok_or_else(|| IdentityError::None {
+        directory: directory.to_owned(),
+    })?;
+    Ok((found.identity, path))
 }
 
 /// XDG base directory specification: a relative path counts as none.
@@ -100,7 +188,7 @@ fn state_directory(state: Option<OsString>, home: Option<OsString>) -> Option<Pa
 }
 
 /// `None` if there is no file.
-fn load(path: &Path) -> Result<Option<Identity>, IdentityError> {
+fn load(path: &Path) -> Result<Option<Found>, IdentityError> {
     let file = match File::open(path) {
         Ok(file) => file,
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
@@ -129,8 +217,13 @@ fn load(path: &Path) -> Result<Option<Identity>, IdentityError> {
     let identity = Identity::parse(&text).map_err(|source| IdentityError::Malformed {
         path: owned,
         source,
-    });
-    identity.map(Some)
+    })?;
+    let (path, seen) = (path.to_owned(), Seen::of(&metadata));
+    Ok(Some(Found {
+        identity: identity.kept_in(Kept { path, seen }),
+        text,
+        metadata,
+    }))
 }
 
 /// Writes `text` beside `path` and renames it to there: whole or not at all, and never over another's.
@@ -161,109 +254,5 @@ fn file_error(action: &'static str, path: &Path, source: io::Error) -> IdentityE
         action,
         path,
         source,
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use std::fs;
-    use std::os::unix::fs::PermissionsExt;
-
-    use super::*;
-
-    fn message(directory: &Path) -> String {
-        load_or_create(directory).unwrap_err().to_string()
-    }
-
-    fn set_mode(path: &Path, mode: u32) {
-        fs::set_permissions(path, fs::Permissions::from_mode(mode)).unwrap();
-    }
-
-    #[test]
-    fn an_identity_is_created_once_and_found_again() {
-        let home = tempfile::tempdir().unwrap();
-        let directory = home.path().join("a/b/mmt");
-        let first = load_or_create(&directory).unwrap();
-        let second = load_or_create(&directory).unwrap();
-        assert_eq!(first.pin(), second.pin());
-        assert_eq!(first.token(), second.token());
-    }
-
-    #[test]
-    fn only_the_owner_can_read_it_and_nothing_else_is_left_behind() {
-        let home = tempfile::tempdir().unwrap();
-        let directory = home.path().join("mmt");
-        load_or_create(&directory).unwrap();
-        let mode = |path: &Path| fs::metadata(path).unwrap().mode() & 0o777;
-        assert_eq!(mode(&directory), 0o700);
-        assert_eq!(mode(&directory.join(FILE_NAME)), 0o600);
-        assert_eq!(fs::read_dir(&directory).unwrap().count(), 1);
-    }
-
-    #[test]
-    fn processes_that_create_it_at_once_agree() {
-        let home = tempfile::tempdir().unwrap();
-        let path = home.path().join(FILE_NAME);
-        let (winner, text) = Identity::generate().unwrap();
-        create(home.path(), &path, &text).unwrap();
-        let (_, late) = Identity::generate().unwrap();
-        create(home.path(), &path, &late).unwrap();
-        assert_eq!(load(&path).unwrap().unwrap().pin(), winner.pin());
-    }
-
-    #[test]
-    fn an_identity_that_others_can_read_is_refused_with_the_remedy() {
-        let home = tempfile::tempdir().unwrap();
-        load_or_create(home.path()).unwrap();
-        for mode in [0o644, 0o640, 0o604, 0o602, 0o700] {
-            set_mode(&home.path().join(FILE_NAME), mode);
-            let text = message(home.path());
-            assert!(text.contains(&format!("{mode:04o}")), "{text}");
-            assert!(text.contains("chmod 600"), "{text}");
-        }
-        set_mode(&home.path().join(FILE_NAME), 0o400);
-        assert!(load_or_create(home.path()).is_ok());
-    }
-
-    #[test]
-    fn what_is_no_identity_is_refused_by_path_and_left_alone() {
-        let home = tempfile::tempdir().unwrap();
-        let path = home.path().join(FILE_NAME);
-        for content in ["", "token: 12", &"x".repeat(20_000), "\u{0}"] {
-            fs::write(&path, content).unwrap();
-            set_mode(&path, 0o600);
-            assert!(message(home.path()).contains(FILE_NAME));
-            assert_eq!(fs::read_to_string(&path).unwrap(), content);
-        }
-    }
-
-    #[test]
-    fn a_directory_that_cannot_be_made_is_named_with_the_remedy() {
-        let home = tempfile::tempdir().unwrap();
-        let file = home.path().join("file");
-        fs::write(&file, "").unwrap();
-        let text = message(&file.join("mmt"));
-        assert!(
-            text.contains("file/mmt") && text.contains("--identity"),
-            "{text}"
-        );
-    }
-
-    #[test]
-    fn the_default_directory_follows_the_xdg_specification() {
-        let directory = |state: Option<&str>, home: Option<&str>| {
-            state_directory(state.map(OsString::from), home.map(OsString::from))
-        };
-        assert_eq!(directory(Some("/s"), Some("/h")), Some("/s/mmt".into()));
-        assert_eq!(
-            directory(Some("s"), Some("/h")),
-            Some("/h/.local/state/mmt".into())
-        );
-        assert_eq!(
-            directory(None, Some("/h")),
-            Some("/h/.local/state/mmt".into())
-        );
-        assert_eq!(directory(Some(""), None), None);
-        assert_eq!(directory(None, Some("h")), None);
     }
 }

@@ -19,11 +19,37 @@ use crate::model::params::{ModelState, ParamsError, WORKSPACE_M, in_range};
 use crate::model::settings::{ModelSettings, Smoothing, checked_coupling};
 use crate::pairing::Token;
 
-/// What a master wants to be.
+/// What a master wants to be, and what its token lets it be.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Role {
     /// Moves the tool; one at a time.
     Operator,
+    /// Sees what the operator's master is sent, and moves nothing.
+    Observer,
+}
+
+impl Role {
+    /// Both, in the order of their numbers on the wire.
+    pub const ALL: [Self; 2] = [Self::Operator, Self::Observer];
+
+    /// Name in options, files and messages.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Operator => "operator",
+            Self::Observer => "observer",
+        }
+    }
+
+    /// The role of this name.
+    pub fn by_name(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|role| role.name() == name)
+    }
+
+    /// Whether the holder of a token of this role may be what it asks for: who may operate may look on as well.
+    pub const fn permits(self, asked: Self) -> bool {
+        matches!((self, asked), (Self::Operator, _) | (_, Self::Observer))
+    }
 }
 
 /// What becomes of another operator that the slave has.
@@ -218,6 +244,8 @@ pub enum Refusal {
     BadHello,
     /// The slave is ending.
     Ending,
+    /// The token is for another role than the one asked for.
+    WrongRole,
 }
 
 /// Why a session ended.

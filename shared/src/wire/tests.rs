@@ -311,13 +311,15 @@ fn pinned<const N: usize>(choices: [impl serde::Serialize + std::fmt::Debug; N])
 #[test]
 fn numbers_of_choices_are_pinned() {
     pinned(Cause::ALL);
-    pinned([Role::Operator]);
+    pinned(Role::ALL);
+    assert_eq!(Role::ALL, [Role::Operator, Role::Observer]);
     pinned(Architecture::ALL);
     pinned([
         Refusal::Busy,
         Refusal::WrongToken,
         Refusal::BadHello,
         Refusal::Ending,
+        Refusal::WrongRole,
     ]);
     pinned([Ending::Finished, Ending::Interrupted, Ending::Failed]);
     pinned([FrictionLaw::Sign, FrictionLaw::LimitSurface]);

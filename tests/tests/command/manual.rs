@@ -2,7 +2,7 @@
 
 use super::mmt;
 
-const COMMANDS: [&str; 16] = [
+const COMMANDS: [&str; 17] = [
     "demo",
     "slave",
     "master",
@@ -16,6 +16,7 @@ const COMMANDS: [&str; 16] = [
     "sweep",
     "doctor",
     "device",
+    "identity",
     "config",
     "completions",
     "bench",

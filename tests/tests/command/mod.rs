@@ -18,6 +18,7 @@ mod bench;
 mod device;
 mod doctor;
 mod hostile;
+mod identity;
 mod interrupted;
 mod manual;
 mod netem;

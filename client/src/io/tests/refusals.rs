@@ -9,6 +9,7 @@ async fn each_refusal_has_its_own_error() {
         Refusal::WrongToken,
         Refusal::BadHello,
         Refusal::Ending,
+        Refusal::WrongRole,
     ] {
         let fake = Fake::new();
         let mut master = start(scripted(&fake), TIMEOUTS);
@@ -20,6 +21,7 @@ async fn each_refusal_has_its_own_error() {
             Refusal::WrongToken => matches!(error, MasterHostError::WrongToken { .. }),
             Refusal::BadHello => matches!(error, MasterHostError::BadHello { samples: 10, .. }),
             Refusal::Ending => matches!(error, MasterHostError::Ending { .. }),
+            Refusal::WrongRole => matches!(error, MasterHostError::WrongRole { .. }),
         };
         assert!(right, "{refusal:?}: {error}");
         let text = error.to_string();
