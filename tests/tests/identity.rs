@@ -7,12 +7,13 @@
 )]
 #![allow(
     clippy::disallowed_methods,
-    reason = "starts processes and reads what they left"
+    clippy::disallowed_types,
+    reason = "starts processes, waits for what they write and reads what they left"
 )]
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use crate::harness::alone;
 use crate::harness::process::{Ended, PROGRAM, Running};
@@ -100,6 +101,13 @@ impl Hosts {
         }
         self.ended(&all[..2].join(" "), ended, 0);
         out
+    }
+
+    /// The secret with which a master that is killed resumes; empty while none operates.
+    fn resume_secret(&self) -> String {
+        let mut kept = files(&self.folder.path().join("state"));
+        kept.retain(|path| path.display().to_string().contains("resume-"));
+        std::fs::read_to_string(&kept[0]).unwrap()
     }
 
     /// A master is refused, with these words.
@@ -216,9 +224,7 @@ fn secrets(hosts: &Hosts, tokens: &[(&'static str, &str)]) -> Vec<Secret> {
             "the search finds"
         );
     }
-    let mut resumes = files(&hosts.folder.path().join("state"));
-    resumes.retain(|path| path.display().to_string().contains("resume-"));
-    let resume = std::fs::read_to_string(&resumes[0]).unwrap();
+    let resume = hosts.resume_secret();
     assert_eq!(resume.len(), 64, "the master was killed in mid-session");
     all.push(Secret::new("resume", &bytes_of_hex(&resume)));
     all
@@ -252,6 +258,10 @@ fn tokens_change_while_a_session_goes_on_and_nothing_that_is_kept_holds_a_secret
         hosts.refuses("stranger", &stranger, "does not know the token");
         let mut killed = hosts.master("killed", &second, "60s");
         killed.wait_for_line(GENEROUS, begins).unwrap();
+        let end = Instant::now() + GENEROUS;
+        while hosts.resume_secret().len() < 64 && Instant::now() < end {
+            std::thread::sleep(Duration::from_millis(10));
+        }
         killed.signal(Signal::KILL).unwrap();
         let killed = killed.end(GENEROUS).unwrap();
         hosts.printed.push(("killed".to_owned(), killed.err));
