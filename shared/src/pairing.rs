@@ -112,6 +112,11 @@ pub enum PairingError {
     /// The address is wrong.
     #[error("the pairing string's {0}")]
     Address(#[from] AddressError),
+    /// Pin or token stand in the address. It is not shown: it may hold the token.
+    #[error(
+        "the pairing string's address has a & or a = in it: copy the whole line that `mmt slave` printed, once"
+    )]
+    NoAddress,
     /// A part of the query is missing.
     #[error(
         "the pairing string has no {key}: copy the whole line that `mmt slave` printed, and put it in \
@@ -235,6 +240,9 @@ impl FromStr for Pairing {
         // An address can hold what was meant as a secret only if the ? is missing: it is read last.
         let pin = pin.ok_or(PairingError::Missing { key: "pin" })?;
         let token = token.ok_or(PairingError::Missing { key: "token" })?;
+        if address.contains(['&', '=']) {
+            return Err(PairingError::NoAddress);
+        }
         Ok(Self {
             address: address.parse()?,
             pin,

@@ -21,6 +21,8 @@ use crate::world::{World, WorldConfig};
 
 /// Accepted length of a run, s: one tick to a week.
 const DURATION_S: (f64, f64) = (0.001, 604_800.0);
+/// The most parts of a key: no configuration is as deep, and each part is a table in a table.
+const KEY_PARTS_MAX: usize = 16;
 /// What the seeds of a plan set.
 pub(crate) const SEED_KEYS: [&str; 3] = ["seed", "slave.seed", "operator.seed"];
 
@@ -147,7 +149,7 @@ impl<'i> Reader<'i> {
         for (n, key) in keys.iter().enumerate() {
             let name = key.get_ref();
             let refuse = |what: String| Err(TextError::at(self.text, Some(key.span()), what));
-            if name.split('.').any(str::is_empty) {
+            if name.split('.').any(str::is_empty) || name.split('.').count() > KEY_PARTS_MAX {
                 return refuse(format!(
                     "`{name}` is no key; write it as slave.trigger.scheme"
                 ));

@@ -50,6 +50,13 @@ fn points(text: &str) -> Vec<WorldConfig> {
 }
 
 #[test]
+fn a_key_of_thousands_of_parts_is_no_key() {
+    let deep = "a.".repeat(5000);
+    let axis = format!("{HEAD}[[axis]]\nkey = \"{deep}a\"\nvalues = [1]\n");
+    refuses(&axis, &["line 4", "is no key"]);
+}
+
+#[test]
 fn rows_are_the_product_of_the_axes_in_their_order_with_seeds_innermost() {
     let plan = plan(GRID);
     assert_eq!(plan.rows(), 12);

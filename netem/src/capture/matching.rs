@@ -78,7 +78,7 @@ impl Match {
         let least = |way: &Way| way.packets.iter().filter_map(Crossing::delay).min();
         let both = least(&up).zip(down.as_ref().and_then(least));
         let ahead = match both {
-            Some((up, down)) if !self.same_clock => (up - down) / 2,
+            Some((up, down)) if !self.same_clock => up.saturating_sub(down) / 2,
             _ => 0,
         };
         let mut ambiguous = up.ambiguous;
@@ -101,7 +101,8 @@ impl Match {
 
 impl Crossing {
     fn delay(&self) -> Option<i64> {
-        self.arrivals.first().map(|arrival| arrival - self.sent)
+        let first = self.arrivals.first();
+        first.map(|arrival| arrival.saturating_sub(self.sent))
     }
 }
 
@@ -148,7 +149,7 @@ fn directions(from: &[Packet], to: &[Packet]) -> Option<(Pair, Option<Pair>)> {
             differences
                 .entry(pair)
                 .or_default()
-                .push(other.at - packet.at);
+                .push(other.at.saturating_sub(packet.at));
         }
     }
     let back = |([a, b], [c, d]): Pair| ([b, a], [d, c]);
@@ -217,7 +218,8 @@ fn entries(
 ) -> Result<Vec<Entry>, MatchError> {
     let mut entries = Vec::new();
     for (number, packet) in (0_u64..).zip(&way.packets) {
-        let offered = Time::from_nanos((packet.sent + clock).max(0).unsigned_abs());
+        let sent = packet.sent.saturating_add(clock);
+        let offered = Time::from_nanos(sent.max(0).unsigned_abs());
         let entry = |end| Entry {
             direction,
             number,
@@ -227,7 +229,7 @@ fn entries(
             end,
         };
         for (copy, arrival) in packet.arrivals.iter().enumerate() {
-            let nanos = arrival - packet.sent + delay;
+            let nanos = arrival.saturating_sub(packet.sent).saturating_add(delay);
             let wrong = MatchError::Clocks {
                 delay_ms: nanos / 1_000_000,
             };

@@ -162,6 +162,26 @@ fn ethernet(ip: Vec<u8>) -> Vec<u8> {
 }
 
 #[test]
+fn times_from_one_end_of_time_to_the_other_are_no_path() {
+    let there = udp([address(1, 10), address(2, 20)], 0, b"there");
+    let back = udp([address(2, 20), address(1, 10)], 0, b"back");
+    let both = |at_ns| {
+        [&there, &back].map(|bytes| Frame {
+            at_ns,
+            link_type: 101,
+            bytes,
+            comment: "",
+        })
+    };
+    for (from, to) in [(0, i64::MAX), (i64::MAX, 0)] {
+        for same_clock in [false, true] {
+            let refused = Match { same_clock }.paths(&both(from), &both(to));
+            assert!(matches!(refused, Err(MatchError::Clocks { .. })), "{refused:?}");
+        }
+    }
+}
+
+#[test]
 fn a_datagram_is_known_again_behind_a_nat_and_another_link_layer() {
     let contents = b"the same";
     let inside = udp([address(1, 10), address(9, 90)], 0, contents);

@@ -63,8 +63,13 @@ pub fn read(bytes: &[u8]) -> Result<(Heading, Vec<Entry>), TraceError> {
     let rest = rest.strip_prefix(VERSION).ok_or_else(|| {
         TraceError::at(0, "a record of another version: this mmt reads version 2")
     })?;
-    let (heading, mut rest) = postcard::take_from_bytes(rest)
+    let (heading, mut rest): (Heading, _) = postcard::take_from_bytes(rest)
         .map_err(|_| TraceError::at(0, "the heading of the record is cut off"))?;
+    // each is a line of the same record in CSV
+    if [&heading.up, &heading.down].map(|words| words.contains(char::is_control)) != [false; 2] {
+        let why = "the words of a link in the heading are not one line";
+        return Err(TraceError::at(0, why));
+    }
     let mut entries = Vec::new();
     let mut offered = Time::ZERO;
     while !rest.is_empty() {

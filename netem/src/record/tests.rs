@@ -194,6 +194,18 @@ fn the_log_of_a_run_is_the_same_to_the_byte_and_another_seed_gives_another() {
 }
 
 #[test]
+fn a_heading_whose_words_are_two_lines_is_refused() {
+    let heading = Heading {
+        up: "none\n# seed 8".to_owned(),
+        ..heading()
+    };
+    let mut bytes = Vec::new();
+    binary::Writer::default().heading(&mut bytes, &heading);
+    let refused = read(&bytes).unwrap_err();
+    assert!(refused.reason.contains("not one line"), "{refused}");
+}
+
+#[test]
 fn a_record_of_another_version_is_refused_by_name() {
     let error = read(b"mmtnetem1\n\x07\x00\x00").unwrap_err();
     assert!(error.to_string().contains("reads version 2"), "{error}");

@@ -35,7 +35,11 @@ pub(super) fn parse(text: &str) -> Result<Vec<Sample>, TraceError> {
         };
         answers.push((number, sample));
     }
-    Ok(with_the_lost(answers))
+    let lines = text.lines().count();
+    with_the_lost(answers).ok_or_else(|| {
+        let why = "more probes are missing than a hundred for each answer and a day of them";
+        TraceError::at(lines, why)
+    })
 }
 
 fn field<'a>(line: &'a str, name: &str) -> Option<&'a str> {
@@ -44,9 +48,11 @@ fn field<'a>(line: &'a str, name: &str) -> Option<&'a str> {
 }
 
 /// The probes whose numbers are missing, evenly between their neighbours. A jump beyond a day of pings is
-/// taken for a counter that began again.
-fn with_the_lost(mut answers: Vec<(u64, Sample)>) -> Vec<Sample> {
+/// taken for a counter that began again. None if so many are missing that a short text would become a long path.
+fn with_the_lost(mut answers: Vec<(u64, Sample)>) -> Option<Vec<Sample>> {
     const GAP_MAX: u64 = 100_000;
+    const LOST_PER_ANSWER: u64 = 100;
+    let mut room = GAP_MAX + LOST_PER_ANSWER * answers.len() as u64;
     answers.sort_by_key(|(_, sample)| sample.at);
     let mut samples: Vec<Sample> = Vec::with_capacity(answers.len());
     let mut before: Option<(u64, Duration)> = None;
@@ -54,6 +60,7 @@ fn with_the_lost(mut answers: Vec<(u64, Sample)>) -> Vec<Sample> {
         if let Some((last, since)) = before {
             let steps = number.saturating_sub(last);
             if (2..=GAP_MAX).contains(&steps) {
+                room = room.checked_sub(steps)?;
                 let way = sample.at.saturating_sub(since).as_secs_f64() / steps as f64;
                 samples.extend((1..steps).map(|step| Sample {
                     at: since + Duration::from_secs_f64(way * step as f64),
@@ -64,5 +71,5 @@ fn with_the_lost(mut answers: Vec<(u64, Sample)>) -> Vec<Sample> {
         before = Some((number, sample.at));
         samples.push(sample);
     }
-    samples
+    Some(samples)
 }

@@ -71,6 +71,19 @@ fn ping_gives_half_of_each_round_trip_and_its_gaps_are_losses() {
 }
 
 #[test]
+fn a_short_text_of_pings_does_not_become_a_long_path() {
+    let answers = |numbers: &[u64]| {
+        let line = |number| format!("[17001{number}.1] icmp_seq={number} time=60.0 ms\n");
+        let lines: String = numbers.iter().map(line).collect();
+        format!("PING\n{lines}")
+    };
+    let day = answers(&[100_000, 190_000]);
+    assert_eq!(path(&day, None).samples().len(), 90_001);
+    let days = refused(&answers(&[100_000, 190_000, 280_000]));
+    assert!(days.reason.contains("missing"), "{days}");
+}
+
+#[test]
 fn lens_csv_is_read_in_both_of_its_forms() {
     let irtt = "timestamp,rtt,uplink,downlink\n\
                 1705744800616897349,0,0,-1\n\

@@ -72,7 +72,10 @@ impl Identity {
     }
 
     /// A fresh identity and its text.
-    pub(super) fn generate() -> Result<(Self, String), GenerateError> {
+    ///
+    /// # Errors
+    /// As [`Identity::ephemeral`].
+    pub fn generate() -> Result<(Self, String), GenerateError> {
         let pair = rcgen::KeyPair::generate_for(&rcgen::PKCS_ED25519)?;
         let parameters = rcgen::CertificateParams::new(vec![CERTIFICATE_NAME.to_owned()])?;
         let certificate = parameters.self_signed(&pair)?;
@@ -94,7 +97,10 @@ impl Identity {
     }
 
     /// An identity from its text.
-    pub(super) fn parse(text: &str) -> Result<Self, ParseError> {
+    ///
+    /// # Errors
+    /// Which part of it is missing, unreadable or another's.
+    pub fn parse(text: &str) -> Result<Self, ParseError> {
         let unreadable = |part, why: String| ParseError::Unreadable { part, why };
         let tokens = Tokens::read(text)?;
         let key = PrivatePkcs8KeyDer::from_pem_slice(text.as_bytes())

@@ -26,7 +26,7 @@ use crate::time::Time;
 use crate::wire::Side;
 
 pub use file::RecordWriter;
-pub use read::{Ended, RecordError, is_record, read};
+pub use read::{Ended, RecordError, is_record, read, read_from};
 pub use shown::Shown;
 pub use sink::{HandReading, RecordSink, Ticked};
 pub use source::{TickAbout, Topics};

@@ -100,6 +100,9 @@ fn each_mistake_has_its_own_answer() {
     assert_eq!(error(&bad), PairingError::NotHex { key, position: 64 });
     let key = "pin";
     assert_eq!(error("mmt://h:1"), PairingError::Missing { key });
+    let twice = format!("mmt://h:1&token={token}?pin={pin}&token={token}");
+    assert_eq!(error(&twice), PairingError::NoAddress);
+    assert!(!error(&twice).to_string().contains("a5a5"));
     let port = format!("mmt://h:x?pin={pin}&token={token}");
     assert!(matches!(error(&port), PairingError::Address(_)));
     assert!(error("mmt://h:1?pin=").to_string().contains("0 characters"));

@@ -8,7 +8,7 @@ use crate::operator::pointer::{Driver, HandEvent, PointerSample};
 /// A message of a page.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
-pub(super) enum FromPage {
+pub enum FromPage {
     /// What its clock shows, ms.
     Clock(f64),
     /// The pointer is pressed: stamp (ms), x and y (m, world).
@@ -102,8 +102,16 @@ fn sample([stamp_ms, x, y]: [f64; 3]) -> PointerSample {
 }
 
 impl FromPage {
+    /// Reads a frame of a page's socket.
+    ///
+    /// # Errors
+    /// It is nothing that a page of this version sends.
+    pub fn read(text: &str) -> Result<Self, serde_json::Error> {
+        serde_json::from_str(text)
+    }
+
     /// What it is to the hand, in order.
-    pub(super) fn hand_events(&self) -> impl Iterator<Item = HandEvent> {
+    pub fn hand_events(&self) -> impl Iterator<Item = HandEvent> {
         let (one, more) = match self {
             Self::Clock(page_ms) => (Some(HandEvent::Clock(page_ms * 1e-3)), &[][..]),
             Self::Press(pressed) => (Some(HandEvent::Press(sample(*pressed))), &[][..]),
@@ -124,7 +132,7 @@ impl FromPage {
     }
 
     /// What it is to whoever runs the session.
-    pub(super) fn order(self) -> Option<Order> {
+    pub fn order(self) -> Option<Order> {
         match self {
             Self::End => Some(Order::End),
             Self::Network(wish) => Some(Order::Network(wish)),
@@ -140,7 +148,7 @@ mod tests {
     use super::*;
 
     fn read(text: &str) -> Option<FromPage> {
-        serde_json::from_str(text).ok()
+        FromPage::read(text).ok()
     }
 
     #[test]

@@ -31,7 +31,7 @@ use tokio::time::{MissedTickBehavior, interval};
 use crate::operator::pointer::{Driver, HandEvent};
 use admission::{Admission, Refusal, Ticket};
 use assets::{Assets, PAGE};
-pub use message::{NetworkWish, Order, SessionWish, StudyWish};
+pub use message::{FromPage, NetworkWish, Order, SessionWish, StudyWish};
 
 /// Between two frames of the page: 62 a second.
 const FRAME: Duration = Duration::from_millis(16);

@@ -91,7 +91,7 @@ impl Viewer {
 
     /// Does what the page wants, as far as this viewer may.
     fn handle(&self, text: &Utf8Bytes) {
-        let Ok(message) = serde_json::from_str::<FromPage>(text) else {
+        let Ok(message) = FromPage::read(text) else {
             tracing::debug!("a page sent what no page of this version sends");
             return;
         };

@@ -207,3 +207,32 @@ fn a_record_that_everybody_has_let_go_is_ended() {
         std::thread::sleep(REST);
     }
 }
+
+#[test]
+fn a_length_that_only_the_file_has_costs_no_memory_and_no_message() {
+    // magic; a schema whose name is 800 MB long; a channel; a message on it
+    let record = |kind: u8, body: &[u8]| {
+        let length = (body.len() as u64).to_le_bytes();
+        [&[kind][..], &length, body].concat()
+    };
+    let schema = [&[1, 0][..], &800_000_000_u32.to_le_bytes(), b"name"].concat();
+    let channel = [&[7, 0, 1, 0, 2, 0, 0, 0][..], b"/a", &[0; 8]].concat();
+    let message = [&[7, 0][..], &[0; 20], b"said"].concat();
+    let file = [
+        mcap::MAGIC.to_vec(),
+        record(3, &schema),
+        record(4, &channel),
+        record(5, &message),
+    ];
+    let mut heard = Vec::new();
+    let ended = read_from::<RecordError>(file.concat().as_slice(), 1 << 20, |topic, message| {
+        heard.push((topic.to_owned(), message.to_vec()));
+        Ok(())
+    });
+    assert_eq!(ended.unwrap(), Ended::CutOff);
+    assert_eq!(heard, [("/a".to_owned(), b"said".to_vec())]);
+    let short = [mcap::MAGIC.to_vec(), record(4, &channel[..9])].concat();
+    let broken = read_from::<RecordError>(short.as_slice(), 1 << 20, |_, _| Ok(()));
+    let broken = broken.unwrap_err().to_string();
+    assert!(broken.contains("a channel in it is malformed"), "{broken}");
+}
