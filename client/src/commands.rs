@@ -115,8 +115,21 @@ impl CommandPacker {
         }
         self.to_skip = (libm::ceil(stretch) as u32).min(SPACING_MAX) - 1;
         if self.block.push(sample).is_err() {
-            self.off_grid += 1;
+            self.push_off_grid(sample);
         }
+    }
+
+    /// A later stamp that is off the grid of those before begins a new command: else all that follow it would be off the grid.
+    fn push_off_grid(&mut self, sample: HipSample) {
+        let is_later = self.block.last().map(|last| last.stamp) < Some(sample.stamp);
+        if !is_later {
+            self.off_grid += 1;
+            return;
+        }
+        self.off_grid += self.block.len() as u64;
+        self.block.clear();
+        // an empty block takes any
+        self.off_grid += u64::from(self.block.push(sample).is_err());
     }
 
     /// The samples of a command once it is full: the new ones behind those that are repeated; no repeats under

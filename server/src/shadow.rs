@@ -14,7 +14,7 @@ use mmt_shared::model::params::ModelState;
 use mmt_shared::model::sample::HipSample;
 use mmt_shared::model::settings::ModelSettings;
 use mmt_shared::model::update::{Cause, Update};
-use mmt_shared::time::{TICK, Time};
+use mmt_shared::time::{TICK, Time, duration_nanos};
 use serde::{Deserialize, Serialize};
 
 /// Updates that may be on their way: a round trip of 4 s with one per sample.
@@ -32,6 +32,9 @@ const LOOP_UNKNOWN: Duration = Duration::from_secs(4);
 const SETTLED: Duration = Duration::from_secs(1);
 /// Most samples that the copies catch up with in a tick: after a longer gap they begin anew from there.
 const CATCH_UP: u32 = 16;
+/// The most ticks that the copies make at once, a second: the clocks of both hosts may have gone on for hours while neither
+/// ticked, as those of a demo that was stopped and continued, and nobody felt anything meanwhile.
+const AT_ONCE: u64 = 1000;
 
 /// What the trigger compares the measured force with.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -180,8 +183,8 @@ impl Shadow {
         match self.newest {
             Some(newest) if until.saturating_since(newest) <= TICK * CATCH_UP => newest + TICK,
             // the copies have not begun, or were left too far behind
-            Some(newest) => newest.max(on_grid.min(until)),
-            None => on_grid.min(until),
+            Some(newest) => no_further_back(newest.max(on_grid.min(until)), until),
+            None => no_further_back(on_grid.min(until), until),
         }
     }
 
@@ -265,6 +268,13 @@ impl Shadow {
             self.make_anew();
         }
     }
+}
+
+/// `from`, or so many whole ticks later that no more than [`AT_ONCE`] lie before `until`.
+fn no_further_back(from: Time, until: Time) -> Time {
+    let ticks = duration_nanos(until.saturating_since(from)) / duration_nanos(TICK);
+    let left_out = ticks.saturating_sub(AT_ONCE);
+    from + Duration::from_nanos(left_out.saturating_mul(duration_nanos(TICK)))
 }
 
 #[cfg(test)]

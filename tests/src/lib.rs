@@ -1,3 +1,3 @@
-//! What the tests of this crate share with the fuzzers of `tests/fuzz`: the fuzz targets.
+//! What tests of this crate run, and whoever else wants to: the fuzz targets.
 
 pub mod fuzz;

@@ -95,6 +95,23 @@ fn stamps_that_go_back_are_new_and_leave_no_mixed_command() {
 }
 
 #[test]
+fn a_stamp_off_the_grid_begins_a_new_command_and_does_not_end_them() {
+    let mut packer = packer(3, 0);
+    let mut made = Vec::new();
+    for ms in 1..=2 {
+        packer.push(sample(ms), 1.0);
+    }
+    for ms in 3..=8 {
+        let mut late = sample(ms);
+        late.stamp = late.stamp.offset_by(37_000);
+        packer.push(late, 1.0);
+        made.extend(packer.take_full(1.0));
+    }
+    assert_eq!(made.len(), 2);
+    assert!(packer.drops().contains(&("samples_off_grid", 2)));
+}
+
+#[test]
 fn congestion_spaces_the_samples_leaves_the_repeats_out_and_goes() {
     let mut packer = packer(3, 1);
     assert_eq!(commands(&mut packer, 1..=3).len(), 1);

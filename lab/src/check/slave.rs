@@ -1,7 +1,6 @@
 //! The slave's end: where the tool goes and when it stands, what is played, which updates leave.
 
-use std::collections::BTreeSet;
-use std::collections::btree_map::{BTreeMap, Entry};
+use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
 use mmt_server::end::{SlaveEnd, SlaveGiven};
@@ -76,7 +75,8 @@ pub struct SlaveChecks {
     /// For how long there has been no sample that was not there before: also one behind a stamp that an enemy put ahead is new.
     quiet: Duration,
     disengaged: bool,
-    samples: BTreeMap<Time, ForceCounts>,
+    /// Forces by stamp; an enemy may have sent another one with a stamp that the slave did not believe then.
+    samples: BTreeMap<Time, Vec<ForceCounts>>,
     played: Option<Time>,
     acknowledged: BTreeSet<u32>,
     /// Numbers, times and causes of updates that no command has acknowledged, or of late: the samples say it later.
@@ -131,10 +131,11 @@ impl SlaveChecks {
             return;
         }
         for sample in command.samples.as_slice() {
-            if let Entry::Vacant(place) = self.samples.entry(sample.stamp) {
-                place.insert(sample.force);
+            let forces = self.samples.entry(sample.stamp).or_default();
+            if forces.is_empty() {
                 self.quiet = Duration::ZERO;
             }
+            forces.push(sample.force);
             if Some(sample.stamp) > self.newest {
                 (self.newest, self.silent) = (Some(sample.stamp), Duration::ZERO);
             }
@@ -300,12 +301,11 @@ impl SlaveChecks {
         self.verdict.judge(Invariant::PlaysInOrder, now, holds, || {
             format!("{stamp:?} is played after {before:?}, {newest:?} is the newest sample")
         });
-        if let (Some(f_m), Some(force)) = (done.f_m, self.samples.get(&stamp)) {
-            let force = force.newtons();
-            self.verdict
-                .judge(Invariant::PlaysTrue, now, f_m == force, || {
-                    format!("{f_m:?} N are taken for f_m at {stamp:?}, {force:?} N came with it")
-                });
+        if let (Some(f_m), Some(forces)) = (done.f_m, self.samples.get(&stamp)) {
+            let holds = forces.iter().any(|force| force.newtons() == f_m);
+            self.verdict.judge(Invariant::PlaysTrue, now, holds, || {
+                format!("{f_m:?} N are taken for f_m at {stamp:?}, {forces:?} came with it")
+            });
         }
     }
 

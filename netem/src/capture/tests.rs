@@ -176,7 +176,10 @@ fn times_from_one_end_of_time_to_the_other_are_no_path() {
     for (from, to) in [(0, i64::MAX), (i64::MAX, 0)] {
         for same_clock in [false, true] {
             let refused = Match { same_clock }.paths(&both(from), &both(to));
-            assert!(matches!(refused, Err(MatchError::Clocks { .. })), "{refused:?}");
+            assert!(
+                matches!(refused, Err(MatchError::Clocks { .. })),
+                "{refused:?}"
+            );
         }
     }
 }

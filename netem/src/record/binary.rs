@@ -5,7 +5,7 @@
 use mmt_shared::time::Time;
 use serde::Serialize;
 
-use super::entry::{Entry, Heading};
+use super::entry::{Entry, Heading, NO_LINE};
 use crate::trace::TraceError;
 
 /// How a record in binary begins, of any version.
@@ -65,10 +65,8 @@ pub fn read(bytes: &[u8]) -> Result<(Heading, Vec<Entry>), TraceError> {
     })?;
     let (heading, mut rest): (Heading, _) = postcard::take_from_bytes(rest)
         .map_err(|_| TraceError::at(0, "the heading of the record is cut off"))?;
-    // each is a line of the same record in CSV
-    if [&heading.up, &heading.down].map(|words| words.contains(char::is_control)) != [false; 2] {
-        let why = "the words of a link in the heading are not one line";
-        return Err(TraceError::at(0, why));
+    if !heading.is_of_lines() {
+        return Err(TraceError::at(0, NO_LINE));
     }
     let mut entries = Vec::new();
     let mut offered = Time::ZERO;

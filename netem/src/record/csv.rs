@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use mmt_shared::time::Time;
 
-use super::entry::{End, Entry, Heading};
+use super::entry::{End, Entry, Heading, NO_LINE};
 use crate::direction::Direction;
 use crate::trace::TraceError;
 
@@ -70,6 +70,9 @@ pub fn read(text: &str) -> Result<(Heading, Vec<Entry>), TraceError> {
     }
     if !opened {
         return Err(TraceError::at(1, "the file is empty"));
+    }
+    if !heading.is_of_lines() {
+        return Err(TraceError::at(1, NO_LINE));
     }
     Ok((heading, entries))
 }

@@ -8,6 +8,9 @@ use serde::{Deserialize, Serialize};
 use crate::direction::Direction;
 use crate::packet::{Departure, DropCause, Fate};
 
+/// Why a heading is none.
+pub(super) const NO_LINE: &str = "the words of a link in the heading are not one line";
+
 /// What a record knows of its run.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Heading {
@@ -17,6 +20,14 @@ pub struct Heading {
     pub up: String,
     /// The link down, in words.
     pub down: String,
+}
+
+impl Heading {
+    /// Whether the words of both links are a line each, as in CSV: no control character is among them.
+    pub(super) fn is_of_lines(&self) -> bool {
+        let words = self.up.chars().chain(self.down.chars());
+        !words.into_iter().any(char::is_control)
+    }
 }
 
 /// One packet, or one copy of one; `T` is how times are given.

@@ -20,7 +20,7 @@ pub(super) fn parse(text: &str) -> Result<Vec<Sample>, TraceError> {
         let stamp = stamp.and_then(|rest| rest.split(']').next());
         let seconds: f64 = stamp
             .and_then(|stamp| stamp.parse().ok())
-            .filter(|stamp| (0.0..1e11).contains(stamp))
+            .filter(|stamp| (0.0..1e10).contains(stamp))
             .ok_or_else(|| wrong("expected a stamp such as [1700182800.410606]: use ping -D"))?;
         let number = field(line, "icmp_seq=").and_then(|number| number.parse().ok());
         let number = number.ok_or_else(|| wrong("expected a number after icmp_seq="))?;

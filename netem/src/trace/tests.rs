@@ -73,7 +73,7 @@ fn ping_gives_half_of_each_round_trip_and_its_gaps_are_losses() {
 #[test]
 fn a_short_text_of_pings_does_not_become_a_long_path() {
     let answers = |numbers: &[u64]| {
-        let line = |number| format!("[17001{number}.1] icmp_seq={number} time=60.0 ms\n");
+        let line = |number| format!("[1700{number}.1] icmp_seq={number} time=60.0 ms\n");
         let lines: String = numbers.iter().map(line).collect();
         format!("PING\n{lines}")
     };

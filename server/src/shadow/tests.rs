@@ -131,3 +131,19 @@ fn samples_between_two_ticks_are_all_taken_and_a_long_gap_is_not_made_up_for() {
     assert_eq!(history.len(), 4);
     assert_eq!(history.newest().unwrap().stamp, at(500));
 }
+
+#[test]
+fn hours_in_which_neither_host_ticked_cost_a_tick_no_more_than_a_second_of_the_hand() {
+    let mut shadow = shadow();
+    play(&mut shadow, 1..=100);
+    let asked = std::cell::Cell::new(0_u64);
+    let (last, until) = (Time::from_millis(100), Time::from_millis(100 + 3_600_000));
+    // the sample of before is the newest that is not later than what is played
+    shadow.step(last, until, |_| {
+        asked.set(asked.get() + 1);
+        Some(Vec2::new(-0.5, 0.0))
+    });
+    assert_eq!(asked.get(), 1001);
+    assert_eq!(play(&mut shadow, 3_600_101..=3_600_200), 0);
+    assert_eq!(masses(&shadow), [0.7, 0.7]);
+}

@@ -22,7 +22,12 @@ pub(super) fn layers(input: &[u8]) -> Outcome {
     let Ok(text) = std::str::from_utf8(text) else {
         return Outcome::refused(&"no text");
     };
-    let layers = Layers { program, file: text, flags: &[], seed: Some(1) };
+    let layers = Layers {
+        program,
+        file: text,
+        flags: &[],
+        seed: Some(1),
+    };
     let read = layers.config();
     match &read {
         Ok(config) => runs(config, program),
@@ -86,8 +91,14 @@ pub(super) fn scene(input: &[u8]) -> Outcome {
     match Environment::of_scene(EnvironmentConfig::default(), &scene) {
         Ok(mut environment) => {
             for tick in 0..5 {
-                let met = environment.step(Vec2::new(-0.19 + 0.001 * f64::from(tick), 0.0), Vec2::new(1.0, 0.0));
-                assert!(met.force.x.is_finite() && met.force.y.is_finite(), "{met:?}");
+                let met = environment.step(
+                    Vec2::new(-0.19 + 0.001 * f64::from(tick), 0.0),
+                    Vec2::new(1.0, 0.0),
+                );
+                assert!(
+                    met.force.x.is_finite() && met.force.y.is_finite(),
+                    "{met:?}"
+                );
                 assert!(met.pose.is_finite());
             }
             Outcome::taken(environment.poses().len().min(8) as u64)
@@ -121,7 +132,11 @@ pub(super) fn device(input: &[u8]) -> Outcome {
     match DeviceProfile::plugged_in(&config) {
         Ok(profile) => {
             let tuning = config.tuning();
-            assert!(tuning.playout_s.is_finite() && tuning.playout_s >= 0.0 && !tuning.silence.is_zero());
+            assert!(
+                tuning.playout_s.is_finite()
+                    && tuning.playout_s >= 0.0
+                    && !tuning.silence.is_zero()
+            );
             assert!((50.0..=10_000.0 * 100.0).contains(&profile.coupling().stiffness_n_per_m));
             Outcome::taken(kind as u64)
         }
@@ -134,12 +149,18 @@ pub(super) fn sweep_part(input: &[u8]) -> Outcome {
     let mut results = Results::default();
     let added = results.add_part(&plan, "part", input);
     assert!(results.done() <= plan.rows());
-    assert_eq!(results.missing(&plan).count() as u64 + results.done(), plan.rows());
+    assert_eq!(
+        results.missing(&plan).count() as u64 + results.done(),
+        plan.rows()
+    );
     let (header, records) = results.table(&plan);
     assert!(records.iter().all(|record| record.len() == header.len()));
     if added.is_ok() {
         assert!(results.add_part(&plan, "again", input).is_ok());
-        assert_eq!(results.to_csv(&plan).is_some(), results.done() == plan.rows());
+        assert_eq!(
+            results.to_csv(&plan).is_some(),
+            results.done() == plan.rows()
+        );
     }
     Outcome::of(added)
 }

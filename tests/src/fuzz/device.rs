@@ -14,7 +14,9 @@ use super::plug::{Held, output};
 pub(super) fn inverse3(input: &[u8]) -> Outcome {
     let mut device = Inverse3::try_new(DeviceLinkConfig::of(DeviceKind::Inverse3)).unwrap();
     let mut held = Held::default();
-    let version = input.first().map(|byte| ["3.5.0", "3.1", "", "x.y"][usize::from(byte % 4)]);
+    let version = input
+        .first()
+        .map(|byte| ["3.5.0", "3.1", "", "x.y"][usize::from(byte % 4)]);
     device.begin(version, |event| held.judge(event));
     let mut frames = 0;
     for (tick, line) in (1..).zip(input.split(|byte| *byte == b'\n')) {
@@ -35,7 +37,9 @@ pub(super) fn inverse3(input: &[u8]) -> Outcome {
     assert!(!held.is_held(), "a device that is silent is not held");
     let counts = device.counts();
     if counts.taken > 0 {
-        return Outcome::taken(counts.nonsense.min(2) + 4 * counts.late.min(2) + 16 * counts.malformed.min(1));
+        return Outcome::taken(
+            counts.nonsense.min(2) + 4 * counts.late.min(2) + 16 * counts.malformed.min(1),
+        );
     }
     Outcome::refused(&"malformed")
 }
@@ -47,9 +51,15 @@ fn judge_request(request: &str, held: &Held) {
     for device in devices.into_iter().flatten() {
         let force = &device["commands"]["set_cursor_force"];
         let force = force.get("vector").or(force.get("values")).unwrap();
-        let square: f64 = ["x", "y", "z"].map(|axis| force[axis].as_f64().unwrap().powi(2)).iter().sum();
+        let square: f64 = ["x", "y", "z"]
+            .map(|axis| force[axis].as_f64().unwrap().powi(2))
+            .iter()
+            .sum();
         assert!(square.sqrt() <= 5.001, "{square}");
-        assert!(held.may_feel() || square == 0.0, "a force on a hand that does not hold: {request}");
+        assert!(
+            held.may_feel() || square == 0.0,
+            "a force on a hand that does not hold: {request}"
+        );
     }
 }
 
@@ -74,12 +84,19 @@ pub(super) fn two_diy(input: &[u8]) -> Outcome {
         let [second, first] = mmt_shared::plug::singles::<2>(&frame[2..]);
         for torque in [first, second] {
             assert!(torque.abs() <= config.torque_max_nm * 1.001, "{torque} Nm");
-            assert!(held.may_feel() || torque == 0.0, "{torque} Nm on a hand that does not hold");
+            assert!(
+                held.may_feel() || torque == 0.0,
+                "{torque} Nm on a hand that does not hold"
+            );
         }
     }
     let counts = device.counts();
     if counts.taken > counts.nonsense {
         return Outcome::taken(u64::from(held.is_held()) + 2 * counts.late.min(2));
     }
-    Outcome::refused(&if counts.nonsense > 0 { "nonsense" } else { "malformed" })
+    Outcome::refused(&if counts.nonsense > 0 {
+        "nonsense"
+    } else {
+        "malformed"
+    })
 }

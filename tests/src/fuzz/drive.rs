@@ -70,8 +70,18 @@ pub struct Failure {
 
 impl fmt::Display for Failure {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { target, input, number, why } = self;
-        write!(f, "{target}: input {number}, {} bytes: {why}\n{}", input.len(), shown(input))
+        let Self {
+            target,
+            input,
+            number,
+            why,
+        } = self;
+        write!(
+            f,
+            "{target}: input {number}, {} bytes: {why}\n{}",
+            input.len(),
+            shown(input)
+        )
     }
 }
 
@@ -79,7 +89,10 @@ impl fmt::Display for Failure {
 #[must_use]
 pub fn shown(input: &[u8]) -> String {
     let text = input.escape_ascii().to_string();
-    let cut = text.char_indices().nth(1200).map_or(text.len(), |(at, _)| at);
+    let cut = text
+        .char_indices()
+        .nth(1200)
+        .map_or(text.len(), |(at, _)| at);
     text[..cut].to_owned()
 }
 
@@ -105,13 +118,25 @@ pub fn drive(
     let mut pool = (target.seeds)();
     pool.extend_from_slice(kept);
     let seeds = pool.len();
-    let mut mutator = Mutator::new(plan.seed, target.name, plan.shard, target.words, target.longest);
+    // inputs of the pool that were taken
+    let mut taken = Vec::new();
+    let mut mutator = Mutator::new(
+        plan.seed,
+        target.name,
+        plan.shard,
+        target.words,
+        target.longest,
+    );
     let (mut ran, mut marks) = (Ran::default(), BTreeSet::new());
     let mut input = Vec::new();
     for number in 1..=plan.inputs {
-        match usize::try_from(number - 1).ok().and_then(|number| pool.get(number)).filter(|_| number <= seeds as u64) {
+        match usize::try_from(number - 1)
+            .ok()
+            .and_then(|number| pool.get(number))
+            .filter(|_| number <= seeds as u64)
+        {
             Some(seed) => seed.clone_into(&mut input),
-            None => mutator.next(&pool, &mut input),
+            None => mutator.next(&pool, &taken, &mut input),
         }
         (watch.before)(target.name, &input);
         let (outcome, peak) = judged(target, &input, watch.measured).map_err(|why| Failure {
@@ -120,7 +145,14 @@ pub fn drive(
             number,
             why,
         })?;
-        if marks.insert(outcome.mark) && number > seeds as u64 && pool.len() < seeds + KEPT_MAX {
+        let is_seed = number <= seeds as u64;
+        if is_seed && outcome.accepted {
+            taken.push(number as usize - 1);
+        }
+        if marks.insert(outcome.mark) && !is_seed && pool.len() < seeds + KEPT_MAX {
+            if outcome.accepted {
+                taken.push(pool.len());
+            }
             pool.push(input.clone());
         }
         ran.accepted += u64::from(outcome.accepted);
@@ -133,7 +165,11 @@ pub fn drive(
 }
 
 /// One input: what became of it and the memory that it took, or what was said when a promise broke.
-fn judged(target: &Target, input: &[u8], measured: fn(&mut dyn FnMut()) -> u64) -> Result<(Outcome, u64), String> {
+fn judged(
+    target: &Target,
+    input: &[u8],
+    measured: fn(&mut dyn FnMut()) -> u64,
+) -> Result<(Outcome, u64), String> {
     let mut outcome = None;
     let peak = measured(&mut || {
         outcome = Some(catch_unwind(AssertUnwindSafe(|| (target.run)(input))));
@@ -145,7 +181,9 @@ fn judged(target: &Target, input: &[u8], measured: fn(&mut dyn FnMut()) -> u64) 
     };
     let most = target.room_kb * 1024 + 64 * input.len() as u64;
     if peak > most {
-        return Err(format!("it takes {peak} bytes of memory at once, {most} are allowed"));
+        return Err(format!(
+            "it takes {peak} bytes of memory at once, {most} are allowed"
+        ));
     }
     Ok((outcome, peak))
 }

@@ -55,8 +55,15 @@ fn golden(channel: &str) -> Vec<Vec<u8>> {
 }
 
 fn bytes(hex: &str) -> Vec<u8> {
-    let digits: Vec<u8> = hex.chars().filter_map(|c| c.to_digit(16)).map(|digit| digit as u8).collect();
-    digits.chunks(2).map(|pair| pair[0] << 4 | pair[1]).collect()
+    let digits: Vec<u8> = hex
+        .chars()
+        .filter_map(|c| c.to_digit(16))
+        .map(|digit| digit as u8)
+        .collect();
+    digits
+        .chunks(2)
+        .map(|pair| pair[0] << 4 | pair[1])
+        .collect()
 }
 
 pub(super) fn datagrams() -> Vec<Vec<u8>> {
@@ -66,13 +73,18 @@ pub(super) fn datagrams() -> Vec<Vec<u8>> {
 /// Without the length in front.
 pub(super) fn stream_messages() -> Vec<Vec<u8>> {
     let framed = golden("stream").into_iter();
-    framed.map(|bytes| bytes.get(4..).unwrap_or_default().to_vec()).collect()
+    framed
+        .map(|bytes| bytes.get(4..).unwrap_or_default().to_vec())
+        .collect()
 }
 
 pub(super) fn reports() -> Vec<Vec<u8>> {
     use mmt_shared::report::{MasterHalf, SlaveHalf};
     let mut master = MasterHalf::default();
-    master.session.drops.insert("datagrams_malformed".to_owned(), 3);
+    master
+        .session
+        .drops
+        .insert("datagrams_malformed".to_owned(), 3);
     master.session.outgoing.expected = 1000;
     vec![
         serde_json::to_vec(&master).unwrap(),
@@ -82,7 +94,12 @@ pub(super) fn reports() -> Vec<Vec<u8>> {
 }
 
 fn device_packet(sequence: u32, flags: u16, place: [f32; 3]) -> Vec<u8> {
-    let head = PlugHead { flags, sequence, answers: 0, stamp_ns: u64::from(sequence) * 1_000_000 };
+    let head = PlugHead {
+        flags,
+        sequence,
+        answers: 0,
+        stamp_ns: u64::from(sequence) * 1_000_000,
+    };
     let numbers = place.into_iter().chain([0.0; 3]).map(f32::to_le_bytes);
     let packet: [u8; DEVICE_BYTES] = encode(PlugKind::Reading, &TOKEN, &head, numbers);
     packet.to_vec()
@@ -99,8 +116,20 @@ pub(super) fn device_packets() -> Vec<Vec<u8>> {
         bytes
     };
     vec![
-        run(&[(1, 0, 0, 0.0), (1, 0, 1, 0.0), (1, 0, 1, 0.001), (1, 0, 1, 0.002), (1, 0, 0, 0.002)]),
-        run(&[(1, 0, 0, 0.0), (1, 0, 1, 0.0), (1, 1, 1, 0.001), (60, 1, 0, 0.002), (1, 1, 1, 0.002)]),
+        run(&[
+            (1, 0, 0, 0.0),
+            (1, 0, 1, 0.0),
+            (1, 0, 1, 0.001),
+            (1, 0, 1, 0.002),
+            (1, 0, 0, 0.002),
+        ]),
+        run(&[
+            (1, 0, 0, 0.0),
+            (1, 0, 1, 0.0),
+            (1, 1, 1, 0.001),
+            (60, 1, 0, 0.002),
+            (1, 1, 1, 0.002),
+        ]),
         run(&[(1, 0, 0, 0.0), (1, 0, 1, 0.4), (1, 0, 1, 0.9)]),
         run(&[(1, 0, 0, 0.0)]),
     ]
@@ -115,9 +144,19 @@ pub(super) fn plant_packets() -> Vec<Vec<u8>> {
         image_age_s: 0.03,
         anew: false,
     };
-    let head = PlugHead { sequence: 7, stamp_ns: 9_000_000, ..PlugHead::default() };
-    let blind = PlantAnswer { object: None, image_age_s: 0.0, ..answer };
-    [answer, blind].map(|answer| answer.packet(&TOKEN, &head).to_vec()).to_vec()
+    let head = PlugHead {
+        sequence: 7,
+        stamp_ns: 9_000_000,
+        ..PlugHead::default()
+    };
+    let blind = PlantAnswer {
+        object: None,
+        image_age_s: 0.0,
+        ..answer
+    };
+    [answer, blind]
+        .map(|answer| answer.packet(&TOKEN, &head).to_vec())
+        .to_vec()
 }
 
 /// A hand that rests at the middle for a second, and goes on; several answers at once.
@@ -132,7 +171,10 @@ pub(super) fn two_diy() -> Vec<Vec<u8>> {
     let run = |answers: &[(u8, &[[f32; 2]])]| {
         let mut bytes = Vec::new();
         for (wait, at_once) in answers {
-            let answers: Vec<u8> = at_once.iter().flat_map(|degrees| answer(*degrees)).collect();
+            let answers: Vec<u8> = at_once
+                .iter()
+                .flat_map(|degrees| answer(*degrees))
+                .collect();
             bytes.extend([*wait, answers.len() as u8]);
             bytes.extend(answers);
         }
@@ -143,12 +185,20 @@ pub(super) fn two_diy() -> Vec<Vec<u8>> {
     let moves: &[[f32; 2]] = &[[20.1, 150.0], [20.2, 150.1]];
     let mut held = rest.clone();
     held.extend([(1, moves), (1, &moves[..1]), (200, &moves[..1])]);
-    vec![run(&held), run(&rest[..3]), run(&[(1, &[[83.18, 96.82]]), (1, &[[1e9, 0.0]])])]
+    vec![
+        run(&held),
+        run(&rest[..3]),
+        run(&[(1, &[[83.18, 96.82]]), (1, &[[1e9, 0.0]])]),
+    ]
 }
 
 fn entries() -> Vec<Entry> {
     let entry = |number: u64, end| Entry {
-        direction: if number.is_multiple_of(3) { Direction::Down } else { Direction::Up },
+        direction: if number.is_multiple_of(3) {
+            Direction::Down
+        } else {
+            Direction::Up
+        },
         number,
         offered: Time::from_millis(number * 10),
         bytes: 100,
@@ -161,7 +211,9 @@ fn entries() -> Vec<Entry> {
         copy,
         corrupted: false,
     };
-    let mut entries: Vec<Entry> = (0..6).map(|number| entry(number, sent(number, false))).collect();
+    let mut entries: Vec<Entry> = (0..6)
+        .map(|number| entry(number, sent(number, false)))
+        .collect();
     entries.push(entry(6, sent(6, true)));
     entries.push(entry(7, End::Unsent));
     entries.extend(mmt_netem::DropCause::ALL.map(|cause| entry(8, End::Dropped(cause))));
@@ -169,15 +221,23 @@ fn entries() -> Vec<Entry> {
 }
 
 fn heading() -> Heading {
-    Heading { seed: 7, up: "delay 50ms 5ms loss 1%".to_owned(), down: "none".to_owned() }
+    Heading {
+        seed: 7,
+        up: "delay 50ms 5ms loss 1%".to_owned(),
+        down: "none".to_owned(),
+    }
 }
 
 pub(super) fn packet_records() -> Vec<Vec<u8>> {
     let mut text = csv::heading(&heading());
-    entries().iter().for_each(|entry| csv::push(&mut text, entry));
+    entries()
+        .iter()
+        .for_each(|entry| csv::push(&mut text, entry));
     let (mut writer, mut bytes) = (binary::Writer::default(), Vec::new());
     writer.heading(&mut bytes, &heading());
-    entries().iter().for_each(|entry| writer.push(&mut bytes, entry));
+    entries()
+        .iter()
+        .for_each(|entry| writer.push(&mut bytes, entry));
     vec![text.into_bytes(), bytes]
 }
 
@@ -191,21 +251,32 @@ pub(super) fn captures() -> Vec<Vec<u8>> {
             entry,
             corrupted_bit: None,
             marked: false,
-            sides: Some(Sides { came: [address(1), address(2)], leaves: [address(2), address(3)], class: 2 }),
+            sides: Some(Sides {
+                came: [address(1), address(2)],
+                leaves: [address(2), address(3)],
+                class: 2,
+            }),
             contents: entry.number.to_le_bytes().to_vec(),
         };
-        writer.blocks(event).iter().for_each(|block| ours.extend(block.bytes()));
+        writer
+            .blocks(event)
+            .iter()
+            .for_each(|block| ours.extend(block.bytes()));
     }
     // IPv4 and UDP by hand: 8 bytes of payload
     let frame = |number: u8, from: u8, to: u8| {
-        let mut frame = vec![0x45, 0, 0, 36, 0, 0, 0x40, 0, 64, 17, 0, 0, 10, 0, 0, from, 10, 0, 0, to];
+        let mut frame = vec![
+            0x45, 0, 0, 36, 0, 0, 0x40, 0, 64, 17, 0, 0, 10, 0, 0, from, 10, 0, 0, to,
+        ];
         frame.extend([0x11, 0x51, 0x11, 0x51, 0, 16, 0, 0]);
         frame.extend([number, 1, 2, 3, 4, 5, 6, 7]);
         frame
     };
     let pcap = |later_us: u32| {
         let mut file = 0xa1b2_c3d4_u32.to_le_bytes().to_vec();
-        file.extend([2, 0, 4, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0xff, 0xff, 0, 0, 101, 0, 0, 0]);
+        file.extend([
+            2, 0, 4, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0xff, 0xff, 0, 0, 101, 0, 0, 0,
+        ]);
         for (number, (from, to)) in (0_u8..).zip([(1, 2), (1, 2), (2, 1), (1, 2), (2, 1)]) {
             let late = if from == 1 { later_us } else { 0 };
             let at = 1000 * u32::from(number) + late;
@@ -220,5 +291,10 @@ pub(super) fn captures() -> Vec<Vec<u8>> {
         let length = (first.len() as u16).to_le_bytes();
         [first, second, &length].concat()
     };
-    vec![both(&ours, &[]), both(&pcap(0), &pcap(5000)), both(&pcap(0), &[]), both(&ours, &ours)]
+    vec![
+        both(&ours, &[]),
+        both(&pcap(0), &pcap(5000)),
+        both(&pcap(0), &[]),
+        both(&ours, &ours),
+    ]
 }

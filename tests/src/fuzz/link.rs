@@ -41,7 +41,13 @@ pub(super) fn words(input: &[u8]) -> Outcome {
             let again = parse(&printed, &mut file).map_err(|why| format!("{why} in {printed}"));
             assert_eq!(again.as_ref(), Ok(&config), "{printed}");
             carries(config);
-            Outcome::taken(printed.bytes().filter(u8::is_ascii_alphabetic).map(u64::from).sum())
+            Outcome::taken(
+                printed
+                    .bytes()
+                    .filter(u8::is_ascii_alphabetic)
+                    .map(u64::from)
+                    .sum(),
+            )
         }
         Err(why) => {
             // what is shown of it is one line and a caret
@@ -75,7 +81,10 @@ fn polled(link: &mut Link<u64>, now: Time) {
         let Some(left) = link.poll(now) else {
             return;
         };
-        assert!(left.due <= now && left.due >= left.offered_at && left.due >= last, "{left:?}");
+        assert!(
+            left.due <= now && left.due >= left.offered_at && left.due >= last,
+            "{left:?}"
+        );
         last = left.due;
     }
     panic!("twenty packets leave a thousand times");
@@ -103,7 +112,10 @@ pub(super) fn trace(input: &[u8]) -> Outcome {
             Outcome::taken(u64::from(kind) + 256 * u64::from(path.loss() > 0.0))
         }
         Err(why) => {
-            assert!(why.line >= 1 && why.line <= text.lines().count() + 1, "{why}");
+            assert!(
+                why.line >= 1 && why.line <= text.lines().count() + 1,
+                "{why}"
+            );
             Outcome::refused(&why.reason)
         }
     }
@@ -114,9 +126,19 @@ fn judge_path(path: &PathTrace) {
     assert!(!samples.is_empty() && samples.len() <= SAMPLES_MAX);
     assert!(samples.is_sorted_by_key(|sample| sample.at) && samples[0].at.is_zero());
     assert!(path.period() > samples.last().unwrap().at);
-    assert!(samples.iter().filter_map(|sample| sample.delay).all(|delay| delay <= HOUR));
+    assert!(
+        samples
+            .iter()
+            .filter_map(|sample| sample.delay)
+            .all(|delay| delay <= HOUR)
+    );
     assert!((0.0..1.0).contains(&path.loss()));
-    for at in [Duration::ZERO, path.period(), path.period() * 2, Duration::MAX] {
+    for at in [
+        Duration::ZERO,
+        path.period(),
+        path.period() * 2,
+        Duration::MAX,
+    ] {
         assert!(path.at(at).is_none_or(|delay| delay <= HOUR));
     }
 }
@@ -150,8 +172,16 @@ pub(super) fn distribution(input: &[u8]) -> Outcome {
     match cdf {
         Ok(cdf) => {
             let points: Vec<_> = cdf.points().collect();
-            assert!(points.is_sorted_by(|a, b| a.0 <= b.0 && a.1 <= b.1), "{points:?}");
-            assert!(points.iter().all(|(nanos, share)| Duration::from_nanos(*nanos) <= HOUR && (0.0..=1.0).contains(share)));
+            assert!(
+                points.is_sorted_by(|a, b| a.0 <= b.0 && a.1 <= b.1),
+                "{points:?}"
+            );
+            assert!(
+                points
+                    .iter()
+                    .all(|(nanos, share)| Duration::from_nanos(*nanos) <= HOUR
+                        && (0.0..=1.0).contains(share))
+            );
             carries(parse("delay cdf c", &mut text_of).unwrap());
             Outcome::taken(sort)
         }
@@ -206,7 +236,12 @@ fn summarised(entries: &[Entry]) {
             summary.burst_packets,
             summary.reordered,
         ];
-        assert!(numbers.iter().all(|number| number.is_finite() && *number >= 0.0), "{summary:?}");
+        assert!(
+            numbers
+                .iter()
+                .all(|number| number.is_finite() && *number >= 0.0),
+            "{summary:?}"
+        );
         assert!(summary.queue.len() <= 202 && summary.delay_histogram.len() <= 40);
     }
 }
@@ -225,11 +260,20 @@ pub(super) fn packet_record(input: &[u8]) -> Outcome {
     assert!(entries.len() <= input.len());
     summarised(&entries);
     let text = in_csv(&heading, &entries);
-    assert_eq!(csv::read(&text).as_ref(), Ok(&(heading.clone(), entries.clone())), "{text}");
+    assert_eq!(
+        csv::read(&text).as_ref(),
+        Ok(&(heading.clone(), entries.clone())),
+        "{text}"
+    );
     let (mut writer, mut bytes) = (binary::Writer::default(), Vec::new());
     writer.heading(&mut bytes, &heading);
-    entries.iter().for_each(|entry| writer.push(&mut bytes, entry));
-    assert_eq!(record::read(&bytes).as_ref(), Ok(&(heading, entries.clone())));
+    entries
+        .iter()
+        .for_each(|entry| writer.push(&mut bytes, entry));
+    assert_eq!(
+        record::read(&bytes).as_ref(),
+        Ok(&(heading, entries.clone()))
+    );
     assert_eq!(record::as_text(bytes).unwrap(), text);
     if let Ok(path) = PathTrace::parse(&text, Some(Direction::Up)) {
         judge_path(&path);

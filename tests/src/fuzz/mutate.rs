@@ -8,7 +8,9 @@ use mmt_shared::rng::Substream;
 use super::numbers::{WRITTEN, below, double, pick, varint, whole};
 
 /// Characters of more than one byte: of two, three and four, marks of direction and a line separator among them.
-const CHARACTERS: [&str; 8] = ["é", "世", "🦀", "\u{202e}", "\u{2028}", "\u{9b}", "\u{feff}", "\u{0}"];
+const CHARACTERS: [&str; 8] = [
+    "é", "世", "🦀", "\u{202e}", "\u{2028}", "\u{9b}", "\u{feff}", "\u{0}",
+];
 /// Bytes with a meaning in texts and in lengths.
 const BYTES: &[u8] = b"\x00\x01\x02\x7f\x80\xff \n\r\t\x1b\",;:=[]{}()#-+.%/@eE0";
 
@@ -24,7 +26,13 @@ pub struct Mutator {
 impl Mutator {
     /// One that is a function of `seed`, the target's `name` and the `shard`.
     #[must_use]
-    pub fn new(seed: u64, name: &str, shard: u64, words: &'static [&'static str], longest: usize) -> Self {
+    pub fn new(
+        seed: u64,
+        name: &str,
+        shard: u64,
+        words: &'static [&'static str],
+        longest: usize,
+    ) -> Self {
         Self {
             draws: Substream::new(seed, name, shard),
             words,
@@ -33,16 +41,20 @@ impl Mutator {
         }
     }
 
-    /// Makes the next input out of one of the pool, or out of nothing.
-    pub fn next(&mut self, pool: &[Vec<u8>], out: &mut Vec<u8>) {
+    /// Makes the next input out of one of the pool, mostly of one of those that were `taken`, or out of nothing.
+    pub fn next(&mut self, pool: &[Vec<u8>], taken: &[usize], out: &mut Vec<u8>) {
         out.clear();
         if pool.is_empty() || self.draws.bits().is_multiple_of(64) {
             let length = self.below(self.longest.min(96) + 1);
             self.random(length, out);
             return;
         }
-        let base: &Vec<u8> = pick(&mut self.draws, pool);
-        out.extend_from_slice(base);
+        let base = if taken.is_empty() || self.draws.chance(0.3) {
+            self.below(pool.len())
+        } else {
+            *pick(&mut self.draws, taken)
+        };
+        out.extend_from_slice(&pool[base]);
         // one change half of the time, up to ten
         let mut more = self.draws.bits();
         for _ in 0..10 {
@@ -138,7 +150,11 @@ impl Mutator {
             }
             15 | 16 if !self.words.is_empty() => {
                 let word = *pick(&mut self.draws, self.words);
-                let gone = if self.draws.chance(0.5) { word.len().min(length - at.min(length)) } else { 0 };
+                let gone = if self.draws.chance(0.5) {
+                    word.len().min(length - at.min(length))
+                } else {
+                    0
+                };
                 bytes.splice(at..at + gone, word.bytes());
             }
             15..=17 => self.change_number(bytes, at),
@@ -146,7 +162,9 @@ impl Mutator {
                 let (from, to) = self.range(length);
                 let copy = bytes[from..to].to_vec();
                 let times = 2 + self.below(40);
-                while bytes.len() < self.longest.min(length + times * copy.len()) && !copy.is_empty() {
+                while bytes.len() < self.longest.min(length + times * copy.len())
+                    && !copy.is_empty()
+                {
                     let at = to.min(bytes.len());
                     bytes.splice(at..at, copy.iter().copied());
                 }
@@ -183,6 +201,16 @@ impl Mutator {
         let of_number = |byte: &u8| byte.is_ascii_digit() || b".eE+-".contains(byte);
         let length = bytes[from..].iter().position(|byte| !of_number(byte));
         let to = length.map_or(bytes.len(), |length| from + length);
+        if self.draws.chance(0.4) {
+            let small = self.draws.bits() % 200;
+            let number = if self.draws.chance(0.5) {
+                small.to_string()
+            } else {
+                (small as f64 / 64.0).to_string()
+            };
+            bytes.splice(from..to, number.into_bytes());
+            return;
+        }
         let number = *pick(&mut self.draws, WRITTEN);
         bytes.splice(from..to, number.bytes());
     }

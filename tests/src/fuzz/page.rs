@@ -3,7 +3,9 @@
 use std::time::Duration;
 
 use mmt_client::io::console::FromPage;
-use mmt_client::operator::pointer::{Driver, HandEvent, HandTuning, Person, PointerSample, REACH_M};
+use mmt_client::operator::pointer::{
+    Driver, HandEvent, HandTuning, Person, PointerSample, REACH_M,
+};
 use mmt_client::operator::scripted::{Scripted, ScriptedConfig, View};
 use mmt_shared::model::geometry::{BoxFootprint, Pose, Vec2};
 
@@ -44,7 +46,10 @@ pub(super) fn page(input: &[u8]) -> Outcome {
     }
     // another page finds a hand that works
     let here = person.hip();
-    let sample = |ms: f64| PointerSample { page_s: 1.0 + ms * 1e-3, at: Vec2::new(ms * 1e-4, 0.0) };
+    let sample = |ms: f64| PointerSample {
+        page_s: 1.0 + ms * 1e-3,
+        at: Vec2::new(ms * 1e-4, 0.0),
+    };
     person.handle(now, HandEvent::Pause(false));
     person.handle(now, HandEvent::NewPage);
     person.handle(now, HandEvent::Press(sample(0.0)));
@@ -54,7 +59,11 @@ pub(super) fn page(input: &[u8]) -> Outcome {
     }
     let way = person.hip() - here;
     let to_the_edge = REACH_M - here.x;
-    assert!(way.x > 0.005_f64.min(to_the_edge - 1e-6), "the hand is dead: {here:?} to {:?}", person.hip());
+    assert!(
+        way.x > 0.005_f64.min(to_the_edge - 1e-6),
+        "the hand is dead: {here:?} to {:?}",
+        person.hip()
+    );
     match reason {
         Some(why) if read == 0 => Outcome::refused(&why),
         _ if read == 0 => Outcome::refused(&"no text"),
@@ -67,6 +76,9 @@ fn ticks(person: &mut Person, now: &mut Duration, ticks: u32) {
         *now += Duration::from_millis(1);
         let hip = person.step(*now, &view(), Vec2::zeros());
         // a hand that is driven by the script is a hand's breadth beyond at most
-        assert!(hip.x.abs() <= REACH_M + 1.0 && hip.y.abs() <= REACH_M + 1.0, "{hip:?}");
+        assert!(
+            hip.x.abs() <= REACH_M + 1.0 && hip.y.abs() <= REACH_M + 1.0,
+            "{hip:?}"
+        );
     }
 }

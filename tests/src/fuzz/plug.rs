@@ -34,7 +34,10 @@ impl Held {
 
     /// Whether a force may act: on a hand that holds, or whose ramp goes out.
     pub(super) fn may_feel(&self) -> bool {
-        self.held || self.released.is_some_and(|then| self.now.saturating_since(then) < RAMP_OUT)
+        self.held
+            || self
+                .released
+                .is_some_and(|then| self.now.saturating_since(then) < RAMP_OUT)
     }
 
     pub(super) fn is_held(&self) -> bool {
@@ -46,12 +49,16 @@ impl Held {
         match event {
             HandEvent::Press(sample) => {
                 assert!(!self.held, "pressed twice");
-                assert!(sample.at.x.is_finite() && sample.at.y.is_finite() && sample.page_s.is_finite());
+                assert!(
+                    sample.at.x.is_finite() && sample.at.y.is_finite() && sample.page_s.is_finite()
+                );
                 self.held = true;
             }
             HandEvent::Move(sample) => {
                 assert!(self.held, "moved without a press");
-                assert!(sample.at.x.is_finite() && sample.at.y.is_finite() && sample.page_s.is_finite());
+                assert!(
+                    sample.at.x.is_finite() && sample.at.y.is_finite() && sample.page_s.is_finite()
+                );
             }
             HandEvent::Release => {
                 assert!(self.held, "released without a press");
@@ -59,7 +66,9 @@ impl Held {
             }
             HandEvent::Clock(page_s) => assert!(page_s.is_finite()),
             HandEvent::NewPage => assert!(!self.held, "another page while held"),
-            HandEvent::Drive(_) | HandEvent::Pause(_) | HandEvent::Finish => panic!("a device does not do this"),
+            HandEvent::Drive(_) | HandEvent::Pause(_) | HandEvent::Finish => {
+                panic!("a device does not do this")
+            }
         }
     }
 }
@@ -81,7 +90,11 @@ pub(super) fn device(input: &[u8]) -> Outcome {
     let (mut now, mut held, mut packets) = (Time::from_millis(1), Held::default(), 0);
     let mut rest = input;
     while let [wait, from, tail @ ..] = rest {
-        let length = if tail.len() < 2 * DEVICE_BYTES { tail.len() } else { DEVICE_BYTES };
+        let length = if tail.len() < 2 * DEVICE_BYTES {
+            tail.len()
+        } else {
+            DEVICE_BYTES
+        };
         let (packet, behind) = tail.split_at(length);
         rest = behind;
         now += Duration::from_millis(u64::from(*wait));
@@ -92,7 +105,8 @@ pub(super) fn device(input: &[u8]) -> Outcome {
         let answers = link.handle(now, from, packet, |event| held.judge(event));
         assert!(read || !answers, "an answer to what is no packet");
         let counts = link.counts();
-        let judged = counts.taken + counts.late + counts.malformed + counts.stranger + counts.second;
+        let judged =
+            counts.taken + counts.late + counts.malformed + counts.stranger + counts.second;
         assert_eq!(judged, packets, "{counts:?}");
         assert!(counts.nonsense <= counts.taken);
         if answers {
@@ -101,15 +115,26 @@ pub(super) fn device(input: &[u8]) -> Outcome {
             let [x, y, z, ..] = singles::<6>(numbers);
             let force = (x * x + y * y + z * z).sqrt();
             assert!(force <= 5.001, "{force} N of 5 N");
-            assert!(held.may_feel() || force == 0.0, "{force} N on a hand that does not hold");
-            assert!(head.flags & 2 == 0 || held.may_feel(), "engaged is whoever holds");
-            assert!(head.flags & 32 == 0 || force == 0.0, "{force} N after a reading that was refused");
+            assert!(
+                held.may_feel() || force == 0.0,
+                "{force} N on a hand that does not hold"
+            );
+            assert!(
+                head.flags & 2 == 0 || held.may_feel(),
+                "engaged is whoever holds"
+            );
+            assert!(
+                head.flags & 32 == 0 || force == 0.0,
+                "{force} N after a reading that was refused"
+            );
             assert!(!held.held || force > 4.9, "no force on a hand that holds");
         }
     }
     let counts = link.counts();
     if counts.taken > counts.nonsense {
-        return Outcome::taken(u64::from(held.held) + 2 * counts.late.min(2) + 8 * counts.second.min(1));
+        return Outcome::taken(
+            u64::from(held.held) + 2 * counts.late.min(2) + 8 * counts.second.min(1),
+        );
     }
     Outcome::refused(&match (counts.nonsense, counts.malformed) {
         (1.., _) => "nonsense",
@@ -125,7 +150,11 @@ pub(super) fn plant(input: &[u8]) -> Outcome {
         Ok((head, Some(answer))) => {
             assert_eq!(input.len(), PLANT_BYTES);
             let within = |of: Vec2, most: f64| of.x.abs() <= most && of.y.abs() <= most;
-            assert!(within(answer.tool, 5.0) && within(answer.velocity, 20.0) && within(answer.force, 1000.0));
+            assert!(
+                within(answer.tool, 5.0)
+                    && within(answer.velocity, 20.0)
+                    && within(answer.force, 1000.0)
+            );
             assert!((0.0..=10.0).contains(&answer.image_age_s));
             if let Some(object) = answer.object {
                 assert!(within(object.position, 5.0) && object.angle.abs() <= 1e6);
@@ -133,7 +162,10 @@ pub(super) fn plant(input: &[u8]) -> Outcome {
             let packet = answer.packet(&TOKEN, &head);
             let (again_head, again) = PlantAnswer::read(&TOKEN, &packet).unwrap();
             assert_eq!(again, Some(answer));
-            assert_eq!((again_head.sequence, again_head.stamp_ns), (head.sequence, head.stamp_ns));
+            assert_eq!(
+                (again_head.sequence, again_head.stamp_ns),
+                (head.sequence, head.stamp_ns)
+            );
             Outcome::taken(u64::from(answer.object.is_some()))
         }
     }

@@ -8,7 +8,8 @@ use mmt_shared::io::record::{Ended, RecordError, read_from};
 use mmt_shared::record::again::EndAgain;
 use mmt_shared::record::cdr::{CdrError, CdrWriter};
 use mmt_shared::record::messages::{
-    Arrival, Link, Loop, MasterTick, Message, Packet, Parameters, Reading, Session, SlaveTick, Value,
+    Arrival, Link, Loop, MasterTick, Message, Packet, Parameters, Reading, Session, SlaveTick,
+    Value,
 };
 use mmt_shared::record::table;
 
@@ -98,7 +99,9 @@ pub(super) fn file(input: &[u8]) -> Outcome {
     let findings = report.findings("fuzz");
     assert!(findings.tables.len() < 20);
     match ended {
-        Ok(ended) => Outcome::taken(messages.min(8) + 16 * broken.min(3) + 64 * u64::from(ended == Ended::Whole)),
+        Ok(ended) => Outcome::taken(
+            messages.min(8) + 16 * broken.min(3) + 64 * u64::from(ended == Ended::Whole),
+        ),
         Err(why) => Outcome::refused(&why),
     }
 }
@@ -114,23 +117,37 @@ impl Again {
     fn take(&mut self, topic: &str, message: &[u8]) {
         match topic {
             "/master/session" => {
-                self.master = Session::read(message).ok().and_then(|session| MasterAgain::try_new(&session).ok());
+                self.master = Session::read(message)
+                    .ok()
+                    .and_then(|session| MasterAgain::try_new(&session).ok());
             }
             "/slave/session" => {
-                self.slave = Session::read(message).ok().and_then(|session| SlaveAgain::try_new(&session).ok());
+                self.slave = Session::read(message)
+                    .ok()
+                    .and_then(|session| SlaveAgain::try_new(&session).ok());
             }
-            "/master/arrivals" => both(&mut self.master, Arrival::read(message), |end, of| end.arrival(&of)),
-            "/slave/arrivals" => both(&mut self.slave, Arrival::read(message), |end, of| end.arrival(&of)),
+            "/master/arrivals" => both(&mut self.master, Arrival::read(message), |end, of| {
+                end.arrival(&of)
+            }),
+            "/slave/arrivals" => both(&mut self.slave, Arrival::read(message), |end, of| {
+                end.arrival(&of)
+            }),
             "/master/ticks" => both(&mut self.master, MasterTick::read(message), |end, of| {
                 end.tick(&of);
                 let force = end.done().unwrap().hand_force;
-                assert!(force.x.is_finite() && force.y.is_finite() && force.norm() <= 50.0 + 1e-9, "{force:?}");
+                assert!(
+                    force.x.is_finite() && force.y.is_finite() && force.norm() <= 50.0 + 1e-9,
+                    "{force:?}"
+                );
                 assert!(end.left().count() <= 8);
             }),
             "/slave/ticks" => both(&mut self.slave, SlaveTick::read(message), |end, of| {
                 end.tick(&of);
                 let tool = end.done().map(|done| done.tool + done.f_s);
-                assert!(tool.is_none_or(|tool| tool.x.is_finite() && tool.y.is_finite()), "{tool:?}");
+                assert!(
+                    tool.is_none_or(|tool| tool.x.is_finite() && tool.y.is_finite()),
+                    "{tool:?}"
+                );
                 assert!(end.left().count() <= 8);
             }),
             _ => {}

@@ -6,7 +6,8 @@ use mmt_shared::model::params::ModelState;
 use mmt_shared::model::update::Update;
 use mmt_shared::report::{Brief, MasterHalf, MasterSession, RunReport, SlaveHalf, SlaveSession};
 use mmt_shared::wire::{
-    DATAGRAM_MAX, Datagram, DecodeError, Ending, Hello, Message, RawState, STREAM_MESSAGE_MAX, Side, StreamMessage,
+    DATAGRAM_MAX, Datagram, DecodeError, Ending, Hello, Message, RawState, STREAM_MESSAGE_MAX,
+    Side, StreamMessage,
 };
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -17,7 +18,13 @@ use super::Outcome;
 const COUPLINGS: [(f64, f64); 3] = [(1000.0, 10.0), (50.0, 0.0), (10_000.0, 40.0)];
 
 /// m (kg), b (N s/m), c (N), I (kg m²) and e (N m) as the documents have them.
-const ACCEPTED: [(f64, f64); 5] = [(0.05, 50.0), (0.0, 200.0), (0.0, 200.0), (3e-6, 34.0), (0.0, 200.0)];
+const ACCEPTED: [(f64, f64); 5] = [
+    (0.05, 50.0),
+    (0.0, 200.0),
+    (0.0, 200.0),
+    (3e-6, 34.0),
+    (0.0, 200.0),
+];
 
 /// The reason that says most: that of the side which may send such a message.
 fn told(master: DecodeError, slave: DecodeError) -> Outcome {
@@ -56,7 +63,10 @@ fn judge_datagram(read: &Datagram) {
         Message::Update(raw) => {
             assert!(raw.sequence > 0);
             for (stiffness_n_per_m, damping_ns_per_m) in COUPLINGS {
-                let coupling = Coupling { stiffness_n_per_m, damping_ns_per_m };
+                let coupling = Coupling {
+                    stiffness_n_per_m,
+                    damping_ns_per_m,
+                };
                 if let Ok(update) = raw.accept(&coupling) {
                     judge_state(&update.state);
                     assert_eq!(Update::<RawState>::from(&update), *raw, "it was changed");
@@ -66,7 +76,11 @@ fn judge_datagram(read: &Datagram) {
         Message::Scene(scene) => {
             let object = scene.object;
             let numbers = [object.position, scene.tool, scene.force];
-            assert!(numbers.iter().all(|of| of.x.is_finite() && of.y.is_finite()));
+            assert!(
+                numbers
+                    .iter()
+                    .all(|of| of.x.is_finite() && of.y.is_finite())
+            );
             assert!(object.angle.is_finite());
         }
         Message::Tool(tool) => assert!(tool.in_j.is_finite() && tool.in_j >= 0.0),
@@ -78,10 +92,14 @@ fn judge_datagram(read: &Datagram) {
 pub(super) fn judge_state(state: &ModelState) {
     let numbers = state.params().to_array();
     for (number, (least, most)) in numbers.into_iter().zip(ACCEPTED) {
-        assert!((least..=most).contains(&number), "{number} is not within {least} to {most}");
+        assert!(
+            (least..=most).contains(&number),
+            "{number} is not within {least} to {most}"
+        );
     }
     let (pose, twist, footprint) = (state.pose(), state.twist(), state.footprint());
-    let within = |number: f64, most: f64| assert!(number.abs() <= most, "{number} is beyond {most}");
+    let within =
+        |number: f64, most: f64| assert!(number.abs() <= most, "{number} is beyond {most}");
     within(pose.position.x, 5.0);
     within(pose.position.y, 5.0);
     within(pose.angle, 6283.0);
@@ -151,7 +169,10 @@ fn judge_coupling(coupling: &Coupling) {
 
 /// A text that is shown neither steers a terminal nor begins a line.
 pub(super) fn fits_a_line(text: &str) {
-    let unfit = |c: char| c.is_control() || matches!(c, '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}' | '\u{200e}' | '\u{200f}');
+    let unfit = |c: char| {
+        c.is_control()
+            || matches!(c, '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}' | '\u{200e}' | '\u{200f}')
+    };
     assert!(!text.contains(unfit), "{text:?}");
 }
 
@@ -185,7 +206,9 @@ fn halves(report: &[u8]) {
 }
 
 /// What is read is what is read of it once it has been written again.
-fn read_twice<T: Serialize + DeserializeOwned + PartialEq + std::fmt::Debug>(report: &[u8]) -> Option<T> {
+fn read_twice<T: Serialize + DeserializeOwned + PartialEq + std::fmt::Debug>(
+    report: &[u8],
+) -> Option<T> {
     let read: T = serde_json::from_slice(report).ok()?;
     let again: T = serde_json::from_slice(&serde_json::to_vec(&read).unwrap()).unwrap();
     assert_eq!(read, again);

@@ -231,6 +231,14 @@ fn a_length_that_only_the_file_has_costs_no_memory_and_no_message() {
     });
     assert_eq!(ended.unwrap(), Ended::CutOff);
     assert_eq!(heard, [("/a".to_owned(), b"said".to_vec())]);
+    // a chunk of one record that says to be longer than the chunk
+    let inner = [&[5][..], &u64::MAX.to_le_bytes(), &message].concat();
+    let length = (inner.len() as u64).to_le_bytes();
+    let chunk = [&[0; 16][..], &length, &[0; 8], &length, &inner].concat();
+    let file = [mcap::MAGIC.to_vec(), record(6, &chunk)].concat();
+    let broken = read_from::<RecordError>(file.as_slice(), 1 << 20, |_, _| Ok(()));
+    let broken = broken.unwrap_err().to_string();
+    assert!(broken.contains("a chunk in it is malformed"), "{broken}");
     let short = [mcap::MAGIC.to_vec(), record(4, &channel[..9])].concat();
     let broken = read_from::<RecordError>(short.as_slice(), 1 << 20, |_, _| Ok(()));
     let broken = broken.unwrap_err().to_string();

@@ -18,7 +18,10 @@ use mmt_shared::model::geometry::Vec2;
 use mmt_shared::pairing::Token;
 use mmt_shared::record::cdr::CdrWriter;
 use mmt_shared::record::digest::RunDigest;
-use mmt_shared::record::messages::{Arrival, Link, Loop, MasterTick, Message, Packet, Parameters, Reading, Session, SlaveTick, Stamp};
+use mmt_shared::record::messages::{
+    Arrival, Link, Loop, MasterTick, Message, Packet, Parameters, Reading, Session, SlaveTick,
+    Stamp,
+};
 use mmt_shared::time::{TICK, Time};
 use mmt_shared::wire::{Architecture, Claim, DATAGRAM_MAX, Hello, Label, Role, Welcome};
 
@@ -38,7 +41,8 @@ impl Kept {
         let mut bytes = CdrWriter::default();
         message.write(bytes.begin());
         self.messages.push((topic, bytes.message().to_vec()));
-        self.out.put(topic, Stamp(1_700_000_000_000_000_000), message);
+        self.out
+            .put(topic, Stamp(1_700_000_000_000_000_000), message);
     }
 }
 
@@ -74,7 +78,10 @@ fn hello(device: &DeviceProfile) -> Hello {
 /// A session of some ticks: its messages, and the file.
 fn recorded() -> (Vec<(&'static str, Vec<u8>)>, Vec<u8>) {
     let memory = Memory::default();
-    let mut kept = Kept { messages: Vec::new(), out: RecordWriter::create(memory.clone()) };
+    let mut kept = Kept {
+        messages: Vec::new(),
+        out: RecordWriter::create(memory.clone()),
+    };
     let device = DeviceProfile::default();
     let (hello, config) = (hello(&device), SlaveConfig::default());
     let (mut now, mut slave_now) = (Time::from_millis(100), Time::from_millis(9000));
@@ -93,12 +100,28 @@ fn recorded() -> (Vec<(&'static str, Vec<u8>)>, Vec<u8>) {
         welcome,
         architecture: Architecture::Mmt,
         limits: device.limits(),
-        commands: CommandConfig { samples_per_command: 1, ..CommandConfig::default() },
+        commands: CommandConfig {
+            samples_per_command: 1,
+            ..CommandConfig::default()
+        },
     };
     let mut master = setting.end().unwrap();
-    let numbered = |session: Session| Session { session: 1, stamp: Stamp(1), ..session };
+    let numbered = |session: Session| Session {
+        session: 1,
+        stamp: Stamp(1),
+        ..session
+    };
     kept.put("/master/session", &numbered(setting.session(&())));
-    kept.put("/slave/session", &numbered(mmt_server::again::session(slave_now, &config, &hello, None, &())));
+    kept.put(
+        "/slave/session",
+        &numbered(mmt_server::again::session(
+            slave_now,
+            &config,
+            &hello,
+            None,
+            &(),
+        )),
+    );
     let (mut of_master, mut of_slave) = (RunDigest::default(), RunDigest::default());
     let (mut up, mut down) = (Vec::<Vec<u8>>::new(), Vec::<Vec<u8>>::new());
     let mut index = [0; 2];
@@ -116,29 +139,32 @@ fn recorded() -> (Vec<(&'static str, Vec<u8>)>, Vec<u8>) {
         let done = master.tick(now, reading);
         of_master.tick(&done);
         let hip = done.sample.hip.metres();
-        kept.put("/master/ticks", &MasterTick {
-            stamp: Stamp(tick),
-            session: 1,
-            index: index[0],
-            deadline_ns: now.as_nanos(),
-            lateness_ns: 5,
-            skipped: 0,
-            reading_x_m: reading.x,
-            reading_y_m: reading.y,
-            engaged: true,
-            releases: false,
-            stops: false,
-            sent_ns: now.as_nanos(),
-            hip_x_m: hip.x,
-            hip_y_m: hip.y,
-            f_m_x_n: done.felt.x,
-            f_m_y_n: done.felt.y,
-            hand_x_n: done.hand_force.x,
-            hand_y_n: done.hand_force.y,
-            in_contact: false,
-            link: done.link.name().to_owned(),
-            digest: of_master.value(),
-        });
+        kept.put(
+            "/master/ticks",
+            &MasterTick {
+                stamp: Stamp(tick),
+                session: 1,
+                index: index[0],
+                deadline_ns: now.as_nanos(),
+                lateness_ns: 5,
+                skipped: 0,
+                reading_x_m: reading.x,
+                reading_y_m: reading.y,
+                engaged: true,
+                releases: false,
+                stops: false,
+                sent_ns: now.as_nanos(),
+                hip_x_m: hip.x,
+                hip_y_m: hip.y,
+                f_m_x_n: done.felt.x,
+                f_m_y_n: done.felt.y,
+                hand_x_n: done.hand_force.x,
+                hand_y_n: done.hand_force.y,
+                in_contact: false,
+                link: done.link.name().to_owned(),
+                digest: of_master.value(),
+            },
+        );
         index[0] += 1;
         while let Some(length) = master.poll_transmit(now, &mut out).unwrap() {
             of_master.datagram(&out[..length]);
@@ -146,12 +172,23 @@ fn recorded() -> (Vec<(&'static str, Vec<u8>)>, Vec<u8>) {
         }
         for datagram in std::mem::take(&mut up) {
             slave.handle_datagram(slave_now, &datagram);
-            kept.put("/slave/arrivals", &arrival(&mut index[1], slave_now, datagram));
+            kept.put(
+                "/slave/arrivals",
+                &arrival(&mut index[1], slave_now, datagram),
+            );
         }
         slave.stop(false);
         let done = slave.tick(slave_now);
         of_slave.tick(&done);
-        kept.put("/slave/ticks", &slave_tick(index[1], slave_now, done.map(|done| done.tool), of_slave.value()));
+        kept.put(
+            "/slave/ticks",
+            &slave_tick(
+                index[1],
+                slave_now,
+                done.map(|done| done.tool),
+                of_slave.value(),
+            ),
+        );
         index[1] += 1;
         while let Some(length) = slave.poll_transmit(slave_now, &mut out).unwrap() {
             of_slave.datagram(&out[..length]);
@@ -165,7 +202,13 @@ fn recorded() -> (Vec<(&'static str, Vec<u8>)>, Vec<u8>) {
 }
 
 fn arrival(index: &mut u64, now: Time, datagram: Vec<u8>) -> Arrival {
-    let arrival = Arrival { stamp: Stamp(2), session: 1, index: *index, at_ns: now.as_nanos(), datagram };
+    let arrival = Arrival {
+        stamp: Stamp(2),
+        session: 1,
+        index: *index,
+        at_ns: now.as_nanos(),
+        datagram,
+    };
     *index += 1;
     arrival
 }
@@ -221,16 +264,55 @@ fn standing(kept: &mut Kept) {
     };
     kept.put("/master/packets", &packet("up", 1, "sent"));
     kept.put("/slave/packets", &packet("up", 1, "newest"));
-    kept.put("/slave/parameters", &Parameters { stamp, session, m_kg: 0.7, b_ns_per_m: 3.0, c_n: 2.0, covariance: [f64::NAN; 9] });
-    let link = Link { stamp, session, rtt_ms: 12.0, up_expected: 10, up_received: 9, down_expected: 5, down_received: 5 };
+    kept.put(
+        "/slave/parameters",
+        &Parameters {
+            stamp,
+            session,
+            m_kg: 0.7,
+            b_ns_per_m: 3.0,
+            c_n: 2.0,
+            covariance: [f64::NAN; 9],
+        },
+    );
+    let link = Link {
+        stamp,
+        session,
+        rtt_ms: 12.0,
+        up_expected: 10,
+        up_received: 9,
+        down_expected: 5,
+        down_received: 5,
+    };
     kept.put("/master/link", &link);
-    let about = Loop { stamp, session, ticks: 1000, skipped: 1, lateness_mean_us: 12.0, lateness_max_us: 99.0, missed: 0 };
+    let about = Loop {
+        stamp,
+        session,
+        ticks: 1000,
+        skipped: 1,
+        lateness_mean_us: 12.0,
+        lateness_max_us: 99.0,
+        missed: 0,
+    };
     kept.put("/slave/loop", &about);
-    kept.put("/master/readings", &Reading { stamp, session, own_s: 1.5, x_m: 0.1, y_m: 0.2, held: true });
+    kept.put(
+        "/master/readings",
+        &Reading {
+            stamp,
+            session,
+            own_s: 1.5,
+            x_m: 0.1,
+            y_m: 0.2,
+            held: true,
+        },
+    );
 }
 
 fn number_of(topic: &str) -> Option<u8> {
-    TOPICS.iter().position(|known| *known == topic).map(|number| number as u8)
+    TOPICS
+        .iter()
+        .position(|known| *known == topic)
+        .map(|number| number as u8)
 }
 
 /// One message each, behind the number of its topic.
@@ -241,7 +323,8 @@ pub(in crate::fuzz) fn messages() -> Vec<Vec<u8>> {
         let Some(number) = number_of(topic) else {
             continue;
         };
-        let short = message.len() < 1400 && !std::mem::replace(&mut seen[usize::from(number)], true);
+        let short =
+            message.len() < 1400 && !std::mem::replace(&mut seen[usize::from(number)], true);
         if short {
             seeds.push([&[number], message.as_slice()].concat());
         }
@@ -270,7 +353,9 @@ pub(in crate::fuzz) fn recorded_sessions() -> Vec<Vec<u8>> {
 }
 
 /// The messages of such an input.
-pub(in crate::fuzz) fn messages_of(mut input: &[u8]) -> impl Iterator<Item = (&'static str, &[u8])> {
+pub(in crate::fuzz) fn messages_of(
+    mut input: &[u8],
+) -> impl Iterator<Item = (&'static str, &[u8])> {
     std::iter::from_fn(move || {
         let (head, rest) = input.split_first_chunk::<3>()?;
         let length = usize::from(u16::from_le_bytes([head[1], head[2]]));

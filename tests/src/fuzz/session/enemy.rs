@@ -35,7 +35,9 @@ pub(super) fn forged(bytes: &[u8], from: Side, draws: &mut Substream) -> Option<
         0 => u32::MAX,
         1 => draws.bits() as u32,
         2 => envelope.number,
-        _ => envelope.number.saturating_add(1 + draws.bits() as u32 % 100),
+        _ => envelope
+            .number
+            .saturating_add(1 + draws.bits() as u32 % 100),
     };
     if draws.chance(0.2) {
         envelope.sent = time(envelope.sent, draws);
@@ -47,7 +49,9 @@ pub(super) fn forged(bytes: &[u8], from: Side, draws: &mut Substream) -> Option<
             command.newest_update = sequence(command.newest_update, draws);
             command.samples = samples(&command.samples, draws);
             if draws.chance(0.3) {
-                command.port = Some(HandPort { in_j: double(draws).abs() });
+                command.port = Some(HandPort {
+                    in_j: double(draws).abs(),
+                });
             }
             Message::Command(command)
         }
@@ -64,7 +68,10 @@ pub(super) fn forged(bytes: &[u8], from: Side, draws: &mut Substream) -> Option<
         Message::Tool(mut tool) => {
             tool.in_j = double(draws).abs();
             tool.answers = time(tool.answers, draws);
-            tool.force = ForceCounts { x: draws.bits() as i32, y: i32::MIN };
+            tool.force = ForceCounts {
+                x: draws.bits() as i32,
+                y: i32::MIN,
+            };
             Message::Tool(tool)
         }
         Message::Heartbeat => Message::Heartbeat,
@@ -91,10 +98,22 @@ fn time(honest: Time, draws: &mut Substream) -> Time {
 
 fn false_echo(echo: Echo, draws: &mut Substream) -> Echo {
     match draws.bits() % 5 {
-        0 => Echo { number: u32::MAX, ..echo },
-        1 => Echo { held_ns: draws.bits() >> (draws.bits() % 64), ..echo },
-        2 => Echo { sent: time(echo.sent, draws), ..echo },
-        3 => Echo { received: draws.bits() as u32, ..echo },
+        0 => Echo {
+            number: u32::MAX,
+            ..echo
+        },
+        1 => Echo {
+            held_ns: draws.bits() >> (draws.bits() % 64),
+            ..echo
+        },
+        2 => Echo {
+            sent: time(echo.sent, draws),
+            ..echo
+        },
+        3 => Echo {
+            received: draws.bits() as u32,
+            ..echo
+        },
         _ => echo,
     }
 }
@@ -121,8 +140,14 @@ fn samples(honest: &SampleBlock, draws: &mut Substream) -> SampleBlock {
     for sample in honest.as_slice() {
         let mut sample = *sample;
         sample.stamp += ahead;
-        sample.hip = HipCounts { x: sample.hip.x.wrapping_add(far), y: far };
-        sample.force = ForceCounts { x: far, y: i32::MAX };
+        sample.hip = HipCounts {
+            x: sample.hip.x.wrapping_add(far),
+            y: far,
+        };
+        sample.force = ForceCounts {
+            x: far,
+            y: i32::MAX,
+        };
         // the first alone where the others do not fit
         if made.push(sample).is_err() {
             break;
@@ -133,7 +158,9 @@ fn samples(honest: &SampleBlock, draws: &mut Substream) -> SampleBlock {
 
 /// Numbers of the state that an update ends with, one or all of them: extreme, or near what was there.
 fn state(update: &mut [u8], draws: &mut Substream) {
-    const EDGES: [f64; 10] = [0.0, 5e-324, 3e-6, 0.05, 50.0, 200.0, 34.0, 1.0, -5.0, 6283.0];
+    const EDGES: [f64; 10] = [
+        0.0, 5e-324, 3e-6, 0.05, 50.0, 200.0, 34.0, 1.0, -5.0, 6283.0,
+    ];
     let all = draws.chance(0.2);
     let from = update.len().saturating_sub(15 * 8);
     let (numbers, _) = update[from..].as_chunks_mut::<8>();

@@ -29,12 +29,21 @@ pub(super) struct MasterJudge {
 
 impl MasterJudge {
     pub(super) fn new(limits: Limits) -> Self {
-        Self { limits, force: Vec2::zeros(), applied: 0, left: 0, handled: 0 }
+        Self {
+            limits,
+            force: Vec2::zeros(),
+            applied: 0,
+            left: 0,
+            handled: 0,
+        }
     }
 
     pub(super) fn ticked(&mut self, done: &MasterTick, end: &MasterEnd) {
         let force = done.hand_force;
-        assert!(finite(force) && force.norm() <= self.limits.force_max_n + HAIR, "{force:?} N on the hand");
+        assert!(
+            finite(force) && force.norm() <= self.limits.force_max_n + HAIR,
+            "{force:?} N on the hand"
+        );
         let step = (force - self.force).norm();
         assert!(step <= self.limits.step_max_n + HAIR, "{step} N in a tick");
         self.force = force;
@@ -43,9 +52,16 @@ impl MasterJudge {
         let pose = model.state().pose;
         assert!(finite(pose.position) && pose.angle.is_finite(), "{pose:?}");
         let [m, b, c, ..] = model.state().params.to_array();
-        assert!((0.05..=50.0).contains(&m) && (0.0..=200.0).contains(&b) && (0.0..=200.0).contains(&c), "{m} {b} {c}");
+        assert!(
+            (0.05..=50.0).contains(&m) && (0.0..=200.0).contains(&b) && (0.0..=200.0).contains(&c),
+            "{m} {b} {c}"
+        );
         let applied = end.counts().newest_applied;
-        assert!(applied >= self.applied, "update {applied} after {}", self.applied);
+        assert!(
+            applied >= self.applied,
+            "update {applied} after {}",
+            self.applied
+        );
         self.applied = applied;
     }
 
@@ -58,8 +74,18 @@ impl MasterJudge {
         let counts = end.channel().counts();
         handled(counts, self.handled);
         let applied: u64 = end.master().applied().iter().sum();
-        let dropped: u64 = end.update_drops().by_name().iter().map(|(_, number)| number).sum();
-        assert_eq!(counts.received.updates, applied + dropped, "{:?}", end.update_drops());
+        let dropped: u64 = end
+            .update_drops()
+            .by_name()
+            .iter()
+            .map(|(_, number)| number)
+            .sum();
+        assert_eq!(
+            counts.received.updates,
+            applied + dropped,
+            "{:?}",
+            end.update_drops()
+        );
         let half = end.half(1.0);
         serde_json::to_string(&half).unwrap();
     }
@@ -77,12 +103,22 @@ pub(super) struct SlaveJudge {
 
 impl SlaveJudge {
     pub(super) fn ticked(&mut self, done: &SlaveTick) {
-        for of in [done.tool, done.f_s, done.true_force, done.f_shadow, done.truth.position] {
+        for of in [
+            done.tool,
+            done.f_s,
+            done.true_force,
+            done.f_shadow,
+            done.truth.position,
+        ] {
             assert!(finite(of), "{done:?}");
         }
         assert!(done.f_m.is_none_or(finite));
         if let Some(update) = &done.update {
-            assert_eq!(update.sequence, self.sequence + 1, "updates are numbered one by one");
+            assert_eq!(
+                update.sequence,
+                self.sequence + 1,
+                "updates are numbered one by one"
+            );
             self.sequence = update.sequence;
             self.made += 1;
             crate::fuzz::wire::judge_state(&update.state);
@@ -97,11 +133,19 @@ impl SlaveJudge {
     pub(super) fn balances(&self, end: &SlaveEnd) {
         handled(end.channel().counts(), self.handled);
         let counts = end.counts();
-        assert_eq!(counts.samples + counts.samples_disengaged, self.samples, "{counts:?}");
+        assert_eq!(
+            counts.samples + counts.samples_disengaged,
+            self.samples,
+            "{counts:?}"
+        );
         // nothing waits once all was polled
         let became = counts.updates.total() + counts.updates_superseded + counts.updates_unsent;
         assert_eq!(became, self.made, "{counts:?}");
-        assert_eq!(end.slave().environment().refused(), 0, "wrenches that are none");
+        assert_eq!(
+            end.slave().environment().refused(),
+            0,
+            "wrenches that are none"
+        );
         let half = end.half(1.0);
         serde_json::to_string(&half).unwrap();
     }
@@ -118,7 +162,8 @@ fn left(side: Side, newest: &mut u32, now: Time, bytes: &[u8]) {
 }
 
 fn handled(counts: &ChannelCounts, handled: u64) {
-    let dropped = counts.datagrams_duplicate + counts.datagrams_too_old + counts.datagrams_malformed;
+    let dropped =
+        counts.datagrams_duplicate + counts.datagrams_too_old + counts.datagrams_malformed;
     assert_eq!(counts.received.total() + dropped, handled, "{counts:?}");
     assert_eq!(counts.messages_unsendable, 0, "what it makes can be sent");
 }
