@@ -7,7 +7,7 @@ use mmt_server::repeats::Repeats;
 use mmt_server::trigger::Scheme;
 use mmt_shared::channel::rate_control::StretchMax;
 use mmt_shared::io::identity::Identity;
-use mmt_shared::pairing::{Address, Pairing, Pin, Token};
+use mmt_shared::pairing::{Address, Pairing, Pin, Token, Tokens};
 use mmt_shared::plug::PlugToken;
 use mmt_shared::recording::Recording;
 
@@ -195,9 +195,15 @@ pub(super) fn identity(input: &[u8]) -> Outcome {
     };
     match Identity::parse(text) {
         Ok(identity) => {
-            let token = identity.token().reveal().to_string();
-            assert!(text.to_ascii_lowercase().contains(&token));
-            assert!(!format!("{identity:?}").contains(&token));
+            let tokens = identity.tokens();
+            let (shown, lower) = (format!("{identity:?}"), text.to_ascii_lowercase());
+            for token in tokens.iter() {
+                let digits = token.token.reveal().to_string();
+                assert!(lower.contains(&digits));
+                assert!(!shown.contains(&digits));
+            }
+            let again = Tokens::read(&tokens.reveal());
+            assert_eq!(again.map(|again| again.reveal()), Ok(tokens.reveal()));
             assert_eq!(identity.derive("fuzz"), identity.derive("fuzz"));
             Outcome::taken(1)
         }
