@@ -97,7 +97,7 @@ impl Haptic {
         self.hand_force = tick.hand_force;
         self.contact += u64::from(tick.rendered.in_contact());
         let sent = self.end.poll_transmit(self.now, out).unwrap();
-        if let Some(length) = sent.filter(|_| phase_ms >= 96) {
+        if let Some(length) = sent.filter(|_| phase_ms >= 90) {
             // the heartbeat answers it: one that answers nothing is silence as well
             self.slave.handle(self.now, out.get(..length).unwrap());
         }
