@@ -1,7 +1,7 @@
 //! What a hostile peer or a careless host does to the command: text for the terminal, a log that nobody reads.
 
 use std::io::Write;
-use std::process::{Command, Stdio};
+use std::process::Stdio;
 
 use mmt_shared::io::congestion::RateCap;
 use mmt_shared::io::connect::connect;
@@ -11,7 +11,7 @@ use mmt_shared::io::transport::CLOSE_FINISHED;
 use mmt_shared::pairing::Pairing;
 use rustix::process::{Pid, Signal, kill_process};
 
-use super::{PATIENCE, mmt, start};
+use super::{PATIENCE, hearing_hang_up, mmt, start};
 
 const SLAVE: [&str; 5] = ["slave", "--listen", "127.0.0.1:0", "--json", "--identity"];
 
@@ -61,11 +61,7 @@ fn a_slave_whose_log_nobody_reads_ends_on_sigterm_and_on_sighup_with_its_report(
         let (_unread, mut full) = std::io::pipe().unwrap();
         full.write_all(&[b'.'; 65_536]).unwrap();
         let slave = mmt(&home, &[&SLAVE[..], &["identity"]].concat());
-        // whoever runs this test may ignore SIGHUP, and a child inherits that
-        let mut command = Command::new("env");
-        command.arg("--default-signal=HUP").arg(slave.get_program());
-        command.args(slave.get_args()).current_dir(home.path());
-        command.stdin(Stdio::null()).stdout(Stdio::piped());
+        let mut command = hearing_hang_up(&slave);
         let mut child = command.stderr(Stdio::from(full)).spawn().unwrap();
         // the process alone holds the other end now
         drop(command);

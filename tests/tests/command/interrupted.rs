@@ -6,7 +6,7 @@ use rustix::process::Signal;
 use serde_json::Value;
 
 use super::runs::recording;
-use super::{PATIENCE, mmt, start};
+use super::{PATIENCE, hearing_hang_up, mmt, start};
 
 #[test]
 fn experiments_that_are_done_when_a_person_ends_reproduce_are_kept() {
@@ -41,7 +41,7 @@ fn files_that_are_done_when_a_replay_is_ended_are_printed_whole() {
         fs::write(home.path().join("short.txt"), recording(2)).unwrap();
         fs::write(home.path().join("long.txt"), recording(60)).unwrap();
         let arguments = ["replay", "--splits", "10000", "short.txt", "long.txt"];
-        let (running, first) = start(mmt(&home, &arguments));
+        let (running, first) = start(hearing_hang_up(&mmt(&home, &arguments)));
         running.signal(signal).unwrap();
         let ended = running.end(PATIENCE).unwrap();
         assert_eq!(ended.status.code(), Some(1), "{}", ended.err);

@@ -46,6 +46,29 @@ fn mmt(home: &tempfile::TempDir, arguments: &[&str]) -> Command {
     command
 }
 
+/// The same command, which hears SIGHUP: whoever runs the test may ignore it, and a child inherits that.
+fn hearing_hang_up(command: &Command) -> Command {
+    let mut hearing = Command::new("env");
+    hearing
+        .arg("--default-signal=HUP")
+        .arg(command.get_program());
+    hearing.args(command.get_args());
+    if let Some(place) = command.get_current_dir() {
+        hearing.current_dir(place);
+    }
+    for (name, value) in command.get_envs() {
+        match value {
+            Some(value) => hearing.env(name, value),
+            None => hearing.env_remove(name),
+        };
+    }
+    hearing
+        .stdin(Stdio::null())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped());
+    hearing
+}
+
 /// Starts a command that prints a line and goes on, and waits for that line.
 fn start(command: Command) -> (Running, String) {
     let mut running = Running::start(command).unwrap();
