@@ -135,6 +135,11 @@ impl LinkConfig {
         self.links().all(Self::is_transparent_itself)
     }
 
+    /// Whether a packet is no larger than the MTU.
+    pub(crate) fn fits(&self, bytes: usize) -> bool {
+        self.mtu.is_none_or(|mtu| bytes <= mtu as usize)
+    }
+
     /// The links of the chain that begins here, in order; mostly one.
     pub(crate) fn links(&self) -> impl Iterator<Item = &Self> {
         std::iter::successors(Some(self), |link| link.then.as_deref())

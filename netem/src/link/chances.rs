@@ -6,7 +6,6 @@ use mmt_shared::rng::Substream;
 
 use super::correlated::ByPacket;
 use super::loss_model::LossModel;
-use super::stages::fits;
 use super::streams::Draws;
 use crate::config::{Correlation, LinkConfig, Reorder};
 
@@ -84,7 +83,7 @@ impl Chances {
         let doubled = self
             .duplicating
             .happens(settings.duplicate, draws.duplicate);
-        if !doubled || !fits(settings, bytes) {
+        if !doubled || !settings.fits(bytes) {
             return (lot, None);
         }
         let hit = draws.copy_loss < loss.probability;

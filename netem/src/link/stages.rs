@@ -245,7 +245,7 @@ impl<T> Stages<T> {
         let (settings, bytes) = (timeline.at(now), packet.departure.bytes);
         let replayed = settings.replay.as_ref().map(|replay| replay.path.at(now));
         packet.replayed = replayed.flatten();
-        let dropped = if !fits(settings, bytes) {
+        let dropped = if !settings.fits(bytes) {
             DropCause::Mtu
         } else if settings.outages.iter().any(|outage| outage.covers(now)) {
             DropCause::Outage
@@ -342,9 +342,4 @@ impl<T> Stages<T> {
         self.arrivals.skip_to(now);
         self.bottleneck.change_at(now);
     }
-}
-
-/// Whether a packet is no larger than the MTU.
-pub(super) fn fits(settings: &LinkConfig, bytes: usize) -> bool {
-    settings.mtu.is_none_or(|mtu| bytes <= mtu as usize)
 }
