@@ -12,7 +12,7 @@ use rustls::pki_types::{
 };
 use rustls::server::ParsedCertificate;
 
-use super::identity_file::Kept;
+use super::identity_file::kept::Kept;
 use super::secret::NoRandomness;
 use crate::pairing::{Created, Pin, TOKEN_LINE, Token, Tokens, TokensError};
 

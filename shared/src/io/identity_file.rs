@@ -2,6 +2,7 @@
 //! and never used once others could read it.
 
 mod change;
+pub(super) mod kept;
 #[cfg(test)]
 mod tests;
 mod token_list;
@@ -16,6 +17,8 @@ use tempfile::NamedTempFile;
 
 use super::identity::{GenerateError, Identity, ParseError};
 use crate::pairing::TokensError;
+
+use kept::{Kept, Seen};
 
 pub use change::{Changed, advertise, advertised, revoke, rotate};
 pub use token_list::{Granted, TokenList};
@@ -101,37 +104,6 @@ pub enum IdentityError {
         /// The names that there are.
         known: String,
     },
-}
-
-/// What tells one state of the file from the next: it is replaced, never written over, and hands that edit it change its time.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Seen {
-    device: u64,
-    inode: u64,
-    bytes: u64,
-    mode: u32,
-    changed_s: i64,
-    changed_ns: i64,
-}
-
-impl Seen {
-    fn of(metadata: &Metadata) -> Self {
-        Self {
-            device: metadata.dev(),
-            inode: metadata.ino(),
-            bytes: metadata.len(),
-            mode: metadata.mode(),
-            changed_s: metadata.ctime(),
-            changed_ns: metadata.ctime_nsec(),
-        }
-    }
-}
-
-/// Where an identity is kept, and the state of the file that it was read from.
-#[derive(Clone, Debug)]
-pub(super) struct Kept {
-    path: PathBuf,
-    seen: Seen,
 }
 
 /// An identity as it was found.

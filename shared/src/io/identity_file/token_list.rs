@@ -11,7 +11,8 @@ use std::{fs, io};
 use tokio::sync::Mutex as Turn;
 use tokio::time::timeout;
 
-use super::{IdentityError, Seen, load};
+use super::kept::Seen;
+use super::{IdentityError, load};
 use crate::io::identity::Identity;
 use crate::pairing::{Pin, Token, TokenName, Tokens};
 use crate::wire::Role;
