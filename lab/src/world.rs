@@ -21,7 +21,7 @@ use mmt_shared::metrics::{PoseError, Staleness};
 use mmt_shared::model::geometry::Vec2;
 use mmt_shared::pairing::Token;
 use mmt_shared::time::{TICK, Time};
-use mmt_shared::wire::{DATAGRAM_MAX, Label, Welcome};
+use mmt_shared::wire::DATAGRAM_MAX;
 use sha2::{Digest, Sha256};
 
 use crate::check::SessionChecks;
@@ -111,14 +111,8 @@ impl World {
         let device = DeviceProfile::default().used_with(config.stiffness_n_per_m, None)?;
         let settings = config.model_settings(device.coupling());
         let mut slave = Slave::with_settings(&config.slave(), settings)?;
-        let welcome = Welcome {
-            settings,
-            state: *slave.state(),
-            tool: slave.tool_at(),
-            resume: Token::new([0; 32]),
-            scheme: Label::clipped(&config.slave.trigger.scheme.to_string()),
-            program: Label::clipped("lab"),
-        };
+        let scheme = config.slave.trigger.scheme.to_string();
+        let welcome = slave.welcome(Token::new([0; 32]), &scheme, "lab");
         let limiter = ForceLimiter::try_new(device.limits())?;
         let master = Master::with_architecture(&welcome, limiter, config.architecture);
         let view = master.view();

@@ -11,8 +11,10 @@ use mmt_shared::model::sample::{ForceCounts, HipSample};
 use mmt_shared::model::settings::ModelSettings;
 use mmt_shared::model::tool::{HandPort, Scene, Tool};
 use mmt_shared::model::update::Update;
+use mmt_shared::pairing::Token;
 use mmt_shared::report::TrueForce;
 use mmt_shared::time::Time;
+use mmt_shared::wire::{Label, Welcome};
 
 use crate::contact::ContactStage;
 use crate::environment::{Environment, EnvironmentConfig};
@@ -153,6 +155,20 @@ impl Slave {
     #[must_use]
     pub fn state(&self) -> &ModelState {
         &self.start
+    }
+
+    /// What a master that is let in is sent: the model as it begins, the tool's place (m), the secret to resume with, and the
+    /// names of the update scheme and of the program, clipped.
+    #[must_use]
+    pub fn welcome(&self, resume: Token, scheme: &str, program: &str) -> Welcome {
+        Welcome {
+            settings: self.settings,
+            state: *self.state(),
+            tool: self.tool_at,
+            resume,
+            scheme: Label::clipped(scheme),
+            program: Label::clipped(program),
+        }
     }
 
     /// The real object: the truth, for reports, never for the estimate. With a plant that is plugged in the configured

@@ -15,7 +15,6 @@ use mmt_shared::pairing::Token;
 use mmt_shared::time::{TICK, Time};
 use mmt_shared::wire::{
     Architecture, Claim, DATAGRAM_MAX, Datagram, Hello, Label, Message, Role, SampleBlock, Side,
-    Welcome,
 };
 
 use super::*;
@@ -62,15 +61,7 @@ impl Shown {
         let (hello, began) = (hello(), Time::from_millis(10));
         let config = SlaveConfig::default();
         let slave = SlaveEnd::of_session(began, &config, &hello, None).unwrap();
-        let core = slave.slave();
-        let welcome = Welcome {
-            settings: *core.settings(),
-            state: *core.state(),
-            tool: core.tool_at(),
-            resume: Token::new([0; 32]),
-            scheme: Label::clipped("any"),
-            program: Label::clipped("test"),
-        };
+        let welcome = slave.slave().welcome(Token::new([0; 32]), "any", "test");
         let limits = DeviceProfile::default().limits();
         let limiter = ForceLimiter::try_new(limits).unwrap();
         let commands = CommandConfig {

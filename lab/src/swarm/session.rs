@@ -16,7 +16,7 @@ use mmt_shared::model::geometry::Vec2;
 use mmt_shared::pairing::Token;
 use mmt_shared::rng::Substream;
 use mmt_shared::time::{TICK, Time};
-use mmt_shared::wire::{Architecture, Claim, DATAGRAM_MAX, Hello, Label, Role, Side, Welcome};
+use mmt_shared::wire::{Architecture, Claim, DATAGRAM_MAX, Hello, Label, Role, Side};
 
 use super::faults::{Fault, Now};
 use super::way::Way;
@@ -99,15 +99,7 @@ impl Session {
         let hello = hello(world, number, &device);
         let config = &world.config.slave;
         let slave = SlaveEnd::of_session(moment.slave_now, config, &hello, memory)?;
-        let core = slave.slave();
-        let welcome = Welcome {
-            settings: *core.settings(),
-            state: *core.state(),
-            tool: core.tool_at(),
-            resume: Token::new([0; 32]),
-            scheme: Label::clipped("any"),
-            program: Label::clipped("swarm"),
-        };
+        let welcome = slave.slave().welcome(Token::new([0; 32]), "any", "swarm");
         let checks = SessionChecks::new(
             (moment.now, moment.slave_now),
             device.limits(),

@@ -8,6 +8,7 @@ use mmt_server::slave::SlaveConfig;
 use mmt_shared::model::contact::Coupling;
 use mmt_shared::model::settings::Mode;
 use mmt_shared::pairing::Token;
+use mmt_shared::wire::Welcome;
 
 mod estimation;
 mod given;
@@ -287,11 +288,8 @@ fn what_the_master_refuses_the_slaves_confirmed_shadow_never_takes_and_both_side
     };
     let welcome = Welcome {
         settings: config.slave.mode.model_settings(coupling),
-        state: *world.slave().state(),
         tool: Vec2::new(-0.45, 0.0),
-        resume: Token::new([0; 32]),
-        scheme: Label::clipped("any"),
-        program: Label::clipped("test"),
+        ..world.slave().welcome(Token::new([0; 32]), "any", "test")
     };
     let limiter = ForceLimiter::try_new(DeviceProfile::default().limits()).unwrap();
     let master = Master::new(&welcome, limiter);

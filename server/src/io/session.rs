@@ -24,7 +24,7 @@ use mmt_shared::io::transport::{
 use mmt_shared::model::contact::Coupling;
 use mmt_shared::pairing::TokenName;
 use mmt_shared::report::{MasterHalf, SlaveHalf};
-use mmt_shared::wire::{Ending, Hello, Label, Refusal, Side, StreamMessage, Welcome};
+use mmt_shared::wire::{Ending, Hello, Refusal, Side, StreamMessage};
 use tokio::sync::watch;
 use tokio::time::{sleep, timeout};
 
@@ -167,14 +167,8 @@ async fn welcome(
     slave: &Slave,
     lease: &Lease,
 ) -> Result<(), WriteFrameError> {
-    let welcome = Welcome {
-        settings: *slave.settings(),
-        state: *slave.state(),
-        tool: slave.tool_at(),
-        resume: lease.resume(),
-        scheme: Label::clipped(&config.trigger.scheme.to_string()),
-        program: Label::clipped(PROGRAM),
-    };
+    let scheme = config.trigger.scheme.to_string();
+    let welcome = slave.welcome(lease.resume(), &scheme, PROGRAM);
     let welcome = StreamMessage::Welcome((&welcome).into());
     write_message(send, &welcome, WRITE_WAIT).await
 }

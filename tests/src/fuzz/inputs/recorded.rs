@@ -23,7 +23,7 @@ use mmt_shared::record::messages::{
     Stamp,
 };
 use mmt_shared::time::{TICK, Time};
-use mmt_shared::wire::{Architecture, Claim, DATAGRAM_MAX, Hello, Label, Role, Welcome};
+use mmt_shared::wire::{Architecture, Claim, DATAGRAM_MAX, Hello, Label, Role};
 
 use crate::fuzz::record::TOPICS;
 
@@ -86,15 +86,7 @@ fn recorded() -> (Vec<(&'static str, Vec<u8>)>, Vec<u8>) {
     let (hello, config) = (hello(&device), SlaveConfig::default());
     let (mut now, mut slave_now) = (Time::from_millis(100), Time::from_millis(9000));
     let mut slave = SlaveEnd::of_session(slave_now, &config, &hello, None).unwrap();
-    let core = slave.slave();
-    let welcome = Welcome {
-        settings: *core.settings(),
-        state: *core.state(),
-        tool: core.tool_at(),
-        resume: Token::new([0; 32]),
-        scheme: Label::clipped("any"),
-        program: Label::clipped("fuzz"),
-    };
+    let welcome = slave.slave().welcome(Token::new([0; 32]), "any", "fuzz");
     let setting = MasterSetting {
         began: now,
         welcome,

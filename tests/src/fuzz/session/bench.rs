@@ -21,7 +21,7 @@ use mmt_shared::pairing::Token;
 use mmt_shared::time::{TICK, Time};
 use mmt_shared::wire::{
     Architecture, Claim, DATAGRAM_MAX, Datagram, Ending, Farewell, Hello, Label, Message, Role,
-    STREAM_MESSAGE_MAX, Side, StreamMessage, Welcome,
+    STREAM_MESSAGE_MAX, Side, StreamMessage,
 };
 
 use super::HEAD;
@@ -509,15 +509,7 @@ impl Ends {
         memory: Option<&Memory>,
     ) -> Self {
         let slave = SlaveEnd::of_session(slave_now, config, hello, memory).unwrap();
-        let core = slave.slave();
-        let welcome = Welcome {
-            settings: *core.settings(),
-            state: *core.state(),
-            tool: core.tool_at(),
-            resume: Token::new([0; 32]),
-            scheme: Label::clipped("any"),
-            program: Label::clipped("fuzz"),
-        };
+        let welcome = slave.slave().welcome(Token::new([0; 32]), "any", "fuzz");
         let mut out = [0; STREAM_MESSAGE_MAX];
         let length = StreamMessage::Welcome((&welcome).into())
             .encode(&mut out)
