@@ -135,7 +135,10 @@ impl SlaveChecks {
             if forces.is_empty() {
                 self.quiet = Duration::ZERO;
             }
-            forces.push(sample.force);
+            // repeats are the same
+            if !forces.contains(&sample.force) {
+                forces.push(sample.force);
+            }
             if Some(sample.stamp) > self.newest {
                 (self.newest, self.silent) = (Some(sample.stamp), Duration::ZERO);
             }

@@ -1,4 +1,4 @@
-//! Runs a target over many inputs, and tells the one that fails.
+//! Runs a target over many inputs, and reports the one that fails.
 
 use std::collections::BTreeSet;
 use std::fmt;

@@ -217,7 +217,7 @@ fn a_length_that_only_the_file_has_costs_no_memory_and_no_message() {
     };
     let schema = [&[1, 0][..], &800_000_000_u32.to_le_bytes(), b"name"].concat();
     let channel = [&[7, 0, 1, 0, 2, 0, 0, 0][..], b"/a", &[0; 8]].concat();
-    let message = [&[7, 0][..], &[0; 20], b"said"].concat();
+    let message = [&[7, 0][..], &[0; 20], b"sent"].concat();
     let file = [
         mcap::MAGIC.to_vec(),
         record(3, &schema),
@@ -230,8 +230,8 @@ fn a_length_that_only_the_file_has_costs_no_memory_and_no_message() {
         Ok(())
     });
     assert_eq!(ended.unwrap(), Ended::CutOff);
-    assert_eq!(heard, [("/a".to_owned(), b"said".to_vec())]);
-    // a chunk of one record that says to be longer than the chunk
+    assert_eq!(heard, [("/a".to_owned(), b"sent".to_vec())]);
+    // a chunk of one record, whose length is greater than the chunk's
     let inner = [&[5][..], &u64::MAX.to_le_bytes(), &message].concat();
     let length = (inner.len() as u64).to_le_bytes();
     let chunk = [&[0; 16][..], &length, &[0; 8], &length, &inner].concat();
