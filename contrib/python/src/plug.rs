@@ -41,10 +41,9 @@ struct End {
 impl End {
     /// Plugs in at an address as mmt printed it.
     fn connect(address: &str) -> PyResult<Self> {
-        let refused = || {
-            let what = format!("address is '{address}'; mmt prints one: udp://HOST:PORT?token=…");
-            PyValueError::new_err(what)
-        };
+        // not shown: a token may stand in it all the same
+        let refused =
+            || PyValueError::new_err("address is none; mmt prints one: udp://HOST:PORT?token=…");
         let (place, token) = address
             .strip_prefix("udp://")
             .and_then(|rest| rest.split_once("?token="))
@@ -154,7 +153,7 @@ fn finite<const N: usize>(numbers: [f64; N], what: &str) -> PyResult<[f64; N]> {
 /// A haptic device at the device link of a master: it sends readings, and gets the force on the hand.
 ///
 /// address: as mmt printed it after "device: ", "udp://HOST:PORT?token=…". Raises ValueError of another text, OSError where no
-/// socket can be had. Whether anybody is there shows in `session`.
+/// socket can be had. Whether a session runs shows in the first bit of `state`.
 #[pyclass(module = "mmt")]
 pub(crate) struct Device {
     end: End,

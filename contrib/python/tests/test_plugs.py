@@ -170,8 +170,9 @@ def test_what_no_master_sent_moves_nobody(bound):
 def test_bad_input_is_refused_in_words(bound):
     _, address = bound
     for wrong in ("", "mmt://127.0.0.1:1?token=" + TOKEN, "udp://127.0.0.1:1"):
-        with pytest.raises(ValueError, match="mmt prints one"):
+        with pytest.raises(ValueError, match="mmt prints one") as refused:
             mmt.Device(wrong)
+        assert TOKEN not in str(refused.value)
     with pytest.raises(ValueError, match="32 hexadecimal digits"):
         mmt.Plant("udp://127.0.0.1:1?token=5a")
     with pytest.raises(OSError, match="127.0.0.1:99999"):
