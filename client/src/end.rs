@@ -13,12 +13,12 @@ use mmt_shared::report::{
     ArchitectureReport, MasterHalf, PassivityReport, ReceivedUpdates, SessionStats, named,
 };
 use mmt_shared::stats::session::UpdateDrops;
-use mmt_shared::time::Time;
+use mmt_shared::time::{TICK, Time};
 use mmt_shared::wire::{Architecture, Command, Message, RawState, Side};
 use serde::Serialize;
 
 use crate::commands::{CommandConfig, CommandPacker};
-use crate::failsafe::LinkState;
+use crate::failsafe::{ANSWER_MAX, LinkState};
 use crate::master::{Master, MasterTick};
 use crate::operator::scripted::View;
 
@@ -50,7 +50,7 @@ pub struct MasterCounts {
     pub newest_applied: u32,
     /// Updates whose numbers were not accepted.
     pub updates_rejected: u64,
-    /// Updates that came while the link was stale.
+    /// Updates that came while the link was stale, or that answer a sample of too long ago.
     pub updates_frozen: u64,
     /// Updates that a newer one overtook before a tick could apply them.
     pub updates_superseded: u64,
@@ -215,7 +215,8 @@ impl MasterEnd {
         if self.window.judge(update.sequence) != Freshness::Fresh {
             return;
         }
-        if LinkState::of_silence(self.channel.silence(at)) >= LinkState::Stale {
+        let stale = LinkState::of_silence(self.channel.silence(at)) >= LinkState::Stale;
+        if stale || self.is_too_old(at, update.answers) {
             self.counts.updates_frozen += 1;
             return;
         }
@@ -229,6 +230,15 @@ impl MasterEnd {
             }
             Err(_) => self.counts.updates_rejected += 1,
         }
+    }
+
+    /// Whether an update that arrives at `at` answers a sample of longer ago than it may. Counted in ticks: where this process
+    /// stood still the hand has not moved.
+    fn is_too_old(&self, at: Time, answers: Time) -> bool {
+        let history = self.master.model().history();
+        let ticks = history.len() - history.first_after(answers);
+        let path = self.channel.peer().round_trip().longest(at);
+        path.is_some_and(|path| TICK * ticks as u32 > path + ANSWER_MAX)
     }
 
     /// Applies the newest accepted update, as the next tick would; returns what the operator sees of the model then.

@@ -16,6 +16,10 @@ pub const STALE: Duration = Duration::from_millis(250);
 /// Twenty heartbeats missed: the slave has to be taken for gone.
 pub const RELEASE: Duration = Duration::from_secs(1);
 
+/// An update answers a sample of longer ago than the path by no more than this: half a second for play-out, waiting and repeats,
+/// and [`STALE`]. What is older is about a hand that has long been elsewhere.
+pub const ANSWER_MAX: Duration = Duration::from_millis(500 + STALE.as_millis() as u64);
+
 const _: () = assert!(
     HEARTBEAT.as_millis() * 2 < LATE.as_millis()
         && LATE.as_millis() < STALE.as_millis()

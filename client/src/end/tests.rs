@@ -121,6 +121,34 @@ fn an_update_is_accepted_before_it_is_acknowledged() {
 }
 
 #[test]
+fn an_update_that_answers_a_sample_of_long_ago_is_neither_applied_nor_acknowledged() {
+    let mut end = end(CommandConfig::default(), Architecture::Mmt);
+    let mut slave = DatagramChannel::new(Side::Slave, Time::ZERO);
+    let send = |end: &mut MasterEnd, slave: &mut DatagramChannel, update: &Update, at: u64| {
+        let bytes = datagram(slave, AT(at), Message::Update(update.into()));
+        end.handle_datagram(AT(at), &bytes);
+    };
+    for ms in 1..2000 {
+        tick(&mut end, &mut slave, ms);
+        if ms % 50 == 0 {
+            let bytes = datagram(&mut slave, AT(ms), Message::Heartbeat);
+            end.handle_datagram(AT(ms), &bytes);
+        }
+    }
+    let answering = |sequence, ms| Update {
+        answers: AT(ms),
+        ..update(sequence, 0.7)
+    };
+    // the path takes no time here
+    send(&mut end, &mut slave, &answering(1, 1999 - 751), 1999);
+    assert_eq!(acknowledged(&mut end, &mut slave, 2000), 0);
+    assert_eq!(end.update_drops().frozen, 1);
+    send(&mut end, &mut slave, &answering(1, 2009 - 740), 2009);
+    assert_eq!(acknowledged(&mut end, &mut slave, 2010), 1);
+    assert_eq!(end.counts().newest_applied, 1);
+}
+
+#[test]
 fn of_the_updates_between_two_ticks_the_newest_is_applied_and_the_others_are_counted() {
     let mut end = end(CommandConfig::default(), Architecture::Mmt);
     let mut slave = DatagramChannel::new(Side::Slave, Time::ZERO);

@@ -215,4 +215,11 @@ impl ChannelChecks {
     pub(super) fn longest_round_trip(&self) -> Option<Duration> {
         self.round_trips.iter().map(|(_, _, most)| *most).max()
     }
+
+    /// The longest of the last 9 s, which no end has forgotten.
+    pub(super) fn longest_remembered(&self, now: Time) -> Option<Duration> {
+        let since = now - Duration::from_secs(9);
+        let recent = self.round_trips.iter().filter(|(at, ..)| *at > since);
+        recent.map(|(_, _, most)| *most).max()
+    }
 }

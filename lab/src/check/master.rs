@@ -62,11 +62,11 @@ pub struct MasterTicked<'a> {
 /// An update that arrived and may be applied.
 #[derive(Clone, Copy)]
 struct Arrived {
-    /// Ticks since the sample that it answers.
-    age: u32,
+    /// The ticks since the sample that it answers.
+    age: Duration,
     sequence: u32,
-    /// For how long the link had been silent: at least.
-    silence: Duration,
+    /// Whether the end must take it.
+    sure: bool,
     /// The longest round trip of late; none before the first.
     path: Option<Duration>,
 }
@@ -141,18 +141,25 @@ impl MasterChecks {
             return;
         }
         let (silence, most) = self.channel.silence(at);
+        let age = TICK * self.ticks_since(update.answers);
+        let path = self.channel.longest_round_trip();
+        let too_old = |path| age > path + ANSWER + STALE;
+        // between nine and eleven seconds an end may have forgotten a round trip
+        let remembered = self.channel.longest_remembered(at).unwrap_or_default();
+        let may_be_too_old = path.is_some() && too_old(remembered);
         // whether it is taken in the hair's breadth between is the end's own business
+        let sure = most < STALE && !may_be_too_old;
         if silence < STALE {
             self.arrived.push(Arrived {
-                age: self.ticks_since(update.answers),
+                age,
                 sequence: update.sequence,
-                silence: most,
-                path: self.channel.longest_round_trip(),
+                sure,
+                path,
             });
         }
-        if most < STALE {
+        if sure {
             self.accepted = update.sequence;
-        } else if silence < STALE {
+        } else if silence < STALE && !path.is_some_and(too_old) {
             self.unsure = update.sequence;
         }
     }
@@ -206,7 +213,7 @@ impl MasterChecks {
         let arrived = std::mem::take(&mut self.arrived);
         let newest = arrived
             .iter()
-            .filter(|update| update.silence < STALE)
+            .filter(|update| update.sure)
             .map(|update| update.sequence)
             .max();
         // what a released hand is not given is dropped
@@ -233,7 +240,7 @@ impl MasterChecks {
                 )
             });
         if let Some((update, path)) = found.and_then(|update| Some((update, update.path?))) {
-            let (age, most) = (TICK * update.age, path + ANSWER + STALE);
+            let (age, most) = (update.age, path + ANSWER + STALE);
             self.verdict
                 .judge(Invariant::UpdateAge, now, age <= most, || {
                     format!(

@@ -1,4 +1,4 @@
-//! Round-trip time from echo stamps: latest, least of the last seconds, quantiles over all.
+//! Round-trip time from echo stamps: latest, least and longest of the last seconds, quantiles over all.
 
 use std::time::Duration;
 
@@ -6,7 +6,7 @@ use crate::stats::histogram::Histogram;
 use crate::stats::recent::Recent;
 use crate::time::Time;
 
-/// The windowed minimum is over this many seconds, the running one included.
+/// Least and longest are over this many seconds, the running one included.
 const WINDOW_S: usize = 10;
 
 /// Round-trip times without the time that the other side held the answer.
@@ -16,8 +16,8 @@ const WINDOW_S: usize = 10;
 #[derive(Clone, Debug)]
 pub struct RoundTrip {
     latest: Option<Duration>,
-    /// The least of each of the last seconds.
-    minima: Recent<Option<Duration>, WINDOW_S>,
+    /// The least and the longest of each of the last seconds.
+    ends: Recent<Option<(Duration, Duration)>, WINDOW_S>,
     histogram: Histogram,
 }
 
@@ -25,7 +25,7 @@ impl Default for RoundTrip {
     fn default() -> Self {
         Self {
             latest: None,
-            minima: Recent::new(None),
+            ends: Recent::new(None),
             histogram: Histogram::default(),
         }
     }
@@ -35,8 +35,9 @@ impl RoundTrip {
     pub(super) fn note(&mut self, now: Time, round_trip: Duration) {
         self.latest = Some(round_trip);
         self.histogram.record(round_trip);
-        if let Some(slice) = self.minima.at(now) {
-            *slice = Some(slice.map_or(round_trip, |least| least.min(round_trip)));
+        if let Some(slice) = self.ends.at(now) {
+            let (least, most) = slice.unwrap_or((round_trip, round_trip));
+            *slice = Some((least.min(round_trip), most.max(round_trip)));
         }
     }
 
@@ -47,7 +48,18 @@ impl RoundTrip {
 
     /// The least of the last 9 to 10 s; none if nothing was measured in that time.
     pub fn least(&self, now: Time) -> Option<Duration> {
-        self.minima.iter_at(now).flatten().min().copied()
+        let least = self.recent(now).map(|(least, _)| *least);
+        least.min()
+    }
+
+    /// The longest of the last 9 to 10 s; none if nothing was measured in that time.
+    pub fn longest(&self, now: Time) -> Option<Duration> {
+        let most = self.recent(now).map(|(_, most)| *most);
+        most.max()
+    }
+
+    fn recent(&self, now: Time) -> impl Iterator<Item = &(Duration, Duration)> {
+        self.ends.iter_at(now).flatten()
     }
 
     /// All that have been measured.
@@ -61,7 +73,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_least_is_remembered_for_nine_seconds_and_forgotten_after_ten() {
+    fn least_and_longest_are_remembered_for_nine_seconds_and_forgotten_after_ten() {
         let (ms, mut round_trip) = (Duration::from_millis, RoundTrip::default());
         let at = Time::from_millis;
         assert_eq!(round_trip.least(at(0)), None);
@@ -69,11 +81,13 @@ mod tests {
         round_trip.note(at(501), ms(80));
         assert_eq!(round_trip.latest(), Some(ms(80)));
         assert_eq!(round_trip.least(at(501)), Some(ms(20)));
+        assert_eq!(round_trip.longest(at(501)), Some(ms(80)));
         for s in 1..10 {
             round_trip.note(at(s * 1000), ms(50));
         }
         assert_eq!(round_trip.least(at(9_999)), Some(ms(20)));
         assert_eq!(round_trip.least(at(10_000)), Some(ms(50)));
+        assert_eq!(round_trip.longest(at(10_000)), Some(ms(50)));
         round_trip.note(at(10_000), ms(60));
         assert_eq!(round_trip.least(at(10_000)), Some(ms(50)));
         assert_eq!(round_trip.least(at(30_000)), None, "nothing for 20 s");
