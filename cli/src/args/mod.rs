@@ -280,7 +280,7 @@ pub(crate) struct SlaveArguments {
 /// Arguments of `mmt master`.
 #[derive(Debug, Args)]
 pub(crate) struct MasterArguments {
-    /// What `mmt slave` printed, in quotes; - reads it from stdin
+    /// What `mmt slave` printed; - asks for it, or reads it from stdin, and keeps it out of the list of processes
     #[arg(value_name = "PAIRING")]
     pub(crate) pairing: PairingWords,
     /// Who moves the hand: scripted, pointer (in the console), or trace:FILE

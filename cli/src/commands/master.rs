@@ -1,6 +1,6 @@
 //! `mmt master`: the host with the hand.
 
-use std::io::BufRead;
+use std::io::IsTerminal as _;
 use std::path::Path;
 use std::sync::PoisonError;
 
@@ -36,7 +36,7 @@ use super::viewer::Viewer;
 use crate::args::{DeviceWords, MasterArguments, OperatorWords, PairingWords};
 use crate::config::configuration;
 use crate::failure::{Exit, Failure};
-use crate::input::read_text;
+use crate::input::{read_line, read_text};
 use crate::log::Messages;
 use crate::output::{note, print_report};
 use crate::stop::Stop;
@@ -214,11 +214,17 @@ fn keep_path(file: &Path, path: &SharedPath) -> Result<(), Failure> {
 }
 
 pub(super) fn pairing(words: &PairingWords) -> Result<Pairing, Failure> {
-    let mut line = String::new();
+    let line;
     let text = match words.reveal() {
         "-" => {
-            let read = std::io::stdin().lock().read_line(&mut line);
-            read.map_err(|error| Failure::usage(format!("cannot read stdin: {error}")))?;
+            let mut stdin = std::io::stdin().lock();
+            if stdin.is_terminal() {
+                note("PAIRING, as mmt slave printed it:");
+            }
+            let read = read_line(&mut stdin);
+            let read =
+                read.map_err(|error| Failure::usage(format!("cannot read stdin: {error}")))?;
+            line = read.unwrap_or_default();
             line.as_str()
         }
         text => text,

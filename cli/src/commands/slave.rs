@@ -1,6 +1,5 @@
 //! `mmt slave`: the host with the object.
 
-use std::io::{self, IsTerminal as _};
 use std::net::SocketAddr;
 use std::path::Path;
 use std::sync::Arc;
@@ -72,8 +71,13 @@ pub(crate) fn run(arguments: SlaveArguments, messages: &Messages) -> Result<(), 
     if let Ok(started) = started.recv() {
         keep_address(&directory, &started.pairing);
         print(&started.pairing)?;
-        note(waiting(&started.pairing, everywhere, is_shown_anyway()));
-        watch_sessions(&host, &started.live, messages, &stop);
+        note(waiting(&started.pairing, everywhere));
+        let mut viewer = Viewer::new(Caption::default(), false, messages, &stop);
+        // else stdin has commands to the network
+        if !emulation.takes_orders() {
+            viewer = viewer.with_keys();
+        }
+        watch_sessions(&host, &started.live, viewer);
     }
     let report = host.join()?.map(RunReport::from);
     emulation.finish()?;
@@ -104,37 +108,27 @@ fn plugged_in(listen: SocketAddr, stop: &Stop) -> Result<Option<PlantHost>, Fail
     Ok(Some(plant))
 }
 
-/// Whether stdout, which has the secret, and stderr go to one terminal.
-fn is_shown_anyway() -> bool {
-    io::stdout().is_terminal() && io::stderr().is_terminal()
-}
-
-/// What to do on the other host. The secret stands on stdout only, unless it is `shown` anyway. `everywhere`: the slave
-/// listens at every address of this host.
-fn waiting(pairing: &Pairing, everywhere: bool, shown: bool) -> String {
+/// What to do on the other host; the secret stands on stdout only. `everywhere`: the slave listens at every address of this
+/// host.
+fn waiting(pairing: &Pairing, everywhere: bool) -> String {
     let address = &pairing.address;
-    let command = if shown {
-        format!("on its host run\n  mmt master '{pairing}'")
-    } else {
-        "on its host run mmt master with the pairing string, which stands on stdout".to_owned()
-    };
     let lost = matches!(&address.host, HostName::V4(v4) if v4.is_loopback());
     let remedy = if everywhere && lost {
         "\nthis host has no interface for others, so the string names 127.0.0.1: give --advertise ADDRESS, one that the master's host reaches"
     } else {
         ""
     };
-    format!("waiting for a master at {address}; {command}{remedy}")
+    format!(
+        "waiting for a master at {address}; on its host run\n  mmt master -\nand give it the pairing string, which stands on stdout{remedy}"
+    )
 }
 
 /// Plain lines while a master is connected.
 fn watch_sessions(
     host: &Host<Option<SlaveReport>>,
     live: &watch::Sender<SlaveLive>,
-    messages: &Messages,
-    stop: &Stop,
+    mut viewer: Viewer,
 ) {
-    let mut viewer = Viewer::new(Caption::default(), false, messages, stop);
     while host.is_running() {
         let slave = Some(*live.borrow()).filter(|slave| slave.connected);
         viewer.look(slave, None);
@@ -316,18 +310,15 @@ mod tests {
     }
 
     #[test]
-    fn a_slave_that_no_other_host_reaches_says_so_and_only_a_terminal_shows_the_secret_twice() {
+    fn a_slave_that_no_other_host_reaches_says_so_and_shows_no_secret() {
         let pairing = |host: &str| {
             let text = format!("mmt://{host}:4433?pin={0}&token={0}", "5a".repeat(32));
             text.parse::<Pairing>().unwrap()
         };
-        let lost = waiting(&pairing("127.0.0.1"), true, false);
+        let lost = waiting(&pairing("127.0.0.1"), true);
         assert!(lost.contains("--advertise"), "{lost}");
-        let robot = pairing("robot");
-        let shown = waiting(&robot, true, true);
-        assert!(shown.contains(&format!("mmt master '{robot}'")), "{shown}");
         for (host, everywhere) in [("127.0.0.1", false), ("192.0.2.7", true), ("robot", true)] {
-            let text = waiting(&pairing(host), everywhere, false);
+            let text = waiting(&pairing(host), everywhere);
             assert!(
                 !text.contains("--advertise") && !text.contains("5a5a"),
                 "{text}"

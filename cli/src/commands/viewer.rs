@@ -1,5 +1,6 @@
-//! Shows a run while it goes on: the dashboard on a terminal, else a plain line a second on stderr.
+//! Shows a run while it goes on: the dashboard on a terminal, else a plain line a second on stderr. The keys are the same.
 
+use std::io;
 use std::time::{Duration, Instant};
 
 use mmt_client::io::MasterLive;
@@ -8,7 +9,7 @@ use mmt_server::io::SlaveLive;
 use crate::log::Messages;
 use crate::output::note;
 use crate::stop::Stop;
-use crate::view::{Caption, History, Screen, Snapshot, Wish, line, render};
+use crate::view::{Caption, History, Keyboard, Screen, Snapshot, Wish, line, render};
 
 /// Time between two frames: 20 a second are as much as an eye can use.
 const LOOK: Duration = Duration::from_millis(50);
@@ -22,6 +23,8 @@ pub(super) struct Viewer {
     caption: Caption,
     history: History,
     screen: Option<Screen>,
+    /// Without a dashboard; none where the keys do nothing.
+    keyboard: Option<Keyboard>,
     /// When the run began to connect.
     began: Instant,
     next_line: Instant,
@@ -35,10 +38,20 @@ impl Viewer {
             caption,
             history: History::default(),
             screen: dashboard.then(|| Screen::take(messages)).flatten(),
+            keyboard: None,
             began: Instant::now(),
             next_line: Instant::now() + LINE,
             stop: stop.clone(),
         }
+    }
+
+    /// The same with the keys of the dashboard where there is none, if stdin is a terminal.
+    pub(super) fn with_keys(self) -> Self {
+        let keyboard = self.screen.is_none().then(Keyboard::take).flatten();
+        if keyboard.is_some() {
+            note("keys: space sets the emergency stop, c clears it, q ends the run");
+        }
+        Self { keyboard, ..self }
     }
 
     /// The same run goes on with other settings.
@@ -60,23 +73,31 @@ impl Viewer {
     pub(super) fn look(&mut self, slave: Option<SlaveLive>, master: Option<MasterLive>) {
         let tried_s = self.began.elapsed().as_secs_f64();
         self.history.push(Snapshot::new(slave, master, tried_s));
-        let Some(screen) = &mut self.screen else {
-            std::thread::sleep(LOOK);
-            self.line();
-            return;
-        };
-        let (caption, history) = (&self.caption, &self.history);
-        let drawn = screen.draw(|frame, messages| render(frame, caption, history, messages));
-        match drawn.and_then(|()| screen.wish(LOOK)) {
+        match self.show() {
             Ok(Some(Wish::End)) => self.stop.ask(),
             Ok(Some(Wish::Stop)) => self.stop.emergency().set(true),
             Ok(Some(Wish::Clear)) => self.stop.emergency().set(false),
             Ok(None) => {}
             Err(error) => {
-                self.screen = None;
-                tracing::warn!("the live view ends: {error}");
+                (self.screen, self.keyboard) = (None, None);
+                tracing::warn!("the terminal is not used any more: {error}");
             }
         }
+    }
+
+    /// Shows the newest and waits a frame for a key.
+    fn show(&mut self) -> io::Result<Option<Wish>> {
+        if let Some(screen) = &mut self.screen {
+            let (caption, history) = (&self.caption, &self.history);
+            screen.draw(|frame, messages| render(frame, caption, history, messages))?;
+            return screen.wish(LOOK);
+        }
+        self.line();
+        if let Some(keyboard) = &mut self.keyboard {
+            return keyboard.wish(LOOK);
+        }
+        std::thread::sleep(LOOK);
+        Ok(None)
     }
 
     fn line(&mut self) {

@@ -3,6 +3,7 @@
 
 mod dashboard;
 mod history;
+mod keys;
 mod lines;
 mod panels;
 mod scene;
@@ -15,8 +16,9 @@ use mmt_shared::model::update::Cause;
 
 pub(crate) use dashboard::render;
 pub(crate) use history::History;
+pub(crate) use keys::{Keyboard, Wish};
 pub(crate) use lines::line;
-pub(crate) use screen::{Screen, Wish, restore_terminal};
+pub(crate) use screen::{Screen, restore_terminal};
 
 /// What does not change during a run.
 #[derive(Clone, Debug, Default)]

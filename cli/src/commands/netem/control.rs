@@ -1,10 +1,12 @@
 //! Commands to an emulated network at work, a line each. It parses and hands over; it changes no network.
 
-use std::io::BufRead;
+use std::io::ErrorKind;
 
 use mmt_netem::{Direction, LinkConfig};
 
 use crate::args::network;
+use crate::input::read_line;
+use crate::output::note;
 
 /// What a line asks for.
 #[derive(Clone, Debug, PartialEq)]
@@ -38,9 +40,12 @@ impl Command {
 /// Hands the lines of stdin to `apply` on a thread of their own, until stdin ends or `apply` returns false.
 pub(crate) fn from_stdin(mut apply: impl FnMut(&str) -> bool + Send + 'static) {
     std::thread::spawn(move || {
-        for line in std::io::stdin().lock().lines().map_while(Result::ok) {
-            if !apply(&line) {
-                break;
+        let mut stdin = std::io::stdin().lock();
+        loop {
+            match read_line(&mut stdin) {
+                Ok(Some(line)) if apply(&line) => {}
+                Err(wrong) if wrong.kind() == ErrorKind::InvalidData => note(wrong),
+                Ok(_) | Err(_) => break,
             }
         }
     });
