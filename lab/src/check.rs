@@ -87,6 +87,8 @@ invariants! {
     Heartbeat "heartbeat" "something leaves each end every 50 ms";
     /// Speed.
     ToolSpeed "tool-speed" "the tool is no faster than its limit";
+    /// Acceleration.
+    ToolAcceleration "tool-acceleration" "in free space the tool has no greater acceleration than its limit, also where it stops";
     /// Workspace.
     ToolReach "tool-reach" "the tool stays within its reach";
     /// Force of the tool.
@@ -96,7 +98,7 @@ invariants! {
     /// Disengaged.
     ToolDisengaged "tool-disengaged" "after 2 s without a new sample nothing moves the tool in this session";
     /// Emergency stop at the tool.
-    ToolStops "tool-stops" "while an emergency stop is set the tool stands, or gives way";
+    ToolStops "tool-stops" "while an emergency stop is set the tool brakes to a stop and stands, or gives way";
     /// Order of play-out.
     PlaysInOrder "plays-in-order" "the stamps that are played never go back, and no further ahead of the samples than a second";
     /// f_m is the master's.

@@ -17,6 +17,7 @@ pub mod scenarios;
 mod schemes;
 mod sensing;
 mod stiffness;
+mod touch;
 mod traces;
 mod transport;
 mod tupdate;
@@ -25,7 +26,7 @@ mod worlds;
 use crate::experiment::description::Experiment;
 
 /// Every experiment, in the order in which they run.
-pub const ALL: [&Experiment; 18] = [
+pub const ALL: [&Experiment; 19] = [
     &physics::PHYSICS,
     &fig5::FIG5,
     &traces::FIG6,
@@ -37,6 +38,7 @@ pub const ALL: [&Experiment; 18] = [
     &scenarios::EXPERIMENT,
     &sensing::EXPERIMENT,
     &stiffness::EXPERIMENT,
+    &touch::EXPERIMENT,
     &tupdate::TUPDATE,
     &repeats::REPEATS,
     &congestion::CONGESTION,

@@ -9,6 +9,7 @@ pub mod contact;
 pub mod end;
 pub mod environment;
 pub mod estimator;
+pub(crate) mod motion_limits;
 pub mod plant;
 pub mod playout;
 pub mod pose_observer;

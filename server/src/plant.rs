@@ -16,6 +16,7 @@ use mmt_shared::time::Time;
 use serde::{Deserialize, Serialize};
 
 use crate::environment::Environment;
+use crate::motion_limits::MotionLimits;
 use crate::sensing::{Sensed, Sensing, VisionSample};
 use follower::Follower;
 
@@ -165,10 +166,13 @@ impl LinkedPlant {
         (speed_max_m_per_s, force_max_n): (f64, f64),
         is_stiff: bool,
     ) -> Self {
-        let acceleration_max = config.acceleration_max_m_per_s2;
+        let limits = MotionLimits {
+            speed_m_per_s: speed_max_m_per_s,
+            acceleration_m_per_s2: config.acceleration_max_m_per_s2,
+        };
         Self {
             stand_in,
-            follower: Follower::new(speed_max_m_per_s, acceleration_max),
+            follower: Follower::new(limits),
             coupling,
             force_max_n,
             is_stiff,

@@ -1,8 +1,8 @@
 //! Play-out: HIP samples in, as the network brings them; a steady HIP out, one per slave tick.
 //!
 //! Three stages. The jitter buffer holds samples until they are due, a delay after the earliest time at which the
-//! network could have brought them. The interpolator finds the HIP at the stamp that is due. The speed limiter keeps the
-//! tool from jumping there. Play-out must never move the tool faster than the limit, never move it on old samples for
+//! network could have brought them. The interpolator finds the HIP at the stamp that is due. The motion limiter keeps the
+//! tool from jumping there. Play-out must never move the tool faster or with more acceleration than the limits, never move it on old samples for
 //! longer than it may extrapolate, and never be blocked for good by stamps, whatever they are.
 
 mod clock;
@@ -11,8 +11,8 @@ mod delay;
 mod interpolator;
 mod jitter_buffer;
 mod lateness;
+mod motion_limiter;
 mod played;
-mod speed_limiter;
 
 pub use config::PlayoutConfig;
 pub use played::{Played, PlayoutCounts, Status};
@@ -27,7 +27,7 @@ use mmt_shared::time::Time;
 
 use interpolator::{Aim, Interpolator, around};
 use jitter_buffer::JitterBuffer;
-use speed_limiter::SpeedLimiter;
+use motion_limiter::MotionLimiter;
 
 /// Once it is no longer held, the tool follows again when the HIP comes this near, m: a hand that went elsewhere meanwhile has
 /// to come for it.
@@ -38,7 +38,7 @@ const ENGAGE_M: f64 = 0.02;
 pub struct PlayoutBuffer {
     buffer: JitterBuffer,
     interpolator: Interpolator,
-    limiter: SpeedLimiter,
+    limiter: MotionLimiter,
     counts: PlayoutCounts,
     delays: Histogram,
     /// Stamp of the newest sample, and for how long there has been no newer one.
@@ -60,7 +60,7 @@ impl PlayoutBuffer {
         Ok(Self {
             buffer: JitterBuffer::new(&config),
             interpolator: Interpolator::new(&config),
-            limiter: SpeedLimiter::new(&config),
+            limiter: MotionLimiter::new(&config),
             counts: PlayoutCounts::default(),
             delays: Histogram::default(),
             newest: None,
@@ -110,11 +110,11 @@ impl PlayoutBuffer {
         self.silent += elapsed;
         let stamp = self.buffer.due(now, elapsed)?;
         let aim = self.aim(stamp)?;
-        let stood = self.standing_at(aim.hip);
-        let target = stood.unwrap_or(aim.hip);
+        let has_to_stand = self.has_to_stand(aim.hip);
+        let target = (!has_to_stand).then_some(aim.hip);
         let slowing = aim.slowing.min(self.interpolator.slowing(self.silent));
         let step = self.limiter.step(now, elapsed, target, slowing);
-        let limited = step.limited || stood.is_some();
+        let limited = step.limited || has_to_stand;
         let stopped = !slowing.is_zero() && step.velocity == Vec2::zeros();
         let played = Played {
             stamp: self.buffer.play(stamp),
@@ -122,19 +122,22 @@ impl PlayoutBuffer {
             velocity: step.velocity,
             force: aim.force.filter(|_| !limited),
             status: aim.status,
+            speed_max_m_per_s: step.speed_max_m_per_s,
             limited,
-            stands: stood.is_some() || stopped,
+            stands: has_to_stand || stopped,
         };
         self.counts.note(&played);
         self.delays.record(self.delay());
         Some(played)
     }
 
-    /// Where the tool stands while it is held, and until the HIP at `aim` has come for it; none while it follows.
-    fn standing_at(&mut self, aim: Vec2) -> Option<Vec2> {
-        let place = self.limiter.place()?;
+    /// Whether the tool has to stand: while it is held, and until the HIP at `aim` has come for it.
+    fn has_to_stand(&mut self, aim: Vec2) -> bool {
+        let Some(place) = self.limiter.place() else {
+            return false;
+        };
         self.stands = self.held || (self.stands && (aim - place).norm() > ENGAGE_M);
-        self.stands.then_some(place)
+        self.stands
     }
 
     /// Where the HIP was at a stamp, m: the sample of that stamp, or what stands in for it when it is lost

@@ -131,7 +131,7 @@ impl Slave {
         Ok(Self {
             settings,
             playout: PlayoutBuffer::try_new(playout)?,
-            tool: ToolDrive::new(port, limit, config.playout.reach_m),
+            tool: ToolDrive::new(port, limit, playout.limits(), config.playout.reach_m),
             compliance: Compliance::try_new(config.tool_compliance)?,
             contact: ContactStage::at(plant, config.conditioner(&coupling)),
             object,

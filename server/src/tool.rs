@@ -1,6 +1,7 @@
 //! Drives the tool: to the played HIP, or as far towards it as energy, force and speed allow.
 //!
-//! It must never move the tool faster than the limit of play-out, and never pass on f_m of a HIP that the tool is not at.
+//! It must never move the tool faster than the limit of play-out, never with more acceleration in free space, and never pass on
+//! f_m of a HIP that the tool is not at.
 
 pub(crate) mod compliance;
 pub mod force;
@@ -9,12 +10,13 @@ pub mod port;
 use mmt_shared::model::geometry::Vec2;
 use mmt_shared::time::TICK_S;
 
+use crate::motion_limits::{BEHIND_M, Goal, MotionLimits};
 use crate::playout::Played;
 use force::ToolForce;
 use port::ToolPort;
 
-/// A tool that is further from the played HIP is behind it, m: 0.1 N at 1000 N/m.
-const BEHIND_M: f64 = 1e-4;
+/// Velocities that differ by less are the same, m/s: rounding.
+const SAME_VELOCITY_M_PER_S: f64 = 1e-9;
 
 /// The tool between play-out and the object.
 #[derive(Clone, Debug)]
@@ -27,13 +29,20 @@ pub(crate) struct ToolDrive {
     held_back: bool,
     port: ToolPort,
     force: ToolForce,
+    limits: MotionLimits,
     /// No farther than this from the origin, m.
     reach_m: f64,
 }
 
 impl ToolDrive {
-    pub(crate) fn new(port: ToolPort, force: ToolForce, reach_m: f64) -> Self {
+    pub(crate) fn new(
+        port: ToolPort,
+        force: ToolForce,
+        limits: MotionLimits,
+        reach_m: f64,
+    ) -> Self {
         Self {
+            limits,
             reach_m,
             own: None,
             passive: false,
@@ -82,19 +91,32 @@ impl ToolDrive {
         let Some(tool) = self.own.or(before) else {
             return played;
         };
+        let follows = self.own.is_none() && !self.passive;
         // nothing draws a tool that has to stand; it may give way all the same
-        let wanted = if played.stands {
-            Vec2::zeros()
+        let stops = played.stands && !follows;
+        let wanted = if stops {
+            let none = Vec2::zeros();
+            self.limits.towards(self.force.velocity(), none, TICK_S) * TICK_S
         } else {
             played.hip - tool
         };
-        let follows = self.own.is_none() && !self.passive;
-        let free = if follows {
+        let bounded = if follows || stops {
             wanted
-        } else if self.passive {
-            self.port.allowed(wanted)
         } else {
-            self.port.within_speed(wanted)
+            let goal = Goal {
+                way: wanted,
+                velocity: played.velocity,
+            };
+            let limits = MotionLimits {
+                speed_m_per_s: played.speed_max_m_per_s,
+                ..self.limits
+            };
+            limits.way(self.force.velocity(), goal, TICK_S)
+        };
+        let free = if self.passive {
+            self.port.allowed(bounded)
+        } else {
+            bounded
         };
         let period_s = if follows {
             period_s(&wanted, &played)
@@ -118,7 +140,9 @@ impl ToolDrive {
         self.force.moved(velocity, held);
         let behind = (wanted - way).norm() > BEHIND_M;
         self.held_back = held || (self.held_back && behind);
-        let there = !self.passive && !played.stands && way == wanted;
+        // with the HIP's velocity, so that it goes on with it
+        let joins = (velocity - played.velocity).norm() < SAME_VELOCITY_M_PER_S;
+        let there = !self.passive && !played.stands && way == wanted && joins;
         self.own = Some(tool + way).filter(|_| !there);
         Played {
             hip: tool + way,
@@ -165,7 +189,11 @@ mod tests {
     fn drive() -> ToolDrive {
         let coupling = Coupling::for_stiffness(1000.0);
         let force = ToolForce::try_new(15.0, coupling).unwrap();
-        ToolDrive::new(ToolPort::new(0.01, 0.6), force, 2.0)
+        let limits = MotionLimits {
+            speed_m_per_s: 0.6,
+            acceleration_m_per_s2: 20.0,
+        };
+        ToolDrive::new(ToolPort::new(0.01, 0.6), force, limits, 2.0)
     }
 
     fn played(x: f64, stands: bool) -> Played {
@@ -175,6 +203,7 @@ mod tests {
             velocity: Vec2::zeros(),
             force: None,
             status: Status::Interpolated,
+            speed_max_m_per_s: 0.6,
             limited: false,
             stands,
         }

@@ -131,7 +131,9 @@ fn without_delay_position_force_is_direct_coupling() {
     for n in 0..8000 {
         // a slow press by up to 3 mm
         let x = 0.0715 * (1.0 - libm::cos(f64::from(n) * 1e-3)) * 0.5;
-        let hip = start + Vec2::new(0.25 + x - 0.0685, 0.0) * f64::from(n.min(2000)) / 2000.0;
+        let share = f64::from(n.min(2000)) / 2000.0;
+        let gently = share * share * (3.0 - 2.0 * share);
+        let hip = start + Vec2::new(0.25 + x - 0.0685, 0.0) * gently;
         let tick = world.step_at(hip, false).unwrap();
         let off = (tick.tool - hip).norm();
         assert!(off <= 1e-6, "tick {n}: the tool is {off} m from the hand");

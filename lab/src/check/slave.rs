@@ -28,6 +28,10 @@ const SLACK: Duration = Duration::from_millis(12);
 const AHEAD: Duration = Duration::from_secs(1);
 /// Samples are remembered for so long.
 const REMEMBERED: Duration = Duration::from_secs(3);
+/// Clocks that drift make a tick longer or shorter by far less than this share.
+const CLOCKS: f64 = 0.01;
+/// A force above is no error of the sensor's, N.
+const FREE_N: f64 = 1.0;
 /// The force may be above the limit by this share: the body moves on within a tick.
 const FORCE_SHARE: f64 = 0.02;
 
@@ -66,8 +70,10 @@ pub struct SlaveChecks {
     channel: ChannelChecks,
     ticked: Time,
     tool: Vec2,
-    /// Whether the tool stood in the tick before because of an emergency stop.
-    stood: bool,
+    /// The tool's velocity in the tick before, m/s; none where that tick was missed or the tool touched something.
+    velocity: Option<Vec2>,
+    /// For how many ticks in a row an emergency stop has been set.
+    stopped: u32,
     stops: bool,
     /// Stamp of the newest sample, and for how long there has been no newer one, as ticks count it.
     newest: Option<Time>,
@@ -95,7 +101,8 @@ impl SlaveChecks {
             channel: ChannelChecks::new(Side::Slave, about.began),
             ticked: about.began,
             tool: about.tool,
-            stood: false,
+            velocity: Some(Vec2::zeros()),
+            stopped: 0,
             stops: false,
             newest: None,
             silent: Duration::ZERO,
@@ -216,11 +223,38 @@ impl SlaveChecks {
             .judge(Invariant::ToolSpeed, now, way <= most + HAIR_M, || {
                 format!("{way} m in {period:?}, {most} m are allowed")
             });
+        // where the hand feels the tool, it goes only as far as the energy allows
+        if !tick.end.architecture().feels_tool() {
+            self.judge_acceleration(now, done, elapsed);
+        }
         let (before, far) = (self.tool.norm(), done.tool.norm());
         let most = self.about.config.playout.reach_m.max(before);
         self.verdict
             .judge(Invariant::ToolReach, now, far <= most + HAIR_M, || {
                 format!("{far} m from the origin, {most} m are allowed")
+            });
+    }
+
+    /// Acceleration in free space. What the limit of its force does to a tool that touches something is not its own motion, nor
+    /// is the end of its reach.
+    fn judge_acceleration(&mut self, now: Time, done: &SlaveTick, elapsed: Duration) {
+        let playout = &self.about.config.playout;
+        let free = done.true_force == Vec2::zeros() && done.f_s.norm() < FREE_N;
+        let inside = done.tool.norm() < playout.reach_m - HAIR_M;
+        let missed = elapsed > TICK.mul_f64(1.5) || elapsed < TICK.mul_f64(0.5);
+        let velocity = (done.tool - self.tool) / TICK_S;
+        let velocity = Some(velocity).filter(|_| !missed && free && inside);
+        let (Some(velocity), Some(before)) =
+            (velocity, std::mem::replace(&mut self.velocity, velocity))
+        else {
+            return;
+        };
+        let change = (velocity - before).norm() / TICK_S;
+        let most = playout.acceleration_max_m_per_s2;
+        let holds = change <= most * (1.0 + CLOCKS) + HAIR_M / (TICK_S * TICK_S);
+        self.verdict
+            .judge(Invariant::ToolAcceleration, now, holds, || {
+                format!("{change} m/s², {most} m/s² are allowed")
             });
     }
 
@@ -241,7 +275,8 @@ impl SlaveChecks {
             || done.f_s.dot(&way) < 0.0
             || self.about.config.tool_compliance.is_some();
         let playout = &self.about.config.playout;
-        let ramp = playout.extrapolation_ms * 1e-3 + self.speed() / playout.deceleration_m_per_s2;
+        let ramp =
+            playout.extrapolation_ms * 1e-3 + self.speed() / playout.acceleration_max_m_per_s2;
         let ramp = Duration::from_secs_f64(ramp) + SLACK;
         let beyond = done.stamp.saturating_since(self.newest.unwrap_or_default());
         if beyond.min(self.quiet) > ramp {
@@ -256,12 +291,13 @@ impl SlaveChecks {
                 });
         }
         let stops = tick.given.stops || self.channel.other_stops();
-        if stops && self.stood {
+        self.stopped = if stops { self.stopped + 1 } else { 0 };
+        let braking = self.speed() / playout.acceleration_max_m_per_s2;
+        if TICK * self.stopped > TICK + Duration::from_secs_f64(braking) {
             self.verdict.judge(Invariant::ToolStops, now, stands, || {
                 format!("the tool goes {way:?} m during an emergency stop")
             });
         }
-        self.stood = stops;
     }
 
     fn judge_force(&mut self, now: Time, done: &SlaveTick) {

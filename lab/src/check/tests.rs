@@ -212,7 +212,7 @@ fn a_session_that_keeps_its_promises_is_found_to_and_each_lie_is_found_out() {
             .any(|(of, judged)| of == needed && judged.checked > 0);
         assert!(looked, "{needed} was never looked at");
     }
-    let lies: [(Invariant, Change); 18] = [
+    let lies: [(Invariant, Change); 19] = [
         (I::ForceCap, Change::Master(|done| done.hand_force *= 100.0)),
         (
             I::ForceCap,
@@ -256,6 +256,14 @@ fn a_session_that_keeps_its_promises_is_found_to_and_each_lie_is_found_out() {
             I::ToolSpeed,
             Change::Slave(|done| {
                 done.tool.y = (done.stamp.as_nanos() / 1_000_000 % 2) as f64 * 1e-3
+            }),
+        ),
+        (
+            I::ToolAcceleration,
+            // 0.03 m/s to and fro in free space
+            Change::Slave(|done| {
+                (done.f_s, done.true_force) = (Vec2::zeros(), Vec2::zeros());
+                done.tool.y += (done.stamp.as_nanos() / 1_000_000 % 2) as f64 * 3e-5
             }),
         ),
         (I::ToolReach, Change::Slave(|done| done.tool.x += 2.5)),

@@ -7,6 +7,8 @@ use mmt_shared::range::{OutOfRange, all_in_range};
 use mmt_shared::wire::Architecture;
 use serde::{Deserialize, Serialize};
 
+use crate::motion_limits::MotionLimits;
+
 /// Accepted play-out delay, ms.
 const DELAY_MS: (f64, f64) = (0.0, 250.0);
 /// Accepted time of extrapolation, ms: three times the default, for studies.
@@ -15,8 +17,8 @@ const EXTRAPOLATION_MS: (f64, f64) = (0.0, 100.0);
 const SPEED_M_PER_S: (f64, f64) = (0.01, 10.0);
 /// Accepted reach, m: to where the model accepts a pose.
 const REACH_M: (f64, f64) = (0.1, WORKSPACE_M);
-/// Accepted deceleration, m/s².
-const DECELERATION_M_PER_S2: (f64, f64) = (0.1, 1000.0);
+/// Accepted greatest acceleration, m/s².
+const ACCELERATION_M_PER_S2: (f64, f64) = (0.5, 1000.0);
 
 /// How samples are played.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -36,8 +38,9 @@ pub struct PlayoutConfig {
     pub speed_max_m_per_s: f64,
     /// The tool's workspace: it stays within this distance from the origin, m. Default 2, an arm on a stand.
     pub reach_m: f64,
-    /// Deceleration after the extrapolation, m/s². Default 10: from 0.4 m/s it stops within 8 mm.
-    pub deceleration_m_per_s2: f64,
+    /// Greatest acceleration of the tool in free space, m/s², and its deceleration where it has to stop. Default 20: from
+    /// 0.4 m/s it stops within 4 mm, and no hand that pushes reaches it.
+    pub acceleration_max_m_per_s2: f64,
 }
 
 impl Default for PlayoutConfig {
@@ -58,7 +61,7 @@ impl PlayoutConfig {
             extrapolation_ms: 30.0,
             speed_max_m_per_s: 0.6,
             reach_m: 2.0,
-            deceleration_m_per_s2: 10.0,
+            acceleration_max_m_per_s2: 20.0,
         }
     }
 
@@ -81,8 +84,16 @@ impl PlayoutConfig {
         Self { delay_ms, ..self }
     }
 
+    /// Greatest speed and acceleration of the tool.
+    pub(crate) fn limits(&self) -> MotionLimits {
+        MotionLimits {
+            speed_m_per_s: self.speed_max_m_per_s,
+            acceleration_m_per_s2: self.acceleration_max_m_per_s2,
+        }
+    }
+
     pub(super) fn check(&self) -> Result<(), OutOfRange> {
-        let deceleration = self.deceleration_m_per_s2;
+        let acceleration = self.acceleration_max_m_per_s2;
         #[rustfmt::skip]
         let checks = [
             ("play-out: delay", "ms", self.delay_ms, DELAY_MS),
@@ -90,7 +101,7 @@ impl PlayoutConfig {
             ("play-out: extrapolation", "ms", self.extrapolation_ms, EXTRAPOLATION_MS),
             ("play-out: speed limit", "m/s", self.speed_max_m_per_s, SPEED_M_PER_S),
             ("play-out: reach", "m", self.reach_m, REACH_M),
-            ("play-out: deceleration", "m/s^2", deceleration, DECELERATION_M_PER_S2),
+            ("play-out: greatest acceleration", "m/s^2", acceleration, ACCELERATION_M_PER_S2),
         ];
         all_in_range(checks)
     }

@@ -62,7 +62,7 @@ impl Interpolator {
     pub(super) fn new(config: &PlayoutConfig) -> Self {
         Self {
             extrapolation: Duration::from_nanos((config.extrapolation_ms * 1e6) as u64),
-            deceleration_m_per_s2: config.deceleration_m_per_s2,
+            deceleration_m_per_s2: config.acceleration_max_m_per_s2,
             speed_max_m_per_s: config.speed_max_m_per_s,
         }
     }

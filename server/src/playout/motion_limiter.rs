@@ -7,8 +7,9 @@ use mmt_shared::model::geometry::Vec2;
 use mmt_shared::time::{TICK, Time};
 
 use super::config::PlayoutConfig;
+use crate::motion_limits::{BEHIND_M, Goal, MotionLimits};
 
-/// A tick is at most this long to the speed limit: a slave that was stopped for a second must not jump.
+/// A tick is at most this long to the limits: a slave that was stopped for a second must not jump.
 const TICK_MAX: Duration = Duration::from_millis(10);
 
 /// One tick of the played HIP.
@@ -17,29 +18,35 @@ pub(super) struct Step {
     pub(super) hip: Vec2,
     /// Over this tick, m/s.
     pub(super) velocity: Vec2,
-    /// Whether a limit holds the HIP back.
+    /// Whether the limits keep the HIP behind.
     pub(super) limited: bool,
+    /// The greatest speed in this tick, m/s.
+    pub(super) speed_max_m_per_s: f64,
 }
 
-/// Follows the HIP that is aimed at, no faster than the limit and no farther than the reach.
+/// Follows the HIP that is aimed at: no faster and with no greater acceleration than the limits, and no farther than the reach.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct SpeedLimiter {
-    speed_max_m_per_s: f64,
-    deceleration_m_per_s2: f64,
+pub(super) struct MotionLimiter {
+    limits: MotionLimits,
     reach_m: f64,
     /// Where the HIP is, m; none before it is known.
     hip: Option<Vec2>,
+    /// Over the last tick, m/s.
+    velocity: Vec2,
+    /// What was aimed at in the last tick, m; none if nothing was.
+    aim: Option<Vec2>,
     /// When it was played; none before the first tick.
     played: Option<Time>,
 }
 
-impl SpeedLimiter {
+impl MotionLimiter {
     pub(super) fn new(config: &PlayoutConfig) -> Self {
         Self {
-            speed_max_m_per_s: config.speed_max_m_per_s,
-            deceleration_m_per_s2: config.deceleration_m_per_s2,
+            limits: config.limits(),
             reach_m: config.reach_m,
             hip: None,
+            velocity: Vec2::zeros(),
+            aim: None,
             played: None,
         }
     }
@@ -51,9 +58,9 @@ impl SpeedLimiter {
         }
     }
 
-    /// The tool is there, m.
+    /// The tool is there (m), at rest.
     pub(super) fn move_to(&mut self, place: Vec2) {
-        self.hip = Some(place);
+        (self.hip, self.velocity, self.aim) = (Some(place), Vec2::zeros(), None);
     }
 
     /// The HIP that was played last, m; none before the first tick.
@@ -74,46 +81,86 @@ impl SpeedLimiter {
 
     /// The place within reach that is nearest to `aim`, m.
     pub(super) fn within_reach(&self, aim: Vec2) -> Vec2 {
-        let far = aim.norm();
-        if far > self.reach_m {
-            aim * (self.reach_m / far)
-        } else {
-            aim
-        }
+        within(self.reach_m, aim)
     }
 
-    /// One tick of length `elapsed` towards `aim`, m. Once samples have run out a HIP that is still behind becomes slower as
-    /// well, for `slowing` by now: it does not go on to a place of long ago.
+    /// One tick of length `elapsed` towards `aim` (m), or to a stop where there is none. Once samples have run out a HIP that
+    /// is still behind becomes slower as well, for `slowing` by now: it does not go on to a place of long ago.
     pub(super) fn step(
         &mut self,
         now: Time,
         elapsed: Duration,
-        aim: Vec2,
+        aim: Option<Vec2>,
         slowing: Duration,
     ) -> Step {
         let period = elapsed.as_secs_f64();
-        let slower = slowing.saturating_sub(elapsed).as_secs_f64() * self.deceleration_m_per_s2;
-        let move_max = (self.speed_max_m_per_s - slower).max(0.0) * period;
-        let within = self.within_reach(aim);
-        let beyond = within != aim;
-        let aim = within;
-        let wanted = self.hip.map_or_else(Vec2::zeros, |from| aim - from);
-        let distance = wanted.norm();
-        // a hair of room, so that a motion at the limit is not held back by rounding
-        let limited = distance > move_max * (1.0 + 1e-9);
-        let (hip, moved) = match self.hip {
-            Some(from) if limited => {
-                let moved = wanted * (move_max / distance);
-                (from + moved, moved)
-            }
-            _ => (aim, wanted),
+        let (from, aimed) = match (self.hip, aim) {
+            (Some(from), aim) => (from, aim),
+            (None, Some(aim)) => (self.within_reach(aim), Some(aim)),
+            (None, None) => (Vec2::zeros(), None),
         };
-        let still = period <= 0.0 || self.played.is_some_and(|then| then >= now);
-        (self.hip, self.played) = (Some(hip), Some(now));
+        let aim = self.within_reach(aimed.unwrap_or(from));
+        let limits = self.slowed(slowing.saturating_sub(elapsed));
+        let way = match aimed {
+            _ if period <= 0.0 => Vec2::zeros(),
+            None => self.limits.towards(self.velocity, Vec2::zeros(), period) * period,
+            Some(_) => self.way(limits, from, aim, period),
+        };
+        let hip = if way == aim - from {
+            aim
+        } else {
+            // whatever the rounding
+            within(self.reach_m.max(from.norm()), from + way)
+        };
+        self.velocity = if period > 0.0 {
+            way / period
+        } else {
+            Vec2::zeros()
+        };
+        (self.hip, self.aim, self.played) = (Some(hip), aimed.map(|_| aim), Some(now));
         Step {
             hip,
-            velocity: if still { Vec2::zeros() } else { moved / period },
-            limited: limited || beyond,
+            velocity: self.velocity,
+            limited: (aimed.unwrap_or(aim) - hip).norm() > BEHIND_M,
+            speed_max_m_per_s: limits.speed_m_per_s,
         }
+    }
+
+    /// The limits after a tool has had to become slower for so long.
+    fn slowed(&self, slowing: Duration) -> MotionLimits {
+        let slower = slowing.as_secs_f64() * self.limits.acceleration_m_per_s2;
+        MotionLimits {
+            speed_m_per_s: (self.limits.speed_m_per_s - slower).max(0.0),
+            ..self.limits
+        }
+    }
+
+    /// The way from a place towards `aim` in a tick of `period` (s), m.
+    fn way(&self, limits: MotionLimits, from: Vec2, aim: Vec2, period: f64) -> Vec2 {
+        let goal = Goal {
+            way: aim - from,
+            velocity: (aim - self.aim.unwrap_or(aim)) / period,
+        };
+        let way = limits.way(self.velocity, goal, period);
+        // before the end of its reach it brakes
+        let far = from.norm();
+        let outwards = if far > 0.0 { from / far } else { Vec2::zeros() };
+        let most = limits.braking_speed((self.reach_m - far).max(0.0), period) * period;
+        let beyond = outwards.dot(&way) - most;
+        if beyond <= 0.0 {
+            return way;
+        }
+        let velocity = (way - outwards * beyond) / period;
+        limits.towards(self.velocity, velocity, period) * period
+    }
+}
+
+/// The place within `reach` (m) of the origin that is nearest to `place`, m.
+fn within(reach: f64, place: Vec2) -> Vec2 {
+    let far = place.norm();
+    if far > reach {
+        place * (reach / far)
+    } else {
+        place
     }
 }

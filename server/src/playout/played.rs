@@ -27,13 +27,15 @@ pub struct Played {
     /// Its velocity over the last tick, world frame, m/s.
     pub velocity: Vec2,
     /// `f_m` that the master rendered for this HIP, N; none where the HIP is not the master's: extrapolated,
-    /// stopped or held back by the speed limit.
+    /// stopped or held back by the limits of the tool.
     pub force: Option<Vec2>,
     /// Where it comes from.
     pub status: Status,
-    /// Whether the speed limit holds the HIP back.
+    /// The greatest speed of the tool in this tick, m/s: it falls while samples have run out.
+    pub speed_max_m_per_s: f64,
+    /// Whether the limits of the tool hold the HIP back.
     pub limited: bool,
-    /// Whether the tool has to stand: it is held, or there are no samples and the ramp to a stop is over.
+    /// Whether the tool has to stand, or to stop: it is held, or there are no samples and the ramp to a stop is over.
     pub stands: bool,
 }
 
@@ -58,7 +60,7 @@ pub struct PlayoutCounts {
     pub extrapolated: u64,
     /// Ticks stopping or stopped.
     pub stopped: u64,
-    /// Ticks in which the speed limit held the HIP back.
+    /// Ticks in which the limits of the tool held the HIP back.
     pub limited: u64,
 }
 

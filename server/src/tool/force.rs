@@ -65,6 +65,11 @@ impl ToolForce {
         Ok(speed)
     }
 
+    /// The tool's velocity in the last tick, m/s.
+    pub(super) fn velocity(&self) -> Vec2 {
+        self.velocity
+    }
+
     /// Ticks in which the limit shortened the tool's way.
     #[must_use]
     pub fn held_ticks(&self) -> u64 {

@@ -262,10 +262,12 @@ fn a_step_of_the_slaves_clock_is_survived_and_the_tool_stays_below_its_speed() {
 }
 
 #[test]
-fn after_an_outage_of_60_ms_the_speed_limit_keeps_the_force_on_the_object_low() {
-    let peak = |one_way_ms, speed_max_m_per_s| {
+fn after_an_outage_of_60_ms_the_limits_of_speed_and_acceleration_keep_the_force_on_the_object_low()
+{
+    let peak = |one_way_ms, speed_max_m_per_s, acceleration_max_m_per_s2| {
         let mut config = delayed(one_way_ms);
         config.slave.playout.speed_max_m_per_s = speed_max_m_per_s;
+        config.slave.playout.acceleration_max_m_per_s2 = acceleration_max_m_per_s2;
         let name = format!("{one_way_ms} ms, outages, {speed_max_m_per_s} m/s");
         let felt = felt(&name, &config, |world| {
             let outage = world.now.as_nanos() / 1_000_000 % 700 < 60;
@@ -274,7 +276,7 @@ fn after_an_outage_of_60_ms_the_speed_limit_keeps_the_force_on_the_object_low() 
         felt.slave_peak_n
     };
     for one_way_ms in [50, 500] {
-        let (limited, free) = (peak(one_way_ms, 0.6), peak(one_way_ms, 10.0));
+        let (limited, free) = (peak(one_way_ms, 0.6, 20.0), peak(one_way_ms, 10.0, 1000.0));
         assert!(limited < free, "the effect exists: {free} N");
         // what a touch that nobody foresaw may cost, at whatever speed a configuration allows
         assert!(free <= 15.0, "{free} N");
