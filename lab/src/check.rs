@@ -96,7 +96,7 @@ invariants! {
     /// Hold.
     ToolHolds "tool-holds" "the tool stands once no new sample has come for the play-out delay, 30 ms and the ramp to a stop";
     /// Disengaged.
-    ToolDisengaged "tool-disengaged" "after 2 s without a new sample nothing moves the tool in this session";
+    ToolDisengaged "tool-disengaged" "after 2 s without a new sample the tool brakes to a stop, and nothing moves it in this session";
     /// Emergency stop at the tool.
     ToolStops "tool-stops" "while an emergency stop is set the tool brakes to a stop and stands, or gives way";
     /// Order of play-out.

@@ -122,6 +122,7 @@ impl PlayoutBuffer {
             velocity: step.velocity,
             force: aim.force.filter(|_| !limited),
             status: aim.status,
+            period_s: elapsed.as_secs_f64(),
             speed_max_m_per_s: step.speed_max_m_per_s,
             limited,
             stands: has_to_stand || stopped,

@@ -92,11 +92,12 @@ impl ToolDrive {
             return played;
         };
         let follows = self.own.is_none() && !self.passive;
+        let period_s = played.period_s.max(TICK_S);
         // nothing draws a tool that has to stand; it may give way all the same
         let stops = played.stands && !follows;
         let wanted = if stops {
             let none = Vec2::zeros();
-            self.limits.towards(self.force.velocity(), none, TICK_S) * TICK_S
+            self.limits.towards(self.force.velocity(), none, period_s) * period_s
         } else {
             played.hip - tool
         };
@@ -111,17 +112,12 @@ impl ToolDrive {
                 speed_m_per_s: played.speed_max_m_per_s,
                 ..self.limits
             };
-            limits.way(self.force.velocity(), goal, TICK_S)
+            limits.way(self.force.velocity(), goal, period_s)
         };
         let free = if self.passive {
             self.port.allowed(bounded)
         } else {
             bounded
-        };
-        let period_s = if follows {
-            period_s(&wanted, &played)
-        } else {
-            TICK_S
         };
         let allowed = self.force.allowed(free, period_s, self.port.held());
         let held = allowed != free;
@@ -169,16 +165,6 @@ impl ToolDrive {
     }
 }
 
-/// How long play-out took for its way (m), s: a tick, and more after ticks that were missed.
-fn period_s(way: &Vec2, played: &Played) -> f64 {
-    let speed = played.velocity.norm();
-    if speed > 0.0 {
-        (way.norm() / speed).max(TICK_S)
-    } else {
-        TICK_S
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -203,6 +189,7 @@ mod tests {
             velocity: Vec2::zeros(),
             force: None,
             status: Status::Interpolated,
+            period_s: TICK_S,
             speed_max_m_per_s: 0.6,
             limited: false,
             stands,

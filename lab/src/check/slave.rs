@@ -72,8 +72,9 @@ pub struct SlaveChecks {
     tool: Vec2,
     /// The tool's velocity in the tick before, m/s; none where that tick was missed or the tool touched something.
     velocity: Option<Vec2>,
-    /// For how many ticks in a row an emergency stop has been set.
+    /// For how many ticks in a row an emergency stop has been set, and the session has been disengaged.
     stopped: u32,
+    disengaged_ticks: u32,
     stops: bool,
     /// Stamp of the newest sample, and for how long there has been no newer one, as ticks count it.
     newest: Option<Time>,
@@ -103,6 +104,7 @@ impl SlaveChecks {
             tool: about.tool,
             velocity: Some(Vec2::zeros()),
             stopped: 0,
+            disengaged_ticks: 0,
             stops: false,
             newest: None,
             silent: Duration::ZERO,
@@ -284,7 +286,11 @@ impl SlaveChecks {
                 format!("the tool goes {way:?} m at a stamp {beyond:?} after the newest sample's")
             });
         }
-        if self.disengaged {
+        // a tool that moves brakes first
+        let braking = Duration::from_secs_f64(self.speed() / playout.acceleration_max_m_per_s2);
+        let braked = |ticks: u32| TICK * ticks > TICK + braking;
+        self.disengaged_ticks += u32::from(self.disengaged);
+        if braked(self.disengaged_ticks) {
             self.verdict
                 .judge(Invariant::ToolDisengaged, now, stands, || {
                     format!("the tool goes {way:?} m in a session that is disengaged")
@@ -292,8 +298,7 @@ impl SlaveChecks {
         }
         let stops = tick.given.stops || self.channel.other_stops();
         self.stopped = if stops { self.stopped + 1 } else { 0 };
-        let braking = self.speed() / playout.acceleration_max_m_per_s2;
-        if TICK * self.stopped > TICK + Duration::from_secs_f64(braking) {
+        if braked(self.stopped) {
             self.verdict.judge(Invariant::ToolStops, now, stands, || {
                 format!("the tool goes {way:?} m during an emergency stop")
             });

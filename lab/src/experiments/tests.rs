@@ -26,12 +26,16 @@ type Row = BTreeMap<String, String>;
 
 impl Done {
     fn of(experiment: &Experiment, milliseconds: u64) -> Self {
+        Self::of_seeds(experiment, 1, milliseconds)
+    }
+
+    fn of_seeds(experiment: &Experiment, seeds: u64, milliseconds: u64) -> Self {
         let folder = tempfile::tempdir().unwrap();
         let quiet = |_: &str, _: usize, _: usize| {};
         let runner = Runner::new(Folder::open(folder.path()).unwrap(), None, &quiet);
         let request = Request {
             extent: Extent {
-                seeds: 1,
+                seeds,
                 duration: Duration::from_millis(milliseconds),
             },
             given: BTreeMap::new(),
@@ -68,6 +72,26 @@ fn physics_meets_its_references() {
     let done = Done::of(&physics::PHYSICS, 1);
     for row in done.rows("physics.csv", &[]) {
         assert!(number(&row, "relative_error") < 0.012, "{row:?}");
+    }
+}
+
+/// However stiff the coupling and wherever the hand; a contact that is stiffer than the session knows costs more.
+#[test]
+fn a_first_touch_costs_no_more_than_the_limit_from_any_start() {
+    let done = Done::of_seeds(&touch::EXPERIMENT, 200, 1000);
+    let most = |times: &str, key: &str| done.number("touch.csv", &[("times_k_p", times)], key);
+    for times in ["0.3", "1.0"] {
+        let peak = most(times, "peak_most_n");
+        assert!((1.0..15.6).contains(&peak), "{peak} N at {times} k_p");
+    }
+    assert!(most("10.0", "peak_most_n") > most("1.0", "peak_most_n"));
+    for times in ["0.3", "1.0", "2.0", "5.0", "10.0"] {
+        let (speed, acceleration) = (
+            most(times, "speed_most_m_per_s"),
+            most(times, "acceleration_most_m_per_s2"),
+        );
+        assert!(speed <= 0.6 + 1e-3, "{speed} m/s");
+        assert!((1.0..20.01).contains(&acceleration), "{acceleration} m/s²");
     }
 }
 

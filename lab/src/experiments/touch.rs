@@ -9,7 +9,6 @@ use mmt_server::environment::EnvironmentConfig;
 use mmt_server::slave::{Slave, SlaveConfig};
 use mmt_shared::model::contact::Coupling;
 use mmt_shared::model::geometry::Vec2;
-use mmt_shared::model::params::GRAVITY;
 use mmt_shared::model::sample::{ForceCounts, HipCounts, HipSample};
 use mmt_shared::model::settings::{CONTACT_DAMPING_NS_PER_M, STIFFNESS_N_PER_M};
 use mmt_shared::rng::Substream;
@@ -36,8 +35,8 @@ const TIMES: [f64; 5] = [0.3, 1.0, 2.0, 5.0, 10.0];
 const START_M: f64 = 0.6;
 /// A hand that a device loses and finds again jumps by up to this, m.
 const JUMP_M: f64 = 0.5;
-/// Draws of a coupling before one that is accepted: about one in four is refused.
-const DRAWS: usize = 100;
+/// Draws before one that is accepted: most are refused, because a light object is not stable at the stiffest contacts.
+const DRAWS: u64 = 1000;
 
 /// A random start.
 struct Start {
@@ -62,25 +61,29 @@ struct Reached {
 }
 
 impl Start {
-    /// Start number `seed`, with a real contact that is `times` as stiff as the coupling.
-    fn new(seed: u64, times: f64) -> Self {
-        let mut random = Substream::new(seed, "touch", 0);
+    /// Start number `seed`, with a real contact that is `times` as stiff as the coupling: the first draw that a slave accepts with
+    /// the stiffest contact, so that all stiffnesses have the same starts.
+    fn new(seed: u64, times: f64) -> Result<Self, ExperimentError> {
+        let stiffest = TIMES.into_iter().fold(1.0, f64::max);
+        let accepted = |draw: &u64| Self::drawn(seed, *draw, stiffest).slave().is_ok();
+        let draw = (0..DRAWS).find(accepted).unwrap_or(DRAWS);
+        let start = Self::drawn(seed, draw, times);
+        start.slave().map(|_| start)
+    }
+
+    fn drawn(seed: u64, draw: u64, times: f64) -> Self {
+        let mut random = Substream::new(seed, "touch", draw);
         let mut log_uniform =
             |low: f64, high: f64| libm::exp(random.uniform_in(libm::log(low), libm::log(high)));
         let side_m = log_uniform(0.2, 0.6);
         let mass_kg = log_uniform(0.2, 5.0);
         // from what slides at a touch to what no hand moves
-        let friction_n = log_uniform(0.3, 150.0);
+        let friction_coefficient = log_uniform(0.05, 5.0);
         let speed = log_uniform(0.02, 5.0);
-        let mut couplings = (0..DRAWS).map(|_| Coupling {
+        let coupling = Coupling {
             stiffness_n_per_m: log_uniform(STIFFNESS_N_PER_M.0, STIFFNESS_N_PER_M.1),
             damping_ns_per_m: log_uniform(0.1, CONTACT_DAMPING_NS_PER_M.1),
-        });
-        let accepted =
-            |coupling: &Coupling| Slave::try_new(&SlaveConfig::default(), *coupling).is_ok();
-        let coupling = couplings
-            .find(accepted)
-            .unwrap_or(Coupling::for_stiffness(STIFFNESS_N_PER_M.0));
+        };
         let mut place = |most: f64| {
             let (sin, cos) = libm::sincos(random.uniform_in(0.0, TAU));
             Vec2::new(cos, sin) * (most * random.uniform().sqrt())
@@ -92,7 +95,8 @@ impl Start {
         let environment = EnvironmentConfig {
             side_m,
             mass_kg,
-            friction_coefficient: friction_n / (mass_kg * GRAVITY),
+            friction_coefficient,
+            coupling,
             contact: Some(Coupling {
                 stiffness_n_per_m: times * coupling.stiffness_n_per_m,
                 ..coupling
@@ -108,6 +112,15 @@ impl Start {
         }
     }
 
+    fn slave(&self) -> Result<Slave, ExperimentError> {
+        let config = SlaveConfig {
+            environment: self.environment,
+            ..SlaveConfig::default()
+        };
+        let made = Slave::try_new(&config, self.coupling);
+        Ok(made.map_err(|wrong| TrialError::World(wrong.into()))?)
+    }
+
     /// The hand at an instant, m.
     fn hand(&self, s: f64) -> Vec2 {
         let (jump, at_s) = self.jump;
@@ -115,12 +128,7 @@ impl Start {
     }
 
     fn reach(&self, duration: Duration) -> Result<Reached, ExperimentError> {
-        let config = SlaveConfig {
-            environment: self.environment,
-            ..SlaveConfig::default()
-        };
-        let made = Slave::try_new(&config, self.coupling);
-        let mut slave = made.map_err(|wrong| TrialError::World(wrong.into()))?;
+        let mut slave = self.slave()?;
         slave.start_at(self.hip);
         let mut reached = Reached {
             peak_n: None,
@@ -162,7 +170,7 @@ type Group = grid::Group<f64, Reached>;
 fn run(runner: &Runner, request: &Request) -> Result<Findings, ExperimentError> {
     let extent = request.extent;
     let groups = runner.grid("touch", extent.seeds, TIMES.to_vec(), |times, seed| {
-        Start::new(seed, *times).reach(extent.duration)
+        Start::new(seed, *times)?.reach(extent.duration)
     })?;
     let title = format!(
         "First touches, {} random starts for each stiffness",

@@ -31,6 +31,8 @@ pub struct Played {
     pub force: Option<Vec2>,
     /// Where it comes from.
     pub status: Status,
+    /// How long the tick took, s: more than a tick's period after ticks that were missed.
+    pub period_s: f64,
     /// The greatest speed of the tool in this tick, m/s: it falls while samples have run out.
     pub speed_max_m_per_s: f64,
     /// Whether the limits of the tool hold the HIP back.
