@@ -45,11 +45,16 @@ impl Pace {
         self.woke = now;
     }
 
+    /// Whether wake-ups are close to each other.
+    pub(super) fn is_busy(&self) -> bool {
+        self.close >= IN_A_ROW
+    }
+
     /// Until when the sockets need no look, if that is so. Something leaves next at `due`; of what comes from now on nothing
     /// leaves before `earliest`, and the kernel notes when it came: then all that comes until `due` is read with one wake-up.
     pub(super) fn rest(&self, now: Time, due: Option<Time>, earliest: Time) -> Option<Time> {
         let rests = |due: &Time| *due > now && *due <= now + self.rest && earliest >= *due;
-        let merged = (self.close >= IN_A_ROW).then(|| self.woke + MERGED);
+        let merged = self.is_busy().then(|| self.woke + MERGED);
         due.filter(rests).max(merged).filter(|until| *until > now)
     }
 }

@@ -25,7 +25,8 @@ use crate::io::record_file::RecordWriter;
 use crate::io::{lock, now};
 use crate::packet::Departure;
 
-/// How often the counts are copied for others at most.
+/// How often the counts are copied for others at most while wake-ups are close to each other. Else they are at each one: a
+/// timer for it costs more than they do.
 const PUBLISH_EVERY: Duration = Duration::from_millis(5);
 
 /// Everything the thread owns.
@@ -304,7 +305,7 @@ impl Worker {
 
     fn publish(&mut self, now: Time) {
         let next = self.published + PUBLISH_EVERY;
-        if now < next {
+        if now < next && self.pace.is_busy() {
             self.unpublished = Some(next);
             return;
         }
