@@ -12,6 +12,7 @@ pub mod fixtures;
 pub mod io;
 pub mod metrics;
 pub mod model;
+pub mod network;
 pub mod pairing;
 pub mod passivity;
 pub mod plug;
