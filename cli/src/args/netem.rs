@@ -49,7 +49,7 @@ pub(crate) struct NetemArguments {
     /// Length of these packets, bytes of UDP payload
     #[arg(long, value_name = "N", default_value_t = mmt_netem::effect::BYTES)]
     pub(crate) bytes: usize,
-    /// Masters at one time; datagrams of one more are dropped and counted
+    /// Masters at one time; one more takes the place of one that does not talk with the slave, or is turned away
     #[arg(long, value_name = "N", default_value_t = mmt_netem::io::relay::CLIENTS)]
     pub(crate) clients: usize,
     #[command(flatten)]

@@ -21,6 +21,7 @@ use crate::stop::Stop;
 pub(super) mod control;
 mod files;
 mod gauge;
+mod places;
 mod report;
 mod shell;
 mod table;
@@ -30,6 +31,7 @@ pub(super) mod wrap;
 use control::Command;
 use files::{Files, record_file};
 use gauge::{Caption, Gauge};
+use places::Places;
 
 /// How often the state of the relay is checked.
 const CHECK_EVERY: Duration = Duration::from_millis(50);
@@ -50,6 +52,8 @@ pub(crate) struct NetemReport {
     degraded: bool,
     /// Whether a master was turned away because there were as many as --clients allows.
     refused_clients: bool,
+    /// Whether a master that did not talk with the slave made room for a newer one.
+    displaced_clients: bool,
     counters: RelaySnapshot,
     configuration: NetemConfiguration,
 }
@@ -136,6 +140,7 @@ pub(crate) fn run(arguments: &NetemArguments, messages: &Messages) -> Result<(),
         ending,
         degraded: counters.lateness.degraded(),
         refused_clients: counters.refused.packets > 0,
+        displaced_clients: counters.clients_displaced > 0,
         counters,
         configuration: NetemConfiguration {
             listen: local.to_string(),
@@ -197,7 +202,7 @@ fn wait(
 ) {
     let (began, duration) = (Instant::now(), arguments.duration);
     let mut links = (arguments.up.clone(), arguments.down.clone());
-    let mut refused = false;
+    let mut places = Places::new(arguments.clients);
     let over = || duration.is_some_and(|duration| began.elapsed() >= duration);
     while !stop.asked() && !over() && relay.is_running() {
         for line in commands.into_iter().flat_map(Receiver::try_iter) {
@@ -205,7 +210,7 @@ fn wait(
                 note(what);
             }
         }
-        refused = refused || warn_of_refused(relay, arguments, show.messages);
+        show.warn(places.warnings(&relay.snapshot(), Instant::now()));
         let left = duration.map(|duration| duration.saturating_sub(began.elapsed()));
         let patience = left.map_or(CHECK_EVERY, |left| left.min(CHECK_EVERY));
         if show.look(relay, patience) {
@@ -213,21 +218,7 @@ fn wait(
         }
     }
     // one that came since the last look counts as well
-    if !refused {
-        warn_of_refused(relay, arguments, show.messages);
-    }
-}
-
-/// Shows that a master was turned away, if one was; whether one was.
-fn warn_of_refused(relay: &RelayHandle, arguments: &NetemArguments, messages: &Messages) -> bool {
-    let refused = relay.snapshot().refused.packets > 0;
-    if refused {
-        let most = arguments.clients;
-        messages.show(&format!(
-            "a master was turned away: there are {most} already (--clients), or no socket is to be had"
-        ));
-    }
-    refused
+    show.warn(places.warnings(&relay.snapshot(), Instant::now()));
 }
 
 /// Where a run shows what it does: the gauge, if there is a terminal for it, and messages.
@@ -237,6 +228,12 @@ struct Show<'a> {
 }
 
 impl Show<'_> {
+    fn warn(&self, warnings: Vec<String>) {
+        for warning in warnings {
+            self.messages.show(&warning);
+        }
+    }
+
     /// Shows what the relay does for as long as `patience`; whether somebody wants the end.
     fn look(&mut self, relay: &RelayHandle, patience: Duration) -> bool {
         let Some(gauge) = &mut self.gauge else {

@@ -30,6 +30,7 @@ mod origin;
 mod pace;
 mod port;
 mod sockets;
+mod standing;
 #[cfg(test)]
 mod tests;
 mod worker;
@@ -39,8 +40,8 @@ use origin::Origin;
 use port::Port;
 use worker::Worker;
 
-/// Clients at one time unless [`Extras::clients`] sets another number; datagrams of one more are dropped and
-/// counted. Each holds one descriptor.
+/// Clients at one time unless [`Extras::clients`] sets another number. One more takes the place of one that does not talk with
+/// the target; where all do, its datagrams are dropped and counted. Each holds one descriptor.
 pub const CLIENTS: usize = 64;
 /// A client without a datagram in either direction for this long is forgotten: four times QUIC's own
 /// idle timeout in this project.
@@ -91,7 +92,9 @@ pub struct RelaySnapshot {
     pub clients: u64,
     /// Clients that the relay met since its start.
     pub clients_met: u64,
-    /// Datagrams from clients beyond the most at one time, or without a socket to be had: never offered.
+    /// Clients that had to make room for newer ones: there were as many as there can be, and they did not talk with the target.
+    pub clients_displaced: u64,
+    /// Datagrams from clients for which nobody had to make room, or without a socket to be had: never offered.
     pub refused: Tally,
     /// Datagrams from clients that the kernel dropped because the relay did not read in time: never offered.
     pub overflows_up: u64,

@@ -5,6 +5,7 @@ mod identity;
 mod lease;
 mod master;
 mod opening;
+mod relay;
 
 use std::sync::Arc;
 use std::time::Duration;

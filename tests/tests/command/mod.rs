@@ -23,6 +23,7 @@ mod interrupted;
 mod manual;
 mod netem;
 mod raw_udp;
+mod relay;
 mod reproduce;
 mod runs;
 mod shell;

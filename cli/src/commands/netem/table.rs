@@ -70,6 +70,7 @@ impl NetemReport {
         }
         writeln!(f, "\nclients met          {:>12}", counters.clients_met)?;
         for (label, count) in [
+            ("clients displaced", counters.clients_displaced),
             ("refused", counters.refused.packets),
             ("not read in time, up", counters.overflows_up),
             ("not read in time, down", counters.overflows_down),
@@ -93,6 +94,12 @@ impl NetemReport {
             write!(
                 f,
                 "\nmasters were turned away: --clients sets how many there can be"
+            )?;
+        }
+        if self.displaced_clients {
+            write!(
+                f,
+                "\nmasters that did not talk with the slave made room for newer ones: --clients sets how many there can be"
             )?;
         }
         if late.degraded() {

@@ -1,5 +1,5 @@
 //! The clients of a relay: bounded in number, each with its socket toward the target, forgotten when
-//! idle.
+//! idle, or when a newer one takes its place.
 
 use std::collections::BTreeMap;
 use std::io;
@@ -11,6 +11,7 @@ use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
 use super::CLIENT_IDLE;
 use super::port::{Port, Received};
 use super::sockets::Sockets;
+use super::standing::{Standing, makes_room};
 use crate::capture::Sides;
 
 /// Descriptors besides one for each client: the program's own.
@@ -25,7 +26,7 @@ pub(super) struct Client {
     /// The socket toward the target, and its address.
     pub(super) port: Port,
     pub(super) port_addr: SocketAddr,
-    last_seen: Time,
+    pub(super) standing: Standing,
 }
 
 impl Client {
@@ -38,10 +39,6 @@ impl Client {
             class,
         }
     }
-
-    pub(super) fn seen(&mut self, now: Time) {
-        self.last_seen = now;
-    }
 }
 
 /// The clients, by a number that is never used twice.
@@ -51,6 +48,7 @@ pub(super) struct Clients {
     by_number: BTreeMap<u64, Client>,
     by_addr: BTreeMap<SocketAddr, u64>,
     met: u64,
+    displaced: u64,
     /// How many there can be at one time.
     most: usize,
     /// All their sockets and those of the relay, so that a wait is one for all of them.
@@ -69,6 +67,7 @@ impl Clients {
             by_number: BTreeMap::new(),
             by_addr: BTreeMap::new(),
             met: 0,
+            displaced: 0,
             most,
             sockets: Sockets::try_new()?,
         })
@@ -103,32 +102,54 @@ impl Clients {
         self.met
     }
 
-    /// The number of the client that sent `datagram`, met now if need be; `None` if there is no room for
-    /// it or no socket to be had.
+    /// Clients that had to make room for newer ones.
+    pub(super) fn displaced(&self) -> u64 {
+        self.displaced
+    }
+
+    /// The number of the client that sent `datagram`, met now if need be. `None` if all places, or all sockets that are to be
+    /// had, are those of clients that talk with the target.
     pub(super) fn meet(&mut self, datagram: &Received<'_>) -> Option<u64> {
         let now = datagram.arrived;
         if let Some(number) = self.by_addr.get(&datagram.from) {
             let client = self.by_number.get_mut(number)?;
             client.local_ip = datagram.local_ip;
-            client.seen(now);
+            client.standing.sends(now);
             return Some(*number);
         }
         if self.by_number.len() >= self.most {
-            return None;
+            self.make_room(datagram.from.ip(), now)?;
         }
         let number = self.met;
-        let (port, port_addr) = self.port_for(number).ok()?;
+        let (port, port_addr) = match self.port_for(number) {
+            Ok(port) => port,
+            Err(_) => {
+                self.make_room(datagram.from.ip(), now)?;
+                self.port_for(number).ok()?
+            }
+        };
         let client = Client {
             addr: datagram.from,
             local_ip: datagram.local_ip,
             port,
             port_addr,
-            last_seen: now,
+            standing: Standing::new(datagram.from.ip(), now),
         };
         self.met = number.saturating_add(1);
         self.by_addr.insert(client.addr, number);
         self.by_number.insert(number, client);
         Some(number)
+    }
+
+    /// Forgets one client for a newcomer from `address`; `None` if none has to go.
+    fn make_room(&mut self, address: IpAddr, now: Time) -> Option<()> {
+        let clients = self.by_number.iter();
+        let standings = clients.map(|(number, client)| (*number, &client.standing));
+        let number = makes_room(standings, address, self.by_number.len(), now)?;
+        let client = self.by_number.remove(&number)?;
+        self.by_addr.remove(&client.addr);
+        self.displaced = self.displaced.saturating_add(1);
+        Some(())
     }
 
     /// Gives every client a new port toward the target; one that can get none keeps the old one. Returns
@@ -150,14 +171,15 @@ impl Clients {
     /// Forgets the clients that were idle for too long.
     pub(super) fn expire(&mut self, now: Time) {
         self.by_number
-            .retain(|_, client| client.last_seen + CLIENT_IDLE > now);
+            .retain(|_, client| client.standing.seen() + CLIENT_IDLE > now);
         let known = &self.by_number;
         self.by_addr.retain(|_, number| known.contains_key(number));
     }
 
     /// When the next client could have been idle for too long.
     pub(super) fn next_expiry(&self) -> Option<Time> {
-        let oldest = self.by_number.values().map(|client| client.last_seen).min();
+        let seen = self.by_number.values().map(|client| client.standing.seen());
+        let oldest = seen.min();
         oldest.map(|oldest| oldest + CLIENT_IDLE)
     }
 }
@@ -224,12 +246,24 @@ mod tests {
     }
 
     #[test]
-    fn one_client_too_many_is_turned_away_and_an_old_one_is_not() {
+    fn a_newcomer_takes_the_place_of_who_was_never_answered_and_none_of_who_talks() {
         let mut clients = clients();
-        for port in 0..64 {
-            assert!(clients.meet(&from(port + 1, Time::ZERO)).is_some());
+        let now = Time::ZERO;
+        for port in 1..=64 {
+            assert!(clients.meet(&from(port, now)).is_some());
         }
-        assert_eq!(clients.meet(&from(1000, Time::ZERO)), None);
-        assert_eq!(clients.meet(&from(1, Time::ZERO)), Some(0));
+        // all but the second one
+        let talk = |client: &mut Client| client.standing.is_answered(now);
+        (0..64).filter(|number| *number != 1).for_each(|number| {
+            clients.get_mut(number).into_iter().for_each(talk);
+        });
+        assert_eq!(clients.meet(&from(100, now)), Some(64));
+        assert_eq!((clients.len(), clients.displaced()), (64, 1));
+        // an old one is one of those that are there, and who has left is a newcomer again
+        assert_eq!(clients.meet(&from(1, now)), Some(0));
+        assert_eq!(clients.meet(&from(2, now)), Some(65));
+        clients.get_mut(65).into_iter().for_each(talk);
+        assert_eq!(clients.meet(&from(100, now)), None, "no place is free");
+        assert_eq!((clients.met(), clients.displaced()), (66, 2));
     }
 }

@@ -248,7 +248,8 @@ impl Worker {
             answers.push((received.arrived, datagram));
             last = Some(received.arrived);
         });
-        last.into_iter().for_each(|arrived| client.seen(arrived));
+        last.into_iter()
+            .for_each(|arrived| client.standing.is_answered(arrived));
         let overflows = client.port.new_overflows();
         self.overflows_down = self.overflows_down.saturating_add(overflows);
         self.note_error(taken);
@@ -315,6 +316,7 @@ impl Worker {
             down: self.down.counters(),
             clients: self.clients.len() as u64,
             clients_met: self.clients.met(),
+            clients_displaced: self.clients.displaced(),
             refused: self.refused,
             overflows_up: self.overflows_up,
             overflows_down: self.overflows_down,

@@ -13,12 +13,12 @@ use super::master::{PATIENCE, TRAFFIC, patiently};
 use super::*;
 
 /// Silent connections a second.
-const A_SECOND: u64 = 50;
+pub(super) const A_SECOND: u64 = 50;
 /// How often the holder of the token comes.
-const COMES: usize = 20;
+pub(super) const COMES: usize = 20;
 
 /// Opens connections that send nothing, without end. Each is kept, as an adversary would.
-async fn silent_ones(pairing: Pairing, from: impl Fn(u32) -> IpAddr) {
+pub(super) async fn silent_ones(pairing: Pairing, from: impl Fn(u32) -> IpAddr) {
     let mut every = interval(Duration::from_millis(1000 / A_SECOND));
     // a host that stood still does not make up for it
     every.set_missed_tick_behavior(MissedTickBehavior::Delay);
@@ -40,7 +40,7 @@ async fn silent_ones(pairing: Pairing, from: impl Fn(u32) -> IpAddr) {
 }
 
 /// The holder's attempt; none if it is turned away.
-async fn welcome(pairing: &Pairing) -> Option<Master> {
+pub(super) async fn welcome(pairing: &Pairing) -> Option<Master> {
     loop {
         let mut master = Master::try_connect(pairing).await.ok()?;
         match timeout(PATIENCE, master.hello(pairing.token, 1000.0)).await {

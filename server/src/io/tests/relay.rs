@@ -1,0 +1,127 @@
+//! A relay before the slave, whose places strangers take.
+
+use std::net::{Ipv4Addr, SocketAddr};
+
+use mmt_netem::io::relay::{Extras, Relay, RelayHandle, RelaySnapshot};
+use mmt_shared::pairing::Address;
+use tokio::net::UdpSocket;
+use tokio::time::{MissedTickBehavior, interval, timeout};
+
+use super::crowd::{A_SECOND, COMES, silent_ones, welcome};
+use super::master::PATIENCE;
+use super::*;
+
+/// Many more strangers than a relay has places.
+const CROWD: u64 = 200;
+
+/// A relay before this slave, and what a master needs to come through it.
+fn relay_before(host: &Running) -> (RelayHandle, Pairing) {
+    let to = host.pairing.address.to_string().parse().unwrap();
+    let delay = || "delay 20ms".parse().unwrap();
+    let any = (Ipv4Addr::LOCALHOST, 0).into();
+    let relay = Relay::bind(any, to, delay(), delay(), 1, Extras::default()).unwrap();
+    let address: Address = relay.local_addr().to_string().parse().unwrap();
+    let pairing = Pairing {
+        address,
+        ..host.pairing.clone()
+    };
+    (relay, pairing)
+}
+
+/// The n-th stranger's address, one of 16 256.
+fn stranger(n: u32) -> Ipv4Addr {
+    Ipv4Addr::new(127, 100, (n >> 7 & 127) as u8, (n & 127) as u8 + 1)
+}
+
+/// Strangers without end, each of whom sends one datagram. QUIC answers every other one: it has no such version.
+async fn silent_sources(relay: SocketAddr) {
+    let mut every = interval(Duration::from_millis(1000 / A_SECOND));
+    // a host that stood still does not make up for it
+    every.set_missed_tick_behavior(MissedTickBehavior::Delay);
+    let mut sources = Vec::new();
+    for n in 0.. {
+        every.tick().await;
+        let source = UdpSocket::bind((stranger(n), 0)).await.unwrap();
+        let mut datagram = [0; 1200];
+        datagram[0] = if n % 2 == 0 { 0xc0 } else { 0 };
+        datagram[1..7].copy_from_slice(&[0x1a, 0x2a, 0x3a, 0x4a, 8, 1]);
+        source.send_to(&datagram, relay).await.unwrap();
+        sources.push(source);
+    }
+}
+
+/// How many of the holder's attempts succeed at once through a relay while strangers come, and what the relay saw.
+async fn let_in<S: Future<Output = ()>>(
+    strangers: impl Fn(Pairing) -> S,
+) -> (usize, RelaySnapshot) {
+    let host = run(options());
+    let (relay, pairing) = relay_before(&host);
+    let come = async {
+        until_crowded(&relay, CROWD).await;
+        let mut let_in = 0;
+        for _ in 0..COMES {
+            if let Ok(Some(master)) = timeout(PATIENCE, welcome(&pairing)).await {
+                let_in += 1;
+                patiently(master.farewell()).await;
+            }
+        }
+        let_in
+    };
+    let let_in = tokio::select! {
+        let_in = come => let_in,
+        () = strangers(pairing.clone()) => unreachable!("it has no end"),
+    };
+    host.end().await;
+    (let_in, relay.stop().unwrap())
+}
+
+/// Until so many have come.
+async fn until_crowded(relay: &RelayHandle, come: u64) {
+    while relay.snapshot().clients_met < come {
+        sleep(Duration::from_millis(20)).await;
+    }
+}
+
+#[tokio::test]
+async fn silent_sources_keep_the_holder_of_the_token_out_of_the_relay_not_once() {
+    let address = |pairing: Pairing| pairing.address.to_string().parse().unwrap();
+    let (let_in, seen) = let_in(|pairing| silent_sources(address(pairing))).await;
+    assert_eq!(let_in, COMES, "{seen:?}");
+    assert!(seen.clients_displaced > 0);
+}
+
+#[tokio::test]
+async fn silent_connections_keep_the_holder_of_the_token_out_of_the_relay_not_once() {
+    let from = |n| stranger(n).into();
+    let (let_in, seen) = let_in(|pairing| silent_ones(pairing, from)).await;
+    assert_eq!(let_in, COMES, "{seen:?}");
+    assert!(seen.clients_displaced > 0);
+}
+
+#[tokio::test]
+async fn a_session_through_the_relay_goes_on_whoever_comes() {
+    let host = run(options());
+    let (relay, pairing) = relay_before(&host);
+    let (mut master, _) = patiently(Master::operate(&pairing)).await;
+    let session = async {
+        while relay.snapshot().clients_met < CROWD {
+            master.push(10).await;
+        }
+        // what was on its way has come
+        master.listen(2).await;
+        master.farewell().await
+    };
+    let (ending, totals) = tokio::select! {
+        end = timeout(PATIENCE, session) => end.unwrap(),
+        () = silent_sources(relay.local_addr()) => unreachable!("it has no end"),
+    };
+    assert_eq!(ending, Ending::Finished);
+    let report = host.end().await.unwrap();
+    let (sent, came) = (report.wire.up.datagrams, report.messages.up.commands);
+    assert_eq!(totals.session.received.commands, came);
+    assert!(came > Some(0) && came <= sent);
+    assert_eq!(report.link.loss_up.get(), Some(0.0));
+    let seen = relay.stop().unwrap();
+    assert!(seen.clients_displaced > CROWD / 2, "{seen:?}");
+    assert_eq!((seen.refused.packets, seen.up.abandoned.packets), (0, 0));
+}
