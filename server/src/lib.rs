@@ -9,6 +9,7 @@ pub mod contact;
 pub mod end;
 pub mod environment;
 pub mod estimator;
+pub mod feed;
 pub(crate) mod motion_limits;
 pub mod plant;
 pub mod playout;

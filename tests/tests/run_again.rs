@@ -53,6 +53,7 @@ async fn session(architecture: Architecture, path: &Path) {
         netem: netem.clone(),
         netem_seed: 1,
         netem_extras: SocketExtras::default(),
+        observers: 0,
         once: true,
         truth: None,
         record: Some(recorder.clone()),

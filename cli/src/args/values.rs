@@ -11,7 +11,7 @@ use clap::builder::{PossibleValue, PossibleValuesParser, RangedI64ValueParser, T
 use mmt_netem::LinkConfig;
 use mmt_server::trigger::Scheme;
 use mmt_shared::model::settings::Mode;
-use mmt_shared::pairing::{Address, AddressError, Host};
+use mmt_shared::pairing::{Address, AddressError, Host, TOKENS_MAX};
 use mmt_shared::wire::{Architecture, SAMPLES_MAX};
 
 /// The longest duration accepted: a week.
@@ -218,4 +218,9 @@ pub(super) fn samples_per_command() -> RangedI64ValueParser<u8> {
 /// 0 to as many commands of one sample as a command has room for.
 pub(super) fn repeat_samples() -> RangedI64ValueParser<u8> {
     RangedI64ValueParser::new().range(0..SAMPLES_MAX as i64)
+}
+
+/// 0 to as many observers as a slave has tokens.
+pub(super) fn observers() -> RangedI64ValueParser<u8> {
+    RangedI64ValueParser::new().range(0..=TOKENS_MAX as i64)
 }

@@ -1,7 +1,6 @@
 //! `mmt demo`: real slave, real master, real QUIC sockets on loopback, an emulated network between them.
 
 use std::net::{Ipv4Addr, SocketAddr};
-use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use mmt_client::commands::CommandConfig;
@@ -156,7 +155,7 @@ impl Round<'_> {
         self.device.give(&mut options);
         let (master, master_live) = master::start(options, stop.receiver())?;
         if let Some(desk) = &mut self.desk {
-            let (slave, master) = (Arc::clone(&started.live), master_live.clone());
+            let (slave, master) = (started.live.clone(), master_live.clone());
             let connected = move || Some(*slave.borrow()).filter(|slave| slave.connected);
             desk.show(&caption, move || *master.borrow(), connected);
             if !self.blind {
@@ -307,6 +306,7 @@ fn slave_options(
         netem_seed: config.seed,
         netem_extras: emulation.extras(Direction::Down),
         once: true,
+        observers: 0,
         truth: Some(truth),
         record: None,
         emergency: EmergencyStop::default(),

@@ -1,7 +1,7 @@
 //! The acceptor: who connects is judged here, beside the session that may be going on.
 //!
 //! The order is the protocol's: token, role, ranges, whether another master operates. Who is refused gets the reason and is
-//! counted; nobody waits for anybody else. No session begins here.
+//! counted; nobody waits for anybody else. No session begins here; an observer, who is in nobody's way, is served at once.
 
 use std::net::SocketAddr;
 use std::pin::pin;
@@ -19,12 +19,14 @@ use mmt_shared::pairing::{Token, TokenName};
 use mmt_shared::wire::{
     DecodeError, Hello, Refusal, Role, STREAM_MESSAGE_MAX, Side, StreamMessage,
 };
-use tokio::sync::{mpsc, watch};
+use tokio::sync::{OwnedSemaphorePermit, mpsc, watch};
 use tokio::task::JoinSet;
 use tokio::time::timeout;
 
 use super::crowd::{Crowd, Place};
 use super::lease::{Lease, Leases};
+use super::observer_session::{self, Observer};
+use super::observers::Observers;
 
 /// A hello may take this long after the handshake: two round trips of 2 s and the wait for a lost packet.
 const HELLO_WAIT: Duration = Duration::from_secs(8);
@@ -43,6 +45,12 @@ pub(super) struct Admitted {
     pub(super) lease: Lease,
 }
 
+/// What whoever is let in may be.
+enum Admission {
+    Operator(Lease),
+    Observer(OwnedSemaphorePermit),
+}
+
 /// Masters that were not let in, by reason, since the host was started.
 #[derive(Debug, Default)]
 pub(super) struct Refusals {
@@ -51,6 +59,8 @@ pub(super) struct Refusals {
     pub(super) bad_hello: AtomicU64,
     pub(super) ending: AtomicU64,
     pub(super) wrong_role: AtomicU64,
+    /// Observers for whom there was no place.
+    pub(super) observers_full: AtomicU64,
     /// Handshakes that failed, other versions included.
     pub(super) handshake: AtomicU64,
     /// Connected, and then no hello that can be read.
@@ -59,12 +69,27 @@ pub(super) struct Refusals {
     pub(super) crowded: AtomicU64,
 }
 
+impl Refusals {
+    /// Counts somebody who wanted to be `role`.
+    fn count(&self, refusal: Refusal, role: Role) {
+        count(match (refusal, role) {
+            (Refusal::Busy, Role::Observer) => &self.observers_full,
+            (Refusal::Busy, Role::Operator) => &self.busy,
+            (Refusal::WrongToken, _) => &self.wrong_token,
+            (Refusal::BadHello, _) => &self.bad_hello,
+            (Refusal::Ending, _) => &self.ending,
+            (Refusal::WrongRole, _) => &self.wrong_role,
+        });
+    }
+}
+
 /// What the judges share.
 #[derive(Clone)]
 pub(super) struct Acceptor {
     tokens: TokenList,
     crowd: Crowd,
     leases: Leases,
+    observers: Arc<Observers>,
     refusals: Arc<Refusals>,
     stop: watch::Receiver<bool>,
     admitted: mpsc::Sender<Admitted>,
@@ -91,6 +116,7 @@ impl Acceptor {
     /// An acceptor that hands admitted masters to the receiver, one at a time.
     pub(super) fn new(
         tokens: TokenList,
+        observers: Arc<Observers>,
         refusals: Arc<Refusals>,
         stop: watch::Receiver<bool>,
     ) -> (Self, mpsc::Receiver<Admitted>) {
@@ -99,6 +125,7 @@ impl Acceptor {
             tokens,
             crowd: Crowd::default(),
             leases: Leases::new(),
+            observers,
             refusals,
             stop,
             admitted,
@@ -196,7 +223,18 @@ impl Acceptor {
         // whoever has a token is no stranger any more
         let stranger = granted.is_none().then_some(place);
         match self.verdict(address, hello, granted).await {
-            Ok((hello, name, lease)) => {
+            Ok((hello, name, Admission::Observer(place))) => {
+                let observer = Observer {
+                    connection,
+                    send,
+                    receive,
+                    hello,
+                    name,
+                    place,
+                };
+                observer_session::serve(&self.observers, observer, &self.tokens).await;
+            }
+            Ok((hello, name, Admission::Operator(lease))) => {
                 let admitted = Admitted {
                     connection,
                     send,
@@ -210,13 +248,7 @@ impl Acceptor {
             }
             Err(refusal) => {
                 tracing::warn!("{address} was refused: {refusal:?}");
-                count(match refusal {
-                    Refusal::Busy => &self.refusals.busy,
-                    Refusal::WrongToken => &self.refusals.wrong_token,
-                    Refusal::BadHello => &self.refusals.bad_hello,
-                    Refusal::Ending => &self.refusals.ending,
-                    Refusal::WrongRole => &self.refusals.wrong_role,
-                });
+                self.refusals.count(refusal, hello.role);
                 let refused = refuse(&connection, send, refusal);
                 match stranger {
                     Some(place) => tokio::select! {
@@ -234,9 +266,9 @@ impl Acceptor {
         address: SocketAddr,
         hello: &Hello,
         granted: Option<Granted>,
-    ) -> Result<(Hello, TokenName, Lease), Refusal> {
+    ) -> Result<(Hello, TokenName, Admission), Refusal> {
         let Granted { name, role } = granted.ok_or(Refusal::WrongToken)?;
-        if hello.role == Role::Observer || !role.permits(hello.role) {
+        if !role.permits(hello.role) {
             tracing::warn!("{address} has the token {name}, of an {}", role.name());
             return Err(Refusal::WrongRole);
         }
@@ -247,12 +279,17 @@ impl Acceptor {
         if *self.stop.borrow() {
             return Err(Refusal::Ending);
         }
+        if hello.role == Role::Observer {
+            let place = self.observers.enter()?;
+            return Ok((hello, name, Admission::Observer(place)));
+        }
         let resume = Token::generate().map_err(|error| {
             tracing::error!("{error}");
             Refusal::Busy
         })?;
         let lease = self.leases.claim(&hello.claim, resume).await;
-        lease.map_or(Err(Refusal::Busy), |lease| Ok((hello, name, lease)))
+        let lease = lease.ok_or(Refusal::Busy)?;
+        Ok((hello, name, Admission::Operator(lease)))
     }
 }
 

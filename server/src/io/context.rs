@@ -16,6 +16,7 @@ use mmt_shared::io::truth::TruthSender;
 
 use super::SlaveConfiguration;
 use super::acceptor::Refusals;
+use super::observers::Observers;
 use super::plant_link::PlantHost;
 use crate::slave::{SlaveConfig, SlaveError};
 
@@ -71,6 +72,7 @@ pub(super) struct Context {
     pub(super) record: Option<Recorder>,
     pub(super) emergency: EmergencyStop,
     pub(super) plant: Option<PlantHost>,
+    pub(super) observers: Arc<Observers>,
 }
 
 impl Context {
@@ -80,8 +82,8 @@ impl Context {
         truth.take()
     }
 
-    /// Who was turned away since the host was started, by name.
-    pub(super) fn refusals(&self) -> [(&'static str, u64); 9] {
+    /// Who and what was turned away since the host was started, by name.
+    pub(super) fn refusals(&self) -> [(&'static str, u64); 11] {
         let read = |counter: &AtomicU64| counter.load(Ordering::Relaxed);
         let refusals = &self.refusals;
         [
@@ -90,10 +92,15 @@ impl Context {
             ("masters_bad_hello", read(&refusals.bad_hello)),
             ("masters_ending", read(&refusals.ending)),
             ("masters_wrong_role", read(&refusals.wrong_role)),
+            ("observers_full", read(&refusals.observers_full)),
             ("masters_no_hello", read(&refusals.no_hello)),
             ("masters_crowded", read(&refusals.crowded)),
             ("handshakes_failed", read(&refusals.handshake)),
             ("handshakes_unreadable", self.listener.unreadable()),
+            (
+                "observer_commands_refused",
+                self.observers.commands_refused(),
+            ),
         ]
     }
 

@@ -22,8 +22,9 @@ use tokio::time::timeout;
 
 use super::acceptor::{Acceptor, Admitted, Refusals};
 use super::context::{Context, SlaveHostError};
+use super::observers::{self, Observers};
 use super::session;
-use super::{SlaveLive, SlaveOptions, SlaveReport};
+use super::{PROGRAM, SlaveLive, SlaveOptions, SlaveReport};
 use crate::slave::Slave;
 
 /// Updates are the longest datagrams of a slave, 196 bytes at most, and what the tool feels takes 92: at one of each
@@ -57,7 +58,12 @@ impl SlaveHost {
     /// operator.
     pub fn bind(options: SlaveOptions) -> Result<Self, SlaveHostError> {
         options.transport.permit(options.listen)?;
-        Slave::try_new(&options.config, Coupling::for_stiffness(TRIAL_STIFFNESS))?;
+        let trial = Slave::try_new(&options.config, Coupling::for_stiffness(TRIAL_STIFFNESS))?;
+        let scheme = options.config.trigger.scheme.to_string();
+        let clock = Clock::start();
+        let (observers, emergency) = (options.observers, options.emergency.clone());
+        let welcome = trial.welcome(observers::NO_RESUME, &scheme, PROGRAM);
+        let observers = Observers::new(observers, clock, emergency, welcome);
         let own = options.identity.tokens().of_operator();
         let own = own.ok_or(SlaveHostError::NoOperator)?.token;
         let unusable = |source| SlaveHostError::Socket {
@@ -81,7 +87,7 @@ impl SlaveHost {
             token: own,
         };
         let context = Context {
-            clock: Clock::start(),
+            clock,
             config: options.config,
             listen: address.to_string(),
             transport: options.transport,
@@ -93,6 +99,7 @@ impl SlaveHost {
             record: options.record,
             emergency: options.emergency,
             plant: options.plant,
+            observers: Arc::new(observers),
         };
         Ok(Self {
             endpoint,
@@ -131,11 +138,13 @@ impl SlaveHost {
         live: Arc<watch::Sender<SlaveLive>>,
     ) -> Result<Option<SlaveReport>, SlaveHostError> {
         let (tokens, refusals) = (self.tokens.clone(), Arc::clone(&self.context.refusals));
-        let (acceptor, masters) = Acceptor::new(tokens, refusals, stop.clone());
+        let observers = Arc::clone(&self.context.observers);
+        let (acceptor, masters) = Acceptor::new(tokens, observers, refusals, stop.clone());
         let listener = Arc::clone(&self.context.listener);
         let (served, ()) = tokio::join!(
             async {
                 let served = self.serve(masters, &mut stop, &live).await;
+                self.context.observers.end().await;
                 self.endpoint.close(CLOSE_FINISHED, b"the slave has ended");
                 served
             },
@@ -169,6 +178,7 @@ impl SlaveHost {
                 session::serve(context, admitted, earlier, socket_before, stop, live).await?;
             socket_before = self.context.meter.snapshot();
             live.send_replace(SlaveLive::default());
+            context.observers.session_over();
             let Some(served) = served else {
                 continue;
             };

@@ -13,12 +13,15 @@ mod context;
 mod crowd;
 mod host;
 mod lease;
+mod observer_session;
+mod observers;
 pub mod plant_link;
 mod record;
 mod session;
 mod slave_loop;
 #[cfg(test)]
 mod tests;
+mod welcome;
 
 use std::net::SocketAddr;
 
@@ -64,6 +67,8 @@ pub struct SlaveOptions {
     pub netem_extras: SocketExtras,
     /// End after the first session.
     pub once: bool,
+    /// How many observers may look on at a time.
+    pub observers: u8,
     /// Takes the object's true pose to a master of this process, for its report; of the first session only.
     pub truth: Option<TruthSender>,
     /// Where sessions are recorded, if anybody wants that.

@@ -2,7 +2,7 @@
 //!
 //! Begins with the slave that the hello asks for, ends with the report. It decides nothing about the model.
 
-mod end;
+pub(super) mod end;
 
 use std::pin::Pin;
 use std::time::Duration;
@@ -15,8 +15,7 @@ use mmt_shared::io::farewell::{
     send_farewell,
 };
 use mmt_shared::io::loop_thread::{self, LoopSide};
-use mmt_shared::io::network_task::{Event, NetworkTask, WAITING_MAX};
-use mmt_shared::io::stream::{WriteFrameError, write_message};
+use mmt_shared::io::network_task::{Event, NetworkTask};
 use mmt_shared::io::ticker::Ticker;
 use mmt_shared::io::transport::{
     CLOSE_FINISHED, CLOSE_TAKEN_OVER, Connection, RecvStream, SendStream,
@@ -24,26 +23,25 @@ use mmt_shared::io::transport::{
 use mmt_shared::model::contact::Coupling;
 use mmt_shared::pairing::TokenName;
 use mmt_shared::report::{MasterHalf, SlaveHalf};
-use mmt_shared::wire::{Ending, Hello, Refusal, Side, StreamMessage};
+use mmt_shared::wire::{Ending, Hello, Refusal, Side};
 use tokio::sync::watch;
-use tokio::time::{sleep, timeout};
+use tokio::time::sleep;
 
 use super::acceptor::{Admitted, refuse};
 use super::context::{Context, SlaveHostError};
 use super::lease::Lease;
 use super::plant_link::PlantHost;
 use super::slave_loop::{Finished, SlaveLoop, Snapshot};
+use super::welcome::welcome;
 use super::{PROGRAM, SlaveLive, SlaveReport, record};
 use crate::end::{DISENGAGE, SlaveEnd, session_config};
-use crate::slave::{Memory, Slave, SlaveConfig};
+use crate::slave::{Memory, SlaveConfig};
 
 use end::{End, SILENCE_MAX};
 
 /// What the read of the master's farewell gives.
 type MastersFarewell = Result<ReceivedFarewell<MasterHalf>, FarewellError>;
 
-/// How long the stream may take to take a message of ours.
-const WRITE_WAIT: Duration = Duration::from_secs(2);
 /// How long the loop may take to end: a tick, or what a stopped or crowded host makes of it.
 const LOOP_WAIT: Duration = Duration::from_secs(5);
 /// The loop's thread.
@@ -118,16 +116,13 @@ pub(super) async fn serve_with(
             return Ok(None);
         }
     };
-    // Datagrams from before the welcome belong to no session.
-    discard(&connection).await;
-    if let Err(error) = welcome(&mut send, &context.config, end.slave(), &lease).await {
-        tracing::warn!(
-            "{} left before its welcome: {error}",
-            connection.remote_address()
-        );
+    let scheme = context.config.trigger.scheme.to_string();
+    let greeting = end.slave().welcome(lease.resume(), &scheme, PROGRAM);
+    if welcome(&connection, &mut send, &greeting).await.is_err() {
         return Ok(None);
     }
     announce(&connection, &name, &hello);
+    context.observers.session_begins(&greeting);
     let mut slave_loop = SlaveLoop::new(end, context.take_truth(), context.emergency.clone());
     let plant = context.plant.as_ref().map(PlantHost::port);
     slave_loop = slave_loop.plugged_into(plant);
@@ -147,30 +142,6 @@ pub(super) async fn serve_with(
         plant_silent: false,
     };
     session.operate(receive, stop, live).await.map(Some)
-}
-
-/// Takes the datagrams that have arrived and were not read, without waiting for more.
-async fn discard(connection: &Connection) {
-    for _ in 0..WAITING_MAX {
-        if !matches!(
-            timeout(Duration::ZERO, connection.read_datagram()).await,
-            Ok(Ok(_))
-        ) {
-            break;
-        }
-    }
-}
-
-async fn welcome(
-    send: &mut SendStream,
-    config: &SlaveConfig,
-    slave: &Slave,
-    lease: &Lease,
-) -> Result<(), WriteFrameError> {
-    let scheme = config.trigger.scheme.to_string();
-    let welcome = slave.welcome(lease.resume(), &scheme, PROGRAM);
-    let welcome = StreamMessage::Welcome((&welcome).into());
-    write_message(send, &welcome, WRITE_WAIT).await
 }
 
 fn announce(connection: &Connection, name: &TokenName, hello: &Hello) {
@@ -310,6 +281,7 @@ impl Session<'_> {
             unsent: self.task.unsent(),
             ..snapshot.live
         });
+        self.context.observers.show(&snapshot.look);
         if snapshot.plant_silent != self.plant_silent {
             self.plant_silent = snapshot.plant_silent;
             if self.plant_silent {

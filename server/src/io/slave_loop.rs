@@ -15,6 +15,7 @@ use super::SlaveLive;
 use super::plant_link::PlantPort;
 use super::record::{self, SlaveSink};
 use crate::end::{SlaveEnd, SlaveGiven};
+use crate::feed::{Look, RecentUpdates};
 use crate::slave::SlaveTick;
 
 /// A snapshot for the network task every so many ticks: 62 a second.
@@ -24,6 +25,8 @@ const SNAPSHOT_TICKS: u64 = 16;
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Snapshot {
     pub(super) live: SlaveLive,
+    /// What observers see; the session's number is not the loop's to know.
+    pub(super) look: Look,
     /// When a datagram of the master last arrived; none before the loop's first snapshot.
     pub(super) last_arrival: Option<Time>,
     /// The plant that is plugged in is silent: the tool stands.
@@ -49,6 +52,8 @@ pub(super) struct SlaveLoop {
     pub(super) truth: Option<TruthSender>,
     pub(super) numbers_spent: bool,
     pub(super) newest: Option<SlaveTick>,
+    /// For observers.
+    updates: RecentUpdates,
     /// Where the session is recorded, if anybody wants that.
     record: Option<SlaveSink>,
     /// The emergency stop of this side.
@@ -64,6 +69,7 @@ impl SlaveLoop {
             truth,
             numbers_spent: false,
             newest: None,
+            updates: RecentUpdates::default(),
             record: None,
             emergency,
             plant: None,
@@ -120,6 +126,9 @@ impl SlaveLoop {
         if let Some(tick) = done {
             if let Some(truth) = &mut self.truth {
                 truth.send(tick.stamp, tick.truth);
+            }
+            if let Some(update) = tick.update {
+                self.updates.push(update);
             }
             self.newest = Some(tick);
         }
@@ -212,6 +221,12 @@ impl SlaveLoop {
         }
         Snapshot {
             live,
+            look: Look {
+                session: 0,
+                updates: self.updates,
+                scene: self.newest.as_ref().map(|tick| slave.scene(tick)),
+                stopped: end.stopped_by().is_some(),
+            },
             last_arrival: Some(channel.last_arrival()),
             plant_silent: self
                 .plant

@@ -4,6 +4,7 @@ mod crowd;
 mod identity;
 mod lease;
 mod master;
+mod observers;
 mod opening;
 mod relay;
 
@@ -44,6 +45,7 @@ fn options() -> SlaveOptions {
         netem_seed: 1,
         netem_extras: SocketExtras::default(),
         once: false,
+        observers: 8,
         truth: None,
         record: None,
         emergency: EmergencyStop::default(),
@@ -208,6 +210,7 @@ async fn a_panic_of_the_thread_ends_the_session_as_failed_and_is_an_error() {
     let context = &host.context;
     let (acceptor, mut masters) = Acceptor::new(
         host.tokens.clone(),
+        Arc::clone(&context.observers),
         Arc::clone(&context.refusals),
         stop.subscribe(),
     );

@@ -12,7 +12,8 @@ mod tests;
 
 pub use choice::{Insecure, Transport};
 pub use connection::{
-    CLOSE_FINISHED, CLOSE_NO_HELLO, CLOSE_NOT_A_HELLO, CLOSE_TAKEN_OVER, Connection, DatagramCounts,
+    CLOSE_FINISHED, CLOSE_NO_HELLO, CLOSE_NOT_A_HELLO, CLOSE_REVOKED, CLOSE_TAKEN_OVER, Connection,
+    DatagramCounts,
 };
 pub use endpoint::Endpoint;
 pub use listen::{AcceptError, Handshake, Listener};

@@ -10,7 +10,7 @@ use mmt_shared::report::MasterHalf;
 use crate::end::DISENGAGE;
 
 /// A master from which nothing arrived for this long has lost its lease (docs/protocol.md, section 2).
-pub(super) const SILENCE_MAX: Duration = Duration::from_secs(10);
+pub(in crate::io) const SILENCE_MAX: Duration = Duration::from_secs(10);
 
 /// Why a session ended.
 #[derive(Debug, thiserror::Error)]

@@ -42,13 +42,14 @@ pub(super) struct Master {
     pub(super) updates: Vec<Update<RawState>>,
     pub(super) architecture: Architecture,
     pub(super) claim: Claim,
+    pub(super) role: Role,
     pub(super) scene_hz: u8,
     _endpoint: Endpoint,
     send: SendStream,
     receive: RecvStream,
     clock: Clock,
     stamp: Time,
-    hip: Vec2,
+    pub(super) hip: Vec2,
 }
 
 pub(super) async fn patiently<T>(future: impl Future<Output = T>) -> T {
@@ -77,6 +78,7 @@ impl Master {
             architecture: Architecture::Mmt,
             scene_hz: 0,
             claim: Claim::IfFree,
+            role: Role::Operator,
             _endpoint: endpoint,
             send,
             receive,
@@ -100,7 +102,7 @@ impl Master {
     ) -> Result<Welcome<RawState>, Refusal> {
         let hello = Hello {
             token,
-            role: Role::Operator,
+            role: self.role,
             claim: self.claim,
             coupling: Coupling::for_stiffness(k_p),
             samples_per_command: PACKED,
@@ -149,12 +151,26 @@ impl Master {
         }
     }
 
+    /// Sends a heartbeat.
+    pub(super) fn beat(&mut self) {
+        let mut out = [0; DATAGRAM_MAX];
+        let now = self.clock.now();
+        let length = self.link.encode(now, Message::Heartbeat, &mut out);
+        let bytes = Bytes::copy_from_slice(&out[..length.unwrap().unwrap()]);
+        self.connection.send_datagram(bytes).unwrap();
+    }
+
+    /// Reads one datagram.
+    pub(super) async fn read(&mut self) {
+        let datagram = self.connection.read_datagram().await.unwrap();
+        self.take(&datagram);
+    }
+
     /// Reads until the slave has sent `heartbeats` heartbeats.
     pub(super) async fn listen(&mut self, heartbeats: u64) {
         let before = self.link.counts().received.heartbeats;
         while self.link.counts().received.heartbeats < before + heartbeats {
-            let datagram = self.connection.read_datagram().await.unwrap();
-            self.take(&datagram);
+            self.read().await;
         }
     }
 

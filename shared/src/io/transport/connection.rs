@@ -18,6 +18,8 @@ pub const CLOSE_NO_HELLO: VarInt = VarInt::from_u32(2);
 pub const CLOSE_NOT_A_HELLO: VarInt = VarInt::from_u32(3);
 /// Close code: another operator has taken over.
 pub const CLOSE_TAKEN_OVER: VarInt = VarInt::from_u32(4);
+/// Close code: the token of an observer was replaced or revoked.
+pub const CLOSE_REVOKED: VarInt = VarInt::from_u32(5);
 /// Close code: one side sends its datagrams by QUIC, the other as raw UDP.
 pub(super) const CLOSE_OTHER_TRANSPORT: VarInt = VarInt::from_u32(1);
 
@@ -51,9 +53,18 @@ impl Connection {
 
     /// Whether the slave closed it because another operator has taken over.
     pub fn is_taken_over(&self) -> bool {
+        self.was_closed_with(CLOSE_TAKEN_OVER)
+    }
+
+    /// Whether the slave closed it because the observer's token was replaced or revoked.
+    pub fn is_revoked(&self) -> bool {
+        self.was_closed_with(CLOSE_REVOKED)
+    }
+
+    fn was_closed_with(&self, code: VarInt) -> bool {
         matches!(
             self.quic.close_reason(),
-            Some(ConnectionError::ApplicationClosed(close)) if close.error_code == CLOSE_TAKEN_OVER
+            Some(ConnectionError::ApplicationClosed(close)) if close.error_code == code
         )
     }
 
