@@ -1,10 +1,11 @@
 #!/usr/bin/env python3
 """A master that pushes the box once, by what docs/protocol.md says: it shares no code with mmt.
 
-usage: client.py PAIRING [--alpn NAME] [--capture FILE.pcap --keys FILE]   (the host an IPv4 address)
+usage: client.py PAIRING [--observe] [--alpn NAME] [--capture FILE.pcap --keys FILE]   (the host an IPv4 address)
 
 Checks the slave's key against the pin, says hello, moves its HIP against the object's western face, pushes,
-lets go, rests until only heartbeats go, says farewell. Prints one JSON document of what it saw.
+lets go, rests until only heartbeats go, says farewell. With --observe it looks on instead, until the slave
+ends. Prints one JSON document of what it saw.
 Exit code: 0 the session ended as it should; 3 the slave refused; 4 the key is not the pinned one;
 5 no protocol in common; 1 anything else. Python 3.10 or later with aioquic (tests/protocol/requirements.txt).
 """
@@ -41,6 +42,8 @@ OTHER_VERSION = 1  # code of the close
 NO_APPLICATION_PROTOCOL = 0x178  # TLS alert 120 as an error of QUIC (RFC 9001, section 4.8)
 DATAGRAM_MAX, STREAM_MAX = 1024, 4096
 SAMPLES_PER_COMMAND, SAMPLES_MAX = 10, 32
+SOFTEST = (50.0, 0.0)  # of an observer: every state that is stable for an operator is for this
+SCENE_HZ = 20  # of an observer
 HEARTBEAT_NS = 50_000_000
 REST_NS = 400_000_000  # at the end, without commands; after 2 s of that the slave disengages
 WAIT_S = 10.0  # for each answer; generous, the host may be busy
@@ -188,8 +191,9 @@ class Master(QuicConnectionProtocol):
 class Session:
     """From the welcome to the farewells."""
 
-    def __init__(self, master, welcome):
+    def __init__(self, master, welcome, coupling):
         self.master, self.welcome, self.push = master, welcome, Push(welcome["state"])
+        self.coupling, self.ticks = coupling, 0
         self.began = time.monotonic_ns()  # also the epoch of all stamps
         self.number = self.newest = self.newest_sent = self.newest_at = 0
         self.seen, self.last_sent, self.sequence = set(), 0, 0
@@ -236,7 +240,7 @@ class Session:
             self.updates["duplicate" if sequence in self.sequences else "stale"] += 1
             return
         self.sequences.add(sequence)
-        if not accepted(update["state"], COUPLING):
+        if not accepted(update["state"], self.coupling):
             self.updates["rejected"] += 1
             return
         self.sequence = sequence
@@ -273,12 +277,16 @@ class Session:
             while len(unsent) >= SAMPLES_PER_COMMAND or (unsent and self.push.over):
                 block, unsent = unsent[:SAMPLES_MAX], unsent[SAMPLES_MAX:]
                 self.send("commands", messages.command(self.envelope(), self.sequence, block))
+        self.ticks = ticks
         rested = self.now() + REST_NS
-        while self.now() < rested:
+        await self.beat_until(lambda: self.now() >= rested)
+
+    async def beat_until(self, over):
+        """Sends heartbeats and nothing else."""
+        while not over():
             await asyncio.sleep(0.001)
             if self.now() - self.last_sent >= HEARTBEAT_NS:
                 self.send("heartbeats", messages.heartbeat(self.envelope()))
-        self.ticks = ticks
 
     def farewell(self):
         udp = self.master.capture
@@ -299,22 +307,28 @@ class Session:
                 "last_state": states[-1] if states else None, "slave_farewell": theirs}
 
 
-async def session(master, token, pin):
+async def session(master, token, pin, observes):
     await master.hear()  # the handshake
     offered = master.peer_pin()
     if offered != pin:
         # before the hello: the token is for the pinned slave only
         raise Over(4, outcome="wrong_pin", offered=offered.hex())
-    master.say(messages.hello(token, COUPLING, SAMPLES_PER_COMMAND, START, "independent client"))
+    role, coupling, scene_hz = ((messages.OBSERVER, SOFTEST, SCENE_HZ) if observes
+                                else (messages.OPERATOR, COUPLING, 0))
+    master.say(messages.hello(token, role, coupling, SAMPLES_PER_COMMAND, scene_hz, START, "independent client"))
     kind, fields = await master.hear_message()
     if kind == "refused":
         raise Over(3, outcome="refused", **fields)
     asked = fields["stiffness_n_per_m"], fields["damping_ns_per_m"]
-    if kind != "welcome" or asked != COUPLING or not accepted(fields["state"], COUPLING):
+    if kind != "welcome" or asked != coupling or not accepted(fields["state"], coupling):
         raise Over(1, outcome="a welcome that must be refused", kind=kind, fields=fields)
-    running = Session(master, fields)
+    running = Session(master, fields, coupling)
     master.take_datagram = running.take
-    await running.operate()
+    if observes:
+        # the slave's farewell, or the end of the connection
+        await running.beat_until(lambda: not master.said.empty())
+    else:
+        await running.operate()
     master.say(running.farewell())
     kind, theirs = await master.hear_message()
     if kind != "farewell":
@@ -339,7 +353,7 @@ async def run(arguments, files):
     await loop.create_datagram_endpoint(lambda: master, local_addr=("0.0.0.0", 0))
     try:
         master.connect((host, port))
-        return await session(master, token, pin)
+        return await session(master, token, pin, arguments.observe)
     finally:
         master.close(error_code=0, reason_phrase="the session is over")
         await asyncio.wait_for(master.wait_closed(), WAIT_S)
@@ -348,6 +362,7 @@ async def run(arguments, files):
 def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
     parser.add_argument("pairing")
+    parser.add_argument("--observe", action="store_true", help="look on, until the slave ends")
     parser.add_argument("--alpn", action="append", help="offer this protocol instead; repeatable")
     parser.add_argument("--capture", help="keep the UDP datagrams here (pcap)")
     parser.add_argument("--keys", help="keep the secrets of TLS here (SSLKEYLOGFILE)")

@@ -9,6 +9,7 @@ import struct
 
 VERSION = 3
 COMMAND, HEARTBEAT, HELLO, FAREWELL = 1, 4, 16, 19
+OPERATOR, OBSERVER = 0, 1
 TICK_NS = 1_000_000
 
 
@@ -85,10 +86,10 @@ def command(fields, newest_update, samples):
     return out + option(None, f64)
 
 
-def hello(token, coupling, samples_per_command, hip, program):
-    operator, if_free, mmt, no_scenes = u32(0), u32(0), u32(0), bytes([0])
-    return (header(HELLO) + token + operator + if_free + f64(*coupling) + bytes([samples_per_command])
-            + mmt + no_scenes + f64(*hip) + text(program))
+def hello(token, role, coupling, samples_per_command, scene_hz, hip, program):
+    if_free, mmt = u32(0), u32(0)
+    return (header(HELLO) + token + u32(role) + if_free + f64(*coupling) + bytes([samples_per_command])
+            + mmt + bytes([scene_hz]) + f64(*hip) + text(program))
 
 
 def farewell(report):

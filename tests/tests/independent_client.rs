@@ -219,3 +219,35 @@ fn who_has_another_pin_or_token_or_version_gets_no_session() {
         }
     });
 }
+
+#[test]
+fn an_observer_that_knows_only_the_document_sees_what_the_master_beside_it_is_sent() {
+    alone(|| {
+        let Some(python) = python("the observer of the independent client", "aioquic") else {
+            return;
+        };
+        let place = tempfile::tempdir().unwrap();
+        let (mut slave, pairing) = slave(place.path());
+        let mut command = Command::new(&python);
+        command.arg(root().join("tests/protocol/client.py"));
+        command.args([&pairing, "--observe"]);
+        let observer = ok(Running::start(command));
+        ok(slave.wait_for_line(GENEROUS, |line| line.contains("looks on as operator")));
+        said(&client(&python, &pairing, &[]), 0);
+        // the slave ends after its first session; so does the observer
+        let observer = said(&ok(observer.end(GENEROUS)), 0);
+        let slave = ok(slave.end(GENEROUS));
+        assert_eq!(slave.status.code(), Some(0), "{}", slave.err);
+        it_pushed(&observer);
+        let resume = observer.pointer("/welcome/resume").cloned();
+        assert_eq!(resume, Some(json!("00".repeat(32))));
+        assert!(get(&observer, "/received/scenes") > 1.0);
+        assert_eq!(get(&observer, "/sent/commands"), 0.0);
+        assert_eq!(get(&observer, "/updates_dropped/rejected"), 0.0);
+        assert_eq!(get(&observer, "/received/tools"), 0.0);
+        let ending = observer.pointer("/slave_farewell/ending");
+        assert_eq!(ending, Some(&json!("interrupted")), "{observer:#}");
+        let slave = ok(slave.document(1));
+        assert_eq!(get(&slave, "/drops/observer_commands_refused"), 0.0);
+    });
+}
