@@ -56,6 +56,9 @@ fn execute(command: Command) -> Result<(), Failure> {
     match command {
         Command::Demo(arguments) => commands::demo::run(&arguments, &messages),
         Command::Slave(arguments) => commands::slave::run(arguments, &messages),
+        Command::Master(arguments) if arguments.observe => {
+            commands::observe::run(&arguments, &messages)
+        }
         Command::Master(arguments) => commands::master::run(arguments, &messages),
         Command::Netem(arguments) => commands::netem::run(&arguments, &messages),
         Command::Replay(arguments) => commands::replay::run(&arguments),

@@ -9,6 +9,7 @@ pub mod end;
 pub mod failsafe;
 pub mod limiter;
 pub mod master;
+pub mod observer;
 pub mod operator;
 pub mod path;
 pub mod tdpa;

@@ -5,6 +5,7 @@ mod harness;
 mod identity;
 mod independent_client;
 mod live;
+mod observers;
 mod plugs;
 mod records;
 mod run_again;

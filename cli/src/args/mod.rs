@@ -223,6 +223,11 @@ pub(crate) struct MasterArguments {
     /// What `mmt slave` printed; - asks for it, or reads it from stdin, and keeps it out of the list of processes
     #[arg(value_name = "PAIRING")]
     pub(crate) pairing: PairingWords,
+    /// Look on and move nothing, as any number of others may, while somebody else operates or nobody does
+    #[arg(long, conflicts_with_all = ["take_over", "operator", "push", "device", "device_config", "device_at", "device_listen",
+          "device_insecure", "stiffness", "architecture", "record", "record_path", "samples_per_command", "repeat_samples",
+          "stretch_max"])]
+    pub(crate) observe: bool,
     /// Who moves the hand: scripted, pointer (in the console), or trace:FILE
     #[arg(long, value_name = "WHO", default_value = "scripted", value_parser = values::operator)]
     pub(crate) operator: OperatorWords,

@@ -173,3 +173,36 @@ fn every_experiment_can_be_asked_for_and_all_of_them() {
         assert!(!asked.is_empty());
     }
 }
+
+#[test]
+fn an_observer_takes_nothing_over_and_has_no_hand() {
+    let Ok(Command::Master(observer)) = parse(&["master", "mmt://…", "--observe"]) else {
+        panic!("no master");
+    };
+    assert!(observer.observe);
+    for words in [
+        &["--take-over"][..],
+        &["--operator", "pointer"],
+        &["--device", "falcon"],
+        &["--record", "file.mcap"],
+        &["--stiffness", "500"],
+    ] {
+        let text = complaint(&[&["master", "mmt://…", "--observe"], words].concat());
+        assert!(text.contains("cannot be used with"), "{text}");
+        assert!(text.contains(words[0]), "{text}");
+    }
+    let listen = ["slave", "--listen", "127.0.0.1:0"];
+    let observers = |words: &[&str]| match parse(&[&listen[..], words].concat()) {
+        Ok(Command::Slave(slave)) => Ok(slave.observers),
+        Ok(_) => panic!("no slave"),
+        Err(text) => Err(text),
+    };
+    assert_eq!(observers(&[]), Ok(8));
+    assert_eq!(observers(&["--observers", "0"]), Ok(0));
+    assert_eq!(observers(&["--observers", "64"]), Ok(64));
+    assert!(
+        observers(&["--observers", "65"])
+            .unwrap_err()
+            .contains("0..=64")
+    );
+}

@@ -1,7 +1,8 @@
 //! The operator's console as a command serves it: what it shows, and what it may change.
 
 use mmt_client::io::MasterLive;
-use mmt_client::io::console::{Console, NetworkWish, Order};
+use mmt_client::io::console::{Console, NetworkWish, Order, Source};
+use mmt_client::observer::ObserverLive;
 use mmt_client::operator::pointer::HandEvent;
 use mmt_netem::Direction;
 use mmt_netem::LinkConfig;
@@ -27,6 +28,12 @@ pub(super) const SCENE_HZ: u8 = 30;
 struct Frame {
     master: MasterLive,
     slave: Option<SlaveLive>,
+}
+
+/// What an observer sees, as the page reads it.
+#[derive(Serialize)]
+struct ObserverFrame {
+    observer: ObserverLive,
 }
 
 /// Of a session what the hand meets, and no more: the remote object as last seen would show the delay.
@@ -114,7 +121,6 @@ impl Desk {
         mut master: impl FnMut() -> MasterLive + Send + 'static,
         mut slave: impl FnMut() -> Option<SlaveLive> + Send + 'static,
     ) {
-        self.sessions += 1;
         let blind = self.blind;
         let source = move || {
             let frame = if blind {
@@ -127,7 +133,29 @@ impl Desk {
             // numbers and names only: it cannot fail
             serde_json::to_string(&frame).unwrap_or_default()
         };
-        self.console.show(Box::new(source));
+        self.begin(caption, Box::new(source));
+    }
+
+    /// Shows what an observer sees; no page may do anything.
+    pub(super) fn show_observer(
+        &mut self,
+        caption: &Caption,
+        mut observer: impl FnMut() -> ObserverLive + Send + 'static,
+    ) {
+        self.console.look_on();
+        let source = move || {
+            let observer = observer();
+            // numbers and names only: it cannot fail
+            serde_json::to_string(&ObserverFrame { observer }).unwrap_or_default()
+        };
+        self.begin(caption, Box::new(source));
+        self.tell([("observes", json!(true))]);
+    }
+
+    fn begin(&mut self, caption: &Caption, source: Source) {
+        self.sessions += 1;
+        let blind = self.blind;
+        self.console.show(source);
         self.tell([
             ("command", json!((!blind).then_some(caption.command))),
             ("setting", json!((!blind).then_some(&caption.setting))),

@@ -295,7 +295,7 @@ fn trace(path: &Path, push: Option<usize>) -> Result<Trace, Failure> {
 }
 
 /// The host's own words, and the exit code that belongs to them.
-fn host_failure(error: &MasterHostError) -> Failure {
+pub(super) fn host_failure(error: &MasterHostError) -> Failure {
     use MasterHostError as E;
     let exit = match error {
         E::Insecure(_) | E::OutOfRange(_) | E::Lookup { .. } | E::NoAddress { .. } => Exit::Usage,
@@ -311,6 +311,8 @@ fn host_failure(error: &MasterHostError) -> Failure {
         | E::Busy { .. }
         | E::WrongToken { .. }
         | E::WrongRole { .. }
+        | E::Full { .. }
+        | E::NoObservers { .. }
         | E::BadHello { .. }
         | E::Ending { .. }
         | E::Unexpected { .. }

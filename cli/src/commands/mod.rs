@@ -15,6 +15,7 @@ pub(crate) mod live;
 pub(crate) mod manual;
 pub(crate) mod master;
 pub(crate) mod netem;
+pub(crate) mod observe;
 mod record;
 pub(crate) mod replay;
 pub(crate) mod report;

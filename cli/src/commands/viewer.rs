@@ -4,6 +4,7 @@ use std::io;
 use std::time::{Duration, Instant};
 
 use mmt_client::io::MasterLive;
+use mmt_client::observer::ObserverLive;
 use mmt_server::io::SlaveLive;
 
 use crate::log::Messages;
@@ -72,9 +73,21 @@ impl Viewer {
     /// Shows both sides, reads the keys, and returns when it is time for the next frame.
     pub(super) fn look(&mut self, slave: Option<SlaveLive>, master: Option<MasterLive>) {
         let tried_s = self.began.elapsed().as_secs_f64();
-        self.history.push(Snapshot::new(slave, master, tried_s));
+        self.turn(Snapshot::new(slave, master, tried_s));
+    }
+
+    /// Shows what an observer sees, reads the keys, and returns when it is time for the next frame.
+    pub(super) fn look_on(&mut self, observer: ObserverLive) {
+        let tried_s = self.began.elapsed().as_secs_f64();
+        self.turn(Snapshot::of_observer(observer, tried_s));
+    }
+
+    fn turn(&mut self, now: Snapshot) {
+        self.history.push(now);
         match self.show() {
             Ok(Some(Wish::End)) => self.stop.ask(),
+            // an observer stops nothing
+            Ok(Some(Wish::Stop | Wish::Clear)) if now.observer.is_some() => {}
             Ok(Some(Wish::Stop)) => self.stop.emergency().set(true),
             Ok(Some(Wish::Clear)) => self.stop.emergency().set(false),
             Ok(None) => {}

@@ -52,7 +52,7 @@ pub(crate) fn render(
     let halves = [Constraint::Fill(1), Constraint::Fill(1)];
     let [left, right] = Layout::horizontal(halves).areas(middle);
     render_head(frame, head, caption, &history.newest());
-    render_scene(frame, left, history.newest().master.as_ref());
+    render_scene(frame, left, &history.newest());
     render_numbers(frame, right, caption, history);
     let newest = messages.iter().rev().take(usize::from(shown)).rev();
     let lines: Vec<Line<'_>> = newest.map(|text| Line::from(text.as_str())).collect();
@@ -71,13 +71,19 @@ fn render_head(frame: &mut Frame<'_>, area: Rect, caption: &Caption, now: &Snaps
     };
     let wide = area.width >= NARROW;
     let master = now.master.filter(|_| wide).map(|master| master.in_contact);
-    let slave = now.slave.filter(|_| wide).map(|slave| slave.in_contact);
+    let slave = now.slave.map(|slave| slave.in_contact);
+    let slave = slave.or(now.observer.map(|observer| observer.in_contact));
+    let keys = if now.observer.is_some() {
+        "   q ends"
+    } else {
+        "   q ends, space stops"
+    };
     let first = Line::from(vec![
         Span::styled(format!("mmt {}", caption.command), bold),
         Span::raw(format!("   {:.1}{of} s", now.elapsed_s())),
         Span::raw(contact("master", master)),
-        Span::raw(contact("slave", slave)),
-        Span::styled("   q ends, space stops", Style::new().fg(Color::DarkGray)),
+        Span::raw(contact("slave", slave.filter(|_| wide))),
+        Span::styled(keys, Style::new().fg(Color::DarkGray)),
     ]);
     let second = Line::from(caption.setting.as_str()).style(Style::new().fg(Color::DarkGray));
     frame.render_widget(Paragraph::new(vec![first, second]), area);

@@ -37,8 +37,7 @@ pub(crate) fn line(caption: &Caption, history: &History) -> String {
         let unsent = missing.unsent.filter(|n| *n > 0).map(|n| n as f64);
         add(&format!("unsent {way}"), unsent, 0, "");
     }
-    let in_use = now.master.map(|master| master.params);
-    let model = now.slave.map(|slave| slave.estimate).or(in_use);
+    let model = now.slave.map(|slave| slave.estimate).or(now.params());
     add("mass", model.map(|[mass, _, _]| mass), 3, " kg");
     add(
         "pushes",
@@ -48,11 +47,12 @@ pub(crate) fn line(caption: &Caption, history: &History) -> String {
         0,
         "",
     );
+    let seen = now.observer.and(now.scene_age_s());
+    add("scene", seen.map(|age_s| age_s * 1e3), 0, " ms old");
     if let Some(stopped) = now.stopped() {
         let _ = write!(text, "  {stopped}");
     }
-    let silent = now.master.map(|master| master.link);
-    if let Some(state) = silent.filter(|state| *state != LinkState::Fresh) {
+    if let Some(state) = now.link().filter(|state| *state != LinkState::Fresh) {
         let _ = write!(text, "  link {}", state.name());
     }
     text

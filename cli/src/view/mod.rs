@@ -9,9 +9,12 @@ mod panels;
 mod scene;
 mod screen;
 
+use mmt_client::failsafe::LinkState;
 use mmt_client::io::MasterLive;
+use mmt_client::observer::ObserverLive;
 use mmt_server::io::SlaveLive;
 use mmt_shared::channel::peer::Loss;
+use mmt_shared::model::tool::Scene;
 use mmt_shared::model::update::Cause;
 
 pub(crate) use dashboard::render;
@@ -42,7 +45,9 @@ pub(crate) struct Snapshot {
     pub(crate) slave: Option<SlaveLive>,
     /// The master.
     pub(crate) master: Option<MasterLive>,
-    /// For how long the master has tried to connect, s; none once its session has begun.
+    /// An observer: then neither of the two is here.
+    pub(crate) observer: Option<ObserverLive>,
+    /// For how long the master or the observer has tried to connect, s; none once its session has begun.
     pub(crate) connecting_s: Option<f64>,
 }
 
@@ -70,14 +75,27 @@ impl Snapshot {
     pub(crate) fn elapsed_s(&self) -> f64 {
         let master = self.master.map(|master| master.elapsed_s);
         let slave = self.slave.map(|slave| slave.elapsed_s);
-        master.or(slave).unwrap_or(0.0)
+        let observer = self.observer.map(|observer| observer.elapsed_s);
+        master.or(slave).or(observer).unwrap_or(0.0)
     }
 
-    /// |f_s|, N; where only the master is here that of the newest scene, which is as old as the scene.
+    /// The remote scene as it last came.
+    fn scene(&self) -> Option<Scene> {
+        let observed = self.observer.and_then(|observer| observer.scene);
+        self.master.and_then(|master| master.scene).or(observed)
+    }
+
+    /// How old it is, s.
+    fn scene_age_s(&self) -> Option<f64> {
+        let observed = self.observer.and_then(|observer| observer.scene_age_s);
+        let master = self.master.and_then(|master| master.scene_age_s);
+        master.or(observed)
+    }
+
+    /// |f_s|, N; where the slave is not here that of the newest scene, which is as old as the scene.
     fn f_s(&self) -> Option<f64> {
-        let shown = self.master.and_then(|master| master.scene);
         let here = self.slave.map(|slave| slave.f_s);
-        here.or(shown.map(|scene| scene.force))
+        here.or(self.scene().map(|scene| scene.force))
             .map(|f_s| f_s.norm())
     }
 
@@ -92,16 +110,32 @@ impl Snapshot {
         self.slave.map(|slave| (slave.f_s - slave.f_shadow).norm())
     }
 
-    /// Updates sent, by cause; applied, where only the master is here.
+    /// Updates sent, by cause; applied, where only the master is here; taken by an observer.
     fn updates(&self) -> Option<[u64; Cause::ALL.len()]> {
         let applied = self.master.map(|master| master.updates_applied);
-        self.slave.map(|slave| slave.updates).or(applied)
+        let taken = self.observer.map(|observer| observer.updates);
+        let sent = self.slave.map(|slave| slave.updates);
+        sent.or(applied).or(taken)
+    }
+
+    /// m, b, c in use at the master; of an observer those of the newest update.
+    fn params(&self) -> Option<[f64; 3]> {
+        let taken = self.observer.map(|observer| observer.params);
+        self.master.map(|master| master.params).or(taken)
+    }
+
+    /// The link as the master or the observer sees it.
+    fn link(&self) -> Option<LinkState> {
+        let observed = self.observer.map(|observer| observer.link);
+        self.master.map(|master| master.link).or(observed)
     }
 
     /// Median round trip, ms.
     fn rtt_ms(&self) -> Option<f64> {
         let slave = self.slave.and_then(|slave| slave.rtt_ms);
-        self.master.and_then(|master| master.rtt_ms).or(slave)
+        let observer = self.observer.and_then(|observer| observer.rtt_ms);
+        let master = self.master.and_then(|master| master.rtt_ms);
+        master.or(slave).or(observer)
     }
 
     /// Both sides, of which the master began to connect `tried_s` (s) ago.
@@ -110,12 +144,25 @@ impl Snapshot {
         Self {
             slave,
             master,
+            observer: None,
             connecting_s: master.filter(|master| connects(*master)).map(|_| tried_s),
         }
     }
 
-    /// Whose emergency stop is set, in words; none if neither's.
+    /// What an observer sees, who began to connect `tried_s` (s) ago.
+    pub(crate) fn of_observer(observer: ObserverLive, tried_s: f64) -> Self {
+        Self {
+            observer: Some(observer),
+            connecting_s: observer.footprint.is_none().then_some(tried_s),
+            ..Self::default()
+        }
+    }
+
+    /// Whose emergency stop is set, in words; none if neither's. An observer does not learn whose.
     fn stopped(&self) -> Option<String> {
+        if self.observer.is_some_and(|observer| observer.stopped) {
+            return Some("EMERGENCY STOP".to_owned());
+        }
         let master = self.master.and_then(|master| master.stopped_by);
         let side = master.or(self.slave.and_then(|slave| slave.stopped_by));
         side.map(|side| format!("EMERGENCY STOP ({})", side.name()))
@@ -123,10 +170,12 @@ impl Snapshot {
 
     /// What does not arrive, up and down.
     fn missing(&self) -> [Missing; 2] {
-        let (master, slave) = (self.master, self.slave);
+        let (master, slave, observer) = (self.master, self.slave, self.observer);
         let up = (master.map(|m| m.up)).or_else(|| slave.map(|s| s.up));
+        let up = up.or(observer.map(|o| o.up));
         let unsent = [master.map(|m| m.unsent), slave.map(|s| s.unsent)];
         let down = master.map(|m| m.down.on_the_path(unsent[1].unwrap_or(0), 0));
+        let down = down.or(observer.map(|o| o.down));
         let of = |(counted, unsent): (Option<Loss>, Option<u64>)| Missing {
             share: counted.and_then(|counted| counted.share()),
             unsent,

@@ -1,5 +1,6 @@
 //! The dashboard's numbers, each section in lines of at most 30 columns. What is not known is a dash.
 
+use mmt_client::failsafe::LinkState;
 use mmt_shared::model::update::Cause;
 
 use super::{Caption, History, Missing, Snapshot};
@@ -18,7 +19,7 @@ pub(super) fn link(caption: &Caption, now: &Snapshot) -> Vec<String> {
         let slave = format!("{}, {tried_s:.0} s", caption.slave);
         return vec!["link: connecting to".to_owned(), slave];
     }
-    let state = now.master.map_or("-", |master| master.link.name());
+    let state = now.link().map_or("-", LinkState::name);
     let state = now.stopped().unwrap_or_else(|| format!("link: {state}"));
     let way = |(name, way): (&str, &Missing)| {
         let share = shown(way.share.map(|share| share * 100.0), 1, " %");
@@ -34,16 +35,20 @@ pub(super) fn link(caption: &Caption, now: &Snapshot) -> Vec<String> {
 /// m, b, c: estimated, true, in use; the force on the hand, pushes.
 pub(super) fn model(caption: &Caption, now: &Snapshot) -> Vec<String> {
     let estimate = now.slave.map(|slave| slave.estimate);
-    let in_use = now.master.map(|master| master.params);
+    let newest = if now.observer.is_some() {
+        "update"
+    } else {
+        "master"
+    };
     let mut lines = vec![format!(
         "{:7}{:>9}{:>7}{:>7}",
-        "model", "estimate", "truth", "master"
+        "model", "estimate", "truth", newest
     )];
     for (index, label) in ["m kg", "b N s/m", "c N"].into_iter().enumerate() {
         let of = |values: Option<[f64; 3]>| {
             shown(values.and_then(|values| values.get(index).copied()), 3, "")
         };
-        let (estimate, truth, in_use) = (of(estimate), of(caption.truth), of(in_use));
+        let (estimate, truth, in_use) = (of(estimate), of(caption.truth), of(now.params()));
         lines.push(format!("{label:7}{estimate:>9}{truth:>7}{in_use:>7}"));
     }
     let hand = shown(now.master.map(|master| master.hand_force.norm()), 2, " N");
@@ -102,7 +107,7 @@ pub(super) fn updates_in_words(history: &History, width: usize) -> Vec<String> {
 
 /// What the counts of updates are of.
 fn title(now: &Snapshot) -> &'static str {
-    if now.slave.is_some() {
+    if now.slave.is_some() || now.observer.is_some() {
         "updates"
     } else {
         "applied"

@@ -1,9 +1,8 @@
 //! What the operator sees, from above: the local model with the HIP, and behind it, as a ghost, the remote scene as it
-//! last came.
+//! last came. An observer sees the object of the newest update in the model's place, and no HIP.
 //!
 //! The model is where it is felt; the title has the age of the ghost. Draws; moves nothing.
 
-use mmt_client::io::MasterLive;
 use mmt_shared::model::geometry::{BoxFootprint, Pose, Vec2, rotate};
 use ratatui::Frame;
 use ratatui::layout::Rect;
@@ -12,6 +11,8 @@ use ratatui::symbols::Marker;
 use ratatui::text::{Line, Span};
 use ratatui::widgets::Block;
 use ratatui::widgets::canvas::{Canvas, Context, Line as Stroke, Points};
+
+use super::Snapshot;
 
 /// Half of the width that is shown, m: the box and the way to any of its faces.
 const HALF_WIDTH_M: f64 = 0.45;
@@ -23,37 +24,58 @@ const MODEL: Color = Color::Cyan;
 const HIP: Color = Color::White;
 const GHOST: Color = Color::DarkGray;
 
-/// Draws the scene of a master; nothing before its session has begun.
-pub(super) fn render_scene(frame: &mut Frame<'_>, area: Rect, master: Option<&MasterLive>) {
+/// What is drawn of the local model, or of what stands for it.
+struct Model {
+    pose: Pose,
+    sides: BoxFootprint,
+    hip: Option<Vec2>,
+}
+
+/// None before the session has begun.
+fn model(now: &Snapshot) -> Option<Model> {
+    let (pose, sides, hip) = match (&now.master, &now.observer) {
+        (Some(master), _) => (master.model, master.footprint, Some(master.hip)),
+        (None, Some(observer)) => (observer.model, observer.footprint, None),
+        (None, None) => return None,
+    };
+    sides.map(|sides| Model { pose, sides, hip })
+}
+
+/// Draws the scene; nothing before the session has begun.
+pub(super) fn render_scene(frame: &mut Frame<'_>, area: Rect, now: &Snapshot) {
     let inner_height = f64::from(area.height.saturating_sub(1).max(1));
     let half_height_m = HALF_WIDTH_M * CELL_HEIGHT * inner_height / f64::from(area.width.max(1));
-    let known = master.and_then(|master| master.footprint.map(|sides| (master, sides)));
+    let known = model(now);
     // the box stays in the middle
-    let middle = known.map_or(Vec2::zeros(), |(master, _)| master.model.position);
+    let middle = known
+        .as_ref()
+        .map_or(Vec2::zeros(), |model| model.pose.position);
     let canvas = Canvas::default()
-        .block(Block::new().title(title(master)))
+        .block(Block::new().title(title(now)))
         .marker(Marker::Braille)
         .x_bounds([middle.x - HALF_WIDTH_M, middle.x + HALF_WIDTH_M])
         .y_bounds([middle.y - half_height_m, middle.y + half_height_m])
         .paint(|context| {
-            let Some((master, sides)) = known else {
+            let Some(Model { pose, sides, hip }) = &known else {
                 return;
             };
-            if let Some(scene) = &master.scene {
+            if let Some(scene) = now.scene() {
                 let gap_m = 2.0 * HALF_WIDTH_M * DOTS_GAP / f64::from(area.width.max(1));
-                dots(context, &corners(&scene.object, &sides), gap_m);
+                dots(context, &corners(&scene.object, sides), gap_m);
                 mark(context, scene.tool, "+", GHOST);
             }
             context.layer();
-            outline(context, &corners(&master.model, &sides));
-            mark(context, master.hip, "o", HIP);
+            outline(context, &corners(pose, sides));
+            if let Some(hip) = hip {
+                mark(context, *hip, "o", HIP);
+            }
         });
     frame.render_widget(canvas, area);
 }
 
 /// Which is which.
-fn title(master: Option<&MasterLive>) -> Line<'static> {
-    let ghost = match master.and_then(|master| master.scene_age_s) {
+fn title(now: &Snapshot) -> Line<'static> {
+    let ghost = match now.scene_age_s() {
         Some(age_s) => format!("┄ remote {:.0} ms ago", age_s * 1e3),
         None => "┄ remote -".to_owned(),
     };

@@ -268,7 +268,8 @@ fn the_scene_shows_the_model_and_behind_it_the_ghost_where_the_slave_saw_it() {
     let Snapshot { master, .. } = snapshot(1.0);
     let mut draw = |master: Option<MasterLive>| {
         let shown = terminal.draw(|frame| {
-            scene::render_scene(frame, frame.area(), master.as_ref());
+            let now = Snapshot::new(None, master, 0.0);
+            scene::render_scene(frame, frame.area(), &now);
         });
         let cells = shown.unwrap().buffer.content().to_vec();
         let drawn = |colour| {
@@ -301,4 +302,63 @@ fn the_scene_shows_the_model_and_behind_it_the_ghost_where_the_slave_saw_it() {
     });
     assert_eq!(draw(blind).1.0, 0, "no ghost that never came");
     assert_eq!(draw(None).0.0, 0);
+}
+
+fn observed() -> ObserverLive {
+    let of_master = snapshot(1.0).master.unwrap();
+    ObserverLive {
+        elapsed_s: 1.0,
+        footprint: of_master.footprint,
+        params: [0.699, 2.9, 2.05],
+        in_contact: true,
+        scene: of_master.scene.map(|scene| Scene {
+            force: Vec2::new(0.0, 4.5),
+            ..scene
+        }),
+        scene_age_s: Some(0.21),
+        updates: [7, 10, 0, 1, 2, 0],
+        rtt_ms: Some(101.5),
+        ..ObserverLive::default()
+    }
+}
+
+#[test]
+fn an_observer_sees_the_slaves_side_no_hand_and_no_key_that_stops() {
+    let mut history = History::default();
+    history.push(Snapshot::of_observer(ObserverLive::default(), 3.2));
+    let text = line(&caption(), &history);
+    assert_eq!(text, "connecting to 192.0.2.7:4433, 3 s");
+    history.push(Snapshot::of_observer(observed(), 1.0));
+    let shown = screen(80, 24, &history, &[]);
+    for part in [
+        "slave touches",
+        "q ends",
+        "┄ remote 210 ms ago",
+        "|f_s| slave 4.50 N",
+        "|f_m| master -",
+        "updates      so far",
+        "timer            10",
+        "update",
+        "0.699",
+        "link: fresh  rtt 101.5 ms",
+        "hand -   pushes -",
+    ] {
+        assert!(shown.contains(part), "{part}\n{shown}");
+    }
+    assert!(!shown.contains("space stops"), "{shown}");
+    let text = line(&caption(), &history);
+    for part in [
+        "f_s 4.50 N",
+        "updates 20",
+        "mass 0.699 kg",
+        "scene 210 ms old",
+    ] {
+        assert!(text.contains(part), "{part}: {text}");
+    }
+    let stopped = ObserverLive {
+        stopped: true,
+        ..observed()
+    };
+    history.push(Snapshot::of_observer(stopped, 1.0));
+    assert!(line(&caption(), &history).contains("EMERGENCY STOP"));
 }

@@ -23,6 +23,8 @@ pub enum SessionEnd {
     ModelBroken,
     /// Another operator has taken the slave over.
     TakenOver,
+    /// The token of an observer was replaced or revoked.
+    Revoked,
     /// The connection broke or was closed.
     ConnectionLost,
     /// The slave sent on the stream what it must not send there, or closed it.
@@ -39,6 +41,7 @@ impl SessionEnd {
             Self::LinkSilent
             | Self::ModelBroken
             | Self::TakenOver
+            | Self::Revoked
             | Self::ConnectionLost
             | Self::StreamBroken => Ending::Failed,
         }
@@ -63,6 +66,9 @@ impl fmt::Display for SessionEnd {
                  defect of mmt; please report it with the report of this session"
             }
             Self::TakenOver => "another operator has taken the slave over",
+            Self::Revoked => {
+                "the token was replaced or revoked: ask the slave's owner for another pairing string"
+            }
             Self::ConnectionLost => {
                 "the connection to the slave was lost: see whether it still runs, and start again"
             }

@@ -125,10 +125,24 @@ pub enum MasterHostError {
         /// The slave.
         address: SocketAddr,
     },
+    /// As many observers as it admits are there.
+    #[error(
+        "as many observers as the slave at {address} admits are looking on: try again later, or start it with a greater --observers"
+    )]
+    Full {
+        /// The slave.
+        address: SocketAddr,
+    },
+    /// It admits no observers.
+    #[error("the slave at {address} admits no observers: start it with --observers N")]
+    NoObservers {
+        /// The slave.
+        address: SocketAddr,
+    },
     /// The token is an observer's.
     #[error(
-        "the slave at {address} lets the token of this pairing string look on and not operate: ask its owner for an \
-         operator's (`mmt identity rotate --name NAME --role operator`)"
+        "the slave at {address} lets the token of this pairing string look on and not operate: add --observe, or ask \
+         its owner for an operator's (`mmt identity rotate --name NAME --role operator`)"
     )]
     WrongRole {
         /// The slave.

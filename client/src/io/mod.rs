@@ -13,6 +13,7 @@ pub mod device;
 mod end;
 mod error;
 pub mod haptic;
+mod observe;
 mod open;
 pub mod record;
 mod report;
@@ -54,6 +55,7 @@ use crate::path::PathRecorder;
 use device::DevicePort;
 pub use end::SessionEnd;
 pub use error::MasterHostError;
+pub use observe::{ObserverConfiguration, ObserverOptions, ObserverReport, observe};
 pub use resume::ResumeFile;
 pub use session::run;
 

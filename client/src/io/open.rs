@@ -1,11 +1,11 @@
-//! From a pairing string to a session: look up, connect, hello, welcome.
+//! From a pairing string to a session, an operator's or an observer's: look up, connect, hello, welcome.
 
 use std::net::{Ipv4Addr, Ipv6Addr, SocketAddr};
 use std::sync::Arc;
 use std::time::Duration;
 
-use mmt_netem::LinkId;
-use mmt_netem::io::socket::{EmulatedSocket, SocketMeter};
+use mmt_netem::io::socket::{EmulatedSocket, SocketExtras, SocketMeter};
+use mmt_netem::{LinkConfig, LinkId};
 use mmt_shared::io::congestion::RateCap;
 use mmt_shared::io::connect::ConnectError;
 use mmt_shared::io::farewell::FAREWELL_WAIT;
@@ -13,9 +13,10 @@ use mmt_shared::io::quic::Traffic;
 use mmt_shared::io::socket;
 use mmt_shared::io::stream::{read_frame, write_message};
 use mmt_shared::io::transport::{
-    CLOSE_FINISHED, Connection, Endpoint, RecvStream, SendStream, WriteError,
+    CLOSE_FINISHED, Connection, Endpoint, RecvStream, SendStream, Transport, WriteError,
 };
 use mmt_shared::model::geometry::Vec2;
+use mmt_shared::pairing::Pairing;
 use mmt_shared::wire::{
     Architecture, Claim, DATAGRAM_MAX, Hello, Label, Refusal, Role, STREAM_MESSAGE_MAX, Side,
     StreamMessage, Welcome,
@@ -80,16 +81,44 @@ pub(super) struct Opened {
     pub(super) welcome: Welcome,
 }
 
-/// Opens a session for an operator that starts at `hip`.
+/// What a session is opened with.
+#[derive(Clone, Debug)]
+pub(super) struct Opening {
+    pub(super) pairing: Pairing,
+    pub(super) transport: Transport,
+    /// Emulated network on what leaves here, its seed, its record and control.
+    pub(super) netem: LinkConfig,
+    pub(super) netem_seed: u64,
+    pub(super) netem_extras: SocketExtras,
+    /// What leaves here at the most.
+    pub(super) traffic: Traffic,
+    pub(super) hello: Hello,
+}
+
+impl Opening {
+    /// An operator's that starts at `hip`, m.
+    pub(super) fn of_operator(options: &MasterOptions, hip: Vec2) -> Self {
+        Self {
+            pairing: options.pairing.clone(),
+            transport: options.transport,
+            netem: options.netem.clone(),
+            netem_seed: options.netem_seed,
+            netem_extras: options.netem_extras.clone(),
+            traffic: traffic(&options.commands, options.architecture),
+            hello: hello(options, hip),
+        }
+    }
+}
+
+/// Opens a session.
 pub(super) async fn open(
-    options: &MasterOptions,
-    hip: Vec2,
+    opening: &Opening,
     timeouts: &Timeouts,
 ) -> Result<Opened, MasterHostError> {
-    let addresses = look_up(options, timeouts.lookup).await?;
+    let addresses = look_up(&opening.pairing, timeouts.lookup).await?;
     let mut first_error = None;
     for address in addresses {
-        match open_at(options, address, hip, timeouts).await {
+        match open_at(opening, address, timeouts).await {
             Ok(opened) => return Ok(opened),
             // a name can have an address that leads nowhere: the next may be the one
             Err(error) if leads_nowhere(&error) => {
@@ -99,15 +128,12 @@ pub(super) async fn open(
         }
     }
     Err(first_error.unwrap_or_else(|| MasterHostError::NoAddress {
-        address: options.pairing.address.to_string(),
+        address: opening.pairing.address.to_string(),
     }))
 }
 
-async fn look_up(
-    options: &MasterOptions,
-    limit: Duration,
-) -> Result<Vec<SocketAddr>, MasterHostError> {
-    let address = options.pairing.address.to_string();
+async fn look_up(pairing: &Pairing, limit: Duration) -> Result<Vec<SocketAddr>, MasterHostError> {
+    let address = pairing.address.to_string();
     let found = timeout(limit, tokio::net::lookup_host(address.clone())).await;
     let found = match found {
         Ok(Ok(found)) => found,
@@ -136,25 +162,24 @@ fn leads_nowhere(error: &MasterHostError) -> bool {
 }
 
 async fn open_at(
-    options: &MasterOptions,
+    opening: &Opening,
     address: SocketAddr,
-    hip: Vec2,
     timeouts: &Timeouts,
 ) -> Result<Opened, MasterHostError> {
-    options.transport.permit(address)?;
+    opening.transport.permit(address)?;
     let local: SocketAddr = match address {
         SocketAddr::V4(_) => (Ipv4Addr::UNSPECIFIED, 0).into(),
         SocketAddr::V6(_) => (Ipv6Addr::UNSPECIFIED, 0).into(),
     };
     let plain = socket::for_quic(socket::bind(local)?).map_err(MasterHostError::Socket)?;
-    let (netem, extras) = (options.netem.clone(), options.netem_extras.clone());
-    let seed = options.netem_seed;
+    let (netem, extras) = (opening.netem.clone(), opening.netem_extras.clone());
+    let seed = opening.netem_seed;
     let wrapped = EmulatedSocket::try_new(plain, netem, seed, LinkId::UP, extras)?;
     let meter = wrapped.meter();
-    let endpoint = Endpoint::of_master(options.transport, Arc::new(wrapped))?;
-    let traffic = traffic(&options.commands, options.architecture);
+    let endpoint = Endpoint::of_master(opening.transport, Arc::new(wrapped))?;
+    let (pin, traffic) = (opening.pairing.pin, opening.traffic);
     let connection = endpoint
-        .connect(address, options.pairing.pin, traffic, timeouts.connect)
+        .connect(address, pin, traffic, timeouts.connect)
         .await?;
     let connected = Connected {
         endpoint,
@@ -162,7 +187,7 @@ async fn open_at(
         meter,
         address,
     };
-    match greet(options, &connected.connection, hip, timeouts.welcome).await {
+    match greet(&opening.hello, &connected.connection, timeouts.welcome).await {
         Ok((send, receive, welcome)) => Ok(Opened {
             connected,
             send,
@@ -192,21 +217,19 @@ fn traffic(commands: &CommandConfig, architecture: Architecture) -> Traffic {
 }
 
 async fn greet(
-    options: &MasterOptions,
+    hello: &Hello,
     connection: &Connection,
-    hip: Vec2,
     limit: Duration,
 ) -> Result<(SendStream, RecvStream, Welcome), MasterHostError> {
     let address = connection.remote_address();
     let unsent = |source| MasterHostError::HelloUnsent { address, source };
     let opened = connection.open_bi().await;
     let (mut send, mut receive) = opened.map_err(|error| unsent(WriteError::from(error).into()))?;
-    let hello = hello(options, hip);
-    let written = write_message(&mut send, &StreamMessage::Hello(hello), limit).await;
+    let written = write_message(&mut send, &StreamMessage::Hello(*hello), limit).await;
     written.map_err(unsent)?;
     let answer = read_frame(&mut receive, STREAM_MESSAGE_MAX, limit).await;
     let answer = answer.map_err(|source| MasterHostError::NoWelcome { address, source })?;
-    let welcome = judge(&answer, address, &hello)?;
+    let welcome = judge(&answer, address, hello)?;
     Ok((send, receive, welcome))
 }
 
@@ -250,7 +273,10 @@ fn judge(answer: &[u8], address: SocketAddr, hello: &Hello) -> Result<Welcome, M
 }
 
 fn refused(refusal: Refusal, address: SocketAddr, hello: &Hello) -> MasterHostError {
+    let observes = hello.role == Role::Observer;
     match refusal {
+        Refusal::Busy if observes => MasterHostError::Full { address },
+        Refusal::WrongRole if observes => MasterHostError::NoObservers { address },
         Refusal::Busy => MasterHostError::Busy { address },
         Refusal::WrongToken => MasterHostError::WrongToken { address },
         Refusal::BadHello => MasterHostError::BadHello {

@@ -17,7 +17,7 @@ use tokio::sync::watch;
 use tokio::time::{Instant, error::Elapsed, timeout_at};
 
 use super::haptic::HapticLoop;
-use super::open::{Opened, TIMEOUTS, Timeouts, open};
+use super::open::{Opened, Opening, TIMEOUTS, Timeouts, open};
 use super::report::half;
 use super::{
     MasterConfiguration, MasterHostError, MasterLive, MasterOptions, MasterReport, SessionEnd,
@@ -70,8 +70,9 @@ pub(super) async fn run_with(
     // before anybody is asked
     ForceLimiter::try_new(options.device.limits())?;
     let start = options.operator.begin(first_view())?.start();
+    let opening = Opening::of_operator(&options, start);
     let opened = tokio::select! {
-        opened = open(&options, start, &timeouts) => opened?,
+        opened = open(&opening, &timeouts) => opened?,
         () = asked_to_stop(&mut stop) => return Err(MasterHostError::Interrupted),
     };
     let welcome = &opened.welcome;

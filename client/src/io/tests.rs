@@ -18,13 +18,14 @@ use mmt_shared::wire::{Architecture, Ending, Message, Refusal};
 use tokio::sync::watch;
 use tokio::time::{Instant, sleep, timeout};
 
-use super::open::{TIMEOUTS, Timeouts, open};
+use super::open::{Opening, TIMEOUTS, Timeouts, open};
 use super::session::{operate, run_with};
 use super::*;
 use fake::{Fake, Session};
 
 mod fake;
 mod haptic;
+mod observe;
 mod refusals;
 
 /// Longer than any healthy test needs on any host.
@@ -348,10 +349,8 @@ async fn the_emulated_link_loses_what_it_is_told_to_and_says_so() {
 async fn a_panic_in_the_haptic_thread_is_an_error_and_closes_the_connection() {
     let fake = Fake::new();
     let options = scripted(&fake);
-    let (opened, slave) = tokio::join!(
-        open(&options, Vec2::new(-0.45, 0.0), &TIMEOUTS),
-        Session::welcomed(&fake)
-    );
+    let opening = Opening::of_operator(&options, Vec2::new(-0.45, 0.0));
+    let (opened, slave) = tokio::join!(open(&opening, &TIMEOUTS), Session::welcomed(&fake));
     let (_stop, stop) = watch::channel(false);
     let (live, _shown) = watch::channel(MasterLive::default());
     let clock = Clock::start();

@@ -81,6 +81,8 @@ struct Stage {
     operator: Option<u64>,
     /// Whether the script never gets the hand.
     no_script: bool,
+    /// Whether no page may do anything: there is no hand.
+    looks_on: bool,
     viewers: usize,
     viewers_ever: u64,
 }
@@ -176,6 +178,11 @@ impl Console {
     /// From now on no page gives the hand to the script.
     pub fn refuse_script(&self) {
         self.shared.stage().no_script = true;
+    }
+
+    /// From now on every page only looks on: none operates, stops, or has anything done.
+    pub fn look_on(&self) {
+        self.shared.stage().looks_on = true;
     }
 
     /// Gives the loop an event; lost where no loop runs.

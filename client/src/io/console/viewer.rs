@@ -64,7 +64,7 @@ impl Viewer {
 
     fn take(&self) {
         let mut stage = self.shared.stage();
-        if stage.operator.is_none() {
+        if stage.operator.is_none() && !stage.looks_on {
             stage.operator = Some(self.number);
             stage.give(HandEvent::NewPage);
             self.shared.operator.send_replace(stage.operator);
@@ -83,8 +83,8 @@ impl Viewer {
     fn role(&self, operator: Option<u64>) -> String {
         let role = match operator {
             Some(number) if number == self.number => "operator",
-            Some(_) => "observer",
-            None => "free",
+            None if !self.shared.stage().looks_on => "free",
+            _ => "observer",
         };
         format!(r#"{{"role":"{role}"}}"#)
     }
@@ -102,7 +102,8 @@ impl Viewer {
         }
         {
             let mut stage = self.shared.stage();
-            let may = stage.operator == Some(self.number) || message == FromPage::Stop;
+            let operates = stage.operator == Some(self.number);
+            let may = operates || (message == FromPage::Stop && !stage.looks_on);
             if !may {
                 return;
             }

@@ -2,6 +2,13 @@
 
 const RETRY_MS = 1000;
 
+/** An observer's frame in the form of a master's, which has no hand. */
+function handless({ observer }) {
+  const none = { hip: null, f_m: null, hand_force: null, proxy: null, person: null, lateness_p99_us: null };
+  const stopped_by = observer.stopped ? "either" : null;
+  return { master: { ...observer, ...none, stopped_by, engaged: false }, slave: null };
+}
+
 export class Link extends EventTarget {
   constructor() {
     super();
@@ -46,8 +53,8 @@ export class Link extends EventTarget {
       } else if (message.about) {
         this.about = message.about;
         this.#tell("about");
-      } else if (message.master) {
-        this.frame = message;
+      } else if (message.master || message.observer) {
+        this.frame = message.observer ? handless(message) : message;
         this.#tell("frame");
       }
     };

@@ -35,7 +35,7 @@ let packets = [];
 let log = [];
 let before = null;
 
-const norm = ([x, y]) => Math.hypot(x, y);
+const norm = (vector) => (vector ? Math.hypot(...vector) : undefined);
 const shown = (value, digits, unit) => (value === null || value === undefined ? "–" : `${value.toFixed(digits)} ${unit}`);
 const signed = (value, digits) => {
   const text = Math.abs(value).toFixed(digits);
@@ -161,22 +161,24 @@ function writeState(frame) {
     $(id).setAttribute("aria-pressed", Boolean(on));
     $(id).disabled = !link.operates || !person || !running || (id === "driver" && Boolean(about.study));
   }
-  $("stop").disabled = !running;
+  $("stop").disabled = !running || about.observes;
   $("end").disabled = !running || !link.operates || Boolean(about.study);
   $("scene").classList.toggle("watching", !link.operates || !running || !person);
-  const hint = !running ? "" : !person ? "A script pushes; you watch." : !link.operates ? "Another page has the hand; you watch."
+  const hint = !running ? "" : about.observes ? "You look on; whoever operates is elsewhere." : !person ? "A script pushes; you watch." : !link.operates ? "Another page has the hand; you watch."
     : frame.master.stopped_by ? "" : person.paused ? "The hand rests. Press P to go on." : pointer.held ? "" : scripted ? "A script pushes. Drag anywhere to take the hand." : "Drag anywhere to push. The hand feels what the model feels.";
   $("hint").textContent = hint;
   document.body.classList.toggle("no-truth", !frame?.slave);
   const touch = frame?.master.in_contact ? "touches the box" : "is free";
-  return `${state}; you are ${role}; ${running ? `the hand ${touch}` : about.why ?? ""}.`;
+  const what = about.observes ? "the tool" : "the hand";
+  return `${state}; you are ${role}; ${running ? `${what} ${touch}` : about.why ?? ""}.`;
 }
 
 function banner() {
   const { about } = link;
   const lost = !link.open ? "No connection to mmt: it has ended, or this page's address has another token. Trying again …" : null;
   const ended = about.state === "ended" && !about.study ? `The session ended: ${about.why}.` : null;
-  const stopped = { master: "Emergency stop: no force on the hand, and the tool stands.", slave: "The slave's emergency stop is set: it is cleared there." };
+  const stopped = { master: "Emergency stop: no force on the hand, and the tool stands.", slave: "The slave's emergency stop is set: it is cleared there.",
+    either: "An emergency stop is set: the tool stands." };
   const text = lost ?? ended ?? stopped[link.frame?.master.stopped_by] ?? about.note;
   if (text === banner.text && link.operates === banner.operates) return;
   [banner.text, banner.operates] = [text, link.operates];
@@ -223,6 +225,8 @@ link.addEventListener("about", () => {
   session = link.about.session;
   $("command").textContent = link.about.study ? "study" : link.about.command ?? "console";
   $("setting").textContent = link.about.setting ?? "";
+  document.body.classList.toggle("observing", Boolean(link.about.observes));
+  $("model-key").textContent = link.about.observes ? "as the newest update has it" : "local model, felt now";
   banner();
 });
 for (const name of ["open", "closed", "role", "unreachable"]) link.addEventListener(name, banner);
@@ -244,7 +248,7 @@ function paint(now) {
   const { frame } = link;
   if (frame?.master) {
     scene.draw(frame, seconds, pointer.held);
-    feedback.feel(norm(frame.master.hand_force), FORCE_MAX_N, now);
+    feedback.feel(norm(frame.master.hand_force) ?? 0, FORCE_MAX_N, now);
   }
   odd = !odd;
   // every second frame will do for what is read

@@ -72,7 +72,7 @@ export class Network {
     }
     this.dots = this.dots.filter((dot) => now - dot.born < across + 0.4);
     for (const dot of calm.matches ? [] : this.dots) this.#dot(c, dot, (now - dot.born) / across, edge, w, lanes);
-    for (const [x, name, below, colour] of [[edge / 2, "master", "your hand", colours.model], [w - edge / 2, "slave", "the box", colours.remote]]) {
+    for (const [x, name, below, colour] of [[edge / 2, ...(frame.master.hip ? ["master", "your hand"] : ["observer", "you look on"]), colours.model], [w - edge / 2, "slave", "the box", colours.remote]]) {
       c.fillStyle = colours.sheet;
       c.strokeStyle = colour;
       c.lineWidth = 2;
@@ -89,7 +89,7 @@ export class Network {
     c.fillStyle = colours.dim;
     c.textAlign = "left";
     const wide = w > 620;
-    if (wide) c.fillText("the hand's motion →", edge + 10, h * 0.13);
+    if (wide) c.fillText(frame.master.hip ? "the hand's motion →" : "heartbeats →", edge + 10, h * 0.13);
     c.textAlign = "right";
     const slower = across / oneWay;
     const speed = slower > 1.05 ? `  ·  shown ${slower >= 10 ? slower.toFixed(0) : slower.toFixed(1)} × slower` : "";

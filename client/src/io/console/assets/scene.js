@@ -65,7 +65,9 @@ export class Scene {
     const { context: c, w, h } = fit(this.canvas);
     this.scale = Math.min(w, h * 1.15) / SHOWN_M;
     const { master, slave } = frame;
-    this.#follow(master.model.position, seconds, held, w, h);
+    // who has no hand looks at the remote side
+    const followed = master.hip ? master.model : master.scene?.object ?? master.model;
+    this.#follow(followed.position, seconds, held, w, h);
     this.#remember(master);
     const at = ([x, y]) => [w / 2 + (x - this.camera[0]) * this.scale, h / 2 - (y - this.camera[1]) * this.scale];
     this.#floor(c, w, h, at);
@@ -79,12 +81,16 @@ export class Scene {
       this.#ring(c, at(remote.tool), 6, this.colours.remote);
       this.#arrow(c, at(remote.tool), remote.force, this.colours.remote, 7);
     }
+    this.#scaleBar(c, w, h);
+    if (master.hip) this.#drawHand(c, at, master, w, h);
+  }
+
+  #drawHand(c, at, master, w, h) {
     const hip = at(master.hip);
     if (master.proxy) this.#spring(c, hip, at(master.proxy), this.colours.model, 4);
     this.#arrow(c, master.proxy ? at(master.proxy) : hip, master.f_m, this.colours.model, -7);
     this.#hand(c, hip, master);
     this.#away(c, hip, w, h);
-    this.#scaleBar(c, w, h);
     this.#lens(master);
     this.#giveWay(hip, w, h);
   }
