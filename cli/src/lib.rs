@@ -69,6 +69,7 @@ fn execute(command: Command) -> Result<(), Failure> {
         Command::Live(arguments) => commands::live::run(&arguments),
         Command::Reproduce(arguments) => commands::reproduce::run(arguments),
         Command::Swarm(arguments) => commands::swarm::run(&arguments),
+        Command::Soak(arguments) => commands::soak::run(&arguments),
         Command::Sweep(arguments) => commands::sweep::run(&arguments),
         Command::Doctor(arguments) => commands::doctor::run(&arguments),
         Command::Device(arguments) => commands::device::run(&arguments),

@@ -131,6 +131,37 @@ impl Interval {
     }
 }
 
+/// A straight line's slope by least squares.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Slope {
+    /// How many points there were.
+    pub n: usize,
+    /// y for each x.
+    pub value: f64,
+    /// Its standard error, for points whose distances to the line are independent.
+    pub error: f64,
+}
+
+impl Slope {
+    /// Of points (x, y); none of fewer than three, and none where all x are the same.
+    #[must_use]
+    pub fn of(points: &[(f64, f64)]) -> Option<Self> {
+        let n = points.len();
+        let freedom = n.checked_sub(2).filter(|freedom| *freedom > 0)?;
+        let mean_x = mean(points.iter().map(|(x, _)| *x))?;
+        let mean_y = mean(points.iter().map(|(_, y)| *y))?;
+        let off = || points.iter().map(|(x, y)| (x - mean_x, y - mean_y));
+        let spread: f64 = off().map(|(x, _)| x * x).sum();
+        if spread <= 0.0 {
+            return None;
+        }
+        let value = off().map(|(x, y)| x * y).sum::<f64>() / spread;
+        let squares: f64 = off().map(|(x, y)| (y - value * x) * (y - value * x)).sum();
+        let error = (squares / freedom as f64 / spread).sqrt();
+        Some(Self { n, value, error })
+    }
+}
+
 /// The mean; none without values.
 #[must_use]
 pub fn mean(values: impl IntoIterator<Item = f64>) -> Option<f64> {
@@ -204,6 +235,16 @@ mod tests {
         );
         assert_eq!(quantile(&[7.0], 0.99), Some(7.0));
         assert_eq!(quantile(&[], 0.5), None);
+    }
+
+    #[test]
+    fn the_slope_of_a_hand_computed_case() {
+        // distances to the line 0.9 x + 0.4: -0.4, 0.7, -0.2, -0.1
+        let slope = Slope::of(&[(0.0, 0.0), (1.0, 2.0), (2.0, 2.0), (3.0, 3.0)]).unwrap();
+        assert!((slope.value - 0.9).abs() < 1e-12 && slope.n == 4);
+        assert!((slope.error - (0.7_f64 / 2.0 / 5.0).sqrt()).abs() < 1e-12);
+        assert_eq!(Slope::of(&[(0.0, 1.0), (1.0, 2.0)]), None);
+        assert_eq!(Slope::of(&[(1.0, 1.0), (1.0, 2.0), (1.0, 3.0)]), None);
     }
 
     #[test]

@@ -20,7 +20,7 @@ use mmt_shared::range::OutOfRange;
 use crate::check::Verdict;
 use crate::worlds::RandomWorld;
 
-pub use faults::{Fault, Scheduled};
+pub use faults::{Fault, Scheduled, draw};
 
 /// What a run of the swarm came to.
 #[derive(Clone, Debug, PartialEq)]
@@ -66,7 +66,7 @@ pub fn swarm(seed: u64, duration: Duration) -> Result<Swarmed, SwarmError> {
         world.config.slave.tool_compliance = None;
         world.config.slave.sensing.force_lag_ms = 0.0;
     }
-    let faults = faults::draw(seed, duration);
+    let faults = draw(seed, duration, &Fault::ALL);
     run::Run::try_new(seed, &world, faults)?.finish(duration)
 }
 

@@ -40,6 +40,9 @@ pub(super) const REPRODUCE: &str = include_str!("help/reproduce.txt").trim_ascii
 /// Examples of `mmt swarm`.
 pub(super) const SWARM: &str = include_str!("help/swarm.txt").trim_ascii_end();
 
+/// Examples of `mmt soak`.
+pub(super) const SOAK: &str = include_str!("help/soak.txt").trim_ascii_end();
+
 /// Examples of `mmt sweep`.
 pub(super) const SWEEP: &str = include_str!("help/sweep.txt").trim_ascii_end();
 

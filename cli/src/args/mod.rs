@@ -3,6 +3,7 @@
 mod bench;
 mod config;
 mod console;
+mod demo;
 mod device;
 mod doctor;
 mod help;
@@ -12,6 +13,7 @@ mod plant;
 mod records;
 mod reproduce;
 mod slave;
+mod soak;
 mod swarm;
 mod sweep;
 mod transport;
@@ -39,6 +41,7 @@ pub(crate) use bench::{
 };
 pub(crate) use config::{ConfigArguments, ConfigCommand, ShowArguments};
 pub(crate) use console::ConsoleArguments;
+pub(crate) use demo::DemoArguments;
 pub(crate) use device::{
     DeviceArguments, DeviceListArguments, DeviceTestArguments, DeviceWords, DevicesArguments,
     DevicesCommand, PlugWords,
@@ -53,6 +56,7 @@ pub(crate) use records::LiveArguments;
 pub(crate) use records::{CheckArguments, ExportArguments, ReplayArguments, ReportArguments};
 pub(crate) use reproduce::ReproduceArguments;
 pub(crate) use slave::SlaveArguments;
+pub(crate) use soak::SoakArguments;
 pub(crate) use swarm::SwarmArguments;
 pub(crate) use sweep::SweepArguments;
 pub(crate) use transport::TransportArguments;
@@ -104,6 +108,9 @@ pub(crate) enum Command {
     /// Random worlds with random faults in virtual time, judged as check judges records
     #[command(after_help = help::SWARM)]
     Swarm(SwarmArguments),
+    /// Real processes for hours, with random faults: does anything break, leak or grow?
+    #[command(after_help = help::SOAK)]
+    Soak(SoakArguments),
     /// Run any grid over configuration in virtual time: in shards, resumable, the same bytes
     #[command(after_help = help::SWEEP)]
     Sweep(SweepArguments),
@@ -133,88 +140,6 @@ pub(crate) enum Command {
     Bench(BenchArguments),
 }
 
-/// Arguments of `mmt demo`.
-#[derive(Clone, Debug, Args)]
-pub(crate) struct DemoArguments {
-    /// How long the operator works; a demo that a browser shows goes on until that is closed
-    #[arg(long, value_name = "TIME", default_value = "20s", value_parser = values::duration)]
-    pub(crate) duration: Duration,
-    /// Configuration of both sides, TOML (docs/configuration.md)
-    #[arg(long, value_name = "FILE")]
-    pub(crate) config: Option<PathBuf>,
-    /// Seed of operator, sensors and network [default: the file's, else 1]
-    #[arg(long, value_name = "N")]
-    pub(crate) seed: Option<u64>,
-    /// Emulated network in each direction [default: the file's, else "delay 50ms 5ms loss 1%"]
-    #[arg(long, value_name = "WORDS", value_parser = values::netem)]
-    pub(crate) netem: Option<LinkConfig>,
-    /// Emulated network from master to slave [default: --netem]
-    #[arg(long, value_name = "WORDS", value_parser = values::netem)]
-    pub(crate) netem_up: Option<LinkConfig>,
-    /// Emulated network from slave to master [default: --netem]
-    #[arg(long, value_name = "WORDS", value_parser = values::netem)]
-    pub(crate) netem_down: Option<LinkConfig>,
-    /// Record and control of the emulated networks
-    #[command(flatten)]
-    pub(crate) emulation: EmulationArguments,
-    /// Record the session of both ends in this file, MCAP: for mmt replay, report, export and the tools of ROS 2
-    #[arg(long, value_name = "FILE")]
-    pub(crate) record: Option<PathBuf>,
-    /// The bundle of choices [default: the file's, else recommended]
-    #[arg(long, value_name = "NAME", value_parser = values::mode())]
-    pub(crate) mode: Option<Mode>,
-    /// Whose force the hand feels [default: the file's, else mmt]
-    #[arg(long, value_name = "NAME", value_parser = values::architecture())]
-    pub(crate) architecture: Option<Architecture>,
-    /// Bodies and walls, TOML [default: the configuration's, else one cube]
-    #[arg(long, value_name = "FILE")]
-    pub(crate) scene: Option<PathBuf>,
-    /// When updates are sent [default: the file's, else the mode's]
-    #[arg(long, value_name = "WORDS", value_parser = values::scheme)]
-    pub(crate) scheme: Option<Scheme>,
-    /// What carries the session.
-    #[command(flatten)]
-    pub(crate) transport: TransportArguments,
-    /// When an update is repeated, such as "10ms 30ms", or none [default: the file's, else the mode's]
-    #[arg(long, value_name = "WORDS")]
-    pub(crate) repeats: Option<Repeats>,
-    /// How many commands before it each command repeats the samples of [default: the file's, else 0]
-    #[arg(long, value_name = "N", value_parser = values::repeat_samples())]
-    pub(crate) repeat_samples: Option<u8>,
-    /// Greatest factor that congestion may stretch Delta, T_update and the time between samples by; 1: off
-    /// [default: the file's, else the mode's]
-    #[arg(long, value_name = "FACTOR")]
-    pub(crate) stretch_max: Option<StretchMax>,
-    /// The haptic device.
-    #[command(flatten)]
-    pub(crate) device: DeviceArguments,
-    /// A blind comparison: two configurations, in the browser, in random order, a question on each (docs/console.md)
-    #[arg(long, value_names = ["A.toml", "B.toml"], num_args = 2, requires = "consent",
-          conflicts_with_all = ["config", "record", "json", "full", "netem_record", "netem_control", "no_console"])]
-    pub(crate) blind: Option<Vec<PathBuf>>,
-    /// What a participant agrees to, text, with --blind
-    #[arg(long, value_name = "FILE", requires = "blind")]
-    pub(crate) consent: Option<PathBuf>,
-    /// What a participant is asked after each part, with --blind
-    #[arg(
-        long,
-        value_name = "TEXT",
-        requires = "blind",
-        default_value = "How real did the box feel?"
-    )]
-    pub(crate) question: String,
-    /// Folder of the answers and records, with --blind
-    #[arg(long, value_name = "DIR", requires = "blind", default_value = "study")]
-    pub(crate) study: PathBuf,
-    /// The console; on a terminal there is one unless it is switched off.
-    #[command(flatten)]
-    pub(crate) console: ConsoleArguments,
-    /// Print every number of the report; without it a sentence and ten lines
-    #[arg(long, conflicts_with = "json")]
-    pub(crate) full: bool,
-    /// Print the report as one JSON document; plain lines instead of the live view
-    #[arg(long)]
-    pub(crate) json: bool,
 }
 
 /// Arguments of `mmt master`.

@@ -18,6 +18,10 @@ use mmt_shared::wire::{Architecture, SAMPLES_MAX};
 const DURATION_MAX: Duration = Duration::from_secs(7 * 24 * 3600);
 /// The shortest duration accepted: a tick.
 const DURATION_MIN: Duration = Duration::from_millis(1);
+/// The longest soak, hours.
+const HOURS_MAX: f64 = 168.0;
+/// The shortest: two cycles of sessions.
+const HOURS_MIN: f64 = 0.002;
 /// The units of a duration, in ms.
 const UNITS: [(&str, f64); 5] = [
     ("ms", 1.0),
@@ -87,6 +91,14 @@ pub(super) fn duration(text: &str) -> Result<Duration, String> {
     } else {
         Err(wrong())
     }
+}
+
+/// Hours of a soak.
+pub(super) fn hours(text: &str) -> Result<f64, String> {
+    let number = text.parse::<f64>().ok();
+    number
+        .filter(|hours| (HOURS_MIN..=HOURS_MAX).contains(hours))
+        .ok_or_else(|| format!("write a number of hours from {HOURS_MIN} to {HOURS_MAX}"))
 }
 
 /// A link in netem's words; a caret line points at the wrong one.

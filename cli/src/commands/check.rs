@@ -1,5 +1,7 @@
 //! `mmt check`: do recorded sessions keep what is promised? By the judges of `mmt_lab::check`.
 
+use std::path::PathBuf;
+
 use mmt_lab::again::AgainError;
 use mmt_lab::check::{CheckError, Invariant, Judged, RecordChecks, Verdict, Violation};
 use mmt_shared::io::record::{Ended, RecordError, read};
@@ -51,9 +53,24 @@ pub(super) struct Row {
 /// # Errors
 /// A record cannot be read or is of another version; an invariant is broken; stdout cannot be written to.
 pub(crate) fn run(arguments: &CheckArguments) -> Result<(), Failure> {
+    let (checks, is_whole) = judge(&arguments.files)?;
+    let document = document(arguments, &checks, is_whole);
+    if arguments.json {
+        print_json(&document)?;
+    } else {
+        show(&document)?;
+    }
+    judged(&document)
+}
+
+/// Judges the records of one run, and whether all of them are whole.
+///
+/// # Errors
+/// One cannot be read or is of another version.
+pub(super) fn judge(files: &[PathBuf]) -> Result<(RecordChecks, bool), Failure> {
     let mut checks = RecordChecks::default();
     let mut is_whole = true;
-    for path in &arguments.files {
+    for path in files {
         let ended = read(path, |topic, message| -> Result<(), Error> {
             Ok(checks.take(topic, message)?)
         });
@@ -69,13 +86,7 @@ pub(crate) fn run(arguments: &CheckArguments) -> Result<(), Failure> {
         })?;
         is_whole &= ended == Ended::Whole;
     }
-    let document = document(arguments, &checks, is_whole);
-    if arguments.json {
-        print_json(&document)?;
-    } else {
-        show(&document)?;
-    }
-    judged(&document)
+    Ok((checks, is_whole))
 }
 
 fn document(arguments: &CheckArguments, checks: &RecordChecks, is_whole: bool) -> Document {

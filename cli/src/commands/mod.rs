@@ -21,6 +21,7 @@ pub(crate) mod replay;
 pub(crate) mod report;
 pub(crate) mod reproduce;
 pub(crate) mod slave;
+pub(crate) mod soak;
 pub(crate) mod swarm;
 pub(crate) mod sweep;
 mod viewer;

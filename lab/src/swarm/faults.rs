@@ -128,23 +128,24 @@ impl fmt::Display for Scheduled {
     }
 }
 
-/// The faults of a run: on average one in five seconds, none in the first two.
-pub(super) fn draw(seed: u64, duration: Duration) -> Vec<Scheduled> {
+/// The faults of a run that lasts as long: those `among` which there are, on average one in five seconds, none in the first two.
+#[must_use]
+pub fn draw(seed: u64, duration: Duration, among: &[Fault]) -> Vec<Scheduled> {
     let mut stream = Substream::new(seed, "swarm/faults", 0);
     let whole_s = duration.as_secs_f64();
     let count = stream.uniform_in(0.0, whole_s / 2.5) as usize;
     let mut faults: Vec<_> = (0..count)
-        .filter_map(|_| one(&mut stream, whole_s))
+        .filter_map(|_| one(&mut stream, whole_s, among))
         .collect();
     faults.sort_by_key(|fault| fault.from);
     faults
 }
 
-fn one(stream: &mut Substream, whole_s: f64) -> Option<Scheduled> {
-    let place = stream.uniform_in(0.0, Fault::ALL.len() as f64) as usize;
+fn one(stream: &mut Substream, whole_s: f64, among: &[Fault]) -> Option<Scheduled> {
+    let place = stream.uniform_in(0.0, among.len() as f64) as usize;
     let from_s = stream.uniform_in(2.0, whole_s.max(2.5));
     let (share, strength) = (stream.uniform(), stream.uniform());
-    let fault = *Fault::ALL.get(place)?;
+    let fault = *among.get(place)?;
     let (least, most) = fault.lasts_ms();
     // short ones are as likely as long ones
     let ms = libm::exp(libm::log(least) + share * (libm::log(most) - libm::log(least)));

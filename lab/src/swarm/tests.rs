@@ -17,7 +17,7 @@ fn a_run_is_a_function_of_its_seed() {
 
 #[test]
 fn every_fault_comes_in_a_hundred_runs() {
-    let drawn = |seed| faults::draw(seed, MINUTE);
+    let drawn = |seed| draw(seed, MINUTE, &Fault::ALL);
     let drawn: Vec<_> = (1..=100).flat_map(drawn).collect();
     for fault in Fault::ALL {
         assert!(drawn.iter().any(|of| of.fault == fault), "{fault:?}");

@@ -2,7 +2,7 @@
 
 use super::mmt;
 
-const COMMANDS: [&str; 17] = [
+const COMMANDS: [&str; 18] = [
     "demo",
     "slave",
     "master",
@@ -12,6 +12,7 @@ const COMMANDS: [&str; 17] = [
     "report",
     "export",
     "reproduce",
+    "soak",
     "swarm",
     "sweep",
     "doctor",
