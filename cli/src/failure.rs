@@ -15,6 +15,8 @@ pub(crate) enum Exit {
     NoAnswer = 4,
     /// The address to listen on cannot be had.
     Address = 5,
+    /// A 1 kHz loop has hung, and its watchdog has ended the process.
+    Hung = 6,
 }
 
 impl Exit {

@@ -140,8 +140,6 @@ pub(crate) enum Command {
     Bench(BenchArguments),
 }
 
-}
-
 /// Arguments of `mmt master`.
 #[derive(Debug, Args)]
 pub(crate) struct MasterArguments {

@@ -317,6 +317,7 @@ pub(super) fn host_failure(error: &MasterHostError) -> Failure {
         | E::Ending { .. }
         | E::Unexpected { .. }
         | E::Welcome { .. } => Exit::Refused,
+        E::Hung => Exit::Hung,
         _ => Exit::Failed,
     };
     // what the slave wrote may stand in it

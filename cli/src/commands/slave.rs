@@ -231,6 +231,7 @@ fn host_failure(error: &SlaveHostError) -> Failure {
             .remedy("`mmt identity rotate` makes one; give it the same --identity"),
         SlaveHostError::Insecure(_) => Failure::usage(error),
         SlaveHostError::Netem(_) => Failure::usage(error).remedy("change --netem"),
+        SlaveHostError::Hung => Failure::new(Exit::Hung, error),
         // what a master wrote may stand in it
         _ => Failure::failed(clean(&error.to_string())),
     }
@@ -301,6 +302,12 @@ mod tests {
         assert_eq!(of(&["--config", &file]), ("5ms 20.5ms".to_owned(), 2.0));
         let both = ["--config", &file, "--repeats", "none", "--stretch-max", "1"];
         assert_eq!(of(&both), ("none".to_owned(), 1.0));
+    }
+
+    #[test]
+    fn a_loop_that_has_hung_has_an_exit_code_of_its_own() {
+        assert_eq!(host_failure(&SlaveHostError::Hung).exit(), Exit::Hung);
+        assert_eq!(host_failure(&SlaveHostError::Panicked).exit(), Exit::Failed);
     }
 
     #[test]

@@ -6,6 +6,7 @@ use std::time::Duration;
 
 use mmt_netem::io::socket::WrapError;
 use mmt_shared::io::connect::ConnectError;
+use mmt_shared::io::loop_thread::LoopHandle;
 use mmt_shared::io::quic::EndpointError;
 use mmt_shared::io::socket::BindError;
 use mmt_shared::io::stream::{ReadFrameError, WriteFrameError};
@@ -183,4 +184,21 @@ pub enum MasterHostError {
          mmt; please report it with what stands above"
     )]
     Panicked,
+    /// A tick of the haptic loop did not end; a device has had no force since 50 ms after the last one.
+    #[error(
+        "the haptic loop has hung, the force is off and the session has ended: this is a defect of mmt; please report it \
+         with what stands above"
+    )]
+    Hung,
+}
+
+impl MasterHostError {
+    /// Why a loop left nothing that it ended with.
+    pub(super) fn of_loop<S: Send, T>(of: &LoopHandle<S, T>) -> Self {
+        if of.has_hung() {
+            Self::Hung
+        } else {
+            Self::Panicked
+        }
+    }
 }

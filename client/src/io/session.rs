@@ -12,7 +12,7 @@ use mmt_shared::io::network_task::{Event, NetworkTask, asked_to_stop};
 use mmt_shared::io::stream::delivered;
 use mmt_shared::model::geometry::{BoxFootprint, Pose};
 use mmt_shared::report::SlaveHalf;
-use mmt_shared::wire::Side;
+use mmt_shared::wire::{Ending, Side};
 use tokio::sync::watch;
 use tokio::time::{Instant, error::Elapsed, timeout_at};
 
@@ -145,7 +145,7 @@ pub(super) async fn operate(
         connected
             .close("the master's haptic loop failed", timeouts.idle)
             .await;
-        return Err(MasterHostError::Panicked);
+        return Err(MasterHostError::of_loop(session.task.handle()));
     };
     let duration = (clock.now()).saturating_since(haptic.end.channel().began());
     // the loop knows its own reasons, the network task the others; one without a reason was asked to end
@@ -165,7 +165,11 @@ pub(super) async fn operate(
             delivered(&send, deadline.saturating_duration_since(Instant::now())).await;
         }
     }
-    if let (Some(_), Some(resume)) = (&session.farewell, &options.resume) {
+    // after a session that failed the slave keeps the operator's place for a while
+    let ended_well = |farewell: &ReceivedFarewell<SlaveHalf>| farewell.ending != Ending::Failed;
+    if session.farewell.as_ref().is_some_and(ended_well)
+        && let Some(resume) = &options.resume
+    {
         resume.forget();
     }
     connected.close(&why.to_string(), timeouts.idle).await;
@@ -199,7 +203,7 @@ struct Session<'a> {
 type FarewellRead = Result<ReceivedFarewell<SlaveHalf>, FarewellError>;
 
 impl Session<'_> {
-    /// Runs until the haptic loop has ended; none if it panicked.
+    /// Runs until the haptic loop has ended; none if it panicked or has hung.
     async fn run<F: Future<Output = FarewellRead>>(
         &mut self,
         mut farewell: Pin<&mut F>,

@@ -18,11 +18,12 @@ use mmt_shared::wire::{Architecture, Ending, Message, Refusal};
 use tokio::sync::watch;
 use tokio::time::{Instant, sleep, timeout};
 
-use super::open::{Opening, TIMEOUTS, Timeouts, open};
-use super::session::{operate, run_with};
+use super::open::{TIMEOUTS, Timeouts, open};
+use super::session::run_with;
 use super::*;
 use fake::{Fake, Session};
 
+mod ends;
 mod fake;
 mod haptic;
 mod observe;
@@ -343,28 +344,4 @@ async fn the_emulated_link_loses_what_it_is_told_to_and_says_so() {
     assert!(report.drops.as_ref().unwrap()["netem_loss"] > 0);
     assert!(report.link.loss_up.get().unwrap() > 0.0);
     assert_eq!(report.configuration.netem, "loss 50%");
-}
-
-#[tokio::test]
-async fn a_panic_in_the_haptic_thread_is_an_error_and_closes_the_connection() {
-    let fake = Fake::new();
-    let options = scripted(&fake);
-    let opening = Opening::of_operator(&options, Vec2::new(-0.45, 0.0));
-    let (opened, slave) = tokio::join!(open(&opening, &TIMEOUTS), Session::welcomed(&fake));
-    let (_stop, stop) = watch::channel(false);
-    let (live, _shown) = watch::channel(MasterLive::default());
-    let clock = Clock::start();
-    let opened = opened.unwrap();
-    let ended = operate(
-        &options,
-        opened,
-        clock,
-        |_, _| panic!("meant to happen in this test"),
-        stop,
-        live,
-        &TIMEOUTS,
-    )
-    .await;
-    assert!(matches!(ended, Err(MasterHostError::Panicked)));
-    timeout(FOR_EVER, slave.connection.closed()).await.unwrap();
 }

@@ -8,6 +8,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use mmt_netem::io::socket::{SocketMeter, WrapError};
 use mmt_shared::io::clock::Clock;
 use mmt_shared::io::emergency::EmergencyStop;
+use mmt_shared::io::loop_thread::LoopHandle;
 use mmt_shared::io::quic::EndpointError;
 use mmt_shared::io::record::Recorder;
 use mmt_shared::io::socket::BindError;
@@ -55,6 +56,23 @@ pub enum SlaveHostError {
     /// The 1 kHz thread panicked: a bug.
     #[error("the slave's 1 kHz thread panicked: please report this with what was printed above")]
     Panicked,
+    /// A tick of the 1 kHz thread did not end; the tool stands, because nothing else moves it.
+    #[error(
+        "the slave's 1 kHz thread has hung: the tool stands and the process ends; please report this with what was \
+         printed above"
+    )]
+    Hung,
+}
+
+impl SlaveHostError {
+    /// Why a loop left nothing that it ended with.
+    pub(super) fn of_loop<S: Send, T>(of: &LoopHandle<S, T>) -> Self {
+        if of.has_hung() {
+            Self::Hung
+        } else {
+            Self::Panicked
+        }
+    }
 }
 
 /// What every session needs of its host.

@@ -170,7 +170,7 @@ impl Session<'_> {
         let end = self.until_end(farewell.as_mut(), stop, live).await;
         tracing::info!("{}: {end}", self.connection.remote_address());
         let finished = match end {
-            End::Panicked => None,
+            End::LoopFailed => None,
             _ => self.task.stop_loop(LOOP_WAIT).await,
         };
         let ending = match &end {
@@ -195,6 +195,9 @@ impl Session<'_> {
         let memory = finished
             .as_ref()
             .map(|finished| finished.end.slave().memory());
+        let (Some(own), Some(memory)) = (own, memory) else {
+            return Err(SlaveHostError::of_loop(self.task.handle()));
+        };
         if disengaged {
             tokio::spawn(self.lease.outlive(SILENCE_MAX.saturating_sub(DISENGAGE)));
         }
@@ -203,11 +206,11 @@ impl Session<'_> {
                 seed: self.config.seed,
                 duration_s,
                 ending,
-                own: own.ok_or(SlaveHostError::Panicked)?,
+                own,
                 other: theirs.and_then(|theirs| theirs.report),
                 configuration: self.context.configuration(&self.config),
             },
-            memory: memory.ok_or(SlaveHostError::Panicked)?,
+            memory,
             taken_over,
         })
     }
@@ -261,7 +264,7 @@ impl Session<'_> {
                 Event::Farewell(Ok(farewell)) => return End::Farewell(Box::new(farewell)),
                 Event::Farewell(Err(error)) => return End::Stream(error),
                 Event::Stopped => return End::Asked,
-                Event::LoopEnded(_) => return End::Panicked,
+                Event::LoopEnded(_) => return End::LoopFailed,
                 Event::Disconnected(error) => return End::Disconnected(error),
                 Event::Beat => {
                     if let Some(end) = self.beat(live) {

@@ -23,6 +23,7 @@ use tokio::task::JoinHandle;
 use tokio::time::sleep;
 
 use super::acceptor::Acceptor;
+use super::slave_loop::Finished;
 use super::*;
 use master::{Master, patiently};
 
@@ -203,8 +204,10 @@ async fn a_host_that_is_stopped_says_farewell_and_reports() {
     assert_eq!(report.updates.received.applied, Some(7));
 }
 
-#[tokio::test]
-async fn a_panic_of_the_thread_ends_the_session_as_failed_and_is_an_error() {
+/// What becomes of a session whose loop is this, and what the master is told.
+async fn served_by(
+    body: impl FnOnce() -> Finished + Send + 'static,
+) -> (Result<(), SlaveHostError>, Ending) {
     let host = SlaveHost::bind(options()).unwrap();
     let (stop, mut stopped) = watch::channel(false);
     let context = &host.context;
@@ -231,12 +234,34 @@ async fn a_panic_of_the_thread_ends_the_session_as_failed_and_is_an_error() {
         context.meter.snapshot(),
         &mut stopped,
         &live,
-        |_, _, _, _| panic!("on purpose"),
+        |_, _, mut ticker, _| {
+            ticker.wait();
+            body()
+        },
     );
-    let served = patiently(served).await;
-    assert!(matches!(served, Err(SlaveHostError::Panicked)));
-    assert_eq!(patiently(master).await.unwrap(), Ending::Failed);
+    let served = patiently(served).await.map(|_| ());
+    let told = patiently(master).await.unwrap();
     keeper.abort();
+    (served, told)
+}
+
+#[tokio::test]
+async fn a_panic_of_the_thread_ends_the_session_as_failed_and_is_an_error() {
+    let (served, told) = served_by(|| panic!("on purpose")).await;
+    assert!(matches!(served, Err(SlaveHostError::Panicked)));
+    assert_eq!(told, Ending::Failed);
+}
+
+#[tokio::test]
+async fn a_tick_that_hangs_ends_the_session_as_failed_and_is_an_error() {
+    let hangs = || {
+        loop {
+            std::thread::park();
+        }
+    };
+    let (served, told) = served_by(hangs).await;
+    assert!(matches!(served, Err(SlaveHostError::Hung)));
+    assert_eq!(told, Ending::Failed);
 }
 
 #[tokio::test]

@@ -3,21 +3,20 @@
 //! Between the two there is one pair of bounded rings of frames, a wake-up, a stop flag and the newest snapshot for
 //! viewers, and nothing else. The loop's side never waits, allocates, locks or logs after its first deadline.
 
+mod spawn;
+
 use std::io;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::thread;
 
 use rtrb::{Consumer, Producer, RingBuffer};
 use tokio::sync::oneshot;
 use triple_buffer::{Input, Output, triple_buffer};
 
-use super::clock::Clock;
-use super::realtime::{self, RealTime};
-use super::ticker::Ticker;
 use super::wake::{self, Waker, Wakeup};
-use crate::time::{TICK, Time};
+use crate::time::Time;
 use crate::wire::DATAGRAM_MAX;
+pub use spawn::spawn;
 
 /// Frames that may wait for the loop: at 2000 a second, two seconds in which it stands.
 pub const ARRIVALS_MAX: usize = 4096;
@@ -66,11 +65,12 @@ pub struct LoopHandle<S: Send, T> {
     departures: Consumer<Frame>,
     snapshots: Output<S>,
     stop: Arc<AtomicBool>,
+    hung: Arc<AtomicBool>,
     arrivals_dropped: u64,
     departures_dropped: Arc<AtomicU64>,
     /// Woken when frames are to leave.
     pub wakeup: Wakeup,
-    /// What the loop ends with; closed without a value if it panicked.
+    /// What the loop ends with; closed without a value if it panicked or hangs.
     pub finished: oneshot::Receiver<T>,
 }
 
@@ -114,47 +114,13 @@ pub fn pair<S: Clone + Send, T>(first: &S) -> io::Result<Boundary<S, T>> {
         departures: departures_out,
         snapshots: snapshots_out,
         stop,
+        hung: Arc::default(),
         arrivals_dropped: 0,
         departures_dropped,
         wakeup,
         finished,
     };
     Ok((handle, side, done))
-}
-
-/// Starts a thread of this name that runs `body` with the loop's side and a ticker of 1 ms.
-///
-/// # Errors
-/// The process is out of descriptors or threads.
-pub fn spawn<S, T>(
-    name: &'static str,
-    clock: Clock,
-    first: &S,
-    body: impl FnOnce(LoopSide<S>, Ticker) -> T + Send + 'static,
-) -> io::Result<LoopHandle<S, T>>
-where
-    S: Clone + Send + 'static,
-    T: Send + 'static,
-{
-    let (handle, side, done) = pair(first)?;
-    let run = move || {
-        announce(name, &realtime::request());
-        let ended = body(side, Ticker::new(clock, TICK));
-        // an error means that nobody waits for it any more: the session was dropped
-        let _ = done.send(ended);
-    };
-    thread::Builder::new().name(name.into()).spawn(run)?;
-    Ok(handle)
-}
-
-/// What was not granted is worth a line by default: deadlines will slip.
-fn announce(name: &str, obtained: &RealTime) {
-    let granted = [&obtained.fifo, &obtained.memory, &obtained.slack];
-    if granted.into_iter().all(|of| of.granted()) {
-        tracing::info!("{name}: {obtained}");
-    } else {
-        tracing::warn!("{name}: {obtained}");
-    }
 }
 
 impl<S: Send, T> LoopHandle<S, T> {
@@ -179,6 +145,11 @@ impl<S: Send, T> LoopHandle<S, T> {
     /// Asks the loop to end; then `finished` has what it ends with.
     pub fn stop(&self) {
         self.stop.store(true, Ordering::Release);
+    }
+
+    /// Whether the loop has ended because a tick hung. Its thread is still there.
+    pub fn has_hung(&self) -> bool {
+        self.hung.load(Ordering::Acquire)
     }
 
     /// Datagrams that arrived and found no room before the loop.
@@ -237,6 +208,7 @@ impl<S: Send> LoopSide<S> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::io::clock::Clock;
 
     const AT: fn(u64) -> Time = Time::from_millis;
 
@@ -294,5 +266,30 @@ mod tests {
         let broken = spawn("test", Clock::start(), &0, |_, _| panic!("on purpose"));
         let mut broken: LoopHandle<i32, ()> = broken.unwrap();
         assert!((&mut broken.finished).await.is_err());
+        assert!(!broken.has_hung() && !handle.has_hung());
+    }
+
+    #[tokio::test]
+    async fn a_tick_that_does_not_end_ends_the_loop_whether_it_is_blocked_or_computes() {
+        let over = Arc::new(AtomicBool::new(false));
+        let (release, blocked) = std::sync::mpsc::channel::<()>();
+        let computes = Arc::clone(&over);
+        let blocks = move || {
+            let _ = blocked.recv();
+        };
+        let spins = move || while !computes.load(Ordering::Relaxed) {};
+        let hangs: [Box<dyn FnOnce() + Send>; 2] = [Box::new(blocks), Box::new(spins)];
+        for hang in hangs {
+            let handle = spawn("test", Clock::start(), &0, |_, mut ticker| {
+                ticker.wait();
+                ticker.wait();
+                hang();
+            });
+            let mut handle: LoopHandle<i32, ()> = handle.unwrap();
+            assert!((&mut handle.finished).await.is_err());
+            assert!(handle.has_hung());
+        }
+        over.store(true, Ordering::Relaxed);
+        drop(release);
     }
 }

@@ -34,6 +34,7 @@ pub mod tls;
 pub mod transport;
 pub mod truth;
 pub mod wake;
+pub mod watchdog;
 
 #[cfg(test)]
 mod tests;

@@ -44,7 +44,7 @@ pub enum Event<T, F> {
     Stopped,
     /// The connection is gone.
     Disconnected(ConnectionError),
-    /// The loop has ended, by itself or by a panic (none).
+    /// The loop has ended, by itself, or by a panic or a hang (none).
     LoopEnded(Option<T>),
     /// It is time to read the snapshot.
     Beat,
@@ -185,7 +185,7 @@ impl<S: Send, T> NetworkTask<S, T> {
     }
 
     /// Takes the datagrams that have arrived and were not read, stops the loop and waits for what it ends with, at most
-    /// `limit`; none if it panicked.
+    /// `limit`; none if it panicked or has hung.
     pub async fn stop_loop(&mut self, limit: Duration) -> Option<T> {
         self.drain().await;
         self.handle.stop();

@@ -8,6 +8,7 @@ use std::time::Duration;
 
 use super::clock::{Clock, thread_cpu_time};
 use super::schedule::{Schedule, Tick};
+use super::watchdog::Pulse;
 use crate::report::LoopReport;
 use crate::stats::histogram::{Histogram, Quantiles};
 
@@ -47,6 +48,8 @@ pub struct Ticker {
     cpu: Histogram,
     /// CPU time of the thread at the last wake; none before the first.
     woken_cpu: Option<Duration>,
+    /// Where its ticks are seen by a watchdog.
+    pulse: Pulse,
 }
 
 impl Ticker {
@@ -60,11 +63,20 @@ impl Ticker {
             lateness: Histogram::default(),
             cpu: Histogram::default(),
             woken_cpu: None,
+            pulse: Pulse::default(),
         }
+    }
+
+    /// The same with this pulse: a tick is under way from each wake to the next wait.
+    #[must_use]
+    pub fn watched_by(mut self, pulse: Pulse) -> Self {
+        self.pulse = pulse;
+        self
     }
 
     /// Waits for the next deadline.
     pub fn wait(&mut self) -> Tick {
+        self.pulse.end();
         if let Some(before) = self.woken_cpu {
             self.cpu.record(thread_cpu_time().saturating_sub(before));
         }
@@ -79,6 +91,7 @@ impl Ticker {
         self.skipped = self.skipped.saturating_add(tick.skipped);
         self.lateness.record(tick.lateness);
         self.woken_cpu = Some(thread_cpu_time());
+        self.pulse.begin(tick.skipped);
         tick
     }
 

@@ -110,4 +110,5 @@ fn a_refusal_and_silence_have_exit_codes_of_their_own() {
     let limit = std::time::Duration::from_secs(5);
     let silent = MasterHostError::from(ConnectError::NoAnswer { address, limit });
     assert_eq!(host_failure(&silent).exit(), Exit::NoAnswer);
+    assert_eq!(host_failure(&MasterHostError::Hung).exit(), Exit::Hung);
 }

@@ -31,6 +31,6 @@ pub(in crate::io) enum End {
     Numbers(#[from] NumbersSpent),
     #[error("another operator has taken over")]
     TakenOver,
-    #[error("the 1 kHz thread panicked")]
-    Panicked,
+    #[error("the 1 kHz thread panicked or has hung")]
+    LoopFailed,
 }
