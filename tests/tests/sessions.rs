@@ -1,6 +1,7 @@
 //! What is promised of sessions in real time: one at a time, because each wants two cores.
 
 mod devices;
+mod endure;
 mod harness;
 mod identity;
 mod independent_client;
@@ -9,4 +10,5 @@ mod observers;
 mod plugs;
 mod records;
 mod run_again;
+mod soak;
 mod two_hosts;
