@@ -36,6 +36,12 @@ fn look_on(fake: &Fake) -> Looking {
 }
 
 impl Looking {
+    /// Waits for the welcome, which a close of the slave could overtake.
+    async fn begun(&mut self) {
+        let begun = self.live.wait_for(|live| live.footprint.is_some());
+        timeout(FOR_EVER, begun).await.unwrap().unwrap();
+    }
+
     async fn ended(self) -> Observed {
         timeout(FOR_EVER, self.task).await.unwrap().unwrap()
     }
@@ -79,15 +85,17 @@ async fn an_observer_asks_for_nothing_but_to_see_shows_it_and_reports_what_came(
 #[tokio::test]
 async fn each_end_of_an_observer_has_its_reason() {
     let fake = Fake::new();
-    let looking = look_on(&fake);
+    let mut looking = look_on(&fake);
     let slave = Session::welcomed(&fake).await;
+    looking.begun().await;
     slave.connection.close(CLOSE_REVOKED, b"");
     let (report, why) = looking.ended().await.unwrap();
     assert_eq!((why, report.ending), (SessionEnd::Revoked, Ending::Failed));
     assert!(why.to_string().contains("replaced or revoked"));
 
-    let looking = look_on(&fake);
+    let mut looking = look_on(&fake);
     let slave = Session::welcomed(&fake).await;
+    looking.begun().await;
     slave.connection.close(9u32.into(), b"");
     let (_, why) = looking.ended().await.unwrap();
     assert_eq!(why, SessionEnd::ConnectionLost);
