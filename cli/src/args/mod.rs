@@ -26,10 +26,7 @@ use std::time::Duration;
 
 use clap::{Args, Parser, Subcommand};
 use mmt_netem::LinkConfig;
-use mmt_server::repeats::Repeats;
-use mmt_server::trigger::Scheme;
 use mmt_shared::channel::rate_control::StretchMax;
-use mmt_shared::model::settings::Mode;
 use mmt_shared::wire::Architecture;
 
 pub(crate) use self::netem::{

@@ -72,9 +72,10 @@ pub struct SlaveChecks {
     tool: Vec2,
     /// The tool's velocity in the tick before, m/s; none where that tick was missed or the tool touched something.
     velocity: Option<Vec2>,
-    /// For how many ticks in a row an emergency stop has been set, and the session has been disengaged.
-    stopped: u32,
-    disengaged_ticks: u32,
+    /// The tool's speed in the tick before, m/s.
+    speed_before: f64,
+    /// Whether an emergency stop was set in the tick before.
+    stopped: bool,
     stops: bool,
     /// Stamp of the newest sample, and for how long there has been no newer one, as ticks count it.
     newest: Option<Time>,
@@ -103,8 +104,8 @@ impl SlaveChecks {
             ticked: about.began,
             tool: about.tool,
             velocity: Some(Vec2::zeros()),
-            stopped: 0,
-            disengaged_ticks: 0,
+            speed_before: 0.0,
+            stopped: false,
             stops: false,
             newest: None,
             silent: Duration::ZERO,
@@ -196,7 +197,7 @@ impl SlaveChecks {
             // a plant of somebody else's moves its tool itself
             if tick.end.plant_command().is_none() {
                 self.judge_tool(tick, done, elapsed);
-                self.judge_standing(tick, done);
+                self.judge_standing(tick, done, elapsed);
                 self.judge_force(tick.now, done);
             }
             self.judge_play(tick.now, done);
@@ -270,13 +271,18 @@ impl SlaveChecks {
         self.about.config.playout.speed_max_m_per_s.min(approach)
     }
 
-    /// Hold, disengaged and emergency stop. A tool that is pressed on may give way.
-    fn judge_standing(&mut self, tick: &SlaveTicked<'_>, done: &SlaveTick) {
+    /// Hold, disengaged and emergency stop: the tool stands, or brakes as hard as it may. One that is pressed on may give way.
+    fn judge_standing(&mut self, tick: &SlaveTicked<'_>, done: &SlaveTick, elapsed: Duration) {
         let (now, way) = (tick.now, done.tool - self.tool);
         let stands = way.norm() <= HAIR_M
             || done.f_s.dot(&way) < 0.0
             || self.about.config.tool_compliance.is_some();
         let playout = &self.about.config.playout;
+        let period = elapsed.max(TICK).as_secs_f64();
+        let speed = way.norm() / period;
+        let slower = playout.acceleration_max_m_per_s2 * period * (1.0 - CLOCKS);
+        let stands = stands || speed <= self.speed_before - slower;
+        self.speed_before = speed;
         let ramp =
             playout.extrapolation_ms * 1e-3 + self.speed() / playout.acceleration_max_m_per_s2;
         let ramp = Duration::from_secs_f64(ramp) + SLACK;
@@ -286,23 +292,19 @@ impl SlaveChecks {
                 format!("the tool goes {way:?} m at a stamp {beyond:?} after the newest sample's")
             });
         }
-        // a tool that moves brakes first
-        let braking = Duration::from_secs_f64(self.speed() / playout.acceleration_max_m_per_s2);
-        let braked = |ticks: u32| TICK * ticks > TICK + braking;
-        self.disengaged_ticks += u32::from(self.disengaged);
-        if braked(self.disengaged_ticks) {
+        if self.disengaged {
             self.verdict
                 .judge(Invariant::ToolDisengaged, now, stands, || {
                     format!("the tool goes {way:?} m in a session that is disengaged")
                 });
         }
         let stops = tick.given.stops || self.channel.other_stops();
-        self.stopped = if stops { self.stopped + 1 } else { 0 };
-        if braked(self.stopped) {
+        if stops && self.stopped {
             self.verdict.judge(Invariant::ToolStops, now, stands, || {
                 format!("the tool goes {way:?} m during an emergency stop")
             });
         }
+        self.stopped = stops;
     }
 
     fn judge_force(&mut self, now: Time, done: &SlaveTick) {

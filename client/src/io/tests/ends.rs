@@ -1,6 +1,7 @@
 //! Ends that nobody wished for: a session that failed, a haptic thread that panics or hangs.
 
 use super::*;
+use crate::io::haptic::HapticLoop;
 use crate::io::open::Opening;
 use crate::io::session::operate;
 
