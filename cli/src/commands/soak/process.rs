@@ -11,7 +11,7 @@ use std::time::{Duration, Instant};
 use rustix::process::{Pid, Signal, kill_process};
 
 use super::usage::Usage;
-use crate::failure::Failure;
+use crate::failure::{Failure, INTERRUPTED_TWICE};
 
 /// A start or an end may take so long, however busy the host is.
 pub(super) const PATIENCE: Duration = Duration::from_secs(60);
@@ -31,7 +31,7 @@ pub(super) enum Ended {
     Refused,
     /// Exit code 4.
     Unanswered,
-    /// By a signal of the soak.
+    /// By a signal of the soak, or by the second one that asked it to end.
     Killed,
     /// Otherwise: it should not.
     Wrong(ExitStatus),
@@ -40,6 +40,8 @@ pub(super) enum Ended {
 impl Ended {
     fn of(status: ExitStatus) -> Self {
         match (status.code(), status.signal()) {
+            // it was asked twice
+            (Some(INTERRUPTED_TWICE), _) => Self::Killed,
             (Some(0), _) => Self::Well,
             (Some(1), _) => Self::Early,
             (Some(3), _) => Self::Refused,
