@@ -97,9 +97,11 @@ impl PlayoutBuffer {
     pub fn push(&mut self, arrived: Time, sample: &HipSample) {
         self.buffer.push(arrived, sample, &mut self.counts);
         let newest = self.buffer.samples().back().map(|newest| newest.stamp);
-        if newest != self.newest {
-            (self.newest, self.silent) = (newest, Duration::ZERO);
+        // where the clock was learned anew from a sample of before, the next one ends the silence
+        if newest > self.newest {
+            self.silent = Duration::ZERO;
         }
+        self.newest = newest;
     }
 
     /// The HIP to follow at `now` by the slave's clock; to be called every tick.
