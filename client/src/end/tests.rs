@@ -248,24 +248,25 @@ fn session(
     let mut end = end(CommandConfig::default(), Architecture::Mmt);
     let mut slave = DatagramChannel::new(Side::Slave, Time::ZERO);
     let (mut ups, mut downs) = (Vec::new(), Vec::new());
-    let mut sequence = 0;
+    let (mut sequence, mut answers) = (0, Time::ZERO);
     let mut seen = Vec::new();
     for ms in 1..=until {
         let mut out = [0; DATAGRAM_MAX];
         ups.retain(|(at, bytes): &(u64, Vec<u8>)| {
             let arrives = *at == ms;
-            if arrives {
-                slave.handle(AT(ms), bytes);
+            let message = arrives.then(|| slave.handle(AT(ms), bytes));
+            if let Some(Message::Command(command)) = message.flatten().map(|of| of.message) {
+                answers = command.samples.last().unwrap().stamp;
             }
             !arrives
         });
         if ms % 20 == 0 {
             sequence += 1;
-            let sent = datagram(
-                &mut slave,
-                AT(ms),
-                Message::Update((&update(sequence, 0.7)).into()),
-            );
+            let update = Update {
+                answers,
+                ..update(sequence, 0.7)
+            };
+            let sent = datagram(&mut slave, AT(ms), Message::Update((&update).into()));
             downs.extend(way(false, ms).map(|takes| (ms + takes, sent)));
         }
         if stands_still.contains(&ms) {

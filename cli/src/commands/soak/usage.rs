@@ -224,6 +224,6 @@ mod tests {
     fn descriptors_grow_where_the_later_half_never_comes_down_to_the_earlier_one() {
         let of = |count: fn(u64) -> u64| course((0..20).map(|k| (k as f64 / 60.0, 1, count(k))));
         assert_eq!(of(|k| 9 + k % 5).grows(), [""; 0]);
-        assert_eq!(of(|k| 9 + k / 3).grows(), ["descriptors"]);
+        assert_eq!(of(|k| 9 + k / 2).grows(), ["descriptors"]);
     }
 }
