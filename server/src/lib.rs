@@ -10,7 +10,7 @@ pub mod end;
 pub mod environment;
 pub mod estimator;
 pub mod feed;
-pub(crate) mod motion_limits;
+mod motion_limits;
 pub mod plant;
 pub mod playout;
 pub mod pose_observer;

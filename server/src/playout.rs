@@ -33,6 +33,9 @@ use motion_limiter::MotionLimiter;
 /// to come for it.
 const ENGAGE_M: f64 = 0.02;
 
+/// A tool that has to become slower stands below this, m/s: rounding.
+const STILL_M_PER_S: f64 = 1e-9;
+
 /// The three stages. Allocates when made, never afterwards.
 #[derive(Clone, Debug)]
 pub struct PlayoutBuffer {
@@ -117,7 +120,7 @@ impl PlayoutBuffer {
         let slowing = aim.slowing.min(self.interpolator.slowing(self.silent));
         let step = self.limiter.step(now, elapsed, target, slowing);
         let limited = step.limited || has_to_stand;
-        let stopped = !slowing.is_zero() && step.velocity == Vec2::zeros();
+        let stopped = !slowing.is_zero() && step.velocity.norm() < STILL_M_PER_S;
         let played = Played {
             stamp: self.buffer.play(stamp),
             hip: step.hip,

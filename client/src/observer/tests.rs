@@ -1,3 +1,5 @@
+//! What an observer sees of a session, and what it sends.
+
 use std::time::Duration;
 
 use mmt_shared::fixtures::{square_at_rest, update};

@@ -1,3 +1,5 @@
+//! What an observer is sent: each update once, scenes at their rate, heartbeats.
+
 use mmt_shared::fixtures::{square_at_rest, update};
 use mmt_shared::model::geometry::{Pose, Vec2};
 use mmt_shared::model::sample::HipSample;

@@ -31,8 +31,8 @@ pub(super) struct MotionLimiter {
     reach_m: f64,
     /// Where the HIP is, m; none before it is known.
     hip: Option<Vec2>,
-    /// Over the last tick, m/s.
-    velocity: Vec2,
+    /// Over the last tick, m/s; none of a HIP whose place nobody set, before its second tick: it goes as what is aimed at.
+    velocity: Option<Vec2>,
     /// What was aimed at in the last tick, m; none if nothing was.
     aim: Option<Vec2>,
     /// When it was played; none before the first tick.
@@ -45,7 +45,7 @@ impl MotionLimiter {
             limits: config.limits(),
             reach_m: config.reach_m,
             hip: None,
-            velocity: Vec2::zeros(),
+            velocity: None,
             aim: None,
             played: None,
         }
@@ -54,13 +54,13 @@ impl MotionLimiter {
     /// Sets where the tool is before the first tick, m.
     pub(super) fn start_at(&mut self, hip: Vec2) {
         if self.played.is_none() {
-            self.hip = Some(hip);
+            (self.hip, self.velocity) = (Some(hip), Some(Vec2::zeros()));
         }
     }
 
     /// The tool is there (m), at rest.
     pub(super) fn move_to(&mut self, place: Vec2) {
-        (self.hip, self.velocity, self.aim) = (Some(place), Vec2::zeros(), None);
+        (self.hip, self.velocity, self.aim) = (Some(place), Some(Vec2::zeros()), None);
     }
 
     /// The HIP that was played last, m; none before the first tick.
@@ -103,7 +103,10 @@ impl MotionLimiter {
         let limits = self.slowed(slowing.saturating_sub(elapsed));
         let way = match aimed {
             _ if period <= 0.0 => Vec2::zeros(),
-            None => self.limits.towards(self.velocity, Vec2::zeros(), period) * period,
+            None => {
+                let before = self.velocity.unwrap_or_default();
+                self.limits.towards(before, Vec2::zeros(), period) * period
+            }
             Some(_) => self.way(limits, from, aim, period),
         };
         let hip = if way == aim - from {
@@ -112,15 +115,16 @@ impl MotionLimiter {
             // whatever the rounding
             within(self.reach_m.max(from.norm()), from + way)
         };
-        self.velocity = if period > 0.0 {
+        let velocity = if period > 0.0 {
             way / period
         } else {
             Vec2::zeros()
         };
+        self.velocity = self.hip.map(|_| velocity);
         (self.hip, self.aim, self.played) = (Some(hip), aimed.map(|_| aim), Some(now));
         Step {
             hip,
-            velocity: self.velocity,
+            velocity,
             limited: (aimed.unwrap_or(aim) - hip).norm() > BEHIND_M,
             speed_max_m_per_s: limits.speed_m_per_s,
         }
@@ -141,7 +145,8 @@ impl MotionLimiter {
             way: aim - from,
             velocity: (aim - self.aim.unwrap_or(aim)) / period,
         };
-        let way = limits.way(self.velocity, goal, period);
+        let before = self.velocity.unwrap_or(goal.velocity);
+        let way = limits.way(before, goal, period);
         // before the end of its reach it brakes
         let far = from.norm();
         let outwards = if far > 0.0 { from / far } else { Vec2::zeros() };
@@ -151,7 +156,7 @@ impl MotionLimiter {
             return way;
         }
         let velocity = (way - outwards * beyond) / period;
-        limits.towards(self.velocity, velocity, period) * period
+        limits.towards(before, velocity, period) * period
     }
 }
 
