@@ -58,8 +58,8 @@ fn who_looks_on_sees_the_operators_work_stops_nothing_and_goes_when_its_token_is
         assert_eq!(operator.status.code(), Some(0), "{}", operator.err);
         let operator = ok(operator.document(0));
         assert!(
-            number(&operator, "/pushes/completed") > Some(0.0),
-            "it moved"
+            number(&operator, "/updates/applied") > Some(0.0),
+            "it pushed"
         );
 
         ok(second.interrupt());
