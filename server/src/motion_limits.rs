@@ -119,7 +119,7 @@ mod tests {
     }
 
     #[test]
-    fn a_motion_that_keeps_the_limits_is_followed_to_the_bit() {
+    fn a_motion_that_keeps_the_limits_is_followed_exactly() {
         let mut speed = 0.0;
         let mut x = 0.0;
         let places: Vec<_> = (0..400)

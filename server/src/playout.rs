@@ -2,8 +2,8 @@
 //!
 //! Three stages. The jitter buffer holds samples until they are due, a delay after the earliest time at which the
 //! network could have brought them. The interpolator finds the HIP at the stamp that is due. The motion limiter keeps the
-//! tool from jumping there. Play-out must never move the tool faster or with more acceleration than the limits, never move it on old samples for
-//! longer than it may extrapolate, and never be blocked for good by stamps, whatever they are.
+//! tool from jumping there. Play-out must never move the tool faster or with more acceleration than the limits, never move it
+//! on old samples for longer than it may extrapolate, and never be blocked for good by stamps, whatever they are.
 
 mod clock;
 mod config;

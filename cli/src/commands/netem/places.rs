@@ -1,4 +1,4 @@
-//! What a relay says when masters find no place, or give theirs to others.
+//! What a relay reports when masters find no place, or give theirs to others.
 
 use std::time::{Duration, Instant};
 
@@ -7,7 +7,7 @@ use mmt_netem::io::relay::RelaySnapshot;
 /// Strangers may come at any rate; a warning comes once in this time.
 const EVERY: Duration = Duration::from_secs(60);
 
-/// What has been said of the clients of a relay with so many places.
+/// What a relay with so many places has reported of its clients.
 #[derive(Debug)]
 pub(super) struct Places {
     most: usize,

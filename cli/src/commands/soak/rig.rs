@@ -28,8 +28,8 @@ pub(super) struct Rig {
     /// None while it is dead.
     pub(super) slave: Option<Process>,
     pub(super) relay: Process,
-    /// What the relay was told last.
-    told: [String; 2],
+    /// The settings that the relay received last, up and down.
+    settings: [String; 2],
 }
 
 /// Whether the slave records.
@@ -73,7 +73,7 @@ impl Rig {
             records,
             slave: Some(slave),
             relay,
-            told: Default::default(),
+            settings: Default::default(),
         })
     }
 
@@ -117,16 +117,16 @@ impl Rig {
             ("up", &world.config.up, Fault::UpSilent),
             ("down", &world.config.down, Fault::DownSilent),
         ];
-        for ((way, link, silent), told) in ways.into_iter().zip(&mut self.told) {
+        for ((way, link, silent), settings) in ways.into_iter().zip(&mut self.settings) {
             let link = std::iter::once(link.to_string());
             let faults = faults.iter().filter_map(|of| behind(of, silent));
             let line = format!(
                 "{way} {}",
                 link.chain(faults).collect::<Vec<_>>().join("; then ")
             );
-            if *told != line {
+            if *settings != line {
                 self.relay.tell(&line);
-                *told = line;
+                *settings = line;
             }
         }
     }

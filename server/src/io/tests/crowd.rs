@@ -40,7 +40,7 @@ pub(super) async fn silent_ones(pairing: Pairing, from: impl Fn(u32) -> IpAddr) 
 }
 
 /// The holder's attempt; none if it is turned away.
-pub(super) async fn welcome(pairing: &Pairing) -> Option<Master> {
+async fn welcome(pairing: &Pairing) -> Option<Master> {
     loop {
         let mut master = Master::try_connect(pairing).await.ok()?;
         match timeout(PATIENCE, master.hello(pairing.token, 1000.0)).await {
@@ -52,21 +52,26 @@ pub(super) async fn welcome(pairing: &Pairing) -> Option<Master> {
     }
 }
 
-/// How many of the holder's attempts succeed at once while others connect and stay silent.
+/// How many of the holder's attempts, one after the other, succeed at once.
+pub(super) async fn times_let_in(pairing: &Pairing) -> usize {
+    let mut let_in = 0;
+    for _ in 0..COMES {
+        if let Ok(Some(master)) = timeout(PATIENCE, welcome(pairing)).await {
+            let_in += 1;
+            patiently(master.farewell()).await;
+        }
+    }
+    let_in
+}
+
+/// The same while others connect and stay silent.
 async fn let_in(from: impl Fn(u32) -> IpAddr) -> usize {
     let host = run(options());
     let pairing = host.pairing.clone();
     let come = async {
         // they have been at it for a while
         sleep(Duration::from_secs(1)).await;
-        let mut let_in = 0;
-        for _ in 0..COMES {
-            if let Ok(Some(master)) = timeout(PATIENCE, welcome(&pairing)).await {
-                let_in += 1;
-                patiently(master.farewell()).await;
-            }
-        }
-        let_in
+        times_let_in(&pairing).await
     };
     let let_in = tokio::select! {
         let_in = come => let_in,

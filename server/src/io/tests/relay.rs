@@ -7,7 +7,7 @@ use mmt_shared::pairing::Address;
 use tokio::net::UdpSocket;
 use tokio::time::{MissedTickBehavior, interval, timeout};
 
-use super::crowd::{A_SECOND, COMES, silent_ones, welcome};
+use super::crowd::{A_SECOND, COMES, silent_ones, times_let_in};
 use super::master::PATIENCE;
 use super::*;
 
@@ -58,14 +58,7 @@ async fn let_in<S: Future<Output = ()>>(
     let (relay, pairing) = relay_before(&host);
     let come = async {
         until_crowded(&relay, CROWD).await;
-        let mut let_in = 0;
-        for _ in 0..COMES {
-            if let Ok(Some(master)) = timeout(PATIENCE, welcome(&pairing)).await {
-                let_in += 1;
-                patiently(master.farewell()).await;
-            }
-        }
-        let_in
+        times_let_in(&pairing).await
     };
     let let_in = tokio::select! {
         let_in = come => let_in,
