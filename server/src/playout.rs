@@ -26,7 +26,7 @@ use mmt_shared::stats::histogram::Histogram;
 use mmt_shared::time::Time;
 
 use interpolator::{Aim, Interpolator, around};
-use jitter_buffer::JitterBuffer;
+use jitter_buffer::{JitterBuffer, WAIT};
 use motion_limiter::MotionLimiter;
 
 /// Once it is no longer held, the tool follows again when the HIP comes this near, m: a hand that went elsewhere meanwhile has
@@ -44,7 +44,7 @@ pub struct PlayoutBuffer {
     limiter: MotionLimiter,
     counts: PlayoutCounts,
     delays: Histogram,
-    /// Stamp of the newest sample, and for how long there has been no newer one.
+    /// The newest stamp of all samples, and for how long there has been no newer one.
     newest: Option<Time>,
     silent: Duration,
     /// The tool is to stand.
@@ -100,11 +100,19 @@ impl PlayoutBuffer {
     pub fn push(&mut self, arrived: Time, sample: &HipSample) {
         self.buffer.push(arrived, sample, &mut self.counts);
         let newest = self.buffer.samples().back().map(|newest| newest.stamp);
-        // where the clock was learned anew from a sample of before, the next one ends the silence
         if newest > self.newest {
-            self.silent = Duration::ZERO;
+            (self.newest, self.silent) = (newest, Duration::ZERO);
+        } else if self.goes_back(newest) {
+            // the next one ends the silence
+            self.newest = newest;
         }
-        self.newest = newest;
+    }
+
+    /// Whether the master's clock was set back so far that play-out waits for nothing: what is less far back may be a sample of
+    /// before that comes again.
+    fn goes_back(&self, newest: Option<Time>) -> bool {
+        let back = |newest| self.newest.map(|then| then.saturating_since(newest));
+        newest.and_then(back).is_some_and(|back| back > WAIT)
     }
 
     /// The HIP to follow at `now` by the slave's clock; to be called every tick.

@@ -24,7 +24,7 @@ const FUTURE: Duration = Duration::from_secs(1);
 /// After this long with only useless samples the sender's clock is learned anew.
 const RELEARN_AFTER: Duration = Duration::from_millis(200);
 /// After the clock was learned anew, play-out waits for stamps that it has played, but not longer.
-const WAIT: Duration = Duration::from_secs(1);
+pub(super) const WAIT: Duration = Duration::from_secs(1);
 /// The stamp that is reported goes ahead of all samples by at most this: where the slave's clock has jumped, no part of
 /// the slave may take the jump for motion. So long an outage has released the hand.
 const AHEAD: Duration = Duration::from_secs(1);

@@ -422,3 +422,53 @@ fn a_hip_that_jumped_away_is_not_gone_to_once_samples_have_run_out() {
     }
     assert!(stood.is_some() && at.x > 0.05 && at.x < 0.15, "{at}");
 }
+
+#[test]
+fn samples_of_before_that_come_after_a_silence_do_not_draw_the_tool_back() {
+    let mut buffer = PlayoutBuffer::try_new(PlayoutConfig::default()).unwrap();
+    let (mut at, mut stood) = (Vec2::zeros(), false);
+    for k in 0..1500_u64 {
+        let now = Time::from_millis(50 + k);
+        let old = match k {
+            0..500 => vec![k],
+            // two datagrams on a long way round, so far apart that the clock is learned anew
+            550 => (330..335).collect(),
+            800 => (200..205).collect(),
+            _ => Vec::new(),
+        };
+        for k in old {
+            buffer.push(now, &sample(k));
+        }
+        let Some(played) = buffer.advance(now) else {
+            continue;
+        };
+        let way = (played.hip - at).norm();
+        stood |= k > 600 && way == 0.0;
+        assert!(!stood || way == 0.0, "{way} m at {k} ms");
+        at = played.hip;
+    }
+    assert!(stood);
+    assert_eq!(buffer.counts().relearned, 1);
+}
+
+#[test]
+fn a_clock_that_was_set_back_is_followed_again() {
+    for back_ms in [500, 900, 5000] {
+        let mut buffer = PlayoutBuffer::try_new(PlayoutConfig::default()).unwrap();
+        let mut last = None;
+        for k in 0..10_000_u64 {
+            let now = Time::from_millis(50 + k);
+            let back = if k < 6000 { 0 } else { back_ms * MS };
+            let set_back = HipSample {
+                stamp: stamp(k).offset_by(-back),
+                ..sample(k)
+            };
+            buffer.push(now, &set_back);
+            last = buffer.advance(now);
+        }
+        let last = last.unwrap();
+        assert_eq!(last.stamp, stamp(9_999 - 16).offset_by(-back_ms * MS));
+        assert_eq!(last.hip, sample(9_999 - 16).hip.metres(), "{back_ms} ms");
+        assert_eq!(last.status, Status::Interpolated);
+    }
+}
