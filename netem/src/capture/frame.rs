@@ -74,12 +74,8 @@ impl Seen {
     pub(super) fn of(link_type: u16, frame: &[u8]) -> Option<Self> {
         let packet = match link_type {
             ETHERNET => SlicedPacket::from_ethernet(frame),
-            LINUX_SLL => SlicedPacket::from_linux_sll(frame),
-            LINUX_SLL2 => {
-                let kind = frame.first_chunk::<2>()?;
-                let kind = EtherType(u16::from_be_bytes(*kind));
-                SlicedPacket::from_ether_type(kind, frame.get(20..)?)
-            }
+            LINUX_SLL => SlicedPacket::from_ether_type(ether_type(frame, 14)?, frame.get(16..)?),
+            LINUX_SLL2 => SlicedPacket::from_ether_type(ether_type(frame, 0)?, frame.get(20..)?),
             NULL | LOOP => SlicedPacket::from_ip(frame.get(4..)?),
             raw if RAW.contains(&raw) => SlicedPacket::from_ip(frame),
             _ => return None,
@@ -125,4 +121,11 @@ impl Seen {
             bytes: u32::try_from(bytes).unwrap_or(u32::MAX),
         })
     }
+}
+
+/// What a cooked frame carries, from the two bytes at `place` of its header. A reader of the whole header would refuse the hardware
+/// types that it does not know.
+fn ether_type(frame: &[u8], place: usize) -> Option<EtherType> {
+    let kind = frame.get(place..)?.first_chunk()?;
+    Some(EtherType(u16::from_be_bytes(*kind)))
 }

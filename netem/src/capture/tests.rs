@@ -207,6 +207,21 @@ const DOWN_MS: i64 = 20;
 
 /// Two captures of a path: 100 packets each way, 20 ms apart; the clock of the second host is ahead by `ahead`.
 /// Every tenth packet up and every twentieth down is lost; every fifth up comes twice.
+#[test]
+fn a_datagram_is_known_again_on_every_kind_of_interface() {
+    let ip = udp([address(1, 4000), address(2, 4433)], 0, b"abcdef");
+    let here = Seen::of(101, &ip).unwrap();
+    // Ethernet, PPP, raw IP of a modem, a TUN device: hardware types of Linux
+    for hardware in [1_u16, 512, 519, 0xfffe] {
+        let mut cooked = vec![0, 4];
+        cooked.extend(hardware.to_be_bytes());
+        cooked.extend([0; 10]);
+        cooked.extend([8, 0]);
+        cooked.extend(&ip);
+        assert_eq!(Seen::of(113, &cooked), Some(here), "{hardware}");
+    }
+}
+
 fn two_captures(ahead: i64) -> (Vec<u8>, Vec<u8>) {
     let start = 1_700_000_000_000_000_000;
     let (a, b) = (address(1, 10), address(9, 90));
