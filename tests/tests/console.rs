@@ -1,4 +1,5 @@
-//! The operator's console in a real browser: `tests/console/check.py` against a running demo, `blind.py` with a study.
+//! The operator's console in a real browser: `tests/console/check.py` against a running demo, `blind.py` with a study,
+//! `observe.py` beside an operator.
 //!
 //! Needs Python with playwright, and chromium: without, it says so, and with `CI` set it fails.
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test may panic")]
@@ -28,6 +29,11 @@ fn a_person_at_a_browser_pushes_the_box_and_changes_the_run() {
 #[test]
 fn a_participant_of_a_blind_comparison_answers_both_parts_and_learns_nothing() {
     holds("blind.py", "the next participant has the other order");
+}
+
+#[test]
+fn an_observers_page_shows_the_operators_work_and_moves_and_stops_nothing() {
+    holds("observe.py", "and stops nothing");
 }
 
 /// Runs a script of `tests/console`, which must find that this promise holds.
