@@ -17,6 +17,8 @@ use crate::failure::Failure;
 use crate::output::{note, print, print_json};
 
 const VERSION: &str = env!("CARGO_PKG_VERSION");
+/// What becomes of those who are there with a token that lets nobody in any more.
+const OF_THOSE_WITHIN: &str = "Who operates with it goes on (--take-over with another token ends that), who looks on with it is shown no more";
 
 /// Runs `mmt identity`.
 ///
@@ -164,7 +166,7 @@ fn make(arguments: &RotateArguments) -> Result<(), Failure> {
     let (name, role) = (&token.name, token.role.name());
     note(if replaced {
         format!(
-            "{name} has a new token, of an {role}; the old one lets nobody in any more. Who operates with it goes on"
+            "{name} has a new token, of an {role}; the old one lets nobody in any more. {OF_THOSE_WITHIN}"
         )
     } else {
         format!("{name} has a token, of an {role}")
@@ -196,7 +198,7 @@ fn take_away(arguments: &RevokeArguments) -> Result<(), Failure> {
         })?;
     }
     note(format_args!(
-        "the token of {} lets nobody in any more. Who operates with it goes on; --take-over with another token ends that",
+        "the token of {} lets nobody in any more. {OF_THOSE_WITHIN}",
         changed.token.name
     ));
     warn_of_nobody(&changed.tokens);
