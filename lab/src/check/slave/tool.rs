@@ -16,6 +16,8 @@ const HAIR_M: f64 = 1e-9;
 const SLACK: Duration = Duration::from_millis(12);
 /// Clocks that drift make a tick longer or shorter by far less than this share.
 const CLOCKS: f64 = 0.01;
+/// By this share a tick of a clock that drifts may be shorter.
+const DRIFT: f64 = 3e-4;
 /// A force above is no error of the sensor's, N.
 const FREE_N: f64 = 1.0;
 /// The force may be above the limit by this share: the body moves on within a tick.
@@ -57,15 +59,17 @@ impl SlaveChecks {
         let playout = &self.about.config.playout;
         let free = done.true_force == Vec2::zeros() && done.f_s.norm() < FREE_N;
         let inside = done.tool.norm() < playout.reach_m - HAIR_M;
-        let missed = elapsed > TICK.mul_f64(1.5) || elapsed < TICK.mul_f64(0.5);
-        let velocity = (done.tool - self.tool) / TICK_S;
+        // a shorter tick goes the way of a whole one where it catches up, and only then
+        let missed = elapsed > TICK.mul_f64(1.5) || elapsed < TICK.mul_f64(1.0 - DRIFT);
+        let period_s = elapsed.max(TICK).as_secs_f64();
+        let velocity = (done.tool - self.tool) / period_s;
         let velocity = Some(velocity).filter(|_| !missed && free && inside);
         let (Some(velocity), Some(before)) =
             (velocity, std::mem::replace(&mut self.velocity, velocity))
         else {
             return;
         };
-        let change = (velocity - before).norm() / TICK_S;
+        let change = (velocity - before).norm() / period_s;
         let most = playout.acceleration_max_m_per_s2;
         let holds = change <= most * (1.0 + CLOCKS) + HAIR_M / (TICK_S * TICK_S);
         self.verdict
