@@ -53,6 +53,9 @@ const REST_DRIFT_M: f64 = 1e-5;
 const COAST: (f64, f64) = (3e-3, 0.02);
 /// Spread of the normal of a new contact with a body that is no box, rad.
 const ANY_NORMAL_RAD: f64 = 0.5;
+/// A tool at one face can have reached the next if it is no farther from the corner between them than this share of the
+/// way from the middle of the face.
+const CORNER_SHARE: f64 = 0.5;
 /// A jump of the normal beyond this, rad, is a new contact with such a body.
 const JUMP_RAD: f64 = 0.2;
 
@@ -224,8 +227,8 @@ impl PoseObserver {
         });
     }
 
-    /// The first tick of a contact. Returns the face that is touched: of a box the one that the force is normal to; of a
-    /// tangent the one that is nearest to the tool, because the master pushes that one.
+    /// The first tick of a contact. Returns the face that is touched: of a box the one that the force is normal to, of those
+    /// that the tool can have reached; of a tangent the one that is nearest to the tool, because the master pushes that one.
     fn begin_contact(&mut self, tool: Vec2, force: Vec2) -> Face {
         self.penetration.begin(tool, force);
         if let Tracker::Tangent(_) = self.tracker {
@@ -234,10 +237,16 @@ impl PoseObserver {
             return self.faces.footprint.nearest(tool_in_object).0;
         }
         let in_object = rotate(-self.motion.pose.angle, force);
-        let mut best = (Face::East, f64::NEG_INFINITY);
+        let tool_in_object = self.motion.pose.point_to_object(tool);
+        let footprint = &self.faces.footprint;
+        let (nearest, distance) = footprint.nearest(tool_in_object);
+        let within_reach = distance - CORNER_SHARE * footprint.offset(nearest);
+        let mut best = (nearest, f64::NEG_INFINITY);
         for face in Face::ALL {
             let along = -face.outward().dot(&in_object);
-            if along > best.1 {
+            // the noise of a light force may point at any face
+            let reached = footprint.distance(face, tool_in_object) >= within_reach;
+            if reached && along > best.1 {
                 best = (face, along);
             }
         }

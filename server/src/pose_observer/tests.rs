@@ -136,6 +136,27 @@ fn the_direction_of_the_force_gives_theta() {
 }
 
 #[test]
+fn a_force_that_points_at_a_face_beyond_the_centre_does_not_move_the_box_there() {
+    let mut observer = observer(true);
+    push(&mut observer, 1000, 0.0);
+    let (pose, footprint) = (observer.pose(), observer.footprint());
+    // the tool is back in front of the west face, and noise is taken for a touch of the east face
+    let tool = pose.position + Vec2::new(-HALF - 1e-3, 0.0);
+    let now = Time::ZERO + TICK * 1001;
+    observer.step(now, tool, Vec2::zeros(), false, &params());
+    for n in 1002..=1020u32 {
+        let noise = Vec2::new(-0.12, 0.02);
+        observer.step(Time::ZERO + TICK * n, tool, noise, true, &params());
+    }
+    let (moved, east) = (
+        observer.pose().position - pose.position,
+        observer.footprint().east,
+    );
+    assert!(moved.norm() < 0.01, "{moved} m");
+    assert!((east - footprint.east).abs() < 0.01, "{east} m");
+}
+
+#[test]
 fn an_unknown_face_is_retracted_in_growing_steps_and_a_known_one_stays() {
     let mut unknown = observer(true);
     let mut depths = Vec::new();

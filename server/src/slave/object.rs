@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 
 use mmt_shared::model::contact::Coupling;
 use mmt_shared::model::geometry::{BoxFootprint, Pose};
-use mmt_shared::model::params::{ModelParams, inertia_of_square};
+use mmt_shared::model::params::{ModelParams, inertia_of_square, least_stable_mass};
 use mmt_shared::model::settings::Mode;
 use mmt_shared::range::in_range;
 use mmt_shared::time::Time;
@@ -26,6 +26,8 @@ pub(super) struct ObjectEstimate {
     pub(super) params: ModelParams,
     /// Estimates whose numbers were not accepted as parameters.
     pub(super) refused: u64,
+    /// Whether a mass too light for the coupling is brought to the least that is accepted.
+    raises_mass: bool,
     coupling: Coupling,
     observer_config: ObserverConfig,
     estimator_config: EstimatorConfig,
@@ -84,6 +86,8 @@ impl ObjectEstimate {
             estimator: Estimator::new(&estimator, coupling),
             params,
             refused: 0,
+            // the paper's block fit may give anything, and what is out of range is no estimate
+            raises_mass: matches!(estimator, EstimatorConfig::Recommended(_)),
             coupling,
             observer_config: observer,
             estimator_config: estimator,
@@ -198,6 +202,12 @@ impl ObjectEstimate {
     /// The parameters of an estimate; none if they are not accepted.
     fn accept(&self, estimate: &Estimate, side: f64, held_back: bool) -> Option<ModelParams> {
         let Estimate { m, b, .. } = *estimate;
+        // a mass that nothing shows may come out as next to none: that says nothing against the friction found beside it
+        let m = if self.raises_mass {
+            m.max(least_stable_mass(b, &self.coupling))
+        } else {
+            m
+        };
         let c = match estimate.holding {
             // a tool that may press no harder does not find out how hard the object is held
             Some(_) if estimate.sticking && held_back => OBSTACLE_N,
@@ -210,5 +220,34 @@ impl ObjectEstimate {
     fn params_of(&self, m: f64, b: f64, c: f64, side: f64) -> Option<ModelParams> {
         let e = c * self.observer.friction_radius();
         ModelParams::try_new(m, b, c, inertia_of_square(m, side), e, &self.coupling).ok()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What becomes of an estimate of the least mass and 5 N of friction.
+    fn accepted(mode: Mode, k_p: f64) -> Option<ModelParams> {
+        let coupling = Coupling::for_stiffness(k_p);
+        let config = SlaveConfig::of_mode(mode);
+        let object = ObjectEstimate::try_new(&config, coupling, Pose::default()).unwrap();
+        let estimate = Estimate {
+            m: 0.05,
+            b: 0.0,
+            c: 5.0,
+            ..*object.estimator.estimate()
+        };
+        object.accept(&estimate, 0.36, false)
+    }
+
+    #[test]
+    fn friction_is_not_withheld_because_the_mass_came_out_too_light_for_the_coupling() {
+        for k_p in [300.0, 1000.0, 3000.0] {
+            let params = accepted(Mode::Recommended, k_p).unwrap();
+            assert_eq!(params.c(), 5.0, "{k_p} N/m");
+            assert!(params.m() >= 0.05);
+        }
+        assert_eq!(accepted(Mode::Paper, 3000.0), None);
     }
 }

@@ -18,6 +18,8 @@ const POSE_M: f64 = 0.1;
 const PRESS_N: f64 = 15.0;
 /// Below this a force has no direction, N.
 const LEAST_N: f64 = 0.5;
+/// No body moves as far in a tick, m: the tool has touched another one.
+const OTHER_BODY_M: f64 = 0.01;
 /// And this share of the hand's work.
 const WORK_SHARE: f64 = 0.25;
 
@@ -92,6 +94,7 @@ struct Seen {
     tool_j: f64,
     /// The hand's way in a round trip at its longest, m.
     way_max_m: f64,
+    body: TouchedBody,
     pose_excess_m: f64,
     work_excess_j: f64,
     opposed_ticks: u64,
@@ -108,6 +111,7 @@ impl Seen {
             tool: None,
             tool_j: 0.0,
             way_max_m: 0.0,
+            body: TouchedBody::default(),
             pose_excess_m: -POSE_M,
             work_excess_j: 0.0,
             opposed_ticks: 0,
@@ -135,7 +139,11 @@ impl Seen {
         let hand_j = world.master().port().energy_j();
         let budget_j = WORK_SHARE * hand_j.max(0.0) + PRESS_N * self.way_max_m;
         self.work_excess_j = self.work_excess_j.max(self.tool_j - hand_j - budget_j);
-        if let Some(then) = world.master().model().history().at(slave.stamp) {
+        let known = self
+            .body
+            .is_known(slave.truth.position, self.round_trip_ticks);
+        let then = world.master().model().history().at(slave.stamp);
+        if let Some(then) = then.filter(|_| known) {
             let off = (then.motion.pose.position - slave.truth.position).norm();
             self.pose_excess_m = self.pose_excess_m.max(off - POSE_M - self.way_m);
         }
@@ -151,5 +159,45 @@ impl Seen {
     fn opposed_share(&self) -> Option<f64> {
         let share = self.opposed_ticks as f64 / self.paired_ticks as f64;
         (self.paired_ticks > 0).then_some(share)
+    }
+}
+
+/// The body that the tool touches, or touched last. The master cannot know within a round trip that it is another one.
+#[derive(Default)]
+struct TouchedBody {
+    /// Its place, m.
+    place: Option<Vec2>,
+    unknown_ticks: usize,
+}
+
+impl TouchedBody {
+    /// Takes the body's place (m) in a tick. Whether the master can know which body it is.
+    fn is_known(&mut self, place: Vec2, round_trip_ticks: usize) -> bool {
+        let before = self.place.replace(place).unwrap_or(place);
+        self.unknown_ticks = if (place - before).norm() > OTHER_BODY_M {
+            round_trip_ticks
+        } else {
+            self.unknown_ticks.saturating_sub(1)
+        };
+        self.unknown_ticks == 0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn another_body_is_judged_by_a_round_trip_later_and_the_same_one_always() {
+        let mut body = TouchedBody::default();
+        for n in 0..100 {
+            // 1 m/s
+            assert!(body.is_known(Vec2::new(1e-3 * f64::from(n), 0.0), 50));
+        }
+        let known: Vec<bool> = (0..60)
+            .map(|_| body.is_known(Vec2::new(0.5, 0.0), 50))
+            .collect();
+        assert!(known.iter().take(50).all(|known| !known));
+        assert!(known.iter().skip(50).all(|known| *known));
     }
 }
