@@ -155,6 +155,23 @@ fn fig5_sends_less_and_errs_more_with_a_wider_deadband() {
     }
 }
 
+/// An oracle that may use what comes later sends less than a scheme that may not, and more where the error must be smaller.
+#[test]
+fn bound_is_below_every_scheme() {
+    let done = Done::of(&bound::EXPERIMENT, 8000);
+    let rows = done.rows("bound.csv", &[]);
+    assert_eq!(rows.len(), 6);
+    for row in rows {
+        let [updates, contact, judged, fewest] =
+            ["updates", "contact_updates", "judged_updates", "fewest"].map(|key| number(&row, key));
+        assert!((1.0..updates).contains(&fewest), "{row:?}");
+        assert!(contact <= updates && judged <= updates, "{row:?}");
+        assert!((number(&row, "ratio") - updates / fewest).abs() < 1e-12);
+        assert!((0.001..1.0).contains(&number(&row, "epsilon_n")), "{row:?}");
+        assert!((1.0..8.0).contains(&number(&row, "judged_s")), "{row:?}");
+    }
+}
+
 #[test]
 fn fig6_and_fig7_are_of_one_run_sample_by_sample() {
     for (experiment, timed) in [(&traces::FIG6, false), (&traces::FIG7, true)] {
