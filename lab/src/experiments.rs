@@ -27,7 +27,7 @@ mod worlds;
 use crate::experiment::description::Experiment;
 
 /// Every experiment, in the order in which they run.
-pub const ALL: [&Experiment; 20] = [
+pub const ALL: [&Experiment; 21] = [
     &physics::PHYSICS,
     &fig5::FIG5,
     &bound::EXPERIMENT,
@@ -47,6 +47,7 @@ pub const ALL: [&Experiment; 20] = [
     &netem::NETEM,
     &transport::TRANSPORT,
     &delay::DELAY,
+    &delay::TUNED,
     &worlds::EXPERIMENT,
 ];
 
