@@ -36,11 +36,13 @@ pub struct Oracle<'a> {
     pub choices: &'a [ModelParams],
     /// What happened.
     pub ticks: &'a [Tick],
+    /// An update may be sent in every tick whose number is a multiple of this; at least 1.
+    pub gap_ticks: usize,
 }
 
 impl Oracle<'_> {
     /// The fewest updates with which a model that begins as `start` is never more than `epsilon_n` (N) off in a judged tick.
-    /// None if an update in every tick would not do.
+    /// None if an update in every tick in which one may be sent would not do.
     #[must_use]
     pub fn fewest(&self, start: ModelState, epsilon_n: f64) -> Option<usize> {
         let start = self.end(Body::new(start), 0, epsilon_n, &[]);
@@ -48,7 +50,7 @@ impl Oracle<'_> {
     }
 
     /// For each tick the first one in which a model that is set in it is off again, under the best of the choices; the tick
-    /// itself where it is off at once.
+    /// itself where it is off at once or no update may be sent.
     fn ends(&self, epsilon_n: f64) -> Vec<usize> {
         let mut best: Vec<usize> = (0..self.ticks.len()).collect();
         for params in self.choices {
@@ -63,7 +65,8 @@ impl Oracle<'_> {
     /// The same for one choice, found from the last tick on.
     fn ends_of(&self, params: &ModelParams, epsilon_n: f64) -> Vec<usize> {
         let mut ends: Vec<usize> = (0..self.ticks.len()).collect();
-        for (k, tick) in self.ticks.iter().enumerate().rev() {
+        let allowed = self.ticks.iter().enumerate().rev();
+        for (k, tick) in allowed.filter(|(k, _)| self.allows(*k)) {
             let Motion { pose, twist } = tick.truth;
             let coupling = &self.settings.coupling;
             let set = ModelState::try_new(*params, self.footprint, pose, twist, coupling);
@@ -75,6 +78,10 @@ impl Oracle<'_> {
         ends
     }
 
+    fn allows(&self, k: usize) -> bool {
+        k.is_multiple_of(self.gap_ticks.max(1))
+    }
+
     /// The first tick from `from` on in which this box is off. `known` are the ends of a box with the same parameters that is set
     /// in a tick later than `from`: one that has come to be the same, untouched, goes the same way.
     fn end(&self, mut body: Body, from: usize, epsilon_n: f64, known: &[usize]) -> usize {
@@ -82,6 +89,7 @@ impl Oracle<'_> {
         for (k, tick) in ticks {
             let state = body.state();
             if k > from
+                && self.allows(k)
                 && body.touch(tick.hip).is_none()
                 && (state.pose, state.twist) == (tick.truth.pose, tick.truth.twist)
                 && let Some(end) = known.get(k)
@@ -230,15 +238,18 @@ mod tests {
     #[test]
     fn an_oracle_that_knows_both_frictions_needs_one_update_for_the_step_and_none_before() {
         let (settings, ticks) = pushed();
-        let fewest = |choices: &[ModelParams], start: f64, epsilon_n: f64| {
+        let every = |gap_ticks: usize, choices: &[ModelParams], start: f64, epsilon_n: f64| {
             let oracle = Oracle {
                 settings,
                 footprint: BoxFootprint::square(0.36),
                 choices,
                 ticks: &ticks,
+                gap_ticks,
             };
             oracle.fewest(state(start), epsilon_n)
         };
+        let fewest =
+            |choices: &[ModelParams], start, epsilon_n| every(1, choices, start, epsilon_n);
         let both = [params(2.0), params(3.0)];
         assert_eq!(fewest(&both, 2.0, 1e-9), Some(1));
         assert_eq!(fewest(&both, 3.0, 1e-9), Some(2));
@@ -246,5 +257,8 @@ mod tests {
         // who knows the second friction only sets the state so often that the first does not show
         let blind = fewest(&both[1..], 3.0, 0.2).unwrap();
         assert!(blind > 2, "{blind}");
+        // the step comes in tick 400: an update of tick 399 is of before it
+        assert_eq!(every(200, &both, 2.0, 1e-9), Some(1));
+        assert_eq!(every(399, &both, 2.0, 1e-9), None);
     }
 }

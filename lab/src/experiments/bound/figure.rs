@@ -1,53 +1,61 @@
-//! The bound's figure: updates of the schemes and of the oracle over the force error, and the one over the other.
+//! The bound's figure: updates of the schemes and of the oracle at each deadband, and the one over the other.
 
 use super::trace::Bounded;
 use super::{Group, Rule, TARGET, ratio};
 use crate::experiment::prelude::*;
 
+/// How far the schemes stand apart at a deadband, in per cent of it: intervals that lie on each other cannot be read.
+const APART: f64 = 0.3;
+
 /// Left both rates, right their ratio with what is demanded of it.
 pub(super) fn figure(groups: &[Group]) -> Figure {
-    let error = || Axis::linear("force error that 95 % of contact stay within, N");
-    let mut rates = Vec::new();
-    let mut ratios = Vec::new();
+    let deadband = || Axis::linear("deadband, %").over(0.0..25.0);
+    let (mut rates, mut ratios) = (Vec::new(), Vec::new());
     for rule in Rule::ALL {
-        let of_rule: Vec<&Group> = groups.iter().filter(|g| g.case.rule == rule).collect();
-        let (colour, mark) = match rule {
-            Rule::Useful => (Colour::BLUE, Mark::Circle),
-            Rule::Adaptive => (Colour::VERMILION, Mark::Square),
+        let (colour, mark, apart) = match rule {
+            Rule::Useful => (Colour::BLUE, Mark::Circle, -APART),
+            Rule::Adaptive => (Colour::VERMILION, Mark::Square, APART),
         };
         let curve = |of: fn(&Group) -> Option<Interval>, is_noted: bool| {
-            let dots = of_rule.iter().filter_map(|group| {
-                let note = format!("{} %", group.case.deadband * 100.0);
+            let own = groups.iter().filter(|group| group.case.rule == rule);
+            let dots = own.filter_map(|group| {
+                let (mean, epsilon_n) = (of(group)?, group.mean(|run| run.epsilon_n)?);
                 Some(Dot {
-                    note: is_noted.then_some(note),
-                    ..Dot::of_intervals(group.interval(|run| run.epsilon_n)?, of(group)?)
+                    y_interval: Some((mean.low, mean.high)),
+                    note: is_noted.then(|| format!("{epsilon_n:.3} N")),
+                    ..Dot::at(group.case.deadband * 100.0 + apart, mean.mean)
                 })
             });
             dots.collect::<Vec<_>>()
         };
-        let (name, least) = (rule.name(), format!("fewest, for {}", rule.name()));
+        let (name, least) = (
+            rule.name(),
+            format!("fewest, at the error of {}", rule.name()),
+        );
         rates.push(Series::line(name, colour, curve(rate, true)).marked(mark));
         let of_oracle = Series::line(&least, colour, curve(fewest_rate, false));
         rates.push(of_oracle.marked(mark).stroked(Stroke::Dashed, 2));
-        ratios.push(Series::line(name, colour, curve(ratio, true)).marked(mark));
+        ratios.push(Series::line(name, colour, curve(ratio, false)).marked(mark));
     }
-    let ends = groups
-        .iter()
-        .filter_map(|group| group.largest(|run| run.epsilon_n));
-    let most = ends.fold(0.0, f64::max);
-    let target = vec![Dot::at(0.0, TARGET), Dot::at(most, TARGET)];
+    let target = vec![Dot::at(0.0, TARGET), Dot::at(25.0, TARGET)];
     ratios.push(Series::line("demanded", Colour::GREY, target).stroked(Stroke::Dashed, 2));
+    let rate = Axis::log("updates per second").over(0.05..10.0);
     Figure {
         panels: vec![
-            Panel::new("Updates", error(), Axis::log("updates per second"), rates)
-                .with_legend(Legend::UpperRight),
+            Panel::new(
+                "Updates, with the error that they reach",
+                deadband(),
+                rate,
+                rates,
+            )
+            .with_legend(Legend::UpperRight),
             Panel::new(
                 "Updates over the fewest with hindsight",
-                error(),
+                deadband(),
                 Axis::linear("ratio"),
                 ratios,
             )
-            .with_legend(Legend::UpperRight),
+            .with_legend(Legend::LowerLeft),
         ],
         columns: 2,
         panel_size: (560, 400),

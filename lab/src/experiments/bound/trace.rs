@@ -20,11 +20,13 @@ use crate::world::{World, WorldConfig, WorldTick};
 
 /// Ticks of a contact that are left out at its beginning: nobody knows anything then.
 const LEFT_OUT_TICKS: u32 = 100;
+/// Ticks from one possible update of the oracle's to the next: the shortest time between two of the schemes.
+const GAP_TICKS: usize = 10;
 /// The share of the judged ticks in which the scheme's error is below epsilon.
 const SHARE: f64 = 0.95;
-/// What an update of the oracle's may take for c and e, over the truth: a square that turns has less friction than the limit
-/// surface of its c and e at some motions and more at others.
-const FRICTION_CHOICES: [f64; 7] = [0.90, 0.95, 1.0, 1.05, 1.10, 1.15, 1.20];
+/// What an update of the oracle's may take for e, over the truth: the limit surface of the model is an ellipsoid, the box's own is
+/// not, so that no e is right for every motion.
+const TURNING_CHOICES: [f64; 7] = [0.90, 0.95, 1.0, 1.05, 1.10, 1.15, 1.20];
 
 /// What a run of a scheme came to, beside the oracle's.
 #[derive(Clone, Debug, PartialEq)]
@@ -92,6 +94,7 @@ impl Bounded {
             footprint: object.footprint(),
             choices: &choices,
             ticks: &ticks,
+            gap_ticks: GAP_TICKS,
         };
         let start = *world.slave().state();
         Ok(Self {
@@ -113,11 +116,11 @@ impl Bounded {
     }
 }
 
-/// What an update of the oracle's may say: the truth, with c and e by each of the choices.
+/// What an update of the oracle's may say: the truth, with e by each of the choices.
 fn choices(truth: &ModelParams, settings: &ModelSettings) -> Vec<ModelParams> {
     let [m, b, c, inertia, e] = truth.to_array();
-    let scaled = |by: f64| ModelParams::try_new(m, b, c * by, inertia, e * by, &settings.coupling);
-    FRICTION_CHOICES
+    let scaled = |by: f64| ModelParams::try_new(m, b, c, inertia, e * by, &settings.coupling);
+    TURNING_CHOICES
         .into_iter()
         .filter_map(|by| scaled(by).ok())
         .collect()

@@ -27,17 +27,15 @@ pub(super) const fn number(architecture: Architecture) -> Number {
             ("force gain", [0.2, 0.4, 0.6, 0.8, 0.9, 1.0])
         }
         Architecture::Bilateral(Baseline::DampedPositionForce) => {
-            ("damping, N s/m", [2.0, 5.0, 10.0, 20.0, 40.0, 80.0])
+            ("damping, N s/m", [1.0, 2.0, 5.0, 10.0, 20.0, 40.0])
         }
         Architecture::Bilateral(Baseline::DeadbandForce | Baseline::TdpaDeadband) => {
             ("Delta", [0.02, 0.05, 0.10, 0.15, 0.20, 0.30])
         }
         Architecture::Bilateral(Baseline::Tdpa) => {
-            ("repayment, N s/m", [2.0, 5.0, 10.0, 20.0, 40.0, 80.0])
+            ("repayment, N s/m", [1.0, 2.0, 5.0, 10.0, 20.0, 40.0])
         }
-        Architecture::Bilateral(Baseline::Waves) => {
-            ("b, N s/m", [2.0, 5.0, 10.0, 20.0, 40.0, 80.0])
-        }
+        Architecture::Bilateral(Baseline::Waves) => ("b, N s/m", [1.0, 2.0, 5.0, 10.0, 20.0, 40.0]),
         Architecture::Mediated(_) => ("T_update, ms", [20.0, 50.0, 100.0, 150.0, 300.0, 1000.0]),
     };
     Number { name, values }

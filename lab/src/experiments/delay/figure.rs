@@ -38,7 +38,7 @@ pub(super) fn figure(groups: &[Group]) -> Figure {
 /// The tuned architectures: error untuned and tuned, aligned by the delay, and the apparent mass; means with their intervals.
 pub(super) fn tuned(judged: &[Judged<'_>]) -> Figure {
     type Measure = (&'static str, fn(&Judged<'_>) -> Option<Interval>, Axis);
-    let error = |label| Axis::log(label).over(0.005..5.0);
+    let error = |label| Axis::log(label).over(0.001..10.0);
     #[rustfmt::skip]
     let measures: [Measure; 4] = [
         ("as they are where nobody tunes them", |judged| force_error(judged.untuned), error("relative error")),
@@ -75,6 +75,9 @@ fn line(architecture: Architecture, dots: Vec<Dot>) -> Series {
     let (colour, width) = colour_and_width(architecture);
     let line = Series::line(architecture.name(), colour, dots);
     match architecture {
+        Architecture::Bilateral(Baseline::DampedPositionForce) => {
+            line.marked(Mark::Triangle).stroked(Stroke::Dashed, width)
+        }
         Architecture::Bilateral(_) => line.marked(Mark::Square).stroked(Stroke::Dashed, width),
         Architecture::Mediated(_) => line.marked(Mark::Circle).stroked(Stroke::Solid, width),
     }
@@ -84,7 +87,7 @@ fn line(architecture: Architecture, dots: Vec<Dot>) -> Series {
 fn colour_and_width(architecture: Architecture) -> (Colour, u32) {
     match architecture {
         Architecture::Bilateral(Baseline::PositionForce) => (Colour::BLUE, 1),
-        Architecture::Bilateral(Baseline::DampedPositionForce) => (Colour::BLUE, 2),
+        Architecture::Bilateral(Baseline::DampedPositionForce) => (Colour::BLUE, 1),
         Architecture::Bilateral(Baseline::DeadbandForce) => (Colour::VERMILION, 1),
         Architecture::Bilateral(Baseline::Tdpa) => (Colour::GREEN, 1),
         Architecture::Bilateral(Baseline::TdpaDeadband) => (Colour::PURPLE, 1),
