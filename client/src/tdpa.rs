@@ -5,7 +5,7 @@
 
 use mmt_shared::model::geometry::Vec2;
 use mmt_shared::model::tool::{HandPort, Tool};
-use mmt_shared::passivity::{PortEnergy, RESERVE_J, impedance_controller};
+use mmt_shared::passivity::{PortEnergy, REPAYMENT_NS_PER_M, RESERVE_J, impedance_controller};
 use mmt_shared::time::{TICK_S, Time};
 
 /// Time constant of the round trip, s: a single late packet is no path.
@@ -84,7 +84,7 @@ impl TdpaHand {
         self.last_velocity = v;
         self.smooth_round_trip();
         let margin_j = self.energy.margin_j(self.other_in_j);
-        impedance_controller(self.received, next_v, margin_j)
+        impedance_controller(self.received, next_v, margin_j, REPAYMENT_NS_PER_M)
     }
 
     /// Takes note of the force on the hand (N) that the limiter let through.

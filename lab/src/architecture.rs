@@ -3,6 +3,7 @@
 //! Bilateral ones run in [`Bilateral`], the live system's own in [`World`]; [`run`] gives the same row for both. What the
 //! columns mean: `docs/baselines.md`. A run must never depend on anything but its arguments.
 
+mod aligned;
 mod bilateral;
 mod felt;
 
@@ -11,8 +12,8 @@ pub use felt::{FeltMass, FeltMasses};
 
 use std::time::Duration;
 
-use crate::baselines::Baseline;
 use crate::baselines::message::OVERHEAD_BYTES;
+use crate::baselines::{Baseline, Tuning};
 use mmt_client::device::DeviceProfile;
 use mmt_client::operator::scripted::Picture;
 use mmt_server::playout::PlayoutBuffer;
@@ -20,6 +21,7 @@ use mmt_shared::model::settings::{ModelSettings, PoseCorrection};
 use serde::Serialize;
 
 use crate::world::{World, WorldConfig, WorldError};
+use aligned::AlignedError;
 use bilateral::pushes;
 
 /// What stands between the hand and the object.
@@ -37,8 +39,9 @@ impl Architecture {
     /// The live system's own.
     pub const REPLAY: Self = Self::Mediated(PoseCorrection::Replay);
     /// All that are compared, in the order of tables.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 9] = [
         Self::Bilateral(Baseline::PositionForce),
+        Self::Bilateral(Baseline::DampedPositionForce),
         Self::Bilateral(Baseline::DeadbandForce),
         Self::Bilateral(Baseline::Tdpa),
         Self::Bilateral(Baseline::TdpaDeadband),
@@ -75,6 +78,8 @@ pub struct DelayRow {
     pub pmse: Option<f64>,
     /// Relative vector error of the same forces.
     pub relative_error: Option<f64>,
+    /// The same of the force displayed against the true force, each shifted by the delay that the architecture has.
+    pub aligned_error: Option<f64>,
     /// Error of the model's position, mm; only where there is a model.
     pub pose_rms_mm: Option<f64>,
     /// Largest force on the hand, N.
@@ -93,21 +98,34 @@ pub struct DelayRow {
     pub apparent_mass_ratio: Option<f64>,
 }
 
-/// Runs an architecture over a network.
+/// Runs an architecture over a network, as it is where nobody tunes it.
+///
+/// # Errors
+/// As [`run_tuned`].
+pub fn run(
+    architecture: Architecture,
+    config: &WorldConfig,
+    duration: Duration,
+) -> Result<DelayRow, WorldError> {
+    run_tuned(architecture, &Tuning::default(), config, duration)
+}
+
+/// Runs an architecture over a network. The tuning is that of the bilateral ones; the others have theirs in the configuration.
 ///
 /// The operator looks at what there is to look at: the delayed picture where there is no model, else what the
 /// configuration asks for.
 ///
 /// # Errors
 /// When a number of the configuration is not accepted.
-pub fn run(
+pub fn run_tuned(
     architecture: Architecture,
+    tuning: &Tuning,
     config: &WorldConfig,
     duration: Duration,
 ) -> Result<DelayRow, WorldError> {
     match architecture {
         Architecture::Bilateral(baseline) => {
-            let mut world = Bilateral::try_new(config, baseline, Picture::Delayed)?;
+            let mut world = Bilateral::try_new(config, (baseline, tuning), Picture::Delayed)?;
             world.run(duration);
             Ok(bilateral_row(&world, duration))
         }
@@ -139,6 +157,7 @@ fn bilateral_row(world: &Bilateral, duration: Duration) -> DelayRow {
         wire_bytes_per_s: (up.bytes + down.bytes) as f64 / seconds,
         pmse: force.pmse,
         relative_error: force.relative_error,
+        aligned_error: outcome.aligned.relative(),
         pose_rms_mm: None,
         force_peak_n: outcome.on_hand.largest_n(),
         breaks_per_push: outcome.breaks.per_push(pushes),
@@ -152,6 +171,7 @@ fn bilateral_row(world: &Bilateral, duration: Duration) -> DelayRow {
 
 fn world_row(mut world: World, duration: Duration) -> DelayRow {
     let mut felt = FeltMasses::default();
+    let mut aligned = AlignedError::default();
     let ticks = u64::try_from(duration.as_millis()).unwrap_or(u64::MAX);
     for _ in 0..ticks {
         let tick = world.step();
@@ -159,7 +179,9 @@ fn world_row(mut world: World, duration: Duration) -> DelayRow {
         let in_contact = world.master().view().in_contact;
         let hip = tick.master.sample.hip.metres();
         felt.push_hand(tick.now, hip, -tick.master.hand_force, pushes && in_contact);
+        aligned.push_felt(tick.now, tick.master.felt);
         if let Some(slave) = &tick.slave {
+            aligned.push_met(slave.stamp, slave.true_force);
             felt.push_tool(slave.stamp, slave.tool, slave.f_s, slave.in_contact);
         }
     }
@@ -175,6 +197,7 @@ fn world_row(mut world: World, duration: Duration) -> DelayRow {
         wire_bytes_per_s: (up.bytes + down.bytes + headers) as f64 / seconds,
         pmse: force.pmse,
         relative_error: force.relative_error,
+        aligned_error: aligned.relative(),
         pose_rms_mm: outcome.pose.position_rms_m().map(|m| m * 1e3),
         force_peak_n: outcome.on_hand.largest_n(),
         breaks_per_push: outcome.breaks.per_push(pushes),

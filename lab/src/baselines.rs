@@ -8,7 +8,10 @@ mod deadband;
 pub mod master;
 pub mod message;
 pub mod slave;
+mod tuning;
 mod wave;
+
+pub use tuning::Tuning;
 
 use serde::{Deserialize, Serialize};
 
@@ -18,7 +21,9 @@ use serde::{Deserialize, Serialize};
 pub enum Baseline {
     /// The tool goes where the hand went, the hand gets the force that the tool met.
     PositionForce,
-    /// The same, a force sent only when it is perceptibly another than the last one sent.
+    /// The same, the hand's own motion damped at the hand.
+    DampedPositionForce,
+    /// Position–force, a force sent only when it is perceptibly another than the last one sent.
     DeadbandForce,
     /// Position–force, its energy watched and paid at both ports.
     Tdpa,
@@ -30,8 +35,9 @@ pub enum Baseline {
 
 impl Baseline {
     /// All of them.
-    pub const ALL: [Self; 5] = [
+    pub const ALL: [Self; 6] = [
         Self::PositionForce,
+        Self::DampedPositionForce,
         Self::DeadbandForce,
         Self::Tdpa,
         Self::TdpaDeadband,
@@ -55,6 +61,7 @@ impl Baseline {
     pub const fn name(self) -> &'static str {
         match self {
             Self::PositionForce => "position-force",
+            Self::DampedPositionForce => "damped-position-force",
             Self::DeadbandForce => "deadband-force",
             Self::Tdpa => "tdpa",
             Self::TdpaDeadband => "tdpa-deadband",

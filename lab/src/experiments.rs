@@ -3,6 +3,7 @@
 //! An experiment must never depend on the order in which its runs end, nor on the machine they run on.
 
 mod ablation;
+mod bound;
 mod claims;
 mod congestion;
 mod delay;
@@ -26,9 +27,10 @@ mod worlds;
 use crate::experiment::description::Experiment;
 
 /// Every experiment, in the order in which they run.
-pub const ALL: [&Experiment; 19] = [
+pub const ALL: [&Experiment; 21] = [
     &physics::PHYSICS,
     &fig5::FIG5,
+    &bound::EXPERIMENT,
     &traces::FIG6,
     &traces::FIG7,
     &claims::CLAIMS,
@@ -45,6 +47,7 @@ pub const ALL: [&Experiment; 19] = [
     &netem::NETEM,
     &transport::TRANSPORT,
     &delay::DELAY,
+    &delay::TUNED,
     &worlds::EXPERIMENT,
 ];
 

@@ -60,8 +60,9 @@ impl PortEnergy {
 /// The passivity controller in impedance causality, for the master: f' = f + alpha v.
 ///
 /// `f` is the force on the object to be displayed (N), `v` the velocity that the hand is expected to keep for the next
-/// tick (m/s), `margin_j` W. Where the network would give more than W it gives W; a debt (W < 0) is paid back by damping.
-pub fn impedance_controller(f: Vec2, v: Vec2, margin_j: f64) -> Vec2 {
+/// tick (m/s), `margin_j` W. Where the network would give more than W it gives W; a debt (W < 0) is paid back by damping,
+/// by `repayment_ns_per_m` (N s/m) at most.
+pub fn impedance_controller(f: Vec2, v: Vec2, margin_j: f64, repayment_ns_per_m: f64) -> Vec2 {
     let speed2 = v.norm_squared();
     if speed2 < AT_REST_M_PER_S * AT_REST_M_PER_S {
         return f;
@@ -71,7 +72,7 @@ pub fn impedance_controller(f: Vec2, v: Vec2, margin_j: f64) -> Vec2 {
     // alpha = (E_out − W) / (T |v|²)
     let alpha = excess_j / (TICK_S * speed2);
     let debt_j = (-margin_j).max(0.0);
-    let repayment = (debt_j / (TICK_S * speed2)).min(REPAYMENT_NS_PER_M);
+    let repayment = (debt_j / (TICK_S * speed2)).min(repayment_ns_per_m);
     f + v * (alpha + repayment)
 }
 
@@ -92,6 +93,11 @@ pub fn admittance_controller(step: Vec2, f: Vec2, margin_j: f64) -> Vec2 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Of a hand that pays back as it does by default.
+    fn controlled(f: Vec2, v: Vec2, margin_j: f64) -> Vec2 {
+        impedance_controller(f, v, margin_j, REPAYMENT_NS_PER_M)
+    }
 
     #[test]
     fn energy_is_split_by_its_direction() {
@@ -117,17 +123,17 @@ mod tests {
     #[test]
     fn alpha_leaves_a_force_alone_that_takes_energy_or_is_covered() {
         let (f, v) = (Vec2::new(3.0, 1.0), Vec2::new(0.1, 0.2));
-        assert_eq!(impedance_controller(f, v, 0.0), f);
+        assert_eq!(controlled(f, v, 0.0), f);
         let covered_j = f.dot(&v) * TICK_S;
-        assert_eq!(impedance_controller(f, -v, covered_j), f);
-        assert_eq!(impedance_controller(f, Vec2::zeros(), -1.0), f);
+        assert_eq!(controlled(f, -v, covered_j), f);
+        assert_eq!(controlled(f, Vec2::zeros(), -1.0), f);
     }
 
     #[test]
     fn alpha_lets_out_exactly_the_margin() {
         let (f, v) = (Vec2::new(3.0, 1.0), Vec2::new(-0.1, 0.05));
         for margin_j in [0.0, 1e-5, 2e-4] {
-            let out_j = -impedance_controller(f, v, margin_j).dot(&v) * TICK_S;
+            let out_j = -controlled(f, v, margin_j).dot(&v) * TICK_S;
             assert!((out_j - margin_j).abs() < 1e-15, "{out_j}");
         }
     }
@@ -135,7 +141,7 @@ mod tests {
     #[test]
     fn a_debt_is_paid_back_and_no_faster_than_the_damping_allows() {
         let (f, v) = (Vec2::zeros(), Vec2::new(0.1, 0.0));
-        let paid = |debt_j: f64| impedance_controller(f, v, -debt_j).dot(&v) * TICK_S;
+        let paid = |debt_j: f64| controlled(f, v, -debt_j).dot(&v) * TICK_S;
         assert!((paid(1e-5) - 1e-5).abs() < 1e-18);
         let most = REPAYMENT_NS_PER_M * 0.01 * TICK_S;
         assert!((paid(1.0) - most).abs() < 1e-15);

@@ -6,10 +6,10 @@
 
 use std::time::Duration;
 
-use crate::baselines::Baseline;
 use crate::baselines::master::BilateralMaster;
 use crate::baselines::message::{ToMaster, ToSlave, wire_bytes};
 use crate::baselines::slave::{BilateralSlave, BilateralSlaveTick};
+use crate::baselines::{Baseline, Tuning};
 use mmt_client::device::DeviceProfile;
 use mmt_client::limiter::ForceLimiter;
 use mmt_client::master::PortObserver;
@@ -25,6 +25,7 @@ use mmt_shared::metrics::{ContactBreaks, ForcePeak, ForceSummary};
 use mmt_shared::model::geometry::Vec2;
 use mmt_shared::time::{TICK, Time};
 
+use super::aligned::AlignedError;
 use super::felt::FeltMasses;
 use crate::world::picture::{DelayedPicture, scene};
 use crate::world::{WorldConfig, WorldError};
@@ -41,6 +42,8 @@ pub struct BilateralOutcome {
     pub on_hand: ForcePeak,
     /// What the hand and the tool would take the object's mass for.
     pub felt: FeltMasses,
+    /// The hand's force against the tool's of a way ago.
+    pub(super) aligned: AlignedError,
     /// The passivity observer at the hand.
     pub hand_port: PortObserver,
     /// The same at the tool: energy that the tool put into the object.
@@ -64,6 +67,8 @@ pub struct Bilateral {
     down: Link<ToMaster>,
     picture: DelayedPicture,
     picture_delay: Duration,
+    /// From a tick of the tool's to the tick in which the hand has its force: what is sent in a tick is there in the next at the soonest.
+    way_down: Duration,
     /// What the run has come to so far.
     pub(super) outcome: BilateralOutcome,
 }
@@ -78,7 +83,7 @@ impl Bilateral {
     /// When a number of the configuration is not accepted.
     pub fn try_new(
         config: &WorldConfig,
-        baseline: Baseline,
+        (baseline, tuning): (Baseline, &Tuning),
         picture: Picture,
     ) -> Result<Self, WorldError> {
         let device = DeviceProfile::default().used_with(config.stiffness_n_per_m, None)?;
@@ -99,14 +104,14 @@ impl Bilateral {
             now: Time::ZERO,
             bytes: wire_bytes(baseline),
             master: BilateralMaster::new(
-                baseline,
+                (baseline, tuning),
                 smoothing_ticks(&config.down),
                 ForceLimiter::try_new(device.limits())?,
             ),
             slave: BilateralSlave::try_new(
                 &slave_config,
                 device.coupling(),
-                baseline,
+                (baseline, tuning),
                 smoothing_up,
                 operator.start(),
             )?,
@@ -119,6 +124,7 @@ impl Bilateral {
                 Picture::Delayed => down_delay,
                 Picture::Model => Duration::ZERO,
             },
+            way_down: down_delay.max(TICK),
             outcome: BilateralOutcome::default(),
         })
     }
@@ -164,6 +170,7 @@ impl Bilateral {
         self.hand_force = tick.hand_force;
         let outcome = &mut self.outcome;
         outcome.on_hand.push(tick.hand_force);
+        outcome.aligned.push_felt(self.now, tick.displayed);
         outcome.hand_port.push(hip, tick.hand_force);
         outcome
             .felt
@@ -185,6 +192,9 @@ impl Bilateral {
         }
         let outcome = &mut self.outcome;
         outcome.breaks.push(tick.in_contact);
+        outcome
+            .aligned
+            .push_met(self.now + self.way_down, tick.true_force);
         outcome
             .felt
             .push_tool(tick.stamp, tick.tool, tick.true_force, tick.in_contact);

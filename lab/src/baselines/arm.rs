@@ -25,11 +25,15 @@ pub(super) struct Arm {
 
 impl Arm {
     /// An arm at rest. `stiffness_n_per_m` is K; the tool stays below `speed_max_m_per_s`.
-    pub(super) fn new(stiffness_n_per_m: f64, speed_max_m_per_s: f64) -> Self {
+    pub(super) fn new(
+        stiffness_n_per_m: f64,
+        speed_max_m_per_s: f64,
+        impedance: WaveImpedance,
+    ) -> Self {
         Self {
             stiffness_n_per_m,
             speed_max_m_per_s,
-            impedance: WaveImpedance::default(),
+            impedance,
             stretch: Vec2::zeros(),
             velocity: Vec2::zeros(),
         }
@@ -54,12 +58,15 @@ impl Arm {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::baselines::wave::WAVE_IMPEDANCE_NS_PER_M;
+
+    const WAVES: fn() -> WaveImpedance = || WaveImpedance::new(WAVE_IMPEDANCE_NS_PER_M);
 
     #[test]
     fn a_free_tool_takes_the_velocity_of_the_wave_and_sends_it_back_whole() {
-        let mut arm = Arm::new(1000.0, 1.0);
+        let mut arm = Arm::new(1000.0, 1.0, WAVES());
         // u = √(b/2) v is what a master at 0.1 m/s sends when the tool follows freely
-        let b = WaveImpedance::default().damping_ns_per_m();
+        let b = WAVES().damping_ns_per_m();
         let u = Vec2::new(f64::sqrt(b / 2.0) * 0.1, 0.0);
         let (mut way, mut w) = (Vec2::zeros(), Vec2::zeros());
         for _ in 0..2000 {
@@ -71,7 +78,7 @@ mod tests {
 
     #[test]
     fn a_blocked_tool_sends_back_the_force_that_blocks_it() {
-        let mut arm = Arm::new(1000.0, 1.0);
+        let mut arm = Arm::new(1000.0, 1.0, WAVES());
         let (u, wall) = (Vec2::new(0.5, 0.0), Vec2::new(20_000.0, 0.0));
         let (mut x, mut w) = (Vec2::zeros(), Vec2::zeros());
         for _ in 0..5000 {
@@ -80,7 +87,7 @@ mod tests {
             x += way;
         }
         // v = 0: f = √(2b) u and w = −u
-        let b = WaveImpedance::default().damping_ns_per_m();
+        let b = WAVES().damping_ns_per_m();
         assert!((x.x * wall.x - f64::sqrt(2.0 * b) * u.x).abs() < 1e-3);
         assert!((w + u).norm() < 1e-4);
     }

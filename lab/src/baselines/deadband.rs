@@ -18,19 +18,25 @@ pub(super) const DELTA: f64 = 0.10;
 pub(super) const REPEAT: Duration = Duration::from_millis(100);
 
 /// Decides which forces are sent.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct PerceptualDeadband {
+    delta: f64,
     sent: Option<(Time, Vec2)>,
 }
 
 impl PerceptualDeadband {
+    /// Nothing sent yet; `delta` is Delta, as a share.
+    pub(super) fn new(delta: f64) -> Self {
+        Self { delta, sent: None }
+    }
+
     /// Whether `f` (N) is sent at `now`; what is sent becomes the centre of the deadband.
     ///
     /// Sent are the first force, one with |f − f_sent| > max(Delta |f_sent|, F_min), and a repeat when
     /// [`REPEAT`] has passed.
     pub(super) fn offer(&mut self, now: Time, f: Vec2) -> bool {
         let sends = self.sent.is_none_or(|(then, sent)| {
-            let threshold = (DELTA * sent.norm()).max(F_MIN_N);
+            let threshold = (self.delta * sent.norm()).max(F_MIN_N);
             (f - sent).norm() > threshold || now.saturating_since(then) >= REPEAT
         });
         if sends {
@@ -51,7 +57,7 @@ mod tests {
     #[test]
     fn a_change_at_the_deadband_is_not_sent_and_the_next_number_is() {
         for (last, edge) in [(2.0, 2.2), (0.1, 0.1 + F_MIN_N), (0.0, F_MIN_N)] {
-            let mut deadband = PerceptualDeadband::default();
+            let mut deadband = PerceptualDeadband::new(DELTA);
             assert!(deadband.offer(ms(0), Vec2::new(last, 0.0)), "the first");
             let just_inside = Vec2::new(edge - 1e-12, 0.0);
             assert!(!deadband.offer(ms(1), just_inside));
@@ -61,7 +67,7 @@ mod tests {
 
     #[test]
     fn the_centre_is_the_last_sent_and_not_the_last_seen() {
-        let mut deadband = PerceptualDeadband::default();
+        let mut deadband = PerceptualDeadband::new(DELTA);
         deadband.offer(ms(0), Vec2::new(1.0, 0.0));
         // each step is far below the deadband, their sum is not
         let sent: Vec<u64> = (1..=60)
@@ -73,7 +79,7 @@ mod tests {
 
     #[test]
     fn a_turned_force_counts_as_another() {
-        let mut deadband = PerceptualDeadband::default();
+        let mut deadband = PerceptualDeadband::new(DELTA);
         deadband.offer(ms(0), Vec2::new(1.0, 0.0));
         assert!(!deadband.offer(ms(1), Vec2::new(1.0, 0.099)));
         assert!(deadband.offer(ms(2), Vec2::new(1.0, 0.101)));
@@ -81,7 +87,7 @@ mod tests {
 
     #[test]
     fn silence_ends_after_the_repeat_time_and_not_a_tick_before() {
-        let mut deadband = PerceptualDeadband::default();
+        let mut deadband = PerceptualDeadband::new(DELTA);
         deadband.offer(ms(0), Vec2::new(1.0, 0.0));
         let sent: Vec<u64> = (1..=250)
             .filter(|n| deadband.offer(ms(*n), Vec2::new(1.0, 0.0)))

@@ -1,6 +1,6 @@
 //! The master's core of a bilateral architecture: HIP in, the slave's force out.
 //!
-//! Position–force holds the newest force that came (zero order); TDPA damps it where the energy is not covered; waves
+//! Position–force holds the newest force that came (zero order), and may damp the hand's own motion; TDPA damps it where the energy is not covered; waves
 //! turn the hand's velocity and the wave that came back into a force. It must never wait, allocate or read a clock,
 //! and force leaves it through the limiter only.
 
@@ -10,9 +10,9 @@ use mmt_shared::model::sample::{ForceCounts, HipCounts, HipSample};
 use mmt_shared::passivity::{PortEnergy, RESERVE_J, impedance_controller};
 use mmt_shared::time::{TICK_S, Time};
 
-use super::Baseline;
 use super::message::{ToMaster, ToSlave};
 use super::wave::{WaveImpedance, WaveReceiver, WaveSender, WaveSum};
+use super::{Baseline, Tuning};
 
 /// What one haptic tick gave.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -29,6 +29,7 @@ pub struct BilateralTick {
 #[derive(Clone, Debug)]
 pub struct BilateralMaster {
     baseline: Baseline,
+    tuning: Tuning,
     limiter: ForceLimiter,
     hip: HipCounts,
     last_hip: Option<Vec2>,
@@ -49,10 +50,15 @@ pub struct BilateralMaster {
 impl BilateralMaster {
     /// A master that has received nothing yet. `smoothing_ticks` is the waves' smoothing time.
     #[must_use]
-    pub fn new(baseline: Baseline, smoothing_ticks: u16, mut limiter: ForceLimiter) -> Self {
+    pub fn new(
+        (baseline, tuning): (Baseline, &Tuning),
+        smoothing_ticks: u16,
+        mut limiter: ForceLimiter,
+    ) -> Self {
         limiter.engage();
         Self {
             baseline,
+            tuning: *tuning,
             limiter,
             hip: HipCounts::default(),
             last_hip: None,
@@ -63,7 +69,7 @@ impl BilateralMaster {
             other_in_j: 0.0,
             port: PortEnergy::with_reserve(RESERVE_J),
             put_in_j: 0.0,
-            impedance: WaveImpedance::default(),
+            impedance: WaveImpedance::new(tuning.wave_impedance_ns_per_m),
             waves_in: WaveReceiver::new(smoothing_ticks),
             waves_out: WaveSender::default(),
         }
@@ -124,12 +130,24 @@ impl BilateralMaster {
     /// The force on the object (N) for the hand's velocity and the one that it is about to have (m/s), and all waves sent.
     fn law(&mut self, v: Vec2, next_v: Vec2) -> (Vec2, WaveSum) {
         match self.baseline {
-            Baseline::PositionForce | Baseline::DeadbandForce => {
-                (self.received, WaveSum::default())
+            Baseline::PositionForce => {
+                let force = self.received * self.tuning.force_gain;
+                (force, WaveSum::default())
             }
+            Baseline::DampedPositionForce => {
+                // f' = f + B v
+                let force = self.received + v * self.tuning.injected_damping_ns_per_m;
+                (force, WaveSum::default())
+            }
+            Baseline::DeadbandForce => (self.received, WaveSum::default()),
             Baseline::Tdpa | Baseline::TdpaDeadband => {
                 let margin_j = self.port.margin_j(self.other_in_j);
-                let force = impedance_controller(self.received, next_v, margin_j);
+                let force = impedance_controller(
+                    self.received,
+                    next_v,
+                    margin_j,
+                    self.tuning.repayment_ns_per_m,
+                );
                 (force, WaveSum::default())
             }
             Baseline::Waves => {
@@ -150,7 +168,7 @@ mod tests {
 
     fn master(baseline: Baseline) -> BilateralMaster {
         let limiter = ForceLimiter::try_new(Limits::default()).unwrap();
-        let mut master = BilateralMaster::new(baseline, 1, limiter);
+        let mut master = BilateralMaster::new((baseline, &Tuning::default()), 1, limiter);
         // past the ramp, at rest
         for n in 0..u64::from(RAMP_TICKS) {
             master.tick(Time::from_millis(n), Vec2::zeros());
@@ -202,7 +220,7 @@ mod tests {
     fn with_waves_a_hand_against_silence_feels_the_wave_impedance() {
         let mut master = master(Baseline::Waves);
         let last = (0..100).map(|ms| tick(&mut master, ms, 1e-4 * ms as f64).displayed);
-        let b = WaveImpedance::default().damping_ns_per_m();
+        let b = Tuning::default().wave_impedance_ns_per_m;
         assert!((last.last().unwrap().x - 0.1 * b).abs() < 1e-6);
     }
 

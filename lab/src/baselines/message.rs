@@ -52,7 +52,9 @@ pub struct ToMaster {
 #[must_use]
 pub const fn wire_bytes(baseline: Baseline) -> usize {
     let payload = match baseline {
-        Baseline::PositionForce | Baseline::DeadbandForce => POINT_BYTES,
+        Baseline::PositionForce | Baseline::DampedPositionForce | Baseline::DeadbandForce => {
+            POINT_BYTES
+        }
         Baseline::Tdpa | Baseline::TdpaDeadband => POINT_BYTES + ENERGY_BYTES,
         Baseline::Waves => WAVE_BYTES,
     };
@@ -66,6 +68,6 @@ mod tests {
     #[test]
     fn sizes_are_those_of_the_fields_that_are_used() {
         let bytes = Baseline::ALL.map(wire_bytes);
-        assert_eq!(bytes, [82, 82, 90, 90, 98]);
+        assert_eq!(bytes, [82, 82, 82, 90, 90, 98]);
     }
 }

@@ -19,11 +19,11 @@ use mmt_server::sensing::Sensing;
 use mmt_server::slave::{SlaveConfig, SlaveError};
 use mmt_server::tool::port::ToolPort;
 
-use super::Baseline;
 use super::arm::Arm;
 use super::deadband::PerceptualDeadband;
 use super::message::{ToMaster, ToSlave};
-use super::wave::{WaveReceiver, WaveSender, WaveSum};
+use super::wave::{WaveImpedance, WaveReceiver, WaveSender, WaveSum};
+use super::{Baseline, Tuning};
 
 /// What one tick of the slave gave.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -68,7 +68,7 @@ impl BilateralSlave {
     pub fn try_new(
         config: &SlaveConfig,
         coupling: Coupling,
-        baseline: Baseline,
+        (baseline, tuning): (Baseline, &Tuning),
         smoothing_ticks: u16,
         hip: Vec2,
     ) -> Result<Self, SlaveError> {
@@ -88,8 +88,12 @@ impl BilateralSlave {
             tool: hip,
             port: ToolPort::new(config.sensing.force_noise_n, speed_max_m_per_s),
             put_out_j: 0.0,
-            deadband: PerceptualDeadband::default(),
-            arm: Arm::new(coupling.stiffness_n_per_m, speed_max_m_per_s),
+            deadband: PerceptualDeadband::new(tuning.delta),
+            arm: Arm::new(
+                coupling.stiffness_n_per_m,
+                speed_max_m_per_s,
+                WaveImpedance::new(tuning.wave_impedance_ns_per_m),
+            ),
             waves_in: WaveReceiver::new(smoothing_ticks),
             waves_out: WaveSender::default(),
             force: ForceMetrics::default(),
@@ -152,7 +156,7 @@ impl BilateralSlave {
     /// The tool's way in this tick, m, and all waves sent.
     fn way(&mut self, played: &Played) -> (Vec2, WaveSum) {
         match self.baseline {
-            Baseline::PositionForce | Baseline::DeadbandForce => {
+            Baseline::PositionForce | Baseline::DampedPositionForce | Baseline::DeadbandForce => {
                 (played.hip - self.tool, WaveSum::default())
             }
             Baseline::Tdpa | Baseline::TdpaDeadband => {

@@ -13,6 +13,9 @@ use mmt_shared::time::TICK_S;
 /// Credit of each sending side, J: covers what sampling shifts by a tick (F v T = 0.4 mJ at 2.5 N and 0.15 m/s).
 pub(super) const CREDIT_J: f64 = 4e-4;
 
+/// b where nobody tunes it, N s/m: near the damping of a hand (25 N s/m), so that waves are hardly reflected by it.
+pub(super) const WAVE_IMPEDANCE_NS_PER_M: f64 = 20.0;
+
 /// The wave impedance b.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct WaveImpedance {
@@ -20,18 +23,16 @@ pub(super) struct WaveImpedance {
     root_2b: f64,
 }
 
-impl Default for WaveImpedance {
-    /// b = 20 N s/m: near the damping of a hand (25 N s/m), so that waves are hardly reflected by it.
-    fn default() -> Self {
-        let b = 20.0;
+impl WaveImpedance {
+    /// An impedance b, N s/m, above zero.
+    #[must_use]
+    pub(super) fn new(b: f64) -> Self {
         Self {
             b,
             root_2b: f64::sqrt(2.0 * b),
         }
     }
-}
 
-impl WaveImpedance {
     /// b, N s/m.
     #[must_use]
     pub(super) fn damping_ns_per_m(&self) -> f64 {
@@ -175,7 +176,10 @@ mod tests {
 
     #[test]
     fn the_power_at_each_port_is_the_difference_of_the_waves_power() {
-        let (waves, mut stream) = (WaveImpedance::default(), Substream::new(1, "wave", 0));
+        let (waves, mut stream) = (
+            WaveImpedance::new(WAVE_IMPEDANCE_NS_PER_M),
+            Substream::new(1, "wave", 0),
+        );
         for _ in 0..100 {
             let (v, w) = (random(&mut stream), random(&mut stream));
             let (f, u) = (waves.master_force(v, w), waves.master_wave(v, w));
@@ -193,7 +197,7 @@ mod tests {
 
     #[test]
     fn without_delay_both_sides_have_the_same_force_and_velocity() {
-        let waves = WaveImpedance::default();
+        let waves = WaveImpedance::new(WAVE_IMPEDANCE_NS_PER_M);
         let (v, w) = (Vec2::new(0.2, -0.1), Vec2::new(0.3, 0.4));
         let (f, u) = (waves.master_force(v, w), waves.master_wave(v, w));
         assert!((waves.slave_wave(u, f) - w).norm() < 1e-12);

@@ -4,15 +4,20 @@
 //! decide there, and jitter, loss and bursts at a few delays; the full grid on request. And what the operator's
 //! picture does beyond 500 ms.
 
+mod choices;
 mod crossing;
 mod figure;
 mod grid_point;
 mod limits;
 mod tables;
+mod tuned;
+mod tuning;
 
 use crate::architecture;
 use crate::experiment::prelude::*;
 use crate::trial::TrialError;
+pub(super) use tuned::TUNED;
+
 use grid_point::{GridPoint, Group, all_points, picture_points, some_points};
 
 /// The architectures over the delay; pushes come later with it.

@@ -155,6 +155,23 @@ fn fig5_sends_less_and_errs_more_with_a_wider_deadband() {
     }
 }
 
+/// An oracle that may use what comes later sends less than a scheme that may not, and more where the error must be smaller.
+#[test]
+fn bound_is_below_every_scheme() {
+    let done = Done::of(&bound::EXPERIMENT, 8000);
+    let rows = done.rows("bound.csv", &[]);
+    assert_eq!(rows.len(), 6);
+    for row in rows {
+        let [updates, contact, judged, fewest] =
+            ["updates", "contact_updates", "judged_updates", "fewest"].map(|key| number(&row, key));
+        assert!((1.0..updates).contains(&fewest), "{row:?}");
+        assert!(contact <= updates && judged <= updates, "{row:?}");
+        assert!((number(&row, "ratio") - updates / fewest).abs() < 1e-12);
+        assert!((0.001..1.0).contains(&number(&row, "epsilon_n")), "{row:?}");
+        assert!((1.0..8.0).contains(&number(&row, "judged_s")), "{row:?}");
+    }
+}
+
 #[test]
 fn fig6_and_fig7_are_of_one_run_sample_by_sample() {
     for (experiment, timed) in [(&traces::FIG6, false), (&traces::FIG7, true)] {
@@ -368,6 +385,36 @@ fn delay_by_replay_injects_no_energy() {
         snap.iter()
             .any(|row| number(row, "energy_injected_j") > 0.0)
     );
+}
+
+/// Equal budgets, the choice by the tuning seeds alone, and seeds that judge and tuned nothing.
+#[test]
+fn tuned_chooses_the_least_error_of_those_that_keep_contact_and_judges_on_other_seeds() {
+    let done = Done::of(&delay::TUNED, 2000);
+    let tried = done.rows("tuned-choices.csv", &[]);
+    assert_eq!(tried.len(), 9 * 9 * 6);
+    for chosen in tried.iter().filter(|row| row["is_chosen"] == "1") {
+        let here = |row: &&Row| {
+            ["architecture", "one_way_ms"]
+                .iter()
+                .all(|key| row[*key] == chosen[*key])
+        };
+        let kept = |row: &&Row| {
+            row["breaks_per_push"]
+                .parse()
+                .is_ok_and(|breaks: f64| breaks <= 2.0)
+        };
+        let errors = |row: &Row| row["relative_error"].parse().unwrap_or(f64::MAX);
+        let rows: Vec<&Row> = tried.iter().filter(here).collect();
+        let any_kept = rows.iter().any(|row| kept(row));
+        let allowed = rows.iter().filter(|row| !any_kept || kept(row));
+        let least = allowed.map(|row| errors(row)).fold(f64::MAX, f64::min);
+        assert_eq!(errors(chosen), least, "{chosen:?}");
+    }
+    let judged = done.rows("tuned.csv", &[]);
+    assert!(judged.iter().all(|row| row["seed"] == "20001"));
+    let tuned = judged.iter().filter(|row| row["is_tuned"] == "1");
+    assert_eq!(tuned.count(), 9 * 9);
 }
 
 /// What the samples of a run of fig. 5 say that its columns must show, by (13) to (15).

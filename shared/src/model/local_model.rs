@@ -18,9 +18,8 @@ use crate::model::settings::{ModelSettings, PoseCorrection, Smoothing};
 use crate::model::update::Update;
 use crate::time::{TICK, TICK_S, Time};
 
-pub use body::{BodyState, Rendered};
+pub use body::{Body, BodyState, Rendered};
 
-use body::Body;
 pub use replay::REPLAYED_PER_TICK;
 use replay::Replay;
 

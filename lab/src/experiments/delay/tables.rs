@@ -32,6 +32,7 @@ pub(super) fn runs(groups: &[Group]) -> Table {
             column("pushes", "", 0, |run| run.measured.pushes),
             column("wire_bytes_per_s", "B/s", 0, |run| run.measured.wire_bytes_per_s),
             column("playout_delay_ms", "ms", 1, |run| run.measured.playout_delay_ms),
+            column("aligned_error", "", 3, |run| run.measured.aligned_error),
         ],
     )
 }

@@ -54,19 +54,25 @@ impl From<ModelState> for BodyState {
     }
 }
 
-/// A box and the proxy on it.
+/// A box and the proxy on it: the local model without smoothing, correction and history.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Body {
+pub struct Body {
     pub(super) state: BodyState,
     pub(super) god: GodObject,
 }
 
 impl Body {
-    pub(super) fn new(state: ModelState) -> Self {
+    /// A box in `state` that nothing has touched yet.
+    pub fn new(state: ModelState) -> Self {
         Self {
             state: state.into(),
             god: GodObject::default(),
         }
+    }
+
+    /// What it is now.
+    pub fn state(&self) -> &BodyState {
+        &self.state
     }
 
     /// Whether every number that moves is one.
@@ -75,7 +81,7 @@ impl Body {
     }
 
     /// What the HIP touches with the box as it is; changes nothing.
-    pub(super) fn touch(&self, hip: Vec2) -> Option<Touch> {
+    pub fn touch(&self, hip: Vec2) -> Option<Touch> {
         self.god
             .touch_at(&self.state.footprint, &self.state.pose, hip)
     }
@@ -130,8 +136,9 @@ impl Body {
         }
     }
 
-    /// One sample period. Returns what was rendered and the power that the ground took, W.
-    pub(super) fn step(
+    /// One sample period with the HIP (m, world) and its velocity (m/s). Returns what was rendered and the power that the
+    /// ground took, W.
+    pub fn step(
         &mut self,
         settings: &ModelSettings,
         hip: Vec2,
