@@ -174,7 +174,7 @@ mod tests {
         assert_eq!(fewest(0, &[3, 3, 3]), Some(1));
         // the update in tick 1 reaches farther than the one in tick 2, where it is off first
         assert_eq!(fewest(2, &[2, 5, 4, 5, 5, 6]), Some(2));
-        assert_eq!(fewest(1, &[2, 1, 4, 4]), None, "nothing mends tick 1");
+        assert_eq!(fewest(1, &[1, 1, 4, 4]), None, "nothing mends tick 1");
     }
 
     const COUPLING: Coupling = Coupling {
