@@ -1,64 +1,64 @@
-//! The bound's figure: updates of the schemes and of the oracle at each deadband, and the one over the other.
+//! The bound's figure: the error that the schemes reach at each deadband, the updates of the schemes and of the oracle, and the
+//! one over the other.
 
 use super::trace::Bounded;
 use super::{Group, Rule, TARGET, ratio};
 use crate::experiment::prelude::*;
 
-/// How far the schemes stand apart at a deadband, in per cent of it: intervals that lie on each other cannot be read.
+/// How far the schemes stand apart at a deadband, in per cent: intervals that lie on each other cannot be read.
 const APART: f64 = 0.3;
+/// The deadbands that are shown, per cent.
+const SHOWN: (f64, f64) = (0.0, 25.0);
 
-/// Left both rates, right their ratio with what is demanded of it.
+/// Left the error, in the middle both rates, right their ratio with what is demanded of it.
 pub(super) fn figure(groups: &[Group]) -> Figure {
-    let deadband = || Axis::linear("deadband, %").over(0.0..25.0);
-    let (mut rates, mut ratios) = (Vec::new(), Vec::new());
+    let deadband = || Axis::linear("deadband, %").over(SHOWN.0..SHOWN.1);
+    let (mut errors, mut rates, mut ratios) = (Vec::new(), Vec::new(), Vec::new());
     for rule in Rule::ALL {
         let (colour, mark, apart) = match rule {
             Rule::Useful => (Colour::BLUE, Mark::Circle, -APART),
             Rule::Adaptive => (Colour::VERMILION, Mark::Square, APART),
         };
-        let curve = |of: fn(&Group) -> Option<Interval>, is_noted: bool| {
+        let curve = |name: &str, of: fn(&Group) -> Option<Interval>| {
             let own = groups.iter().filter(|group| group.case.rule == rule);
             let dots = own.filter_map(|group| {
-                let (mean, epsilon_n) = (of(group)?, group.mean(|run| run.epsilon_n)?);
+                let mean = of(group)?;
                 Some(Dot {
                     y_interval: Some((mean.low, mean.high)),
-                    note: is_noted.then(|| format!("{epsilon_n:.3} N")),
                     ..Dot::at(group.case.deadband * 100.0 + apart, mean.mean)
                 })
             });
-            dots.collect::<Vec<_>>()
+            Series::line(name, colour, dots.collect()).marked(mark)
         };
-        let (name, least) = (
-            rule.name(),
-            format!("fewest, at the error of {}", rule.name()),
-        );
-        rates.push(Series::line(name, colour, curve(rate, true)).marked(mark));
-        let of_oracle = Series::line(&least, colour, curve(fewest_rate, false));
-        rates.push(of_oracle.marked(mark).stroked(Stroke::Dashed, 2));
-        ratios.push(Series::line(name, colour, curve(ratio, false)).marked(mark));
+        let name = rule.name();
+        errors.push(curve(name, |group| group.interval(|run| run.epsilon_n)));
+        rates.push(curve(name, rate));
+        let least = curve(&format!("fewest, for {name}"), fewest_rate);
+        rates.push(least.stroked(Stroke::Dashed, 2));
+        ratios.push(curve(name, ratio));
     }
-    let target = vec![Dot::at(0.0, TARGET), Dot::at(25.0, TARGET)];
+    let target = vec![Dot::at(SHOWN.0, TARGET), Dot::at(SHOWN.1, TARGET)];
     ratios.push(Series::line("demanded", Colour::GREY, target).stroked(Stroke::Dashed, 2));
+    let error = Axis::linear("force error, N").over(0.0..0.1);
     let rate = Axis::log("updates per second").over(0.05..10.0);
+    let ratio = Axis::linear("updates over the fewest");
+    let panels = [
+        ("95 % of contact within", error, errors, Legend::LowerRight),
+        ("Updates", rate, rates, Legend::UpperRight),
+        (
+            "Over the fewest with hindsight",
+            ratio,
+            ratios,
+            Legend::LowerRight,
+        ),
+    ];
+    let panels = panels.map(|(title, y, series, legend)| {
+        Panel::new(title, deadband(), y, series).with_legend(legend)
+    });
     Figure {
-        panels: vec![
-            Panel::new(
-                "Updates, with the error that they reach",
-                deadband(),
-                rate,
-                rates,
-            )
-            .with_legend(Legend::UpperRight),
-            Panel::new(
-                "Updates over the fewest with hindsight",
-                deadband(),
-                Axis::linear("ratio"),
-                ratios,
-            )
-            .with_legend(Legend::LowerLeft),
-        ],
-        columns: 2,
-        panel_size: (560, 400),
+        panels: panels.to_vec(),
+        columns: 3,
+        panel_size: (400, 360),
     }
 }
 
