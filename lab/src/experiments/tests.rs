@@ -406,7 +406,7 @@ fn tuned_chooses_the_least_error_of_those_that_keep_contact_and_judges_on_other_
         };
         let errors = |row: &Row| row["relative_error"].parse().unwrap_or(f64::MAX);
         let rows: Vec<&Row> = tried.iter().filter(here).collect();
-        let any_kept = rows.iter().any(|row| kept(row));
+        let any_kept = rows.iter().any(&kept);
         let allowed = rows.iter().filter(|row| !any_kept || kept(row));
         let least = allowed.map(|row| errors(row)).fold(f64::MAX, f64::min);
         assert_eq!(errors(chosen), least, "{chosen:?}");
