@@ -25,7 +25,7 @@ impl Default for Tuning {
     fn default() -> Self {
         Self {
             force_gain: 1.0,
-            // half of the damping of a hand
+            // less than half of the damping of a hand (25 N s/m)
             injected_damping_ns_per_m: 10.0,
             delta: DELTA,
             repayment_ns_per_m: REPAYMENT_NS_PER_M,

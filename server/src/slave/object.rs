@@ -202,7 +202,7 @@ impl ObjectEstimate {
     /// The parameters of an estimate; none if they are not accepted.
     fn accept(&self, estimate: &Estimate, side: f64, held_back: bool) -> Option<ModelParams> {
         let Estimate { m, b, .. } = *estimate;
-        // a mass that nothing shows may come out as next to none: that says nothing against the friction found beside it
+        // where nothing shows the mass, it may come out as next to none; the friction beside it is good all the same
         let m = if self.raises_mass {
             m.max(least_stable_mass(b, &self.coupling))
         } else {

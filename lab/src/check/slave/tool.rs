@@ -59,7 +59,7 @@ impl SlaveChecks {
         let playout = &self.about.config.playout;
         let free = done.true_force == Vec2::zeros() && done.f_s.norm() < FREE_N;
         let inside = done.tool.norm() < playout.reach_m - HAIR_M;
-        // a shorter tick goes the way of a whole one where it catches up, and only then
+        // in a shorter tick a tool that catches up goes as far as in a whole one
         let missed = elapsed > TICK.mul_f64(1.5) || elapsed < TICK.mul_f64(1.0 - DRIFT);
         let period_s = elapsed.max(TICK).as_secs_f64();
         let velocity = (done.tool - self.tool) / period_s;

@@ -6,13 +6,16 @@ use super::grid_point::{Group, STIFFNESSES, sweep};
 use crate::architecture::Architecture;
 use crate::experiment::prelude::*;
 
+/// More breaks of contact per push than this are no contact.
+pub(super) const BREAKS_MAX: f64 = 2.0;
+
 /// Why an architecture is no longer usable, if it is not: by the medians over the seeds. A run that completed no push
 /// counts as broken.
 fn failing(group: &Group, peak_at_zero: f64) -> Option<&'static str> {
     let breaks = group.median(|row| Some(row.breaks_per_push.unwrap_or(f64::MAX)))?;
     let peak = group.median(|row| row.force_peak_n)?;
     let mass = group.median(|row| row.apparent_mass_ratio);
-    if breaks > 2.0 {
+    if breaks > BREAKS_MAX {
         Some("breaks per push > 2")
     } else if peak > 2.0 * peak_at_zero {
         Some("force peak > 2 x that at zero delay")

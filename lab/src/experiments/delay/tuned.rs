@@ -1,5 +1,6 @@
 //! Baselines at their best: each architecture tuned per delay with an equal budget, and judged on seeds that tuned nothing.
 
+mod figure;
 mod tables;
 
 use super::choices::Choice;
@@ -80,7 +81,7 @@ fn run(runner: &Runner, request: &Request) -> Result<Findings, ExperimentError> 
 
     runner.keep_table("tuned-choices.csv", &tables::choices(&tried, &pairs))?;
     runner.keep_table("tuned.csv", &tables::runs(&judged, &pairs, JUDGING))?;
-    runner.keep_figure("tuned.svg", &super::figure::tuned(&pairs))?;
+    runner.keep_figure("tuned.svg", &figure::figure(&pairs))?;
     Ok(Findings {
         digest: String::new(),
         configuration: vec![WorldConfig::default()],

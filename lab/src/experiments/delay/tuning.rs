@@ -2,14 +2,12 @@
 
 use super::choices::Choice;
 use super::grid_point::GridPoint;
+use super::limits::BREAKS_MAX;
 use crate::architecture::DelayRow;
 use crate::experiment::grid;
 
 /// A value at a point with the rows of its seeds.
 pub(super) type Tried = grid::Group<Choice, DelayRow>;
-
-/// More breaks of contact per push than this are no contact: the limit of the delay experiment.
-const BREAKS_MAX: f64 = 2.0;
 
 /// Mean relative error over the seeds; none if a run has none, since nothing was touched in it.
 pub(super) fn error(tried: &Tried) -> Option<f64> {
@@ -18,7 +16,7 @@ pub(super) fn error(tried: &Tried) -> Option<f64> {
 }
 
 /// Whether contact is kept, by the median over the seeds; a run that completed no push counts as broken.
-fn keeps_contact(tried: &Tried) -> bool {
+pub(super) fn keeps_contact(tried: &Tried) -> bool {
     let breaks = tried.median(|row| Some(row.breaks_per_push.unwrap_or(f64::MAX)));
     breaks.is_some_and(|breaks| breaks <= BREAKS_MAX)
 }

@@ -4,7 +4,7 @@ use super::Judged;
 use crate::architecture::{Architecture, DelayRow};
 use crate::experiment::prelude::*;
 use crate::experiments::delay::choices::number;
-use crate::experiments::delay::tuning::{Tried, error};
+use crate::experiments::delay::tuning::{Tried, error, keeps_contact};
 
 /// A row a value that was tried.
 #[rustfmt::skip]
@@ -110,7 +110,7 @@ impl Nearest<'_> {
     }
 }
 
-/// Which architecture is the nearest to the object by each measure: of those that keep contact in every run.
+/// Which architecture is the nearest to the object by each measure: of those that keep contact.
 #[rustfmt::skip]
 pub(super) fn nearest(judged: &[Judged<'_>], delays_ms: &[u64]) -> Table {
     let mut rows = Vec::new();
@@ -134,12 +134,7 @@ fn of_delay<'a>(judged: &[Judged<'a>], one_way_ms: u64, measure: Measure) -> Opt
             .filter(move |judged| judged.point().one_way_ms == one_way_ms)
     };
     let replay = here().find(|judged| judged.point().architecture == Architecture::REPLAY)?;
-    let kept = here().filter(|judged| {
-        judged
-            .tuned
-            .mean(|row| row.breaks_per_push)
-            .is_some_and(|breaks| breaks <= 2.0)
-    });
+    let kept = here().filter(|judged| keeps_contact(judged.tuned));
     let measured = kept.filter_map(|judged| Some((judged.tuned, judged.tuned.mean(measure.1)?)));
     let (nearest, _) = measured.min_by(|(_, a), (_, b)| a.total_cmp(b))?;
     Some(Nearest {
