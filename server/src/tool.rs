@@ -115,7 +115,7 @@ impl ToolDrive {
             limits.way(self.force.velocity(), goal, period_s)
         };
         let free = if self.passive {
-            self.port.allowed(bounded)
+            self.port.allowed(bounded, period_s)
         } else {
             bounded
         };
@@ -126,7 +126,7 @@ impl ToolDrive {
             return played;
         }
         let way = if held {
-            self.port.within_speed(allowed)
+            self.port.within_speed(allowed, period_s)
         } else {
             free
         };

@@ -4,13 +4,14 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
 use mmt_server::end::{SlaveEnd, SlaveGiven};
+use mmt_server::playout::PlayoutCounts;
 use mmt_server::slave::{SlaveConfig, SlaveTick};
 use mmt_server::trigger::MismatchMetric;
 use mmt_shared::model::contact::Coupling;
 use mmt_shared::model::geometry::Vec2;
 use mmt_shared::model::sample::ForceCounts;
 use mmt_shared::model::update::{Cause, Update};
-use mmt_shared::time::Time;
+use mmt_shared::time::{TICK, Time};
 use mmt_shared::wire::{Datagram, Message, RawState, Side};
 
 mod tool;
@@ -77,6 +78,12 @@ pub struct SlaveChecks {
     disengaged: bool,
     /// Forces by stamp; an enemy may have sent another one with a stamp that the slave did not believe then.
     samples: BTreeMap<Time, Vec<ForceCounts>>,
+    /// Stamps of samples that came since the last tick.
+    fresh: Vec<Time>,
+    /// Stamps of samples that came when play-out refused some: it may not have these.
+    doubtful: BTreeSet<Time>,
+    /// What play-out had counted by the last tick.
+    counts: PlayoutCounts,
     played: Option<Time>,
     acknowledged: BTreeSet<u32>,
     /// Numbers, times and causes of updates that no command has acknowledged, or of late: the samples say it later.
@@ -104,6 +111,9 @@ impl SlaveChecks {
             quiet: Duration::ZERO,
             disengaged: false,
             samples: BTreeMap::new(),
+            fresh: Vec::new(),
+            doubtful: BTreeSet::new(),
+            counts: PlayoutCounts::default(),
             played: None,
             acknowledged: BTreeSet::from([0]),
             unconfirmed: Vec::new(),
@@ -137,6 +147,7 @@ impl SlaveChecks {
             if forces.is_empty() {
                 self.quiet = Duration::ZERO;
             }
+            self.fresh.push(sample.stamp);
             // repeats are the same
             if !forces.contains(&sample.force) {
                 forces.push(sample.force);
@@ -147,6 +158,18 @@ impl SlaveChecks {
         }
         let newest = self.newest.unwrap_or_default();
         self.samples = self.samples.split_off(&(newest - REMEMBERED));
+        self.doubtful = self.doubtful.split_off(&(newest - REMEMBERED));
+    }
+
+    /// Takes in what play-out counts: it did not believe a sample, had no room for it, or learned the clock anew and dropped all.
+    fn doubt(&mut self, counts: PlayoutCounts) {
+        let before = std::mem::replace(&mut self.counts, counts);
+        let fresh = self.fresh.drain(..);
+        if counts.relearned > before.relearned {
+            self.doubtful.extend(self.samples.keys());
+        } else if counts.implausible > before.implausible || counts.overflow > before.overflow {
+            self.doubtful.extend(fresh);
+        }
     }
 
     /// A command acknowledges an update; of a number that never left it acknowledges none.
@@ -185,7 +208,10 @@ impl SlaveChecks {
             self.quiet += elapsed;
         }
         self.disengaged |= self.silent > DISENGAGE;
+        self.doubt(tick.end.slave().playout().counts());
         if let Some(done) = tick.done {
+            // the tool begins from rest: its first tick is one period, however long ago the session began
+            let elapsed = self.played.map_or(TICK, |_| elapsed);
             // a plant of somebody else's moves its tool itself
             if tick.end.plant_command().is_none() {
                 self.judge_tool(tick, done, elapsed);
@@ -215,7 +241,9 @@ impl SlaveChecks {
         self.verdict.judge(Invariant::PlaysInOrder, now, holds, || {
             format!("{stamp:?} is played after {before:?}, {newest:?} is the newest sample")
         });
-        if let (Some(f_m), Some(forces)) = (done.f_m, self.samples.get(&stamp)) {
+        let forces = self.samples.get(&stamp);
+        let forces = forces.filter(|_| !self.doubtful.contains(&stamp));
+        if let (Some(f_m), Some(forces)) = (done.f_m, forces) {
             let holds = forces.iter().any(|force| force.newtons() == f_m);
             self.verdict.judge(Invariant::PlaysTrue, now, holds, || {
                 format!("{f_m:?} N are taken for f_m at {stamp:?}, {forces:?} came with it")

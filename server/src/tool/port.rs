@@ -5,7 +5,6 @@
 
 use mmt_shared::model::geometry::Vec2;
 use mmt_shared::passivity::{PortEnergy, admittance_controller};
-use mmt_shared::time::TICK_S;
 
 /// A force below this many times the sensor's noise per axis is taken for none: three ticks in ten thousand in free
 /// space are not. It is F_min with the default sensor.
@@ -53,20 +52,20 @@ impl ToolPort {
         self.other_in_j = self.other_in_j.max(other_in_j);
     }
 
-    /// The part of the way from the tool to the HIP (m) that the energy allows: towards the hand, not along its
+    /// The part of the way from the tool to the HIP (m, in `period_s`) that the energy allows: towards the hand, not along its
     /// velocity, so that where beta held the tool back it makes up for it as soon as there is energy (Artigas, Ryu and
     /// Preusche, IROS 2010).
     #[must_use]
-    pub fn allowed(&self, wanted: Vec2) -> Vec2 {
-        let wanted = self.within_speed(wanted);
+    pub fn allowed(&self, wanted: Vec2, period_s: f64) -> Vec2 {
+        let wanted = self.within_speed(wanted, period_s);
         let margin_j = self.energy.margin_j(self.other_in_j);
         admittance_controller(wanted, self.held + self.doubt(), margin_j)
     }
 
-    /// The part of the way from the tool to the HIP (m) that the speed limit allows.
+    /// The part of the way from the tool to the HIP (m, in `period_s`) that the speed limit allows.
     #[must_use]
-    pub fn within_speed(&self, wanted: Vec2) -> Vec2 {
-        let most = self.speed_max_m_per_s * TICK_S;
+    pub fn within_speed(&self, wanted: Vec2, period_s: f64) -> Vec2 {
+        let most = self.speed_max_m_per_s * period_s;
         wanted * (most / wanted.norm().max(most))
     }
 
@@ -102,6 +101,7 @@ impl ToolPort {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use mmt_shared::time::TICK_S;
 
     #[test]
     fn the_tool_goes_as_far_as_the_hand_has_paid_for_and_no_further() {
@@ -109,7 +109,7 @@ mod tests {
         port.measured(Vec2::new(2.0, 0.0));
         let wanted = Vec2::new(1e-3, 5e-4);
         assert_eq!(
-            port.allowed(wanted),
+            port.allowed(wanted, TICK_S),
             Vec2::new(0.0, 5e-4),
             "nothing was paid"
         );
@@ -117,7 +117,7 @@ mod tests {
         port.receive(5e-4);
         let mut x = 0.0;
         for _ in 0..100 {
-            let way = port.allowed(wanted);
+            let way = port.allowed(wanted, TICK_S);
             port.moved(way);
             x += way.x;
         }
@@ -129,6 +129,8 @@ mod tests {
         let mut port = ToolPort::new(0.01, 0.6);
         port.measured(Vec2::new(0.03, 0.02));
         assert_eq!(port.held(), Vec2::zeros());
-        assert!((port.allowed(Vec2::new(1.0, 0.0)).x - 0.6e-3).abs() < 1e-12);
+        assert!((port.allowed(Vec2::new(1.0, 0.0), TICK_S).x - 0.6e-3).abs() < 1e-12);
+        // a tick that is longer leaves it its speed
+        assert!((port.allowed(Vec2::new(1.0, 0.0), 3.0 * TICK_S).x - 1.8e-3).abs() < 1e-12);
     }
 }

@@ -440,14 +440,17 @@ impl Bench {
     pub(super) fn recover(&mut self) {
         self.network = Network::Direct;
         (self.stops, self.engaged, self.velocity) = ([false; 2], true, Vec2::zeros());
-        for _ in 0..2300 {
-            self.reading = self.ends.slave.slave().tool_at();
-            self.tick();
-        }
+        self.rest(2300);
         let over = self.releasing
             || self.ends.master.channel().silence(self.master_now) > Duration::from_secs(1);
+        if over {
+            // the ramp
+            self.rest(200);
+        }
         let released = self.ends.master.master().limiter().at_rest();
-        if over || released || self.ends.slave.is_disengaged() {
+        // a master that never had an answer waits longer for one: the path may be of 4 s
+        let unheard = self.ends.slave.channel().silence(self.slave_now) > Duration::from_secs(2);
+        if over || released || unheard || self.ends.slave.is_disengaged() {
             assert!(
                 released || !over,
                 "the hand of a session that is over is not released"
@@ -458,6 +461,14 @@ impl Bench {
             }
         }
         self.works();
+    }
+
+    /// The hand is where the tool is.
+    fn rest(&mut self, ticks: u32) {
+        for _ in 0..ticks {
+            self.reading = self.ends.slave.slave().tool_at();
+            self.tick();
+        }
     }
 
     /// Samples come through, updates would, and the hand is held.
