@@ -8,7 +8,7 @@ use std::f64::consts::{PI, TAU};
 use mmt_client::operator::scripted::ScriptedConfig;
 use mmt_netem::LinkConfig;
 use mmt_server::environment::{BodyConfig, EnvironmentConfig, SceneConfig, Wall};
-use mmt_server::sensing::SensingConfig;
+use mmt_server::sensing::{SensingConfig, VisionConfig};
 use mmt_server::slave::SlaveConfig;
 use mmt_shared::model::contact::Coupling;
 use mmt_shared::model::geometry::{Pose, Vec2};
@@ -17,6 +17,8 @@ use mmt_shared::rng::Substream;
 
 use crate::world::WorldConfig;
 
+/// Error of the size that images show, m r.m.s. per face: that of the position in one image.
+const SIZE_NOISE_M: f64 = 1e-3;
 /// The hand gives no more than this, N: what takes more does not move.
 pub const MOVABLE_N: f64 = 8.0;
 
@@ -226,6 +228,10 @@ fn sensor(draws: &Draws, default: SensingConfig) -> SensingConfig {
         force_drift_n_per_s: draws.uniform("worlds/drift", 0.0, 0.01),
         force_lag_ms: draws.uniform("worlds/lag", 0.0, 5.0),
         force_gain: draws.uniform("worlds/gain", 0.9, 1.1),
+        vision: VisionConfig {
+            size_noise_m: Some(SIZE_NOISE_M),
+            ..default.vision
+        },
         ..default
     }
 }

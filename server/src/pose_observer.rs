@@ -70,6 +70,8 @@ pub struct ObserverConfig {
     pub vision_noise_m: f64,
     /// Vision noise of the angle, rad r.m.s.
     pub vision_noise_rad: f64,
+    /// Error of the footprint that it starts from, m r.m.s. per face; none where nothing is known of the faces.
+    pub size_noise_m: Option<f64>,
     /// Whether it takes images, learns the face offsets and reckons with how the box turns and slides. Otherwise vision
     /// gives the first pose only, as in the paper.
     pub learn: bool,
@@ -100,7 +102,7 @@ impl PoseObserver {
                 pose,
                 twist: Twist::default(),
             },
-            faces: FaceMap::new(footprint),
+            faces: FaceMap::new(footprint, config.size_noise_m),
             angle: AngleFilter::new(config.vision_noise_rad.powi(2)),
             contact: None,
             penetration: Penetration::new(config.coupling),

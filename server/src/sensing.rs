@@ -9,7 +9,8 @@ mod force;
 
 use std::collections::VecDeque;
 
-use mmt_shared::model::geometry::{Pose, Vec2};
+use mmt_shared::model::geometry::{BoxFootprint, Face, Pose, Vec2};
+use mmt_shared::model::params::FACE_OFFSET_M;
 use mmt_shared::range::{OutOfRange, all_in_range};
 use mmt_shared::rng::Substream;
 use mmt_shared::time::Time;
@@ -70,6 +71,10 @@ pub struct VisionConfig {
     pub angle_noise_rad: f64,
     /// Time from the image to its pose, ms. Default 30: one frame.
     pub latency_ms: f64,
+    /// Images before the session show how far each face is from the centre, with this error, m r.m.s.; without the key they show the
+    /// pose only. Default: without.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub size_noise_m: Option<f64>,
 }
 
 impl Default for SensingConfig {
@@ -93,6 +98,7 @@ impl Default for VisionConfig {
             position_noise_m: 1e-3,
             angle_noise_rad: 5e-3,
             latency_ms: 30.0,
+            size_noise_m: None,
         }
     }
 }
@@ -251,6 +257,26 @@ impl Sensing {
     }
 }
 
+/// Footprints as images before the session show them, in the order of the bodies; none where they show no size.
+pub(crate) fn sizes_seen(
+    vision: &VisionConfig,
+    seed: u64,
+    truth: Vec<BoxFootprint>,
+) -> Vec<BoxFootprint> {
+    let Some(error) = vision.size_noise_m.filter(|_| vision.rate_hz > 0.0) else {
+        return Vec::new();
+    };
+    let mut seen = truth;
+    for (number, footprint) in (0..).zip(&mut seen) {
+        let mut noise = Substream::new(seed, "slave/size-noise", number);
+        for face in Face::ALL {
+            let offset = footprint.offset(face) + error * noise.normal();
+            footprint.set_offset(face, offset.clamp(FACE_OFFSET_M.0, FACE_OFFSET_M.1));
+        }
+    }
+    seen
+}
+
 fn pair(stream: &mut Substream) -> Vec2 {
     let (x, y) = stream.normal_pair();
     Vec2::new(x, y)
@@ -282,6 +308,7 @@ impl SensingConfig {
             ("vision position noise", "m", v.position_noise_m, POSITION_NOISE_M),
             ("vision angle noise", "rad", v.angle_noise_rad, ANGLE_NOISE_RAD),
             ("vision latency", "ms", v.latency_ms, LATENCY_MS),
+            ("vision size noise", "m", v.size_noise_m.unwrap_or_default(), POSITION_NOISE_M),
         ];
         all_in_range(checks)?;
         if v.rate_hz * v.latency_ms / 1e3 + 2.0 > IMAGES_MAX as f64 {

@@ -5,7 +5,7 @@
 
 use mmt_shared::metrics::ForceMetrics;
 use mmt_shared::model::contact::Coupling;
-use mmt_shared::model::geometry::{BoxFootprint, Pose, Twist, Vec2};
+use mmt_shared::model::geometry::{Pose, Twist, Vec2};
 use mmt_shared::model::params::ModelState;
 use mmt_shared::model::sample::{ForceCounts, HipSample};
 use mmt_shared::model::settings::ModelSettings;
@@ -114,8 +114,13 @@ impl Slave {
         };
         let environment = Environment::of_scene(environment, &config.scene)?;
         let pose = environment.pose();
-        let object = ObjectEstimate::try_new(config, coupling, pose)?;
-        let footprint = BoxFootprint::square(config.start.side_m);
+        let object = ObjectEstimate::try_new(
+            config,
+            coupling,
+            pose,
+            plant::sizes_seen(config, &environment),
+        )?;
+        let footprint = object.observer.footprint();
         let start =
             ModelState::try_new(object.params, footprint, pose, Twist::default(), &coupling)?;
         let noise_n = config.sensing.force_noise_n;

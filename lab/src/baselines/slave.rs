@@ -160,7 +160,7 @@ impl BilateralSlave {
                 (played.hip - self.tool, WaveSum::default())
             }
             Baseline::Tdpa | Baseline::TdpaDeadband => {
-                let way = self.port.allowed(played.hip - self.tool);
+                let way = self.port.allowed(played.hip - self.tool, TICK_S);
                 (way, WaveSum::default())
             }
             Baseline::Waves => {

@@ -227,6 +227,16 @@ impl Environment {
         self.touched.outline.bounding_box()
     }
 
+    /// The bounding boxes of all bodies, in the order of their numbers.
+    #[must_use]
+    pub fn footprints(&self) -> Vec<BoxFootprint> {
+        let mut objects: Vec<&Object> =
+            std::iter::once(&self.touched).chain(&self.others).collect();
+        objects.sort_by_key(|object| object.number);
+        let boxes = objects.iter().map(|object| object.outline.bounding_box());
+        boxes.collect()
+    }
+
     /// The real m, b and c = mu m g of sliding on the ground outside of ripple and patches, and I and e of
     /// the real footprint ((8) and (9) for a square): what a perfect estimator would find. Of a fixed body: were it
     /// free.

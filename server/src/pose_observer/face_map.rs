@@ -27,10 +27,17 @@ pub(super) struct FaceMap {
 }
 
 impl FaceMap {
-    pub(super) fn new(footprint: BoxFootprint) -> Self {
+    /// A footprint of which each face is known to `error` (m r.m.s.), or none is.
+    pub(super) fn new(footprint: BoxFootprint, error: Option<f64>) -> Self {
+        let variance = error.map(|error| error * error);
         Self {
             footprint,
-            variances: PerFace::default(),
+            variances: PerFace {
+                east: variance,
+                north: variance,
+                west: variance,
+                south: variance,
+            },
             margin: MARGIN_M.0,
         }
     }

@@ -15,6 +15,7 @@ fn observer(learn: bool) -> PoseObserver {
         force_noise_n: 0.01,
         vision_noise_m: 1e-3,
         vision_noise_rad: 5e-3,
+        size_noise_m: None,
         learn,
     };
     PoseObserver::new(config, Pose::default(), BoxFootprint::square(0.40))
@@ -93,7 +94,7 @@ fn the_first_touch_of_a_box_at_rest_teaches_the_offset_of_its_face() {
 /// How far from the true centre a box is taken to be that is pushed off its middle, turns and is never seen, m.
 fn off_after_turning(learn: bool) -> f64 {
     let mut observer = observer(learn);
-    observer.faces = FaceMap::new(BoxFootprint::square(2.0 * HALF));
+    observer.faces = FaceMap::new(BoxFootprint::square(2.0 * HALF), None);
     let mut truth = Motion::default();
     for n in 1..=3000 {
         let contact = Vec2::new(-HALF, 0.015);

@@ -100,6 +100,28 @@ fn ideal_sensors_tell_the_truth_to_the_bit() {
 }
 
 #[test]
+fn images_before_the_session_show_each_face_with_their_error_or_no_size() {
+    let truth = vec![BoxFootprint::square(0.3); 200];
+    let vision = |rate_hz, size_noise_m| VisionConfig {
+        rate_hz,
+        size_noise_m,
+        ..VisionConfig::default()
+    };
+    let seen = |vision| sizes_seen(&vision, 1, truth.clone());
+    assert!(seen(vision(30.0, None)).is_empty());
+    assert!(seen(vision(0.0, Some(1e-3))).is_empty(), "no images");
+    assert_eq!(seen(vision(30.0, Some(0.0))), truth);
+    let errors: Vec<f64> = seen(vision(30.0, Some(1e-3)))
+        .iter()
+        .flat_map(|footprint| Face::ALL.map(|face| footprint.offset(face) - 0.15))
+        .collect();
+    let rms = (errors.iter().map(|e| e * e).sum::<f64>() / errors.len() as f64).sqrt();
+    assert!((rms - 1e-3).abs() < 1e-4, "{rms}");
+    let apart = errors.iter().zip(errors.iter().skip(1));
+    assert!(apart.clone().all(|(one, next)| one != next));
+}
+
+#[test]
 fn vision_delivers_30_images_a_second_each_once_after_its_latency() {
     let (sensing, sensed) = run(SensingConfig::default(), 10_001);
     let images = images(&sensed);

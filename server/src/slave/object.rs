@@ -35,8 +35,10 @@ pub(super) struct ObjectEstimate {
     body: usize,
     /// What was found of other bodies, by their numbers.
     found: BTreeMap<usize, Found>,
-    /// What is taken for true of a body that has never been touched.
+    /// What is taken for true of a body that has never been touched, but for its footprint where that was seen.
     start: Found,
+    /// Footprints of the bodies as vision saw them before the session, by their numbers.
+    seen: Vec<BoxFootprint>,
     start_params: ModelParams,
 }
 
@@ -52,11 +54,13 @@ pub(super) struct Found {
 }
 
 impl ObjectEstimate {
-    /// Starts from the configured parameters, and from the pose that vision has averaged before the session.
+    /// Starts from the configured parameters, and from the pose that vision has averaged before the session and the footprints of
+    /// all bodies that it saw; none where it sees no size.
     pub(super) fn try_new(
         config: &SlaveConfig,
         coupling: Coupling,
         pose: Pose,
+        seen: Vec<BoxFootprint>,
     ) -> Result<Self, SlaveError> {
         let sensing = &config.sensing;
         let observer = ObserverConfig {
@@ -64,6 +68,7 @@ impl ObjectEstimate {
             force_noise_n: sensing.force_noise_n,
             vision_noise_m: sensing.vision.position_noise_m,
             vision_noise_rad: sensing.vision.angle_noise_rad,
+            size_noise_m: sensing.vision.size_noise_m.filter(|_| !seen.is_empty()),
             learn: config.mode == Mode::Recommended || sensing.vision.rate_hz > 0.0,
         };
         let start = config.start;
@@ -75,14 +80,15 @@ impl ObjectEstimate {
             .unwrap_or_else(|| EstimatorConfig::of_mode(config.mode, coupling))
             .starting_at(mbc);
         estimator.check()?;
-        let params = ModelParams::of_square(m, b, c, start.side_m, &coupling)?;
+        let footprint = (seen.first().copied()).unwrap_or(BoxFootprint::square(start.side_m));
+        let params = ModelParams::of_square(m, b, c, footprint.mean_side(), &coupling)?;
         let start = Found {
             params: params.to_array(),
             mbc,
-            footprint: BoxFootprint::square(start.side_m),
+            footprint,
         };
         Ok(Self {
-            observer: PoseObserver::new(observer, pose, start.footprint),
+            observer: PoseObserver::new(observer, pose, footprint),
             estimator: Estimator::new(&estimator, coupling),
             params,
             refused: 0,
@@ -95,6 +101,7 @@ impl ObjectEstimate {
             found: BTreeMap::new(),
             start,
             start_params: params,
+            seen,
         })
     }
 
@@ -139,7 +146,11 @@ impl ObjectEstimate {
     /// Takes up a body at `pose` with what was found of it. Parameters that the coupling of this session does not allow
     /// are those of the start.
     fn take_up(&mut self, body: usize, pose: Pose) {
-        let found = self.found.get(&body).copied().unwrap_or(self.start);
+        let unknown = Found {
+            footprint: self.seen.get(body).copied().unwrap_or(self.start.footprint),
+            ..self.start
+        };
+        let found = self.found.get(&body).copied().unwrap_or(unknown);
         let [m, b, c, inertia, e] = found.params;
         self.body = body;
         self.params =
@@ -231,7 +242,8 @@ mod tests {
     fn accepted(mode: Mode, k_p: f64) -> Option<ModelParams> {
         let coupling = Coupling::for_stiffness(k_p);
         let config = SlaveConfig::of_mode(mode);
-        let object = ObjectEstimate::try_new(&config, coupling, Pose::default()).unwrap();
+        let object =
+            ObjectEstimate::try_new(&config, coupling, Pose::default(), Vec::new()).unwrap();
         let estimate = Estimate {
             m: 0.05,
             b: 0.0,

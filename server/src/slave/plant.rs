@@ -1,12 +1,13 @@
 //! The slave's object as a plant of somebody else's.
 
 use mmt_shared::model::contact::Coupling;
+use mmt_shared::model::geometry::BoxFootprint;
 use mmt_shared::time::Time;
 
 use super::{Slave, SlaveConfig, SlaveError};
 use crate::environment::Environment;
 use crate::plant::{LinkedPlant, Plant, PlantAnswer, PlantCommand};
-use crate::sensing::Sensing;
+use crate::sensing::{self, Sensing};
 
 /// What the tool of a configuration meets: `environment`, or a plant for which it stands.
 pub(super) fn of_config(
@@ -25,6 +26,18 @@ pub(super) fn of_config(
         environment: Box::new(environment),
         sensing: Box::new(Sensing::try_new(config.sensing, config.seed)?),
     })
+}
+
+/// Footprints of the bodies of a configuration as vision sees them before the session; none of a plant, and where it sees no size.
+pub(super) fn sizes_seen(config: &SlaveConfig, environment: &Environment) -> Vec<BoxFootprint> {
+    if config.plant.link {
+        return Vec::new();
+    }
+    sensing::sizes_seen(
+        &config.sensing.vision,
+        config.seed,
+        environment.footprints(),
+    )
 }
 
 impl Slave {

@@ -1,9 +1,10 @@
 //! The promises of `slave`.
 
-use crate::environment::BodyConfig;
+use crate::environment::{BodyConfig, Shape};
 use crate::estimator::Measured;
 use crate::tool::force::TOOL_FORCE_MAX_N;
 use crate::trigger::TriggerInput;
+use mmt_shared::model::geometry::Face;
 use mmt_shared::model::sample::HipCounts;
 use mmt_shared::model::settings::Mode;
 use mmt_shared::time::TICK;
@@ -59,8 +60,12 @@ impl Driven {
     fn new(mode: Mode, bodies: Vec<BodyConfig>) -> Self {
         let mut config = SlaveConfig::of_mode(mode);
         config.scene.bodies = bodies;
+        Self::of(&config)
+    }
+
+    fn of(config: &SlaveConfig) -> Self {
         let coupling = Coupling::for_stiffness(1000.0);
-        let mut slave = Slave::try_new(&config, coupling).unwrap();
+        let mut slave = Slave::try_new(config, coupling).unwrap();
         let hip = Vec2::new(-0.3, 0.0);
         slave.start_at(hip);
         Self {
@@ -174,6 +179,39 @@ fn the_model_goes_over_to_the_body_that_is_touched_and_comes_back() {
         );
         assert!(model.rendered().in_contact(), "{mode:?}");
     }
+}
+
+#[test]
+fn where_images_show_the_size_the_model_begins_with_it_and_so_does_each_other_body() {
+    let brick = Shape::Brick {
+        length_m: 0.5,
+        width_m: 0.2,
+    };
+    let mut config = SlaveConfig::of_mode(Mode::Recommended);
+    let second = BodyConfig {
+        shape: brick,
+        ..cube(1.0, 2.0, false)
+    };
+    config.scene.bodies = vec![cube(0.0, 0.7, false), second];
+    let offsets = |slave: &Slave| Face::ALL.map(|face| slave.observer().footprint().offset(face));
+    let near = |found: [f64; 4], expected: [f64; 4]| {
+        let mut pairs = found.into_iter().zip(expected);
+        pairs.all(|(found, expected)| (found - expected).abs() < 5e-3)
+    };
+    assert!(
+        near(offsets(&Driven::of(&config).slave), [0.2; 4]),
+        "assumed"
+    );
+    config.sensing.vision.size_noise_m = Some(1e-3);
+    let mut driven = Driven::of(&config);
+    assert!(near(offsets(&driven.slave), [0.18; 4]), "seen");
+    let start = driven.slave.start.footprint();
+    assert!(near(Face::ALL.map(|face| start.offset(face)), [0.18; 4]));
+    for to in [(-0.6, 0.0), (-0.6, 1.0), (0.0, 1.0)] {
+        driven.go(to);
+    }
+    let found = offsets(&driven.slave);
+    assert!(near(found, [0.25, 0.1, 0.25, 0.1]), "{found:?}");
 }
 
 #[test]
