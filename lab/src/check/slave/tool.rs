@@ -110,7 +110,8 @@ impl SlaveChecks {
             || self.about.config.tool_compliance.is_some();
         let playout = &self.about.config.playout;
         let period = elapsed.max(TICK).as_secs_f64();
-        let speed = way.norm() / period;
+        // after ticks that were missed the rest of the ramp is gone at once, at whatever speed
+        let speed = way.norm() / TICK_S;
         let slower = playout.acceleration_max_m_per_s2 * period * (1.0 - CLOCKS);
         let stands = stands || speed <= self.speed_before - slower;
         self.speed_before = speed;
@@ -118,7 +119,8 @@ impl SlaveChecks {
             playout.extrapolation_ms * 1e-3 + self.speed() / playout.acceleration_max_m_per_s2;
         let ramp = Duration::from_secs_f64(ramp) + SLACK;
         let beyond = done.stamp.saturating_since(self.newest.unwrap_or_default());
-        if beyond.min(self.quiet) > ramp {
+        let missed = elapsed.saturating_sub(TICK);
+        if beyond.min(self.quiet).saturating_sub(missed) > ramp {
             self.verdict.judge(Invariant::ToolHolds, now, stands, || {
                 format!("the tool goes {way:?} m at a stamp {beyond:?} after the newest sample's")
             });

@@ -72,7 +72,8 @@ impl LocalModel {
             self.body.state.footprint = received;
             return Vec2::zeros();
         };
-        let touched = self.body.god.touched();
+        // the box may have moved from under the HIP since the sample: what it touched then it may be beside now
+        let touched = self.body.touch(hip).map(|touch| touch.face);
         let face = touched.unwrap_or_else(|| self.body.gap(hip).0);
         let state = &mut self.body.state;
         let growth = received.offset(face) - state.footprint.offset(face);

@@ -231,3 +231,24 @@ fn a_heavier_box_is_paid_for_or_slowed_and_never_faster() {
     assert_eq!(paid.state.twist, moving().state.twist);
     assert!((level - tank.level_j() - (kinetic(&paid) - before)).abs() < 1e-12);
 }
+
+#[test]
+fn a_footprint_that_grows_over_a_hip_that_has_left_the_end_of_its_face_moves_the_box_instead() {
+    let mut model = model(Mode::Recommended, PoseCorrection::Replay);
+    // 1 mm inside of the west face, 0.5 mm from its end
+    let hip = Vec2::new(-0.199, -0.1995);
+    model.step(Time::from_millis(1), hip - Vec2::new(0.01, 0.0));
+    assert!(model.step(Time::from_millis(2), hip).in_contact());
+    // a correction moves the box 2 mm on
+    model.body.state.pose.position.y += 2e-3;
+    assert!(model.body.touch(hip).is_none(), "beside the end");
+    let mut received = model.body.state;
+    received.footprint.set_offset(Face::South, 0.205);
+    model.apply(&update(Cause::Deadband, 2, received));
+    let injected = model.energy_injected_j();
+    assert!(injected < 1e-9, "{injected} J");
+    assert!(
+        model.body.touch(hip).is_none(),
+        "the box stays off the hand"
+    );
+}
