@@ -88,8 +88,7 @@ impl ToolForce {
     ///
     /// The next force follows from the law of contact with an object that keeps its velocity (an object at rest is the
     /// worst case but for one that comes towards the tool), so the gain on the sensor's noise is 1: the force is as
-    /// steady as it is measured, and the tool does not chatter. After ticks that were missed an object that went along with
-    /// the tool may have come to rest since: then all of the force is the spring's.
+    /// steady as it is measured, and the tool does not chatter.
     #[must_use]
     pub fn allowed(&self, way: Vec2, period_s: f64, force: Vec2) -> Vec2 {
         let size = force.norm();
@@ -102,13 +101,7 @@ impl ToolForce {
             damping_ns_per_m: k_d,
         } = self.coupling;
         // f(k+1) = f(k) + (k_p + k_d/T) n·way − k_d n·v(k) ≤ f_max
-        let damping = k_d * n.dot(&self.velocity);
-        let damping = if is_missed(period_s) {
-            damping.min(0.0)
-        } else {
-            damping
-        };
-        let at_rest = size - damping;
+        let at_rest = size - k_d * n.dot(&self.velocity);
         let most = (self.max_n - at_rest) / (k_p + k_d / period_s);
         let along = n.dot(&way);
         if along <= most {
@@ -122,7 +115,7 @@ impl ToolForce {
     /// (k_p + k_d/T) |way| for the touch and k_p |way| τ/T for the tick τ in which the tool stops.
     fn unforeseen(&self, way: Vec2, period_s: f64) -> Vec2 {
         // the ways of single ticks are bounded by their speed, see `approach_speed`
-        if !is_missed(period_s) {
+        if period_s <= TICK_S * (1.0 + 1e-9) {
             return way;
         }
         let Coupling {
@@ -148,9 +141,4 @@ impl ToolForce {
     pub fn measured(&mut self, force: Vec2) {
         self.peak_n = self.peak_n.max(force.norm());
     }
-}
-
-/// Whether ticks were missed before one of this period, s.
-fn is_missed(period_s: f64) -> bool {
-    period_s > TICK_S * (1.0 + 1e-9)
 }

@@ -227,16 +227,3 @@ fn a_limit_that_is_none_is_refused_by_name() {
         );
     }
 }
-
-#[test]
-fn after_missed_ticks_an_object_that_has_come_to_rest_is_pressed_no_harder_than_the_limit() {
-    // the object goes along with the tool, so all of the force is the spring's
-    let (pressed, speed) = (Vec2::new(14.0, 0.0), Vec2::new(0.35, 0.0));
-    let mut limit = ToolForce::try_new(15.0, SOFT).unwrap();
-    limit.moved(speed, false);
-    for period_s in [2.0 * TICK_S, 0.054, 1.0] {
-        let way = limit.allowed(speed * period_s, period_s, pressed).x;
-        let now = 14.0 + SOFT.stiffness_n_per_m * way + SOFT.damping_ns_per_m * way / period_s;
-        assert!(way > 0.0 && now <= 15.0 + 1e-9, "{period_s} s: {now} N");
-    }
-}
