@@ -110,15 +110,16 @@ impl SlaveChecks {
             || self.about.config.tool_compliance.is_some();
         let playout = &self.about.config.playout;
         let period = elapsed.max(TICK).as_secs_f64();
-        // after ticks that were missed the rest of the ramp is gone at once, at whatever speed
-        let speed = way.norm() / TICK_S;
+        let speed = way.norm() / period;
         let slower = playout.acceleration_max_m_per_s2 * period * (1.0 - CLOCKS);
         let stands = stands || speed <= self.speed_before - slower;
-        self.speed_before = speed;
+        // after ticks that were missed the way may have been gone in the last of them
+        self.speed_before = way.norm() / TICK_S;
         let ramp =
             playout.extrapolation_ms * 1e-3 + self.speed() / playout.acceleration_max_m_per_s2;
         let ramp = Duration::from_secs_f64(ramp) + SLACK;
         let beyond = done.stamp.saturating_since(self.newest.unwrap_or_default());
+        // the rest of a ramp that the process stood through is gone in the first tick after
         let missed = elapsed.saturating_sub(TICK);
         if beyond.min(self.quiet).saturating_sub(missed) > ramp {
             self.verdict.judge(Invariant::ToolHolds, now, stands, || {
