@@ -2,7 +2,7 @@
 //!
 //! An object that a wall stops would be pressed on with k_p times the way that the hand has gone since, which at a delay is
 //! a lot. So the part of the tool's way that would raise the contact force above the limit is not gone. Pure: the sensor's
-//! force in, a way out, a tick at a time. It must never shorten the way along the face, and never one that is allowed.
+//! force in, a way out, a tick at a time. It must never shorten the way of a tick along the face, and never one that is allowed.
 
 #[cfg(test)]
 mod tests;
@@ -91,9 +91,11 @@ impl ToolForce {
     /// steady as it is measured, and the tool does not chatter.
     #[must_use]
     pub fn allowed(&self, way: Vec2, period_s: f64, force: Vec2) -> Vec2 {
+        // a force that is measured is no sign of all that the tool may touch: it may be the sensor's bias
+        let way = self.unforeseen(way, period_s);
         let size = force.norm();
         if size <= 0.0 {
-            return self.unforeseen(way, period_s);
+            return way;
         }
         let n = force / size;
         let Coupling {
@@ -110,8 +112,8 @@ impl ToolForce {
         way - n * (along - most)
     }
 
-    /// The part of a way (m, in `period_s`) without a force that a touch nobody foresaw costs the limit at most. After ticks
-    /// that were missed the way may be several ticks long, so the speed alone is no bound:
+    /// The part of a way (m, in `period_s`) that a touch nobody foresaw costs the limit at most. After ticks that were missed
+    /// the way may be several ticks long, so the speed alone is no bound:
     /// (k_p + k_d/T) |way| for the touch and k_p |way| τ/T for the tick τ in which the tool stops.
     fn unforeseen(&self, way: Vec2, period_s: f64) -> Vec2 {
         // the ways of single ticks are bounded by their speed, see `approach_speed`

@@ -135,13 +135,18 @@ fn a_first_touch_after_missed_ticks_costs_no_more_than_the_limit() {
         let period_s = f64::from(missed + 1) * TICK_S;
         let wanted = Vec2::new(0.6 * period_s, 0.0);
         let way = limit.allowed(wanted, period_s, Vec2::zeros());
-        // it stood just before the wall
-        let force = coupling.force(way.x, way.x / period_s);
-        assert!(
-            force <= 15.0 + 1e-9,
-            "{force} N after {missed} missed ticks"
-        );
         assert!(way == wanted || missed > 2, "{missed}");
+        // it stood just before the wall, and the sensor has a bias, or something is rubbed along
+        for bias in [-0.2, 0.0, 0.2] {
+            let mut limit = limit;
+            limit.moved(Vec2::new(0.6, 0.0), false);
+            let way = limit.allowed(wanted, period_s, Vec2::new(bias, 0.0));
+            let force = coupling.force(way.x, way.x / period_s);
+            assert!(
+                force <= 15.0 + 1e-9,
+                "{force} N after {missed} missed ticks, with a bias of {bias} N"
+            );
+        }
         longest = longest.max(way.x);
     }
     assert!(longest > 6e-3, "{longest} m");
