@@ -169,6 +169,9 @@ class TriggerInput:
     def shift(self) -> _Pair:
         """Of the master's object by an update, m."""
     @property
+    def shift_deviation(self) -> float:
+        """Of the shift per axis while nobody touches the object, m; else 0."""
+    @property
     def turn(self) -> float:
         """The same, rad."""
 

@@ -291,7 +291,8 @@ local function state(r)
     r:group("state", function() r:floats("state.", STATE) end)
 end
 
-local CAUSES = { "deadband", "timer", "master_only_contact", "slave_only_contact", "contact_lost", "every_sample" }
+local CAUSES = { "deadband", "timer", "master_only_contact", "slave_only_contact", "contact_lost", "every_sample",
+  "elsewhere" }
 
 local function update(r)
     local info = envelope(r)

@@ -76,6 +76,7 @@ fn trigger(criterion: &mut Criterion) {
         force_deviation: 0.0,
         params,
         shift: Vec2::zeros(),
+        shift_deviation: 0.0,
         turn: 0.001,
     };
     for text in ["hybrid 10% 150ms", "useful 10% 150ms"] {

@@ -90,6 +90,8 @@ pub struct Conditioner {
     left: Option<Vec2>,
     detector: ContactDetector,
     in_contact: bool,
+    /// Whether images show the tool clear of everything.
+    seen_clear: bool,
 }
 
 impl Conditioner {
@@ -105,7 +107,13 @@ impl Conditioner {
             left: None,
             detector: ContactDetector::new(contact),
             in_contact: false,
+            seen_clear: false,
         }
+    }
+
+    /// Images show the tool clear of everything: a force that a drift of the bias explains is no contact.
+    pub fn see_clear(&mut self) {
+        self.seen_clear = true;
     }
 
     /// The tool may touch from the beginning: the first samples are no bias.
@@ -155,7 +163,8 @@ impl Conditioner {
         let drifted =
             self.detector.config().on_n + 3.0 * deviation + DRIFT_N_PER_S * self.bias.age_s;
         let stays = self.withdrawal.step(steady, tool, 3.0 * deviation);
-        if let Some(stays) = stays.filter(|force| force.norm() < drifted) {
+        let seen = std::mem::take(&mut self.seen_clear).then_some(steady);
+        if let Some(stays) = seen.or(stays).filter(|force| force.norm() < drifted) {
             self.bias.set(self.bias.known() + stays);
             self.detector.release();
             self.in_contact = false;

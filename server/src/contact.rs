@@ -86,6 +86,11 @@ impl ContactStage {
         self.conditioner.resume();
     }
 
+    /// Images show the tool clear of everything: what is felt is no contact, unless it is too much to be the sensor's.
+    pub fn see_clear(&mut self) {
+        self.conditioner.see_clear();
+    }
+
     /// One tick with the tool at `tool` (m), moving at `velocity` (m/s).
     pub fn step(&mut self, now: Time, tool: Vec2, velocity: Vec2) -> Contact {
         let met = self.plant.meet(now, tool, velocity, self.body);

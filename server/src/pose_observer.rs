@@ -5,7 +5,6 @@
 //! coordinate. Vision (slow, late, noisy) corrects what touch cannot see and teaches the distance from
 //! the centre to each face. Pure; it must never use the true pose.
 
-mod angle_filter;
 mod centre;
 mod contact_frame;
 mod face_map;
@@ -13,6 +12,7 @@ mod felt;
 mod past;
 mod penetration;
 mod tangent_tracker;
+mod track;
 mod tracker;
 mod turning;
 mod vision;
@@ -26,10 +26,10 @@ use mmt_shared::model::params::{ModelParams, friction_torque_of_square};
 use mmt_shared::model::settings::FrictionLaw;
 use mmt_shared::time::{TICK_S, Time};
 
-use angle_filter::AngleFilter;
 use face_map::FaceMap;
 use past::{Past, PastPoses};
 use penetration::Penetration;
+use track::Track;
 use tracker::{BoxTracker, Tracker};
 use turning::Push;
 
@@ -49,13 +49,19 @@ const DIRECTION_FLOOR_RAD: f64 = 2e-3;
 const SLIDE_DRIFT_M: f64 = 5e-3;
 /// Drift of a box that nobody touches, m per square root of a second.
 const REST_DRIFT_M: f64 = 1e-5;
-/// How far a box that was let go may coast, m, and turn, rad.
-const COAST: (f64, f64) = (3e-3, 0.02);
+/// Error of the speed of a box that is let go, m/s, and by how much it turns while it settles, rad.
+const LET_GO: (f64, f64) = (0.02, 0.02);
+/// Unknown acceleration of a box that coasts, m/s² and rad/s²: how well its friction is known.
+const COAST: (f64, f64) = (0.5, 2.5);
 /// Spread of the normal of a new contact with a body that is no box, rad.
 const ANY_NORMAL_RAD: f64 = 0.5;
 /// A tool at one face can have reached the next if it is no farther from the corner between them than this share of the
 /// way from the middle of the face.
 const CORNER_SHARE: f64 = 0.5;
+/// Images in a row that show the tool clear of the object.
+const CLEAR_IMAGES: u32 = 5;
+/// A tool is seen clear of the object at this distance, m, and so many standard deviations of what is known of it.
+const CLEAR: (f64, f64) = (5e-3, 5.0);
 /// A jump of the normal beyond this, rad, is a new contact with such a body.
 const JUMP_RAD: f64 = 0.2;
 
@@ -83,13 +89,15 @@ pub struct PoseObserver {
     config: ObserverConfig,
     motion: Motion,
     faces: FaceMap,
-    angle: AngleFilter,
+    angle: Track,
+    /// How well the centre is known on each axis; in touch, along the face.
+    centre: Track,
     contact: Option<ContactFrame>,
     penetration: Penetration,
     tracker: Tracker,
-    /// Variance of the centre along the face (or, without touch, of both coordinates), m².
-    slide_var: f64,
     past: PastPoses,
+    /// Images in a row that show a tool in contact clear of the object.
+    clear_images: u32,
 }
 
 impl PoseObserver {
@@ -103,12 +111,13 @@ impl PoseObserver {
                 twist: Twist::default(),
             },
             faces: FaceMap::new(footprint, config.size_noise_m),
-            angle: AngleFilter::new(config.vision_noise_rad.powi(2)),
+            angle: Track::at_rest(config.vision_noise_rad.powi(2)),
+            centre: Track::at_rest(config.vision_noise_m.powi(2)),
             contact: None,
             penetration: Penetration::new(config.coupling),
             tracker: Tracker::Box(BoxTracker::default()),
-            slide_var: config.vision_noise_m.powi(2),
             past: PastPoses::default(),
+            clear_images: 0,
         }
     }
 
@@ -163,10 +172,25 @@ impl PoseObserver {
         ratio * self.faces.footprint.mean_side()
     }
 
+    /// Standard deviation of the place per axis, m, while nobody touches the object; in touch 0.
+    #[must_use]
+    pub fn deviation(&self) -> f64 {
+        match self.contact {
+            Some(_) => 0.0,
+            None => self.centre.variance().sqrt(),
+        }
+    }
+
     /// What the tool touches; none without contact.
     #[must_use]
     pub fn contact(&self) -> Option<ContactFrame> {
         self.contact
+    }
+
+    /// Whether images show the tool clear of the object that it is taken to touch: what is felt is no contact.
+    #[must_use]
+    pub fn sees_clear(&self) -> bool {
+        self.clear_images >= CLEAR_IMAGES
     }
 
     /// One tick: measured tool (m), force, whether the slave is in contact, and the parameters as
@@ -187,6 +211,7 @@ impl PoseObserver {
         self.penetration.remember(tool);
         self.past.push(Past {
             time: now,
+            tool,
             pose: self.motion.pose,
             contact: self.contact,
         });
@@ -213,7 +238,7 @@ impl PoseObserver {
                 // a body that stood still stands where it was last seen, so its face is where it is felt
                 let offset = inward.dot(&(self.motion.pose.position - surface));
                 self.faces
-                    .learn(&mut self.tracker, face, offset, self.slide_var);
+                    .learn(&mut self.tracker, face, offset, self.centre.variance());
             }
             self.slide_along(inward, params);
             self.follow_plane(face, inward, surface);
@@ -221,7 +246,7 @@ impl PoseObserver {
         if let Tracker::Tangent(tangent) = &mut self.tracker {
             tangent.touch(self.motion.twist.angular);
         }
-        self.slide_var += SLIDE_DRIFT_M * SLIDE_DRIFT_M * TICK_S;
+        self.centre.hold(SLIDE_DRIFT_M * SLIDE_DRIFT_M * TICK_S);
         self.contact = Some(ContactFrame {
             face,
             inward,
@@ -261,7 +286,7 @@ impl PoseObserver {
             tangent.begin();
         }
         self.motion.twist.angular = 0.0;
-        self.angle = AngleFilter::new(ANY_NORMAL_RAD * ANY_NORMAL_RAD);
+        self.angle = Track::at_rest(ANY_NORMAL_RAD * ANY_NORMAL_RAD);
     }
 
     /// Turns the box by the moment of the push, where that can be reckoned, and returns the turning
@@ -290,7 +315,8 @@ impl PoseObserver {
 
     /// theta by the direction of the force.
     fn follow_angle(&mut self, face: Face, felt: &Felt, acceleration: f64) {
-        self.angle.predict(&mut self.motion, acceleration);
+        self.motion.pose.angle += self.motion.twist.angular * TICK_S;
+        self.angle.predict(acceleration);
         let (force, size) = (felt.force, felt.force.norm());
         if size < FORCE_MIN_N.max(DEVIATIONS * felt.noise_n) {
             return;
@@ -303,18 +329,26 @@ impl PoseObserver {
         }
         let spread = self.config.force_noise_n.max(felt.noise_n) / size;
         let variance = spread * spread + DIRECTION_FLOOR_RAD.powi(2);
-        self.angle.measure(&mut self.motion, innovation, variance);
+        let (angle, rate) = self.angle.measure(variance);
+        self.motion.pose.angle += angle * innovation;
+        self.motion.twist.angular += rate * innovation;
     }
 
     fn let_go(&mut self, params: &ModelParams) {
+        self.clear_images = 0;
         if let Some(was) = self.contact.take() {
             if let Tracker::Tangent(tangent) = &mut self.tracker {
                 self.faces.guess(tangent, was.face);
             }
-            self.slide_var += COAST.0 * COAST.0;
-            self.angle.let_go(COAST.1 * COAST.1);
+            self.centre.let_go(LET_GO.0 * LET_GO.0);
+            self.angle.hold(LET_GO.1 * LET_GO.1);
         }
-        self.slide_var += REST_DRIFT_M * REST_DRIFT_M * TICK_S;
+        // where no image corrects it, a coasting box stops as its friction says
+        let coasts = self.config.learn && self.motion.twist != Twist::default();
+        let (linear, angular) = if coasts { COAST } else { (0.0, 0.0) };
+        self.centre.predict(linear);
+        self.centre.widen(REST_DRIFT_M * REST_DRIFT_M * TICK_S);
+        self.angle.predict(angular);
         let law = FrictionLaw::LimitSurface;
         self.motion = self.motion.step(law, params, Vec2::zeros(), Vec2::zeros());
     }
@@ -335,6 +369,8 @@ impl PoseObserver {
         if let Some(away) = self.faces.retract(face, depth, self.config.learn && !known) {
             let inward = -rotate(pose.angle, face.outward());
             pose.position += inward * away;
+            // that it is further away is a guess
+            self.centre.widen(away * away);
         }
     }
 }

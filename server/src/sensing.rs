@@ -167,6 +167,8 @@ pub struct Sensing {
     next_image: Option<Time>,
     images_taken: u64,
     on_their_way: VecDeque<VisionSample>,
+    /// The last tick.
+    last: Option<Time>,
     dropped: u64,
 }
 
@@ -193,6 +195,7 @@ impl Sensing {
             next_image: None,
             images_taken: 0,
             on_their_way: VecDeque::with_capacity(IMAGES_MAX),
+            last: None,
             dropped: 0,
         })
     }
@@ -220,6 +223,11 @@ impl Sensing {
     }
 
     fn image_due(&mut self, now: Time, object: &Pose) -> Option<VisionSample> {
+        if self.last.replace(now).is_some_and(|last| last > now) {
+            // the clock was set back: when these were taken means nothing any more
+            self.drop_images();
+            self.next_image = Some(now);
+        }
         if self.period_ns > 0 && now >= *self.next_image.get_or_insert(now) {
             self.take_image(now, object);
         }

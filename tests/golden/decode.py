@@ -165,7 +165,7 @@ def tool(r):
 
 def update(r):
     causes = ["deadband", "timer", "master_only_contact", "slave_only_contact", "contact_lost",
-              "every_sample"]
+              "every_sample", "elsewhere"]
     return {**envelope(r), "sequence": r.numbered("sequence"), "cause": r.choice(causes),
             "answers": r.u64(), "slave_in_contact": r.boolean(), "state": state(r)}
 

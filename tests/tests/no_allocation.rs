@@ -307,6 +307,7 @@ impl Parts {
             force_deviation: 0.0,
             params: self.shadow.ahead().state().params,
             shift: Vec2::zeros(),
+            shift_deviation: 0.0,
             turn: 0.0,
         };
         self.decided += u64::from(self.trigger.step(now, &input).is_some());

@@ -200,8 +200,10 @@ fn objects_of_mujoco_are_pushed_over_the_emulated_network_within_the_contract() 
         assert!(get(&run, "/packets") >= 3.0, "{object}: {run:#}");
         // far fewer than the 1000 samples a second
         assert!(get(&run, "/packets_per_s") < 60.0, "{object}: {run:#}");
+        // no box is a door: docs/plugs.md has what a minute of it comes to
+        let most = if object == "door" { 2.0 } else { 1.0 };
         assert!(
-            get(&run, "/force_relative_error") < 1.0,
+            get(&run, "/force_relative_error") < most,
             "{object}: {run:#}"
         );
     }

@@ -17,7 +17,7 @@ fn snapshot(elapsed_s: f64) -> Snapshot {
         elapsed_s,
         f_s: Vec2::new(3.0, 4.0),
         f_shadow: Vec2::new(3.0, 3.5),
-        updates: [7, 11, 0, 1, 2, 0],
+        updates: [7, 11, 0, 1, 2, 0, 0],
         estimate: [0.701, 2.95, 2.06],
         in_contact: true,
         // a stall of its host: the path lost 9 of the 1000 that it did send
@@ -28,7 +28,7 @@ fn snapshot(elapsed_s: f64) -> Snapshot {
         elapsed_s,
         f_m: Vec2::new(0.0, 2.5),
         params: [0.699, 2.9, 2.05],
-        updates_applied: [7, 10, 0, 1, 2, 0],
+        updates_applied: [7, 10, 0, 1, 2, 0, 0],
         pushes: Some(3),
         link: LinkState::Late,
         footprint: Some(BoxFootprint::square(0.4)),
@@ -316,7 +316,7 @@ fn observed() -> ObserverLive {
             ..scene
         }),
         scene_age_s: Some(0.21),
-        updates: [7, 10, 0, 1, 2, 0],
+        updates: [7, 10, 0, 1, 2, 0, 0],
         rtt_ms: Some(101.5),
         ..ObserverLive::default()
     }

@@ -77,7 +77,7 @@ fn an_observer_shows_the_newest_update_counts_each_once_and_what_it_changed() {
     let live = observer.live(AT(3));
     assert_eq!(live.params, [0.7, 3.0, 2.0]);
     assert!(live.in_contact && live.footprint.is_some());
-    assert_eq!(live.updates, [1, 1, 0, 0, 0, 0]);
+    assert_eq!(live.updates, [1, 1, 0, 0, 0, 0, 0]);
     let change = live.change.unwrap();
     assert_eq!((change.sequence, change.cause), (3, Cause::Deadband));
     assert!((change.params[0] - 0.2).abs() < 1e-12, "{change:?}");

@@ -266,7 +266,7 @@ impl SlaveChecks {
         let metric = self.about.config.trigger.metric;
         let fits = !lone
             || match update.cause {
-                Cause::MasterOnlyContact | Cause::ContactLost => !touches,
+                Cause::MasterOnlyContact | Cause::ContactLost | Cause::Elsewhere => !touches,
                 Cause::SlaveOnlyContact => touches,
                 // parameters and pose can differ in free space
                 Cause::Deadband => touches || metric != MismatchMetric::Force,

@@ -29,6 +29,7 @@ pub fn columns<'a>() -> Vec<Column<'a, Measured>> {
         packets("packets_slave_only_contact", Cause::SlaveOnlyContact),
         packets("packets_contact_lost", Cause::ContactLost),
         packets("packets_every_sample", Cause::EverySample),
+        packets("packets_elsewhere", Cause::Elsewhere),
         column("pmse", "", 0, |run| run.force.pmse),
         column("pmse_x", "", 0, |run| run.force.pmse_x),
         column("pmse_y", "", 0, |run| run.force.pmse_y),

@@ -180,3 +180,29 @@ fn an_object_that_does_not_move_is_touched_as_long_as_it_is_whatever_the_lag() {
 fn an_object_that_does_not_move_is_touched_as_long_as_it_is_whatever_the_noise() {
     pressed_and_eased(Press::new(0.1, Vec2::zeros(), Vec2::zeros()));
 }
+
+/// Presses, while the bias drifts to 0.12 N, goes back by 1.5 mm, too little to be found out, and is seen there `seen` times. In how many
+/// of the next 50 ticks there was contact.
+fn seen_clear(depth: f64, seen: u32) -> u32 {
+    let mut press = Press::new(0.005, Vec2::zeros(), Vec2::new(0.03, 0.0));
+    press.stay(FREE, 500);
+    press.go(FREE, depth);
+    press.stay(depth, 4000);
+    press.drift = Vec2::zeros();
+    for _ in 0..seen {
+        press.conditioner.see_clear();
+        press.tick(depth - 1.5e-3);
+    }
+    press.stay(depth - 1.5e-3, 50)
+}
+
+#[test]
+fn what_images_show_clear_ends_unless_it_presses_harder_than_any_drift() {
+    assert_eq!(seen_clear(1e-3, 0), 50, "the bias looks like contact");
+    assert_eq!(seen_clear(1e-3, 1), 0);
+    assert_eq!(
+        seen_clear(3e-3, 1),
+        50,
+        "1.5 N are contact, whatever is seen"
+    );
+}

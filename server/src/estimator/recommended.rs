@@ -23,6 +23,10 @@ use super::{Estimate, Measured, STICK_SPEED};
 /// the object ran up against it is no friction.
 const COPY_ROWS: u64 = 250;
 
+/// On the first press the surface may seem to move by so much, m, and by this share of the depth, although the object stands: the
+/// stiffness of the contact is known that badly.
+const SEEMS: (f64, f64) = (0.3e-3, 0.5);
+
 /// Settings of `RecommendedEstimator`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RecommendedConfig {
@@ -82,6 +86,8 @@ pub(super) struct RecommendedEstimator {
     /// The regression as it was, newest last.
     copies: [RecursiveLeastSquares; 2],
     obstacle: Obstacle,
+    /// Where this contact began.
+    began: Option<Vec2>,
     pub(super) estimate: Estimate,
 }
 
@@ -110,6 +116,7 @@ impl RecommendedEstimator {
             recursive,
             copies: [recursive; 2],
             obstacle: Obstacle::default(),
+            began: None,
             estimate,
         }
     }
@@ -149,11 +156,14 @@ impl RecommendedEstimator {
             measured.force_noise_n,
         );
         self.slide(gate, &self.row(&motion, normal, measured.seen.as_ref()));
-        self.stand(motion.row.force, gate == GateState::Open);
+        let began = *self.began.get_or_insert(motion.point);
+        let way = normal.dot(&(motion.point - began));
+        self.stand(motion.row.force, gate == GateState::Open, way);
     }
 
     /// Whether something beyond friction holds the object against this force, N.
-    fn stand(&mut self, force: f64, slides_on: bool) {
+    /// `way` (m) is how far its surface seems to have gone in this contact.
+    fn stand(&mut self, force: f64, slides_on: bool, way: f64) {
         let [older, _] = self.copies;
         let known = older.samples > 0;
         let slides = self.gate.slides(self.estimate.speed);
@@ -162,6 +172,10 @@ impl RecommendedEstimator {
             (true, _) => MotionState::Slides,
             (false, true) => MotionState::Sticks,
             (false, false) => MotionState::Slowly,
+        };
+        let motion = match motion {
+            MotionState::Slowly if self.seems_to_move(way) => MotionState::Sticks,
+            _ => motion,
         };
         let found = if known { &older } else { &self.recursive }.estimate;
         let needed = found.x * self.estimate.acceleration + found.y * self.estimate.speed;
@@ -175,6 +189,12 @@ impl RecommendedEstimator {
             self.copies = [older; 2];
         }
         self.estimate.holding = self.obstacle.holding();
+    }
+
+    /// Whether a way (m) of the surface of an object that nobody has seen slide may be the give of the contact alone.
+    fn seems_to_move(&self, way: f64) -> bool {
+        let (least, share) = SEEMS;
+        self.recursive.samples == 0 && way < least + share * self.surface.depth()
     }
 
     /// The row of (1) that a motion gives while the object slides.
@@ -217,6 +237,7 @@ impl RecommendedEstimator {
         self.gate.close();
         self.creep.reset();
         self.obstacle.clear();
+        self.began = None;
         self.recursive.hold();
         self.estimate.release();
     }

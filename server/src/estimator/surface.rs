@@ -52,6 +52,12 @@ impl Surface {
         *self = Self::new(self.coupling);
     }
 
+    /// Depth of the tool behind the surface along the normal, m.
+    #[must_use]
+    pub(super) fn depth(&self) -> f64 {
+        self.penetration
+    }
+
     /// Takes one tick in contact and returns the surface point under the tool, m: tool (m), force on the object (N), inward
     /// unit normal n.
     #[must_use]

@@ -2,7 +2,7 @@
 //!
 //! An offset that is guessed or retracted never leaves the range that the model accepts.
 
-use mmt_shared::model::geometry::{BoxFootprint, Face, PerFace};
+use mmt_shared::model::geometry::{BoxFootprint, Face, PerFace, Vec2};
 use mmt_shared::model::params::FACE_OFFSET_M;
 
 use super::tangent_tracker::TangentTracker;
@@ -50,6 +50,12 @@ impl FaceMap {
     /// Whether the face has been learned.
     pub(super) fn is_known(&self, face: Face) -> bool {
         self.variances.get(face).is_some()
+    }
+
+    /// How far a point of the object's frame is outside, m, and the variance of that, m²; none where nothing is known of that face.
+    pub(super) fn outside(&self, point: Vec2) -> Option<(f64, f64)> {
+        let (face, distance) = self.footprint.nearest(point);
+        Some((distance, self.variances.get(face)?))
     }
 
     /// Sets an offset (m), or the least one that is accepted.

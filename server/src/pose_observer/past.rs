@@ -1,6 +1,6 @@
 //! What the observer took for true in the last quarter of a second: vision is late.
 
-use mmt_shared::model::geometry::Pose;
+use mmt_shared::model::geometry::{Pose, Twist, Vec2};
 use mmt_shared::time::Time;
 
 use super::contact_frame::ContactFrame;
@@ -12,6 +12,7 @@ const TICKS: usize = 256;
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Past {
     pub(super) time: Time,
+    pub(super) tool: Vec2,
     pub(super) pose: Pose,
     pub(super) contact: Option<ContactFrame>,
 }
@@ -40,6 +41,21 @@ impl PastPoses {
         self.next = (self.next + 1) % TICKS;
     }
 
+    /// When the newest was; a clock that was set back leaves later times in the ring.
+    pub(super) fn newest(&self) -> Time {
+        let newest = self.ring.get((self.next + TICKS - 1) % TICKS);
+        newest.map_or(Time::ZERO, |past| past.time)
+    }
+
+    /// An object that nobody touches was found to be off by `off`, and to drift off at the rate `rate`, at `since`: so was all that was
+    /// taken for true from then on.
+    pub(super) fn correct(&mut self, since: Time, off: Pose, rate: Twist) {
+        for past in self.ring.iter_mut().filter(|past| past.time >= since) {
+            let seconds = past.time.saturating_since(since).as_secs_f64();
+            past.pose = corrected(past.pose, off, rate, seconds);
+        }
+    }
+
     /// The newest that is not later than `time`.
     pub(super) fn at(&self, time: Time) -> Option<Past> {
         // the ring is short and vision is slow: a search is cheap
@@ -48,5 +64,13 @@ impl PastPoses {
             .filter(|past| past.time <= time && past.time > Time::ZERO)
             .max_by_key(|past| past.time)
             .copied()
+    }
+}
+
+/// A pose that is off by `off`, and by `rate` for some seconds.
+pub(super) fn corrected(pose: Pose, off: Pose, rate: Twist, seconds: f64) -> Pose {
+    Pose {
+        position: pose.position + off.position + rate.linear * seconds,
+        angle: pose.angle + off.angle + rate.angular * seconds,
     }
 }

@@ -360,3 +360,97 @@ fn a_box_at_rest_whose_face_is_learned_does_not_seem_to_move() {
     assert!((observer.footprint().west - HALF).abs() < 1e-6, "learned");
     assert!(fastest < 1e-6, "{fastest} m/s");
 }
+
+/// Lets go of a box that was pushed at 0.1 m/s and coasts against less friction than is believed; vision looks every 33 ms, 30 ms late,
+/// or not at all. How far off the pose is after 100, 200 and 400 ms, m.
+fn off_while_coasting(seen: bool) -> [f64; 3] {
+    let mut observer = observer(true);
+    let mut truth = push(&mut observer, 1000, 0.0);
+    let mut images = std::collections::VecDeque::new();
+    let mut speed = 0.1_f64;
+    let mut off = [0.0; 3];
+    for n in 1001..=1400_u32 {
+        // 2.06 N over 0.7 kg would stop it within 35 ms
+        speed = (speed - 0.2 * TICK_S).max(0.0);
+        truth.position.x += speed * TICK_S;
+        let now = Time::ZERO + TICK * n;
+        observer.step(now, Vec2::new(-1.0, 0.0), Vec2::zeros(), false, &params());
+        if n % 33 == 0 {
+            images.push_back(VisionSample {
+                taken: now,
+                pose: truth,
+            });
+        }
+        let due = |image: &VisionSample| image.taken + TICK * 30 <= now;
+        if let Some(image) = images.pop_front_if(|image| due(image)).filter(|_| seen) {
+            observer.see(&image);
+        }
+        if let Some(k) = [1100, 1200, 1400].iter().position(|at| *at == n) {
+            off[k] = (observer.pose().position - truth.position).norm();
+        }
+    }
+    off
+}
+
+#[test]
+fn images_show_how_fast_a_box_coasts_that_was_taken_to_stop() {
+    let [unseen, seen] = [false, true].map(off_while_coasting);
+    assert!(unseen[2] > 0.02, "the effect exists: {unseen:?}");
+    for (seen, unseen, share) in [
+        (seen[0], unseen[0], 0.7),
+        (seen[1], unseen[1], 0.4),
+        (seen[2], unseen[2], 0.2),
+    ] {
+        assert!(seen < share * unseen, "{seen} m of {unseen} m");
+    }
+}
+
+#[test]
+fn a_box_at_rest_is_known_better_with_every_image_and_what_was_seen_counts_once() {
+    let mut observer = observer(true);
+    let deviation = observer.deviation();
+    for n in 1..=330_u32 {
+        let now = Time::ZERO + TICK * n;
+        observer.step(now, Vec2::new(-1.0, 0.0), Vec2::zeros(), false, &params());
+        // each image is 100 ms late, so three are on their way
+        if n % 33 == 0 && n > 100 {
+            observer.see(&VisionSample {
+                taken: Time::ZERO + TICK * (n - 100),
+                pose: Pose::new(1e-3, 0.0, 0.0),
+            });
+        }
+    }
+    let off = (observer.pose().position - Vec2::new(1e-3, 0.0)).norm();
+    assert!(off < 0.3e-3, "{off} m");
+    assert!(observer.deviation() < 0.5 * deviation);
+}
+
+/// A tool in contact with nothing, `away` m before the face, under a bias of the force; images show a box that does not follow.
+fn seen_with_tool_away(away: f64) -> PoseObserver {
+    let mut observer = observer(true);
+    let truth = push(&mut observer, 1000, 0.0);
+    let tool = truth.position - Vec2::new(HALF + away, 0.0);
+    for n in 1001..=1400_u32 {
+        let now = Time::ZERO + TICK * n;
+        observer.step(now, tool, Vec2::new(0.3, 0.0), true, &params());
+        if n % 33 == 0 {
+            observer.see(&VisionSample {
+                taken: now,
+                pose: truth,
+            });
+        }
+    }
+    observer
+}
+
+#[test]
+fn images_that_show_the_tool_clear_of_the_box_are_no_images_of_a_contact() {
+    let clear = seen_with_tool_away(0.02);
+    assert!(clear.sees_clear());
+    assert!(
+        (clear.footprint().west - HALF).abs() < 1e-3,
+        "nothing is learned from them"
+    );
+    let near = seen_with_tool_away(0.002);
+    assert!(!near.sees_clear());
+}

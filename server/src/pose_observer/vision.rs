@@ -1,11 +1,12 @@
 //! What vision adds: it is slow, late and noisy, but sees what touch cannot.
 
-use mmt_shared::model::geometry::{Vec2, wrap_angle};
+use mmt_shared::model::geometry::{Pose, Twist, Vec2, wrap_angle};
 
-use super::PoseObserver;
-use super::past::Past;
+use super::past::{Past, corrected};
 use super::tangent_tracker::TangentTracker;
+use super::track::Track;
 use super::tracker::Tracker;
+use super::{CLEAR, PoseObserver};
 use crate::sensing::VisionSample;
 
 impl PoseObserver {
@@ -16,61 +17,102 @@ impl PoseObserver {
             return;
         };
         let error = vision.pose.position - then.pose.position;
-        if !self.see_angle(vision, &then) {
-            self.become_tangent(error);
+        let turn = wrap_angle(vision.pose.angle + self.tracker.turned() - then.pose.angle);
+        if self.shows_clear(vision, &then) {
+            self.clear_images += 1;
             return;
         }
-        let variance = self.config.vision_noise_m.powi(2);
-        let gain = if variance > 0.0 {
-            self.slide_var / (self.slide_var + variance)
-        } else {
-            1.0
-        };
-        self.slide_var *= 1.0 - gain;
+        self.clear_images = 0;
+        if self.refutes(turn, &then) {
+            self.become_tangent(turn, error);
+            return;
+        }
         match (then.contact, self.contact) {
-            (Some(was), Some(is)) if was.face == is.face => {
-                let along = error - is.inward * is.inward.dot(&error);
-                self.motion.pose.position += along * gain;
-                let known = self.faces.footprint.offset(is.face);
-                let seen = was.inward.dot(&(vision.pose.position - was.surface));
-                self.faces
-                    .learn(&mut self.tracker, was.face, seen, variance);
-                // the face stays where it is touched: that the centre lies elsewhere is no motion
-                let shift = self.faces.footprint.offset(is.face) - known;
-                self.motion.pose.position += is.inward * shift;
-            }
-            (None, None) => self.motion.pose.position += error * gain,
-            _ => {}
+            (None, None) => self.see_free(vision, error, turn),
+            _ => self.see_touched(vision, &then, error, turn),
         }
     }
 
-    /// Takes the angle of an image. False if the image shows that the body that was taken for a box is none.
-    fn see_angle(&mut self, vision: &VisionSample, then: &Past) -> bool {
-        let seen = vision.pose.angle + self.tracker.turned();
-        let turn = wrap_angle(seen - then.pose.angle);
-        let noise = self.config.vision_noise_rad;
-        let touched = then.contact.is_some();
+    /// An image of an object that nobody touches shows where it is and how it moves, then and since.
+    fn see_free(&mut self, vision: &VisionSample, error: Vec2, turn: f64) {
+        let (place, velocity) = self.centre.measure(self.config.vision_noise_m.powi(2));
+        let (angle, omega) = self.angle.measure(self.config.vision_noise_rad.powi(2));
+        let off = Pose {
+            position: error * place,
+            angle: turn * angle,
+        };
+        let rate = Twist {
+            linear: error * velocity,
+            angular: turn * omega,
+        };
+        let seconds = self.past.newest().saturating_since(vision.taken);
+        self.past.correct(vision.taken, off, rate);
+        let motion = &mut self.motion;
+        motion.pose = corrected(motion.pose, off, rate, seconds.as_secs_f64());
+        motion.twist.linear += rate.linear;
+        motion.twist.angular += rate.angular;
+    }
+
+    /// An image of an object that is touched, or was: touch knows the plane of the face better.
+    fn see_touched(&mut self, vision: &VisionSample, then: &Past, error: Vec2, turn: f64) {
+        let variance = self.config.vision_noise_m.powi(2);
         match &mut self.tracker {
-            Tracker::Tangent(tangent) if touched => {
+            Tracker::Tangent(tangent) if then.contact.is_some() => {
                 tangent.see(vision.taken, turn);
-                return true;
             }
-            Tracker::Box(tracker) => {
-                let refuted = touched && tracker.is_refuted(turn, noise);
-                if refuted {
-                    self.tracker = Tracker::Tangent(TangentTracker::new(-turn));
-                    return false;
-                }
+            _ => {
+                let (angle, omega) = self.angle.measure(self.config.vision_noise_rad.powi(2));
+                self.motion.pose.angle += turn * angle;
+                self.motion.twist.angular += turn * omega;
             }
-            Tracker::Tangent(_) => {}
         }
-        self.angle.measure(&mut self.motion, turn, noise * noise);
-        true
+        let (gain, _) = self.centre.measure(variance);
+        let (Some(was), Some(is)) = (then.contact, self.contact) else {
+            return;
+        };
+        if was.face != is.face {
+            return;
+        }
+        let along = error - is.inward * is.inward.dot(&error);
+        self.motion.pose.position += along * gain;
+        let known = self.faces.footprint.offset(is.face);
+        let seen = was.inward.dot(&(vision.pose.position - was.surface));
+        self.faces
+            .learn(&mut self.tracker, was.face, seen, variance);
+        // the face stays where it is touched: that the centre lies elsewhere is no motion
+        let shift = self.faces.footprint.offset(is.face) - known;
+        self.motion.pose.position += is.inward * shift;
     }
 
-    /// The body is no box: the centre is where vision sees it, `error` m away.
-    fn become_tangent(&mut self, error: Vec2) {
+    /// Whether an image shows a tool in contact clear of a box.
+    fn shows_clear(&self, vision: &VisionSample, then: &Past) -> bool {
+        let in_contact = then.contact.is_some() && self.contact.is_some();
+        let is_box = matches!(self.tracker, Tracker::Box(_));
+        let outside = self.faces.outside(vision.pose.point_to_object(then.tool));
+        let Some((distance, variance)) = outside.filter(|_| in_contact && is_box) else {
+            return false;
+        };
+        let turned = self.config.vision_noise_rad * self.faces.footprint.mean_side();
+        let noise = variance + self.config.vision_noise_m.powi(2) + turned * turned;
+        let (least, deviations) = CLEAR;
+        distance > least.max(deviations * noise.sqrt())
+    }
+
+    /// Whether an image that differs from touch by `turn` (rad) shows that the body that was taken for a box is none.
+    fn refutes(&mut self, turn: f64, then: &Past) -> bool {
+        match &mut self.tracker {
+            Tracker::Box(tracker) if then.contact.is_some() => {
+                tracker.is_refuted(turn, self.config.vision_noise_rad)
+            }
+            _ => false,
+        }
+    }
+
+    /// The body is no box, and what touches it is turned against it by `turn` (rad): the centre is where vision sees it,
+    /// `error` (m) away.
+    fn become_tangent(&mut self, turn: f64, error: Vec2) {
+        self.tracker = Tracker::Tangent(TangentTracker::new(-turn));
         self.motion.pose.position += error;
-        self.slide_var = self.config.vision_noise_m.powi(2);
+        self.centre = Track::at_rest(self.config.vision_noise_m.powi(2));
     }
 }

@@ -80,6 +80,7 @@ impl ForceReference {
             force_deviation: estimate.force_deviation(),
             params: object.params,
             shift: pose.position - model.pose.position,
+            shift_deviation: object.observer.deviation(),
             turn: wrap_angle(pose.angle - model.pose.angle),
         }
     }

@@ -50,6 +50,9 @@ impl Slave {
             self.trigger.repeat(Cause::SlaveOnlyContact);
         }
         let measured = self.object.step(now, &contact, held_back);
+        if self.object.observer.sees_clear() {
+            self.contact.see_clear();
+        }
         if let Some(estimator) = others.estimator
             && let Some(found) = estimator(played.stamp, &measured)
         {

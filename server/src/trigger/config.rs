@@ -12,6 +12,8 @@ use super::{ContactConfig, MismatchMetric, Scheme};
 const FORCE_FLOOR_N: (f64, f64) = (0.001, 10.0);
 /// Accepted thresholds of contact, N.
 const CONTACT_N: (f64, f64) = (0.001, 10.0);
+/// Accepted error of the place in free space, m; 0 is off.
+const FREE_SPACE_ERROR_M: (f64, f64) = (0.0, 1.0);
 /// Accepted samples in a row of a contact that begins or ends.
 const CONTACT_SAMPLES: (f64, f64) = (1.0, 1000.0);
 
@@ -33,6 +35,9 @@ pub struct TriggerConfig {
     pub force_floor_n: f64,
     /// Whether a box that sticks can be mismatched: its force is whatever friction holds.
     pub judge_sticking: bool,
+    /// An object that nobody touches and that is this much away from where the model has it is sent, m, if that is beyond the
+    /// noise of the images; 0: only contact is sent, as in the paper.
+    pub free_space_error_m: f64,
     /// How long only one side must be in contact before it counts.
     pub mismatch_debounce: Duration,
     /// How often a contact mismatch that lasts is sent again.
@@ -43,13 +48,13 @@ pub struct TriggerConfig {
 
 impl TriggerConfig {
     /// The settings of a mode. Paper: hybrid at its best point (10 %, 150 ms), floor F_min = 0.04 N.
-    /// Recommended: `useful` with the same numbers, floor 0.3 N.
+    /// Recommended: `useful` with the same numbers, floor 0.3 N, free space to 1 mm.
     #[must_use]
     pub fn of_mode(mode: Mode) -> Self {
         let (delta, t_update) = (0.10, Duration::from_millis(150));
-        let (scheme, force_floor_n, judge_sticking) = match mode {
-            Mode::Paper => (Scheme::Hybrid { delta, t_update }, 0.04, true),
-            Mode::Recommended => (Scheme::Useful { delta, t_update }, 0.3, false),
+        let (scheme, force_floor_n, judge_sticking, free_space_error_m) = match mode {
+            Mode::Paper => (Scheme::Hybrid { delta, t_update }, 0.04, true, 0.0),
+            Mode::Recommended => (Scheme::Useful { delta, t_update }, 0.3, false, 1e-3),
         };
         Self {
             scheme,
@@ -58,6 +63,7 @@ impl TriggerConfig {
             timer_carries_pose: true,
             force_floor_n,
             judge_sticking,
+            free_space_error_m,
             mismatch_debounce: Duration::from_millis(10),
             mismatch_repeat: Duration::from_millis(50),
             contact: ContactConfig::default(),
@@ -80,6 +86,12 @@ impl TriggerConfig {
                 "N",
                 self.force_floor_n,
                 FORCE_FLOOR_N,
+            ),
+            (
+                "trigger: free space error",
+                "m",
+                self.free_space_error_m,
+                FREE_SPACE_ERROR_M,
             ),
             ("trigger: contact.on_n", "N", on_n, CONTACT_N),
             // a contact that has begun does not end by the force that began it

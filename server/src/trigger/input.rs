@@ -30,6 +30,8 @@ pub struct TriggerInput {
     pub params: ModelParams,
     /// By how much it would shift the shadow, m.
     pub shift: Vec2,
+    /// Standard deviation of that per axis, m, where nobody touches the object; else 0.
+    pub shift_deviation: f64,
     /// By how much it would turn the shadow, rad.
     pub turn: f64,
 }

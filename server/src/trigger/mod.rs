@@ -41,6 +41,11 @@ const ESTIMATE_DEVIATIONS: f64 = 5.0;
 /// And so may a turn of fewer standard deviations of the force's direction.
 const TURN_DEVIATIONS: f64 = 2.0;
 
+/// A place that is off by fewer standard deviations may be the noise of the images.
+const PLACE_DEVIATIONS: f64 = 3.0;
+/// Shortest time between two updates of an object that nobody touches.
+const ELSEWHERE_GAP: Duration = Duration::from_millis(50);
+
 /// A contact mismatch that lasts while the HIP stands is sent again ever more rarely, up to this: nobody feels it.
 const REPEAT_MAX: Duration = Duration::from_secs(1);
 
@@ -132,6 +137,7 @@ impl Trigger {
         let cause = self
             .geometry(now, input)
             .or_else(|| scheme(self))
+            .or_else(|| self.elsewhere(now, input))
             .or(self.repeat);
         if cause.is_some() {
             self.last = Some((now, input.params));
@@ -181,6 +187,15 @@ impl Trigger {
         } else {
             lost.then_some(Cause::ContactLost)
         }
+    }
+
+    /// An object that nobody touches and that is not where the model has it: the hand would meet it elsewhere.
+    fn elsewhere(&self, now: Time, input: &TriggerInput) -> Option<Cause> {
+        let least = self.config.free_space_error_m;
+        let free = !input.slave_in_contact && !input.shadow_in_contact;
+        let rested = (self.last).is_none_or(|(last, _)| now >= last + ELSEWHERE_GAP);
+        let off = input.shift.norm() > least.max(PLACE_DEVIATIONS * input.shift_deviation);
+        (least > 0.0 && free && rested && off).then_some(Cause::Elsewhere)
     }
 
     fn due(&self, now: Time, input: &TriggerInput) -> Option<Cause> {

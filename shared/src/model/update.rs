@@ -21,17 +21,20 @@ pub enum Cause {
     ContactLost,
     /// The scheme sends every sample.
     EverySample,
+    /// Nobody touches the object, and it is not where the model has it.
+    Elsewhere,
 }
 
 impl Cause {
     /// All causes, in the order of their numbers on the wire.
-    pub const ALL: [Self; 6] = [
+    pub const ALL: [Self; 7] = [
         Self::Deadband,
         Self::Timer,
         Self::MasterOnlyContact,
         Self::SlaveOnlyContact,
         Self::ContactLost,
         Self::EverySample,
+        Self::Elsewhere,
     ];
 
     /// Its number on the wire and its place in [`Cause::ALL`].
@@ -48,6 +51,7 @@ impl Cause {
             Self::SlaveOnlyContact => "slave_only_contact",
             Self::ContactLost => "contact_lost",
             Self::EverySample => "every_sample",
+            Self::Elsewhere => "elsewhere",
         }
     }
 }

@@ -235,7 +235,8 @@ fn values_stand_under_their_keys() {
         document["updates"]["by_cause"],
         json!({
             "deadband": 30, "timer": 0, "master_only_contact": 0,
-            "slave_only_contact": 0, "contact_lost": 1, "every_sample": 0
+            "slave_only_contact": 0, "contact_lost": 1, "every_sample": 0,
+            "elsewhere": 0
         })
     );
     assert_eq!(document["updates"]["dropped"], json!({ "stale": 1 }));

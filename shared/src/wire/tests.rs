@@ -339,7 +339,8 @@ fn numbers_of_choices_are_pinned() {
         Cause::SlaveOnlyContact,
         Cause::ContactLost,
         Cause::EverySample,
+        Cause::Elsewhere,
     ];
     assert_eq!(Cause::ALL, named);
-    assert_eq!(named.map(Cause::number), [0, 1, 2, 3, 4, 5]);
+    assert_eq!(named.map(Cause::number), [0, 1, 2, 3, 4, 5, 6]);
 }

@@ -22,7 +22,10 @@ impl LocalModel {
         self.aim(update);
         let state = &mut self.body.state;
         match update.cause {
-            Cause::MasterOnlyContact | Cause::SlaveOnlyContact | Cause::ContactLost => {
+            Cause::MasterOnlyContact
+            | Cause::SlaveOnlyContact
+            | Cause::ContactLost
+            | Cause::Elsewhere => {
                 state.footprint = update.state.footprint();
                 self.correction.snap(&mut state.pose);
                 state.twist = update.state.twist();

@@ -11,9 +11,9 @@ import { lines, raster, WINDOW_S } from "./charts.js";
 
 const $ = (id) => document.getElementById(id);
 const NAMES = ["paper", "sheet", "ink", "dim", "line", "grid", "grid-strong", "model", "model-fill", "remote", "remote-fill",
-  "truth", "error", "bad", "cause-0", "cause-1", "cause-2", "cause-3", "cause-4", "cause-5"];
+  "truth", "error", "bad", "cause-0", "cause-1", "cause-2", "cause-3", "cause-4", "cause-5", "cause-6"];
 const CAUSES = { deadband: "deadband", timer: "timer", master_only_contact: "only here in touch", slave_only_contact: "only there in touch",
-  contact_lost: "contact lost", every_sample: "every sample" };
+  contact_lost: "contact lost", every_sample: "every sample", elsewhere: "moved untouched" };
 /** Numbers are written this often, ms: more nobody can read. */
 const WRITE_MS = 150;
 /** What is read aloud comes no more often, ms. */

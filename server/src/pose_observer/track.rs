@@ -1,0 +1,67 @@
+//! How well a coordinate and its rate are known: the covariance of a constant-velocity Kalman filter.
+//!
+//! The coordinate itself is part of the object's motion; whoever moves that calls [`Track::predict`], and whoever measures it
+//! takes the gains of [`Track::measure`].
+
+use mmt_shared::time::TICK_S;
+
+/// Covariance of a coordinate (m or rad) and its rate.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Track {
+    /// [place², place·rate, rate²], in m or rad, and s.
+    covariance: [f64; 3],
+}
+
+impl Track {
+    /// The place is known with this variance, and the rate is 0.
+    pub(super) fn at_rest(variance: f64) -> Self {
+        Self {
+            covariance: [variance, 0.0, 0.0],
+        }
+    }
+
+    /// Variance of the place.
+    pub(super) fn variance(&self) -> f64 {
+        let [place, ..] = self.covariance;
+        place
+    }
+
+    /// The place is less certain by this variance.
+    pub(super) fn widen(&mut self, variance: f64) {
+        let [place, ..] = &mut self.covariance;
+        *place += variance;
+    }
+
+    /// The rate is now followed by somebody else, and the place is less certain by this variance.
+    pub(super) fn hold(&mut self, variance: f64) {
+        *self = Self::at_rest(self.variance() + variance);
+    }
+
+    /// From now on the rate is what it was taken for, with this variance.
+    pub(super) fn let_go(&mut self, variance: f64) {
+        self.covariance = [self.variance(), 0.0, variance];
+    }
+
+    /// One tick under an acceleration that is unknown but of this size.
+    pub(super) fn predict(&mut self, acceleration: f64) {
+        let [p, pc, q] = self.covariance;
+        let noise = acceleration * acceleration * TICK_S;
+        self.covariance = [
+            p + 2.0 * pc * TICK_S + q * TICK_S * TICK_S,
+            pc + q * TICK_S,
+            q + noise * TICK_S,
+        ];
+    }
+
+    /// Takes a measured place of this variance; the shares of the innovation by which place and rate (1/s) are to be corrected.
+    pub(super) fn measure(&mut self, variance: f64) -> (f64, f64) {
+        let [p, pc, q] = self.covariance;
+        let total = p + variance;
+        if total <= 0.0 {
+            return (1.0, 0.0);
+        }
+        let (place, rate) = (p / total, pc / total);
+        self.covariance = [p * (1.0 - place), pc * (1.0 - place), q - rate * pc];
+        (place, rate)
+    }
+}
