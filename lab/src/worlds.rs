@@ -253,6 +253,20 @@ mod tests {
     use crate::world::World;
 
     #[test]
+    fn a_drift_of_the_sensor_does_not_lead_the_pose_away_with_the_tool() {
+        // its bias drifts into contact in the first push, and the tool then goes to the next face
+        let mut world = World::try_new(&RandomWorld::new(958).config).unwrap();
+        let mut most_m = 0.0_f64;
+        for _ in 0..20_000 {
+            if let Some(tick) = world.step().slave {
+                let pose = world.slave().observer().pose();
+                most_m = most_m.max((pose.position - tick.truth.position).norm());
+            }
+        }
+        assert!(most_m < 0.1, "{most_m} m");
+    }
+
+    #[test]
     fn a_world_is_a_function_of_its_number_and_every_world_can_be_made() {
         let worlds: Vec<_> = (1..=300).map(RandomWorld::new).collect();
         assert_eq!(worlds.first(), Some(&RandomWorld::new(1)));

@@ -1,5 +1,6 @@
 //! Laws of the estimators on the plant, each with the effect that it removes shown first.
 
+mod first_press;
 mod paper;
 mod plant;
 
@@ -468,25 +469,4 @@ proptest! {
             }
         }
     }
-}
-
-#[test]
-fn the_give_of_a_soft_contact_is_no_motion_of_an_object_that_nobody_has_moved() {
-    // it gives 40 % more than the device says, so that the surface seems to move
-    let mut estimator = recommended(|_| ());
-    let mut holding = None;
-    for k in 0..400 {
-        let depth = 1e-5 * f64::from(k);
-        let force = Vec2::new(COUPLING.stiffness_n_per_m * depth / 1.4, 0.0);
-        let measured = Measured {
-            tool: Vec2::new(depth, 0.0),
-            force,
-            force_noise_n: 0.0,
-            normal: Some(Vec2::new(1.0, 0.0)),
-            seen: None,
-        };
-        holding = estimator.step(&measured).holding;
-    }
-    let most = COUPLING.stiffness_n_per_m * 4e-3 / 1.4;
-    assert!(holding.is_some_and(|c| c > 0.8 * most), "{holding:?}");
 }

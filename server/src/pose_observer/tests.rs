@@ -406,6 +406,31 @@ fn images_show_how_fast_a_box_coasts_that_was_taken_to_stop() {
 }
 
 #[test]
+fn images_correct_the_speed_of_a_box_that_coasts() {
+    let mut observer = observer(true);
+    let mut truth = push(&mut observer, 1000, 0.0);
+    let slippery = ModelParams::of_square(0.7, 0.0, 0.0, 0.36, &COUPLING).unwrap();
+    let speed = 0.15;
+    for n in 1001..=1400_u32 {
+        truth.position.x += speed * TICK_S;
+        let now = Time::ZERO + TICK * n;
+        observer.step(now, Vec2::new(-1.0, 0.0), Vec2::zeros(), false, &slippery);
+        if n == 1001 {
+            let believed = observer.twist().linear.x;
+            assert!(believed < 0.11, "the effect exists: {believed} m/s");
+        }
+        if n % 33 == 0 {
+            observer.see(&VisionSample {
+                taken: now,
+                pose: truth,
+            });
+        }
+    }
+    let found = observer.twist().linear.x;
+    assert!((found - speed).abs() < 0.01, "{found} m/s of {speed} m/s");
+}
+
+#[test]
 fn a_box_at_rest_is_known_better_with_every_image_and_what_was_seen_counts_once() {
     let mut observer = observer(true);
     let deviation = observer.deviation();
@@ -453,4 +478,29 @@ fn images_that_show_the_tool_clear_of_the_box_are_no_images_of_a_contact() {
     );
     let near = seen_with_tool_away(0.002);
     assert!(!near.sees_clear());
+}
+
+#[test]
+fn a_box_that_is_guessed_to_be_further_away_is_where_the_next_image_shows_it() {
+    let mut observer = observer(true);
+    let truth = push(&mut observer, 1000, 0.0);
+    let look = |observer: &mut PoseObserver, from: u32, ticks: u32| {
+        for n in from..from + ticks {
+            let now = Time::ZERO + TICK * n;
+            observer.step(now, Vec2::new(-1.0, 0.0), Vec2::zeros(), false, &params());
+            if n % 33 == 0 {
+                observer.see(&VisionSample {
+                    taken: now,
+                    pose: truth,
+                });
+            }
+        }
+    };
+    look(&mut observer, 1001, 1000);
+    let inside = truth.position - Vec2::new(HALF - 0.01, 0.0);
+    observer.retract_face(inside, Face::West);
+    let off = |observer: &PoseObserver| (observer.pose().position - truth.position).norm();
+    assert!(off(&observer) > 9e-3, "the effect exists");
+    look(&mut observer, 2001, 40);
+    assert!(off(&observer) < 1e-3, "{} m", off(&observer));
 }

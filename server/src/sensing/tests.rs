@@ -1,6 +1,7 @@
 //! Promises of the sensors.
 
 use super::*;
+use mmt_shared::time::TICK;
 
 const TOOL: Vec2 = Vec2::new(0.1, -0.2);
 const FORCE: Vec2 = Vec2::new(3.0, -1.0);
@@ -173,6 +174,26 @@ fn a_gap_in_time_yields_the_newest_image_and_counts_the_rest() {
     });
     assert_eq!(burst.count(), 0);
     assert!(sensing.on_their_way.len() <= 6);
+}
+
+#[test]
+fn after_the_clock_was_set_back_images_come_again_and_none_of_before() {
+    // one image is on its way
+    let (mut sensing, _) = run(SensingConfig::default(), 1005);
+    let back = Time::from_millis(500);
+    let dropped = sensing.images_dropped();
+    let mut seen = Vec::new();
+    for tick in 0..100 {
+        let now = back + TICK * tick;
+        let image = sensing.sense(now, TOOL, FORCE, &pose()).vision;
+        seen.extend(image.map(|image| image.taken));
+    }
+    assert_eq!(seen.len(), 3, "{seen:?}");
+    assert!(
+        seen.iter()
+            .all(|taken| *taken >= back && *taken < back + TICK * 100)
+    );
+    assert_eq!(sensing.images_dropped(), dropped + 1);
 }
 
 #[test]

@@ -40,7 +40,7 @@ pub struct TriggerConfig {
     pub free_space_error_m: f64,
     /// How long only one side must be in contact before it counts.
     pub mismatch_debounce: Duration,
-    /// How often a contact mismatch that lasts is sent again.
+    /// How often a contact mismatch that lasts is sent again, and an untouched object that is elsewhere.
     pub mismatch_repeat: Duration,
     /// Thresholds of contact.
     pub contact: ContactConfig,

@@ -43,8 +43,6 @@ const TURN_DEVIATIONS: f64 = 2.0;
 
 /// A place that is off by fewer standard deviations may be the noise of the images.
 const PLACE_DEVIATIONS: f64 = 3.0;
-/// Shortest time between two updates of an object that nobody touches.
-const ELSEWHERE_GAP: Duration = Duration::from_millis(50);
 
 /// A contact mismatch that lasts while the HIP stands is sent again ever more rarely, up to this: nobody feels it.
 const REPEAT_MAX: Duration = Duration::from_secs(1);
@@ -193,7 +191,7 @@ impl Trigger {
     fn elsewhere(&self, now: Time, input: &TriggerInput) -> Option<Cause> {
         let least = self.config.free_space_error_m;
         let free = !input.slave_in_contact && !input.shadow_in_contact;
-        let rested = (self.last).is_none_or(|(last, _)| now >= last + ELSEWHERE_GAP);
+        let rested = (self.last).is_none_or(|(last, _)| now >= last + self.config.mismatch_repeat);
         let off = input.shift.norm() > least.max(PLACE_DEVIATIONS * input.shift_deviation);
         (least > 0.0 && free && rested && off).then_some(Cause::Elsewhere)
     }
