@@ -129,7 +129,7 @@ impl Conditioner {
         let (for_contact, for_trigger) = self.noise.averaged();
         let steady = self.average(measured, for_contact) - self.bias.known();
         let deviation = self.noise.of_average(for_contact);
-        let untouched = self.config.tare && self.bias.first && self.bias.value.norm() < BIAS_MAX_N;
+        let untouched = self.config.tare && self.bias.first && self.is_bias();
         self.in_contact = !untouched && self.detector.step(steady.norm(), deviation);
         if self.config.tare {
             self.tare(measured, steady, tool, deviation);
@@ -169,6 +169,13 @@ impl Conditioner {
             self.detector.release();
             self.in_contact = false;
         }
+    }
+
+    /// Whether the newest measured forces may be the bias of an untouched tool. Of a few, as one may be noise; before there are
+    /// so many, the others count as none.
+    fn is_bias(&self) -> bool {
+        let sum: Vec2 = self.recent.iter().sum();
+        sum.norm() < BIAS_MAX_N * CONTACT_MAX as f64
     }
 
     /// The mean of the newest `n` measured forces, N.

@@ -38,6 +38,7 @@ pub(super) struct ChannelChecks {
     answered: u32,
     /// Round trips of the last 10 s: the least and the longest of each tenth of a second that has any, by its beginning.
     round_trips: VecDeque<(Time, Duration, Duration)>,
+    latest: Option<Duration>,
     seen: BTreeSet<u32>,
     newest: Option<Newest>,
     received: u32,
@@ -56,6 +57,7 @@ impl ChannelChecks {
             answered_at: None,
             answered: 0,
             round_trips: VecDeque::new(),
+            latest: None,
             seen: BTreeSet::new(),
             newest: None,
             received: 0,
@@ -117,6 +119,7 @@ impl ChannelChecks {
     }
 
     fn measured(&mut self, at: Time, round_trip: Duration) {
+        self.latest = Some(round_trip);
         match self.round_trips.back_mut() {
             Some((then, least, most)) if at < *then + TENTH => {
                 (*least, *most) = ((*least).min(round_trip), (*most).max(round_trip));
@@ -201,13 +204,14 @@ impl ChannelChecks {
         (heard.max(least), heard.max(most))
     }
 
-    /// The least round trip of the last seconds.
+    /// The least round trip of the last seconds; the last one if there is none in that time.
     fn path(&self, now: Time, window: Duration) -> Duration {
         let from = now - window;
         let recent = self.round_trips.iter().filter(|(then, ..)| *then >= from);
         recent
             .map(|(_, least, _)| *least)
             .min()
+            .or(self.latest)
             .unwrap_or(PATH_UNKNOWN)
     }
 

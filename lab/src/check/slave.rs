@@ -86,8 +86,11 @@ pub struct SlaveChecks {
     counts: PlayoutCounts,
     played: Option<Time>,
     acknowledged: BTreeSet<u32>,
-    /// Numbers, times and causes of updates that no command has acknowledged, or of late: the samples say it later.
-    unconfirmed: Vec<(u32, Time, Cause)>,
+    /// Numbers and causes of updates that no command has acknowledged, or of late: the samples say it later. And what had been ticked
+    /// by then.
+    unconfirmed: Vec<(u32, Duration, Cause)>,
+    /// All that has been ticked.
+    lived: Duration,
     /// The newest update as it was made, and as it left.
     made: Option<Update>,
     left: Option<Update<RawState>>,
@@ -117,6 +120,7 @@ impl SlaveChecks {
             played: None,
             acknowledged: BTreeSet::from([0]),
             unconfirmed: Vec::new(),
+            lived: Duration::ZERO,
             made: None,
             left: None,
             about,
@@ -138,7 +142,7 @@ impl SlaveChecks {
             return;
         };
         self.acknowledged.insert(command.newest_update);
-        self.confirm(at, command.newest_update);
+        self.confirm(command.newest_update);
         if self.disengaged {
             return;
         }
@@ -173,11 +177,12 @@ impl SlaveChecks {
     }
 
     /// A command acknowledges an update; of a number that never left it acknowledges none.
-    fn confirm(&mut self, at: Time, sequence: u32) {
+    fn confirm(&mut self, sequence: u32) {
         let left = self.left.map_or(0, |left| left.sequence);
+        let lived = self.lived;
         if sequence <= left {
             self.unconfirmed
-                .retain(|(made, then, _)| *made > sequence || *then + REMEMBERED > at);
+                .retain(|(made, then, _)| *made > sequence || *then + REMEMBERED > lived);
         }
     }
 
@@ -203,6 +208,7 @@ impl SlaveChecks {
         self.channel
             .ticked(tick.now, tick.polled, &mut self.verdict);
         let elapsed = tick.now.saturating_since(self.ticked).min(TICK_MAX);
+        self.lived += elapsed;
         if self.newest.is_some() {
             self.silent += elapsed;
             self.quiet += elapsed;
@@ -281,6 +287,7 @@ impl SlaveChecks {
             )
         });
         self.made = Some(update);
-        self.unconfirmed.push((update.sequence, now, update.cause));
+        self.unconfirmed
+            .push((update.sequence, self.lived, update.cause));
     }
 }

@@ -99,6 +99,17 @@ fn a_bias_is_tared_and_its_drift_followed() {
 }
 
 #[test]
+fn a_touch_while_the_bias_is_measured_for_the_first_time_is_contact_at_once_and_no_bias() {
+    for ticks in 0..99 {
+        let mut press = Press::new(0.01, Vec2::new(0.0, 0.2), Vec2::zeros());
+        press.stay(FREE, ticks);
+        assert!(press.stay(2e-3, 200) >= 197, "after {ticks} ticks");
+        let taken_off = 2.0 - press.tick(2e-3).force.x;
+        assert!(taken_off < 0.1, "{taken_off} N after {ticks} ticks");
+    }
+}
+
+#[test]
 fn a_contact_in_which_the_bias_drifts_beyond_the_threshold_ends_and_is_tared_after() {
     for angle in 0..8 {
         let angle = f64::from(angle) * std::f64::consts::FRAC_PI_4;

@@ -105,7 +105,12 @@ impl JitterBuffer {
     /// Notes that `stamp` is played, drops what is no longer needed, and returns the stamp to report.
     pub(super) fn play(&mut self, stamp: Time) -> Time {
         let newest = self.samples.back();
-        let reported = newest.map_or(stamp, |newest| stamp.min(newest.stamp + AHEAD));
+        let ahead = newest.map_or(stamp, |newest| stamp.min(newest.stamp + AHEAD));
+        // the clock may have been learned anew from an older sample
+        let reported = match self.last {
+            Some(last) if stamp >= last.stamp => ahead.max(last.reported),
+            _ => ahead,
+        };
         self.last = Some(Last { stamp, reported });
         self.forget(stamp);
         reported

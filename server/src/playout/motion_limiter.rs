@@ -109,12 +109,7 @@ impl MotionLimiter {
             }
             Some(_) => self.way(limits, from, aim, period),
         };
-        let hip = if way == aim - from {
-            aim
-        } else {
-            // whatever the rounding
-            within(self.reach_m.max(from.norm()), from + way)
-        };
+        let (hip, way) = self.place_after(from, aim, way);
         let velocity = if period > 0.0 {
             way / period
         } else {
@@ -128,6 +123,18 @@ impl MotionLimiter {
             limited: (aimed.unwrap_or(aim) - hip).norm() > BEHIND_M,
             speed_max_m_per_s: limits.speed_m_per_s,
         }
+    }
+
+    /// Where the tool is after a way towards `aim`, and the way that it has gone: one that brakes beside the end of its reach
+    /// slides along it, and goes on from what it does.
+    fn place_after(&self, from: Vec2, aim: Vec2, way: Vec2) -> (Vec2, Vec2) {
+        if way == aim - from {
+            return (aim, way);
+        }
+        let (reach, free) = (self.reach_m.max(from.norm()), from + way);
+        let hip = within(reach, free);
+        let way = if hip == free { way } else { hip - from };
+        (hip, way)
     }
 
     /// The limits after a tool has had to become slower for so long.

@@ -5,6 +5,7 @@ mod delay;
 use super::*;
 use mmt_shared::model::sample::{ForceCounts, HipCounts};
 use mmt_shared::rng::Substream;
+use mmt_shared::time::TICK_S;
 
 const MS: i64 = 1_000_000;
 /// The master's clock starts elsewhere.
@@ -449,6 +450,69 @@ fn samples_of_before_that_come_after_a_silence_do_not_draw_the_tool_back() {
     }
     assert!(stood);
     assert_eq!(buffer.counts().relearned, 1);
+}
+
+#[test]
+fn no_stamp_is_played_again_after_the_clock_was_learned_anew_from_an_older_sample() {
+    let mut buffer = PlayoutBuffer::try_new(PlayoutConfig::default()).unwrap();
+    let mut last = Time::ZERO;
+    for k in 0..1500_u64 {
+        // at 600 ms the slave stands for 2 s, so that the stamp played is as far ahead of all samples as it may be
+        let now = Time::from_millis(if k < 600 { k } else { k + 2000 });
+        let some = match k {
+            0..500 => vec![k],
+            // two datagrams of before, so far apart that the clock is learned anew
+            700 => vec![420],
+            1000 => vec![430],
+            _ => Vec::new(),
+        };
+        for k in some {
+            buffer.push(now, &sample(k));
+        }
+        // it stands again before it plays the second
+        if (1000..1100).contains(&k) {
+            continue;
+        }
+        let Some(played) = buffer.advance(now) else {
+            continue;
+        };
+        assert!(played.stamp >= last, "{:?} after {last:?}", played.stamp);
+        last = played.stamp;
+    }
+    assert_eq!(last, stamp(499) + Duration::from_secs(1));
+    assert_eq!(buffer.counts().relearned, 1);
+}
+
+#[test]
+fn a_tool_that_slides_along_the_end_of_its_reach_brakes_all_the_same_when_it_is_held() {
+    let config = PlayoutConfig {
+        reach_m: 0.5,
+        ..PlayoutConfig::default()
+    };
+    let (mut slid, a) = (0, config.acceleration_max_m_per_s2);
+    for held_at in 500..1500 {
+        let mut buffer = PlayoutBuffer::try_new(config).unwrap();
+        buffer.start_at(Vec2::new(0.0, 0.3));
+        let (mut at, mut speed) = (Vec2::zeros(), 0.0);
+        for k in 0..held_at + 50 {
+            let now = Time::from_millis(k);
+            // the hand goes straight on
+            let hip = HipCounts::nearest(Vec2::new(0.55e-3 * k as f64, 0.3));
+            buffer.push(now, &HipSample { hip, ..sample(k) });
+            buffer.hold(k >= held_at);
+            let Some(played) = buffer.advance(now) else {
+                continue;
+            };
+            let goes = (played.hip - at).norm() / TICK_S;
+            if k >= held_at {
+                let most = (speed - a * TICK_S).max(0.0);
+                assert!(goes <= most + 2e-4, "{goes} m/s after {speed} m/s");
+                slid += u32::from(goes > 0.0 && played.hip.norm() > 0.5 - 1e-9);
+            }
+            (at, speed) = (played.hip, goes);
+        }
+    }
+    assert!(slid > 0, "the effect exists");
 }
 
 #[test]

@@ -151,7 +151,7 @@ fn step(bench: &mut Bench, op: Op, mut draws: Substream) {
         }
         Op::Mutated(from, which) => {
             if let Some(bytes) = bench.captured(from, which) {
-                bench.arrives(from.other(), enemy::mutated(bytes, &mut draws));
+                bench.arrives_forged(from.other(), enemy::mutated(bytes, &mut draws));
             }
         }
         Op::Forged(from, which) => {
@@ -159,7 +159,7 @@ fn step(bench: &mut Bench, op: Op, mut draws: Substream) {
                 .captured(from, which)
                 .and_then(|bytes| enemy::forged(&bytes, from, &mut draws))
             {
-                bench.arrives(from.other(), bytes);
+                bench.arrives_forged(from.other(), bytes);
             }
         }
         Op::Foreign(from, which) => {
@@ -167,7 +167,7 @@ fn step(bench: &mut Bench, op: Op, mut draws: Substream) {
                 .of_earlier(from, which)
                 .or_else(|| bench.captured(from.other(), which))
             {
-                bench.arrives(from.other(), bytes);
+                bench.arrives_forged(from.other(), bytes);
             }
         }
         Op::Garbage(from, length) => {

@@ -46,16 +46,16 @@ impl RoundTrip {
         self.latest
     }
 
-    /// The least of the last 9 to 10 s; none if nothing was measured in that time.
+    /// The least of the last 9 to 10 s; the last one if nothing was measured in that time.
     pub fn least(&self, now: Time) -> Option<Duration> {
         let least = self.recent(now).map(|(least, _)| *least);
-        least.min()
+        least.min().or(self.latest)
     }
 
-    /// The longest of the last 9 to 10 s; none if nothing was measured in that time.
+    /// The longest of the last 9 to 10 s; the last one if nothing was measured in that time.
     pub fn longest(&self, now: Time) -> Option<Duration> {
         let most = self.recent(now).map(|(_, most)| *most);
-        most.max()
+        most.max().or(self.latest)
     }
 
     fn recent(&self, now: Time) -> impl Iterator<Item = &(Duration, Duration)> {
@@ -73,7 +73,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn least_and_longest_are_remembered_for_nine_seconds_and_forgotten_after_ten() {
+    fn least_and_longest_are_of_the_last_ten_seconds_or_else_the_last_one() {
         let (ms, mut round_trip) = (Duration::from_millis, RoundTrip::default());
         let at = Time::from_millis;
         assert_eq!(round_trip.least(at(0)), None);
@@ -90,7 +90,10 @@ mod tests {
         assert_eq!(round_trip.longest(at(10_000)), Some(ms(50)));
         round_trip.note(at(10_000), ms(60));
         assert_eq!(round_trip.least(at(10_000)), Some(ms(50)));
-        assert_eq!(round_trip.least(at(30_000)), None, "nothing for 20 s");
-        assert_eq!(round_trip.histogram().total(), 12);
+        round_trip.note(at(10_001), ms(70));
+        let late = at(30_000);
+        assert_eq!(round_trip.least(late), Some(ms(70)), "nothing for 20 s");
+        assert_eq!(round_trip.longest(late), Some(ms(70)));
+        assert_eq!(round_trip.histogram().total(), 13);
     }
 }

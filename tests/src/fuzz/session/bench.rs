@@ -90,6 +90,8 @@ pub(super) struct Bench {
     /// What left in this session, and in those before.
     left: [VecDeque<Vec<u8>>; 2],
     earlier: [VecDeque<Vec<u8>>; 2],
+    /// Whether an enemy has sent what an end may have believed, in this session.
+    enemy: bool,
     /// What was seen, as bits.
     seen: u64,
 }
@@ -174,6 +176,7 @@ impl Bench {
             held: VecDeque::new(),
             left: Default::default(),
             earlier: Default::default(),
+            enemy: false,
             seen: 0,
         }
     }
@@ -371,6 +374,12 @@ impl Bench {
         }
     }
 
+    /// A datagram of an enemy arrives, in the name of the other end.
+    pub(super) fn arrives_forged(&mut self, to: Side, bytes: Vec<u8>) {
+        self.enemy = true;
+        self.arrives(to, bytes);
+    }
+
     /// A datagram that left this side, the how-manieth from the newest.
     pub(super) fn captured(&self, from: Side, which: u8) -> Option<Vec<u8>> {
         chosen(&self.left[usize::from(from == Side::Slave)], which)
@@ -419,7 +428,7 @@ impl Bench {
         );
         self.held.clear();
         self.earlier = std::mem::take(&mut self.left);
-        self.releasing = false;
+        (self.releasing, self.enemy) = (false, false);
         self.reading = self.ends.slave.slave().tool_at();
         self.velocity = Vec2::zeros();
         self.seen |= 1 << 8;
@@ -436,7 +445,7 @@ impl Bench {
     }
 
     /// Everybody behaves again: the session works, or it is over after two seconds at either end, as it is where an enemy used
-    /// up its numbers, and the next one works.
+    /// up its numbers or set an emergency stop with one that is yet to come, and the next one works.
     pub(super) fn recover(&mut self) {
         self.network = Network::Direct;
         (self.stops, self.engaged, self.velocity) = ([false; 2], true, Vec2::zeros());
@@ -448,9 +457,14 @@ impl Bench {
             self.rest(200);
         }
         let released = self.ends.master.master().limiter().at_rest();
+        let stopped = self.ends.are_stopped();
+        assert!(
+            !stopped || self.enemy,
+            "an emergency stop that nobody holds"
+        );
         // a master that never had an answer waits longer for one: the path may be of 4 s
         let unheard = self.ends.slave.channel().silence(self.slave_now) > Duration::from_secs(2);
-        if over || released || unheard || self.ends.slave.is_disengaged() {
+        if over || released || unheard || stopped || self.ends.slave.is_disengaged() {
             assert!(
                 released || !over,
                 "the hand of a session that is over is not released"
@@ -485,9 +499,8 @@ impl Bench {
         assert_eq!(link, LinkState::Fresh, "the link does not come back");
         assert!(ends.slave.counts().samples > before, "no samples come");
         assert!(
-            !ends.slave.is_disengaged()
-                && ends.slave.stopped_by().is_none()
-                && ends.master.stopped_by().is_none()
+            !ends.slave.is_disengaged() && !ends.are_stopped(),
+            "the tool stands"
         );
         assert!(
             ends.master.master().limiter().engaged(),
@@ -510,6 +523,11 @@ fn chosen(of: &VecDeque<Vec<u8>>, which: u8) -> Option<Vec<u8>> {
 }
 
 impl Ends {
+    /// Whether an emergency stop is set, as either end has it.
+    fn are_stopped(&self) -> bool {
+        self.slave.stopped_by().is_some() || self.master.stopped_by().is_some()
+    }
+
     /// Both ends of a session that begins now, after the welcome has crossed the wire.
     fn new(
         config: &SlaveConfig,
