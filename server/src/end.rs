@@ -39,9 +39,6 @@ pub struct SlaveEndConfig {
     pub scene_hz: u8,
 }
 
-/// A tick counts as at most this long.
-const TICK_MAX: Duration = Duration::from_millis(10);
-
 /// What a tick of the slave's end is given besides its deadline.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SlaveGiven {
@@ -86,11 +83,6 @@ pub struct SlaveEnd {
     channel: DatagramChannel,
     config: SlaveEndConfig,
     newest_acknowledged: u32,
-    /// Stamp of the newest sample; none before the first.
-    newest_sample: Option<Time>,
-    /// Time that has been ticked since it came: neither a step of the clock nor a host that stands still is silence.
-    silent: Duration,
-    ticked: Time,
     disengaged: bool,
     /// Sequence of the newest update that left.
     newest_sent: u32,
@@ -114,9 +106,6 @@ impl SlaveEnd {
             channel: DatagramChannel::with_rate_control(Side::Slave, now, config.stretch_max),
             config,
             newest_acknowledged: 0,
-            newest_sample: None,
-            silent: Duration::ZERO,
-            ticked: now,
             disengaged: false,
             newest_sent: 0,
             update: None,
@@ -238,10 +227,6 @@ impl SlaveEnd {
             self.counts.samples_disengaged += command.samples.len() as u64;
             return;
         }
-        let newest = (command.samples.as_slice().last()).map(|sample| sample.stamp);
-        if newest > self.newest_sample {
-            (self.newest_sample, self.silent) = (newest, Duration::ZERO);
-        }
         let new = usize::from(self.config.samples_per_command).max(1);
         let repeated = command.samples.len().saturating_sub(new);
         for (n, sample) in command.samples.as_slice().iter().enumerate() {
@@ -260,18 +245,10 @@ impl SlaveEnd {
     #[must_use]
     pub fn plant_command(&self) -> Option<PlantCommand> {
         self.slave.plant_command().map(|command| PlantCommand {
-            begins: self.newest_sample.is_none(),
+            begins: self.slave.playout().silence().is_none(),
             held: self.stopped_by().is_some(),
             ..command
         })
-    }
-
-    fn consider_disengaging(&mut self, now: Time) {
-        if self.newest_sample.is_some() {
-            self.silent += now.saturating_since(self.ticked).min(TICK_MAX);
-        }
-        self.ticked = now;
-        self.disengaged |= self.silent > DISENGAGE;
     }
 
     /// One sample period; `now` is the tick's deadline. None before the first HIP sample is due.
@@ -281,7 +258,8 @@ impl SlaveEnd {
 
     /// The same with stages of somebody else's.
     pub fn tick_with(&mut self, now: Time, others: Substitutes<'_>) -> Option<SlaveTick> {
-        self.consider_disengaging(now);
+        let silence = self.slave.playout().silence();
+        self.disengaged |= silence.is_some_and(|silence| silence >= DISENGAGE);
         let stands = self.stopped_by().is_some() || self.disengaged;
         self.slave.hold_tool(stands);
         let tick = self.slave.tick_with(now, others)?;

@@ -174,6 +174,13 @@ impl PlayoutBuffer {
         before.map(|sample| sample.stamp)
     }
 
+    /// For how long no new sample has come, as ticks count it: neither a step of the clock nor a host that stands still is
+    /// silence, and a sample that is not believed is none. None before the first.
+    #[must_use]
+    pub fn silence(&self) -> Option<Duration> {
+        self.newest.map(|_| self.silent)
+    }
+
     /// What happened so far.
     #[must_use]
     pub fn counts(&self) -> PlayoutCounts {

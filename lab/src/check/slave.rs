@@ -70,10 +70,10 @@ pub struct SlaveChecks {
     /// Whether an emergency stop was set in the tick before.
     stopped: bool,
     stops: bool,
-    /// Stamp of the newest sample, and for how long there has been no newer one, as ticks count it.
+    /// Stamp of the newest sample.
     newest: Option<Time>,
-    silent: Duration,
-    /// For how long there has been no sample that was not there before: also one behind a stamp that an enemy put ahead is new.
+    /// For how long there has been no sample that was not there before, as ticks count it: also one behind a stamp that an enemy put
+    /// ahead is new.
     quiet: Duration,
     disengaged: bool,
     /// Forces by stamp; an enemy may have sent another one with a stamp that the slave did not believe then.
@@ -110,7 +110,6 @@ impl SlaveChecks {
             stopped: false,
             stops: false,
             newest: None,
-            silent: Duration::ZERO,
             quiet: Duration::ZERO,
             disengaged: false,
             samples: BTreeMap::new(),
@@ -156,9 +155,7 @@ impl SlaveChecks {
             if !forces.contains(&sample.force) {
                 forces.push(sample.force);
             }
-            if Some(sample.stamp) > self.newest {
-                (self.newest, self.silent) = (Some(sample.stamp), Duration::ZERO);
-            }
+            self.newest = self.newest.max(Some(sample.stamp));
         }
         let newest = self.newest.unwrap_or_default();
         self.samples = self.samples.split_off(&(newest - REMEMBERED));
@@ -210,10 +207,9 @@ impl SlaveChecks {
         let elapsed = tick.now.saturating_since(self.ticked).min(TICK_MAX);
         self.lived += elapsed;
         if self.newest.is_some() {
-            self.silent += elapsed;
             self.quiet += elapsed;
         }
-        self.disengaged |= self.silent > DISENGAGE;
+        self.disengaged |= self.quiet > DISENGAGE;
         self.doubt(tick.end.slave().playout().counts());
         if let Some(done) = tick.done {
             // the tool begins from rest: its first tick is one period, however long ago the session began

@@ -371,6 +371,21 @@ fn samples_that_come_after_two_seconds_of_none_move_nothing() {
 }
 
 #[test]
+fn a_stamp_of_hours_ahead_does_not_disengage_a_tool_whose_samples_go_on() {
+    let ahead = |ms, slave: &mut SlaveEnd, master: &mut DatagramChannel| {
+        if ms == 1000 {
+            let stamps = 3_600_000..=3_600_000;
+            slave.handle_datagram(AT(ms), &command(master, ms, stamps, 0, None));
+        }
+    };
+    let end = four_seconds(|ms| Some(going_on(ms)), ahead);
+    assert_eq!(end.slave().playout().counts().implausible, 1);
+    assert!(!end.is_disengaged());
+    let x = end.slave().tool_at().x;
+    assert!((x - -0.602).abs() < 0.01, "it follows: {x} m");
+}
+
+#[test]
 fn a_hip_that_jumped_away_before_a_silence_moves_a_disengaged_tool_nowhere() {
     // 1.9 m, which take more than three seconds
     let hand = |ms| (ms < 1020).then(|| if ms < 1000 { -0.9 } else { 1.0 });
