@@ -1,5 +1,6 @@
 //! stdout is data, stderr is messages. A reader that has gone away is no error and no panic.
 
+use std::collections::BTreeMap;
 use std::fmt::Display;
 use std::io::{self, ErrorKind, Write};
 use std::path::Path;
@@ -49,6 +50,12 @@ pub(crate) fn print_report<C: Serialize>(
     } else {
         print(Brief(report))
     }
+}
+
+/// How often each was there, as `name 3, name 5`.
+pub(crate) fn counts<N: Display>(of: &BTreeMap<N, u64>) -> String {
+    let of = of.iter().map(|(name, count)| format!("{name} {count}"));
+    of.collect::<Vec<_>>().join(", ")
 }
 
 /// Makes the folder that a command writes to, if it is not there.

@@ -102,7 +102,7 @@ invariants! {
     /// Order of play-out.
     PlaysInOrder "plays-in-order" "the stamps that are played never go back, and no further ahead of the samples than a second";
     /// f_m is the master's.
-    PlaysTrue "plays-true" "the force taken for f_m at a sample's stamp is the one that came with it";
+    PlaysTrue "plays-true" "the force taken for f_m is the one that came with the sample, or between two of them";
     /// Updates as made.
     UpdateTrue "update-true" "an update leaves as it was made, numbered one by one; repeats are copies of the newest";
     /// Cause of an update.

@@ -14,7 +14,7 @@ use serde::Serialize;
 use super::check::{Row as Invariant, rows, show_rows};
 use crate::args::SoakArguments;
 use crate::failure::Failure;
-use crate::output::{make_folder, print, print_json};
+use crate::output::{counts, make_folder, print, print_json};
 use crate::stop::Stop;
 
 mod cycle;
@@ -215,25 +215,11 @@ fn show(document: &Document<'_>) -> Result<(), Failure> {
         sessions,
         ..
     } = document;
-    let counts = |of: Vec<(&str, u64)>| {
-        let of = of
-            .into_iter()
-            .map(|(name, count)| format!("{name} {count}"));
-        of.collect::<Vec<_>>().join(", ")
-    };
-    let masters = document.masters.iter();
-    let faults = document.faults.iter();
     print(format_args!(
         "{duration_h:.2} h, seed {seed}, {ending}: {cycles} cycles, {sessions} ends of sessions judged"
     ))?;
-    print(format_args!(
-        "masters: {}",
-        counts(masters.map(|(name, count)| (*name, *count)).collect())
-    ))?;
-    print(format_args!(
-        "faults: {}\n",
-        counts(faults.map(|(name, count)| (&**name, *count)).collect())
-    ))?;
+    print(format_args!("masters: {}", counts(document.masters)))?;
+    print(format_args!("faults: {}\n", counts(document.faults)))?;
     print(Row::heading())?;
     for row in &document.processes {
         print(row.line())?;

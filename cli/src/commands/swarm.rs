@@ -1,5 +1,7 @@
 //! `mmt swarm`: random worlds with random faults in virtual time, judged as `mmt check` judges records.
 
+use std::collections::BTreeMap;
+
 use mmt_lab::check::Verdict;
 use mmt_lab::io::{Repeated, swarm_of};
 use mmt_lab::swarm::Swarmed;
@@ -8,7 +10,7 @@ use serde::Serialize;
 use super::check::{Row, rows, show_rows};
 use crate::args::SwarmArguments;
 use crate::failure::Failure;
-use crate::output::{print, print_json};
+use crate::output::{counts, print, print_json};
 use crate::progress::Bar;
 
 #[derive(Debug, Serialize)]
@@ -19,6 +21,8 @@ struct Document {
     duration_s: f64,
     sessions: u64,
     faults: usize,
+    /// How often each kind of fault was there.
+    by_fault: BTreeMap<String, u64>,
     /// Seeds that were run twice.
     repeated: usize,
     holds: bool,
@@ -74,13 +78,17 @@ fn document(arguments: &SwarmArguments, ran: &[Repeated]) -> Document {
         .iter()
         .filter_map(|one| failed(arguments, one))
         .collect();
+    let faults = || ran.iter().flat_map(|one| &one.swarmed.faults);
+    let mut by_fault = BTreeMap::new();
+    faults().for_each(|of| *by_fault.entry(format!("{:?}", of.fault)).or_default() += 1);
     Document {
         version: env!("CARGO_PKG_VERSION"),
         command: "swarm",
         seeds: ran.len(),
         duration_s: arguments.duration.as_secs_f64(),
         sessions: ran.iter().map(|one| one.swarmed.sessions).sum(),
-        faults: ran.iter().map(|one| one.swarmed.faults.len()).sum(),
+        faults: faults().count(),
+        by_fault,
         repeated: ran.iter().filter(|one| one.same.is_some()).count(),
         holds: failed.is_empty(),
         failed,
@@ -121,12 +129,14 @@ fn show(arguments: &SwarmArguments, document: &Document, ran: &[Repeated]) -> Re
         duration_s,
         sessions,
         faults,
+        by_fault,
         repeated,
         ..
     } = document;
     print(format_args!(
         "{seeds} seeds of {duration_s} s: {sessions} sessions, {faults} faults, {repeated} seeds run twice"
     ))?;
+    print(format_args!("faults: {}\n", counts(by_fault)))?;
     show_rows(&document.invariants)
 }
 

@@ -25,6 +25,8 @@ const TICK_MAX: Duration = Duration::from_millis(10);
 const DISENGAGE: Duration = Duration::from_millis(2010);
 /// Stamps go ahead of all samples by at most this.
 const AHEAD: Duration = Duration::from_secs(1);
+/// Rounding of a force, N.
+const ROUNDING_N: f64 = 1e-9;
 /// Samples are remembered for so long.
 const REMEMBERED: Duration = Duration::from_secs(3);
 
@@ -243,14 +245,41 @@ impl SlaveChecks {
         self.verdict.judge(Invariant::PlaysInOrder, now, holds, || {
             format!("{stamp:?} is played after {before:?}, {newest:?} is the newest sample")
         });
-        let forces = self.samples.get(&stamp);
-        let forces = forces.filter(|_| !self.doubtful.contains(&stamp));
-        if let (Some(f_m), Some(forces)) = (done.f_m, forces) {
-            let holds = forces.iter().any(|force| force.newtons() == f_m);
+        if let (Some(f_m), Some(rendered)) = (done.f_m, self.rendered_at(stamp)) {
+            let holds = rendered
+                .iter()
+                .any(|force| (force - f_m).norm() <= ROUNDING_N);
             self.verdict.judge(Invariant::PlaysTrue, now, holds, || {
-                format!("{f_m:?} N are taken for f_m at {stamp:?}, {forces:?} came with it")
+                format!(
+                    "{f_m:?} N are taken for f_m at {stamp:?}, the samples there have {rendered:?}"
+                )
             });
         }
+    }
+
+    /// f_m at a stamp, N: linear between the samples around it, by each of the forces that came with their stamps. None where play-out
+    /// may not have these samples.
+    fn rendered_at(&self, stamp: Time) -> Option<Vec<Vec2>> {
+        let (before, from) = self.samples.range(..=stamp).next_back()?;
+        let (after, to) = if *before == stamp {
+            (before, from)
+        } else {
+            self.samples.range(stamp..).next()?
+        };
+        if self.doubtful.contains(before) || self.doubtful.contains(after) {
+            return None;
+        }
+        let gap = after.saturating_since(*before).as_secs_f64();
+        let share = if gap > 0.0 {
+            stamp.saturating_since(*before).as_secs_f64() / gap
+        } else {
+            0.0
+        };
+        let mix = |a: Vec2, b: Vec2| a + (b - a) * share;
+        let pairs = from
+            .iter()
+            .flat_map(|a| to.iter().map(move |b| mix(a.newtons(), b.newtons())));
+        Some(pairs.collect())
     }
 
     fn judge_update(&mut self, now: Time, done: &SlaveTick) {
