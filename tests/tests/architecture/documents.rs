@@ -110,3 +110,26 @@ fn documents_name_only_tests_that_exist() {
         ],
     );
 }
+
+#[test]
+fn no_cell_is_empty_where_hazards_promises_and_figures_stand() {
+    let is_empty = |line: &str| {
+        let row = line.strip_prefix('|').and_then(|row| row.strip_suffix('|'));
+        row.is_some_and(|row| row.split('|').any(|cell| cell.trim().is_empty()))
+    };
+    hold(
+        |file| file.lines_that(file.path == "docs/reliability.md", is_empty),
+        [(
+            "docs/reliability.md",
+            "| a hazard | a promise | a test | | a command |",
+        )],
+        [
+            (
+                "docs/reliability.md",
+                "| a hazard | a promise | `a_test` | – | a command |",
+            ),
+            ("docs/reliability.md", "text || text"),
+            ("docs/a.md", "| a | |"),
+        ],
+    );
+}
