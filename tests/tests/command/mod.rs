@@ -27,6 +27,7 @@ mod relay;
 mod reproduce;
 mod runs;
 mod shell;
+mod swarm;
 mod sweep;
 mod wrong_input;
 
