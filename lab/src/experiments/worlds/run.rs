@@ -54,7 +54,10 @@ pub(super) struct Measured {
 pub(super) fn reach(config: &WorldConfig, duration: Duration) -> Result<Measured, ExperimentError> {
     let mut world = World::try_new(config).map_err(TrialError::from)?.judged();
     let path_s = (config.up.delay.middle() + config.down.delay.middle()).as_secs_f64();
-    let mut seen = Seen::new(path_s + WORKING_S);
+    let slow_s = (config.up.delay.quantile(0.99) + config.down.delay.quantile(0.99)).as_secs_f64();
+    let first = world.master().model().state().pose.position;
+    let body = TouchedBody::new(first, slow_s + WORKING_S);
+    let mut seen = Seen::new(path_s + WORKING_S, body);
     for _ in 0..duration.as_millis() {
         let tick = world.step();
         seen.take(&world, &tick);
@@ -102,7 +105,7 @@ struct Seen {
 }
 
 impl Seen {
-    fn new(round_trip_s: f64) -> Self {
+    fn new(round_trip_s: f64, body: TouchedBody) -> Self {
         Self {
             ways: VecDeque::new(),
             way_m: 0.0,
@@ -111,7 +114,7 @@ impl Seen {
             tool: None,
             tool_j: 0.0,
             way_max_m: 0.0,
-            body: TouchedBody::default(),
+            body,
             pose_excess_m: -POSE_M,
             work_excess_j: 0.0,
             opposed_ticks: 0,
@@ -139,9 +142,7 @@ impl Seen {
         let hand_j = world.master().port().energy_j();
         let budget_j = WORK_SHARE * hand_j.max(0.0) + PRESS_N * self.way_max_m;
         self.work_excess_j = self.work_excess_j.max(self.tool_j - hand_j - budget_j);
-        let known = self
-            .body
-            .is_known(slave.truth.position, self.round_trip_ticks);
+        let known = self.body.is_known(slave.truth.position);
         let then = world.master().model().history().at(slave.stamp);
         if let Some(then) = then.filter(|_| known) {
             let off = (then.motion.pose.position - slave.truth.position).norm();
@@ -163,19 +164,29 @@ impl Seen {
 }
 
 /// The body that the tool touches, or touched last. The master cannot know within a round trip that it is another one.
-#[derive(Default)]
 struct TouchedBody {
     /// Its place, m.
-    place: Option<Vec2>,
+    place: Vec2,
+    /// A round trip of slow packets: play-out waits for these.
+    round_trip_ticks: usize,
     unknown_ticks: usize,
 }
 
 impl TouchedBody {
+    /// The body that the master was told of at the beginning, at `place` (m).
+    fn new(place: Vec2, round_trip_s: f64) -> Self {
+        Self {
+            place,
+            round_trip_ticks: (round_trip_s / TICK_S) as usize,
+            unknown_ticks: 0,
+        }
+    }
+
     /// Takes the body's place (m) in a tick. Whether the master can know which body it is.
-    fn is_known(&mut self, place: Vec2, round_trip_ticks: usize) -> bool {
-        let before = self.place.replace(place).unwrap_or(place);
+    fn is_known(&mut self, place: Vec2) -> bool {
+        let before = std::mem::replace(&mut self.place, place);
         self.unknown_ticks = if (place - before).norm() > OTHER_BODY_M {
-            round_trip_ticks
+            self.round_trip_ticks
         } else {
             self.unknown_ticks.saturating_sub(1)
         };
@@ -189,13 +200,24 @@ mod tests {
 
     #[test]
     fn another_body_is_judged_by_a_round_trip_later_and_the_same_one_always() {
-        let mut body = TouchedBody::default();
+        let mut body = TouchedBody::new(Vec2::zeros(), 0.05);
         for n in 0..100 {
             // 1 m/s
-            assert!(body.is_known(Vec2::new(1e-3 * f64::from(n), 0.0), 50));
+            assert!(body.is_known(Vec2::new(1e-3 * f64::from(n), 0.0)));
         }
         let known: Vec<bool> = (0..60)
-            .map(|_| body.is_known(Vec2::new(0.5, 0.0), 50))
+            .map(|_| body.is_known(Vec2::new(0.5, 0.0)))
+            .collect();
+        assert!(known.iter().take(50).all(|known| !known));
+        assert!(known.iter().skip(50).all(|known| *known));
+    }
+
+    #[test]
+    fn a_first_touch_of_another_body_than_the_one_that_the_master_was_told_of_is_judged_later_too()
+    {
+        let mut body = TouchedBody::new(Vec2::zeros(), 0.05);
+        let known: Vec<bool> = (0..60)
+            .map(|_| body.is_known(Vec2::new(0.5, 0.0)))
             .collect();
         assert!(known.iter().take(50).all(|known| !known));
         assert!(known.iter().skip(50).all(|known| *known));
