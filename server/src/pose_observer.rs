@@ -11,6 +11,7 @@ mod face_map;
 mod felt;
 mod past;
 mod penetration;
+mod slow;
 mod tangent_tracker;
 mod track;
 mod tracker;
@@ -29,6 +30,7 @@ use mmt_shared::time::{TICK_S, Time};
 use face_map::FaceMap;
 use past::{Past, PastPoses};
 use penetration::Penetration;
+use slow::Slow;
 use track::Track;
 use tracker::{BoxTracker, Tracker};
 use turning::Push;
@@ -81,6 +83,8 @@ pub struct ObserverConfig {
     /// Whether it takes images, learns the face offsets and reckons with how the box turns and slides. Otherwise vision
     /// gives the first pose only, as in the paper.
     pub learn: bool,
+    /// Whether it is pushed so slowly that the push equals the ground's friction: then it is followed by the force alone.
+    pub quasi_static: bool,
 }
 
 /// Follows pose, velocity and face offsets of the object.
@@ -98,6 +102,8 @@ pub struct PoseObserver {
     past: PastPoses,
     /// Images in a row that show a tool in contact clear of the object.
     clear_images: u32,
+    /// What is known beside that of a slow push.
+    slow: Slow,
 }
 
 impl PoseObserver {
@@ -118,6 +124,7 @@ impl PoseObserver {
             tracker: Tracker::Box(BoxTracker::default()),
             past: PastPoses::default(),
             clear_images: 0,
+            slow: Slow::default(),
         }
     }
 
@@ -131,7 +138,7 @@ impl PoseObserver {
     /// tangent, where it will be by then; of a box, the pose.
     #[must_use]
     pub fn pose_ahead(&self, omega: f64, tau_s: f64) -> Pose {
-        let pose = self.motion.pose;
+        let pose = self.put_aside(self.motion.pose);
         let (Some(contact), Tracker::Tangent(tangent)) = (self.contact, &self.tracker) else {
             return pose;
         };
@@ -164,6 +171,9 @@ impl PoseObserver {
     /// in the paper's mode.
     #[must_use]
     pub fn friction_radius(&self) -> f64 {
+        if self.config.quasi_static {
+            return slow::RADIUS_M;
+        }
         let ratio = match &self.tracker {
             Tracker::Box(tracker) => tracker.turning.radius_ratio(),
             // (9)
@@ -203,7 +213,9 @@ impl PoseObserver {
         in_contact: bool,
         params: &ModelParams,
     ) {
-        if in_contact {
+        if in_contact && self.config.quasi_static {
+            self.touch_slowly(tool, &felt.into());
+        } else if in_contact {
             self.touch(tool, &felt.into(), params);
         } else {
             self.let_go(params);
@@ -328,7 +340,7 @@ impl PoseObserver {
             self.begin_tangent();
         }
         let spread = self.config.force_noise_n.max(felt.noise_n) / size;
-        let variance = spread * spread + DIRECTION_FLOOR_RAD.powi(2);
+        let variance = spread * spread + self.direction_floor_rad().powi(2);
         let (angle, rate) = self.angle.measure(variance);
         self.motion.pose.angle += angle * innovation;
         self.motion.twist.angular += rate * innovation;
@@ -340,6 +352,7 @@ impl PoseObserver {
             if let Tracker::Tangent(tangent) = &mut self.tracker {
                 self.faces.guess(tangent, was.face);
             }
+            self.lie_where_seen();
             self.centre.let_go(LET_GO.0 * LET_GO.0);
             self.angle.hold(LET_GO.1 * LET_GO.1);
         }
@@ -357,6 +370,10 @@ impl PoseObserver {
     /// been touched is not where it was thought to be and is retracted; a known face, or any in the
     /// paper's mode, means that the box is further away.
     pub fn retract_face(&mut self, tool: Vec2, face: Face) {
+        if self.config.quasi_static {
+            // no face of it is known
+            return;
+        }
         let pose = &mut self.motion.pose;
         let tool = pose.point_to_object(tool);
         if self.config.learn && !self.faces.footprint.within_ends(face, tool) {

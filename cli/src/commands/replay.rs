@@ -5,7 +5,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::Sender;
 
-use mmt_lab::replay::{ReplayConfig, replay};
+use mmt_lab::replay::{ReplayConfig, pipeline, pipeline_table, replay};
 use mmt_lab::what_if::Otherwise;
 use mmt_shared::recording::Recording;
 
@@ -58,7 +58,8 @@ pub(crate) fn run(arguments: &ReplayArguments) -> Result<(), Failure> {
         },
         |of: Replayed| {
             if !arguments.json {
-                shown.step_aside(|| print(format_args!("{}\n{}", of.file, of.report)))?;
+                let table = pipeline_table(&of.pipeline);
+                shown.step_aside(|| print(format_args!("{}\n{}\n{table}", of.file, of.report)))?;
             }
             replayed.push(of);
             Ok(())
@@ -87,9 +88,14 @@ fn every_recording(
         let name = path.file_name().unwrap_or_default().to_string_lossy();
         let mut progress = |done: usize, whole: usize| bar.show(&name, done, whole);
         let report = replay(recording, config, &mut progress);
+        let pipeline = pipeline(recording).unwrap_or_default();
         bar.clear();
-        let file = path.display().to_string();
-        if done.send(Replayed { file, report }).is_err() {
+        let replayed = Replayed {
+            file: path.display().to_string(),
+            report,
+            pipeline,
+        };
+        if done.send(replayed).is_err() {
             return;
         }
     }

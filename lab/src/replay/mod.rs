@@ -7,12 +7,14 @@
 mod config;
 mod fit;
 mod heldout;
+mod pipeline;
 mod report;
 mod surface;
 mod trigger;
 
 pub use config::ReplayConfig;
 pub use heldout::HeldOut;
+pub use pipeline::{Errors, PipelineReport, pipeline, table as pipeline_table};
 pub use report::{LawOnPush, LawReport, PushReport, Rates, ReplayReport, Spread};
 pub use surface::{Friction, Law, PushMotion};
 pub use trigger::Packets;

@@ -170,7 +170,7 @@ fn of_repeats(errors: &[f64]) -> String {
     format!("5th to 95th percentile: {low} to {high}")
 }
 
-fn percent(share: Option<f64>) -> Option<f64> {
+pub(super) fn percent(share: Option<f64>) -> Option<f64> {
     share.map(|share| 100.0 * share)
 }
 

@@ -5,7 +5,7 @@
 
 use mmt_shared::range::{Check, OutOfRange, all_in_range};
 
-use super::{EstimatorConfig, PaperConfig, RecommendedConfig};
+use super::{EstimatorConfig, PaperConfig, QuasiStaticConfig, RecommendedConfig};
 
 impl EstimatorConfig {
     /// Checks every number.
@@ -23,6 +23,9 @@ impl EstimatorConfig {
                     .chain(recursive(config))
                     .chain(prior(config.recursive.prior)),
             ),
+            Self::QuasiStatic(config) => {
+                all_in_range(quasi_static(config).into_iter().chain(prior(config.prior)))
+            }
         }
     }
 }
@@ -32,6 +35,14 @@ fn prior([m, b, c]: [f64; 3]) -> [Check; 3] {
         ("estimator: prior m", "kg", m, (0.05, 50.0)),
         ("estimator: prior b", "N s/m", b, (0.0, 200.0)),
         ("estimator: prior c", "N", c, (0.0, 200.0)),
+    ]
+}
+
+#[rustfmt::skip]
+fn quasi_static(config: &QuasiStaticConfig) -> [Check; 2] {
+    [
+        ("estimator: memory_s", "s", config.memory_s, (0.001, 60.0)),
+        ("estimator: way_min_m", "m", config.way_min_m, (0.0, 0.1)),
     ]
 }
 

@@ -20,6 +20,7 @@ mod limits;
 mod obstacle;
 mod paper;
 mod quadratic;
+mod quasi_static;
 mod recommended;
 mod recursive;
 mod surface;
@@ -33,12 +34,14 @@ pub use gate::GateConfig;
 pub use kalman::KalmanConfig;
 pub use obstacle::OBSTACLE_N;
 pub use paper::{ObjectMotion, PaperConfig};
+pub use quasi_static::QuasiStaticConfig;
 pub use recommended::RecommendedConfig;
 pub use recursive::{ChangeTest, RecursiveConfig};
 pub use turning::Seen;
 pub use windowed::Rows;
 
 use paper::PaperEstimator;
+use quasi_static::QuasiStaticEstimator;
 use recommended::RecommendedEstimator;
 
 /// Below this speed along the normal the object is taken to stick, m/s: four standard deviations of the
@@ -157,6 +160,8 @@ pub enum EstimatorConfig {
     Paper(PaperConfig),
     /// Along the normal, filtered alike, recursive.
     Recommended(RecommendedConfig),
+    /// For pushes of some mm/s: friction alone.
+    QuasiStatic(QuasiStaticConfig),
 }
 
 impl EstimatorConfig {
@@ -175,6 +180,7 @@ impl EstimatorConfig {
         match &mut self {
             Self::Paper(config) => config.prior = prior,
             Self::Recommended(config) => config.recursive.prior = prior,
+            Self::QuasiStatic(config) => config.prior = prior,
         }
         self
     }
@@ -194,6 +200,8 @@ enum Kind {
     Paper(PaperEstimator),
     /// Along the normal, filtered alike, recursive.
     Recommended(RecommendedEstimator),
+    /// Friction alone.
+    QuasiStatic(QuasiStaticEstimator),
 }
 
 impl Estimator {
@@ -206,6 +214,9 @@ impl Estimator {
             EstimatorConfig::Recommended(config) => {
                 Kind::Recommended(RecommendedEstimator::new(config))
             }
+            EstimatorConfig::QuasiStatic(config) => {
+                Kind::QuasiStatic(QuasiStaticEstimator::new(config))
+            }
         })
     }
 
@@ -214,6 +225,7 @@ impl Estimator {
         match &mut self.0 {
             Kind::Paper(estimator) => estimator.step(measured),
             Kind::Recommended(estimator) => estimator.step(measured),
+            Kind::QuasiStatic(estimator) => estimator.step(measured),
         }
         *self.estimate()
     }
@@ -224,6 +236,7 @@ impl Estimator {
         match &self.0 {
             Kind::Paper(estimator) => &estimator.estimate,
             Kind::Recommended(estimator) => &estimator.estimate,
+            Kind::QuasiStatic(estimator) => &estimator.estimate,
         }
     }
 }

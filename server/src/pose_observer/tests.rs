@@ -11,6 +11,7 @@ const HALF: f64 = 0.18;
 
 fn observer(learn: bool) -> PoseObserver {
     let config = ObserverConfig {
+        quasi_static: false,
         coupling: COUPLING,
         force_noise_n: 0.01,
         vision_noise_m: 1e-3,

@@ -23,6 +23,10 @@ impl PoseObserver {
             return;
         }
         self.clear_images = 0;
+        if self.config.quasi_static && (then.contact.is_some() || self.contact.is_some()) {
+            self.slow.seen = Some(vision.pose);
+            return;
+        }
         if self.refutes(turn, &then) {
             self.become_tangent(turn, error);
             return;

@@ -63,22 +63,23 @@ impl ObjectEstimate {
         seen: Vec<BoxFootprint>,
     ) -> Result<Self, SlaveError> {
         let sensing = &config.sensing;
+        let start = config.start;
+        let mbc = [start.mass_kg, start.damping_ns_per_m, start.friction_n];
+        let estimator = config
+            .estimator
+            .unwrap_or_else(|| EstimatorConfig::of_mode(config.mode, coupling))
+            .starting_at(mbc);
         let observer = ObserverConfig {
             coupling,
+            quasi_static: matches!(estimator, EstimatorConfig::QuasiStatic(_)),
             force_noise_n: sensing.force_noise_n,
             vision_noise_m: sensing.vision.position_noise_m,
             vision_noise_rad: sensing.vision.angle_noise_rad,
             size_noise_m: sensing.vision.size_noise_m.filter(|_| !seen.is_empty()),
             learn: config.mode == Mode::Recommended || sensing.vision.rate_hz > 0.0,
         };
-        let start = config.start;
-        let mbc = [start.mass_kg, start.damping_ns_per_m, start.friction_n];
         let [m, b, c] = mbc;
         in_range("start model: side", "m", start.side_m, SIDE_M)?;
-        let estimator = config
-            .estimator
-            .unwrap_or_else(|| EstimatorConfig::of_mode(config.mode, coupling))
-            .starting_at(mbc);
         estimator.check()?;
         let footprint = (seen.first().copied()).unwrap_or(BoxFootprint::square(start.side_m));
         let params = ModelParams::of_square(m, b, c, footprint.mean_side(), &coupling)?;

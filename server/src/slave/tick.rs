@@ -103,6 +103,9 @@ impl Slave {
         if let (Cause::MasterOnlyContact, Some(touch)) = (cause, touch) {
             self.object.observer.retract_face(played.hip, touch.face);
         }
+        if cause == Cause::SlaveOnlyContact {
+            self.object.observer.approach();
+        }
         self.reference.take_update(contact.force);
         let model = self.shadow.ahead();
         let (stamp, in_contact) = (played.stamp, contact.in_contact);

@@ -31,6 +31,9 @@ pub struct TriggerConfig {
     /// ("both geometry and impedance"). If not, it carries the pose and the velocity of the shadow, and renews the
     /// parameters alone.
     pub timer_carries_pose: bool,
+    /// (12) compares the means of both forces over so long since the last update. Default 0: each sample by itself.
+    #[serde(skip_serializing_if = "Duration::is_zero")]
+    pub judged_over: Duration,
     /// Least force that (12) divides by, N.
     pub force_floor_n: f64,
     /// Whether a box that sticks can be mismatched: its force is whatever friction holds.
@@ -61,6 +64,7 @@ impl TriggerConfig {
             metric: MismatchMetric::Force,
             timer_in_free_space: true,
             timer_carries_pose: true,
+            judged_over: Duration::ZERO,
             force_floor_n,
             judge_sticking,
             free_space_error_m,

@@ -8,6 +8,7 @@
 mod config;
 mod contact;
 mod input;
+mod judged;
 mod metric;
 mod scheme;
 
@@ -18,6 +19,8 @@ pub use metric::MismatchMetric;
 pub use scheme::{Scheme, SchemeError};
 
 use std::time::Duration;
+
+use judged::Judged;
 
 use mmt_shared::model::params::ModelParams;
 use mmt_shared::model::update::Cause;
@@ -72,6 +75,8 @@ pub struct Trigger {
     accumulated_error: f64,
     /// Cause of the last update, if that was lost.
     repeat: Option<Cause>,
+    /// What (12) is judged by.
+    recent: Judged,
 }
 
 impl Trigger {
@@ -80,6 +85,7 @@ impl Trigger {
     pub fn new(config: TriggerConfig) -> Self {
         Self {
             scheme: config.scheme,
+            recent: Judged::over(config.judged_over),
             config,
             last: None,
             began: None,
@@ -130,6 +136,7 @@ impl Trigger {
     ) -> Option<Cause> {
         self.began.get_or_insert(now);
         if input.both_in_contact() {
+            self.recent.push([input.f_s, input.f_m]);
             self.accumulated_error += self.expected_correction(input) * TICK_S;
         }
         let cause = self
@@ -141,6 +148,7 @@ impl Trigger {
             self.last = Some((now, input.params));
             self.accumulated_error = 0.0;
             self.repeat = None;
+            self.recent.begin();
         }
         cause
     }
@@ -241,8 +249,11 @@ impl Trigger {
 
     /// (12), multiplied out, and more than the noise of the force.
     fn is_beyond(&self, input: &TriggerInput, delta: f64) -> bool {
-        let felt = delta * input.f_s.norm().max(self.config.force_floor_n);
-        input.force_error() > felt.max(NOISE_DEVIATIONS * input.noise_n)
+        let Some([f_s, f_m]) = self.recent.forces([input.f_s, input.f_m]) else {
+            return false;
+        };
+        let felt = delta * f_s.norm().max(self.config.force_floor_n);
+        (f_s - f_m).norm() > felt.max(NOISE_DEVIATIONS * input.noise_n)
     }
 
     fn violated(&self, input: &TriggerInput, delta: f64) -> Option<Cause> {

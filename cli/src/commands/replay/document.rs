@@ -1,6 +1,6 @@
 //! The document of a replay: the report of a run, as far as its keys have a meaning here, and every table.
 
-use mmt_lab::replay::{Law, ReplayConfig, ReplayReport};
+use mmt_lab::replay::{Law, PipelineReport, ReplayConfig, ReplayReport};
 use mmt_shared::model::update::Cause;
 use mmt_shared::report::{Number, RunReport, SentUpdates, named};
 use serde::Serialize;
@@ -16,6 +16,9 @@ pub(super) struct Replayed {
     /// What was found.
     #[serde(flatten)]
     pub(super) report: ReplayReport,
+    /// The same pushes through mmt itself, and the last measured force held instead; none if the finger goes where no tool
+    /// can.
+    pub(super) pipeline: Vec<PipelineReport>,
 }
 
 /// `{ ...RunReport, "replay": { … } }`.

@@ -6,6 +6,7 @@
 //! be corrected. It must never touch the box that is felt, and never take longer in a tick than its share.
 
 use super::body::{Body, BodyState};
+use crate::model::contact::GodObject;
 use crate::model::geometry::Pose;
 use crate::model::history::History;
 use crate::model::params::ModelState;
@@ -17,6 +18,10 @@ use crate::time::Time;
 /// budget of 10 µs. A second of history, 1000 samples and one more a tick, is caught up with in 53 ticks.
 /// Counted, not timed, so that both sides replay alike.
 pub const REPLAYED_PER_TICK: usize = 20;
+
+/// A box that is found this far from where it was, m, with the HIP no deeper in it than this, m, is met anew.
+const JUMP_M: f64 = 0.01;
+const FLAT_M: f64 = 0.005;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Progress {
@@ -77,6 +82,15 @@ impl Replay {
             return;
         };
         let (state, mut god) = (BodyState::from(update.state), then.god);
+        let jump = (state.pose.position - then.motion.pose.position).norm();
+        let depth = -state
+            .footprint
+            .nearest(state.pose.point_to_object(then.hip))
+            .1;
+        if jump > JUMP_M && depth < FLAT_M && god.touched().is_none() {
+            // where the HIP was seen from another place says nothing of the face that it is at
+            god = GodObject::default();
+        }
         god.after_jump(&state.footprint, &state.pose, then.hip);
         self.body = Body { state, god };
         self.progress = Progress::Behind(then.stamp);
