@@ -8,6 +8,8 @@ use serde::{Deserialize, Serialize};
 
 use super::{ContactConfig, MismatchMetric, Scheme};
 
+/// Accepted time that (12) is judged over, s; 0 is each sample by itself.
+const JUDGED_S: (f64, f64) = (0.0, 10.0);
 /// Accepted least force that (12) divides by, N.
 const FORCE_FLOOR_N: (f64, f64) = (0.001, 10.0);
 /// Accepted thresholds of contact, N.
@@ -85,6 +87,12 @@ impl TriggerConfig {
             samples,
         } = self.contact;
         all_in_range([
+            (
+                "trigger: judged_over",
+                "s",
+                self.judged_over.as_secs_f64(),
+                JUDGED_S,
+            ),
             (
                 "trigger: force floor",
                 "N",
