@@ -88,7 +88,7 @@ impl ChannelChecks {
             self.newest = Some(Newest {
                 number,
                 sent: datagram.envelope.sent,
-                stopped: datagram.stopped,
+                stopped: datagram.flags.stopped,
             });
         }
         Some(datagram)
@@ -161,7 +161,7 @@ impl ChannelChecks {
         let number = self.left.0 + 1;
         let holds = datagram.as_ref().is_some_and(|datagram| {
             let envelope = &datagram.envelope;
-            (envelope.number, envelope.sent, datagram.stopped) == (number, at, stops)
+            (envelope.number, envelope.sent, datagram.flags.stopped) == (number, at, stops)
         });
         verdict.judge(Invariant::Numbers, at, holds, || {
             format!("number {number} is due at {at:?} with stop {stops}, and {datagram:?} leaves")

@@ -249,7 +249,10 @@ fn a_session_that_keeps_its_promises_is_found_to_and_each_lie_is_found_out() {
             Change::Up(|of| command(of, |command| command.newest_update += 1)),
         ),
         (I::Numbers, Change::Up(|of| of.envelope.number += 1)),
-        (I::Numbers, Change::Down(|of| of.stopped = !of.stopped)),
+        (
+            I::Numbers,
+            Change::Down(|of| of.flags.stopped = !of.flags.stopped),
+        ),
         (I::EchoTrue, Change::Down(|of| of.envelope.echo = None)),
         (I::Heartbeat, Change::Hidden(|_| true)),
         (

@@ -100,11 +100,11 @@ fn kind(message: &Message) -> &'static str {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::wire::{DATAGRAM_MAX, Envelope};
+    use crate::wire::{DATAGRAM_MAX, Envelope, Flags};
 
     fn heartbeat(number: u32) -> Vec<u8> {
         let datagram = Datagram {
-            stopped: false,
+            flags: Flags::default(),
             envelope: Envelope {
                 number,
                 sent: Time::from_millis(3),

@@ -85,10 +85,14 @@ fn full() -> RunReport<Value> {
     report.tool = ToolReport {
         held_s: 0.25.into(),
         force_peak_n: 15.02.into(),
+        work_j: 1.5.into(),
+        hand_work_j: 1.25.into(),
+        energy_held_s: 0.125.into(),
     };
     report.passivity = PassivityReport {
         energy_injected_j: 0.0.into(),
         observer_min_j: (-0.2e-3).into(),
+        hand_work_j: 1.3.into(),
     };
     report.link.rtt_ms = DelayReport {
         p50: 100.2.into(),
