@@ -128,52 +128,49 @@ fn wrong(known: &Known, mode: &str, usual: &str) -> Option<String> {
         .then(|| format!("{key} changes nothing: {:?}", candidates(known)))
 }
 
-#[test]
-fn every_key_of_a_sweep_changes_a_run_or_is_refused() {
-    let mut all = Vec::new();
-    for (mode, only) in [
-        (Mode::Recommended, ""),
-        (Mode::Paper, "slave.estimator.paper"),
-    ] {
-        let flags = vec![Flag::new("--mode", "slave.mode", &mode).unwrap()];
-        let layers = Layers {
-            program: Program::Sweep,
-            file: "",
-            flags: &flags,
-            seed: None,
-        };
-        let mode = if only.is_empty() {
-            ""
-        } else {
-            "slave.mode = \"paper\"\n"
-        };
-        let usual = digest(&format!("{DELAY}{mode}"), 5).unwrap();
-        let known = layers.known().unwrap().into_iter();
-        let wanted = known.filter(|known| {
-            let network = ["up", "down"].contains(&known.key.as_str());
-            let seed = known.key.rsplit('.').next() == Some("seed");
-            !network
-                && !seed
-                && known.value.as_deref().is_some_and(|value| value != "[]")
-                && known.key.starts_with(only)
-        });
-        all.extend(wanted.map(|known| (known, mode, usual.clone())));
-    }
-    let wrong: Vec<String> = std::thread::scope(|scope| {
-        let halves = all.chunks(all.len().div_ceil(2));
-        let halves: Vec<_> = halves
-            .map(|half| {
-                scope.spawn(|| {
-                    half.iter()
-                        .filter_map(|(known, mode, usual)| wrong(known, mode, usual))
-                        .collect::<Vec<_>>()
-                })
-            })
-            .collect();
-        halves
-            .into_iter()
-            .flat_map(|half| half.join().unwrap())
-            .collect()
+/// Checks every key of a mode that is chosen.
+fn check(mode: Mode, chosen: fn(&str) -> bool) {
+    let flags = vec![Flag::new("--mode", "slave.mode", &mode).unwrap()];
+    let layers = Layers {
+        program: Program::Sweep,
+        file: "",
+        flags: &flags,
+        seed: None,
+    };
+    let mode = match mode {
+        Mode::Recommended => "",
+        Mode::Paper => "slave.mode = \"paper\"\n",
+    };
+    let usual = digest(&format!("{DELAY}{mode}"), 5).unwrap();
+    let known = layers.known().unwrap();
+    // networks are words, seeds are the plan's, and what is left out or empty has no value to change
+    let wanted = known.iter().filter(|known| {
+        let key = known.key.as_str();
+        let other = ["up", "down", "seed"].contains(&key) || key.ends_with(".seed");
+        let has_value = known.value.as_deref().is_some_and(|value| value != "[]");
+        chosen(key) && !other && has_value
     });
-    assert!(wrong.is_empty(), "{:#?}", wrong);
+    let wrong: Vec<String> = wanted
+        .filter_map(|known| wrong(known, mode, &usual))
+        .collect();
+    assert!(wrong.is_empty(), "{wrong:#?}");
+}
+
+#[test]
+fn every_key_of_the_hand_and_the_session_changes_a_run_or_is_refused() {
+    check(Mode::Recommended, |key| !within(key, "slave"));
+}
+
+#[test]
+fn every_key_of_the_slave_changes_a_run_or_is_refused() {
+    check(Mode::Recommended, |key| {
+        within(key, "slave") && !within(key, "slave.estimator")
+    });
+}
+
+#[test]
+fn every_key_of_an_estimator_changes_a_run_or_is_refused() {
+    for mode in [Mode::Recommended, Mode::Paper] {
+        check(mode, |key| within(key, "slave.estimator"));
+    }
 }
