@@ -5,6 +5,7 @@
 #[cfg(test)]
 mod tests;
 
+use std::collections::BTreeSet;
 use std::ops::Range;
 
 use toml::Spanned;
@@ -38,6 +39,9 @@ impl Given {
                 }
             }
         }
+        // once each: an axis has its keys at every step
+        let mut known = BTreeSet::new();
+        keys.retain(|(key, _)| known.insert(key.clone()));
         let why = vec![""; keys.len()];
         Self { keys, why }
     }
