@@ -1,6 +1,7 @@
 //! What is promised of sessions in real time: one at a time, because each wants two cores.
 
 mod devices;
+mod ends;
 mod endure;
 mod harness;
 mod identity;

@@ -74,6 +74,8 @@ pub(crate) struct Ended {
     pub(crate) out: Vec<String>,
     /// Its standard error.
     pub(crate) err: String,
+    /// When that was seen.
+    pub(crate) at: Instant,
 }
 
 impl Ended {
@@ -95,14 +97,27 @@ impl Running {
     ///
     /// # Errors
     /// The system does not start it.
-    pub(crate) fn start(mut command: Command) -> Result<Self, ProcessError> {
+    pub(crate) fn start(command: Command) -> Result<Self, ProcessError> {
+        Self::start_reading(command, "")
+    }
+
+    /// Starts a command whose standard input is this.
+    ///
+    /// # Errors
+    /// The system does not start it.
+    pub(crate) fn start_reading(mut command: Command, input: &str) -> Result<Self, ProcessError> {
         let name = format!("{command:?}");
         let mut child = command
-            .stdin(Stdio::null())
+            .stdin(Stdio::piped())
             .stdout(Stdio::piped())
             .stderr(Stdio::piped())
             .spawn()
             .map_err(|source| system(format!("starting {name}"), source))?;
+        // one that reads nothing may have ended before
+        let _ = child
+            .stdin
+            .take()
+            .map(|mut stdin| stdin.write_all(input.as_bytes()));
         let (send, lines) = channel();
         let (out, err) = (child.stdout.take(), child.stderr.take());
         let send_err = send.clone();
@@ -236,12 +251,14 @@ impl Running {
                 None => thread::sleep(ASK),
             }
         };
+        let at = Instant::now();
         // both readers end with the process, unless a child of it lives on
         while self.take_line(Duration::from_secs(1)).is_ok() {}
         Ok(Ended {
             status,
             out: std::mem::take(&mut self.out),
             err: self.err.join("\n"),
+            at,
         })
     }
 
