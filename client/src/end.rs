@@ -125,6 +125,7 @@ impl MasterEnd {
         UpdateDrops {
             duplicate: self.window.duplicate(),
             stale: self.window.stale(),
+            implausible: self.window.implausible(),
             rejected: self.counts.updates_rejected,
             superseded: self.counts.updates_superseded,
             frozen: self.counts.updates_frozen

@@ -10,8 +10,8 @@ use super::{Invariant, Verdict};
 
 /// At least this often something leaves.
 const HEARTBEAT: Duration = Duration::from_millis(50);
-/// Numbers so far behind the newest are not judged by an end.
-const WINDOW: u32 = 1024;
+/// Numbers so far behind the newest are not judged by an end, and one so far ahead waits for a second.
+pub(super) const WINDOW: u32 = 1024;
 /// An end remembers its departures 10 ms apart: the first without an answer may be this much older than the one it knows.
 const DEPARTURES: Duration = Duration::from_millis(20);
 const TENTH: Duration = Duration::from_millis(100);
@@ -40,6 +40,8 @@ pub(super) struct ChannelChecks {
     round_trips: VecDeque<(Time, Duration, Duration)>,
     latest: Option<Duration>,
     seen: BTreeSet<u32>,
+    /// The last number that was too far ahead.
+    far: u32,
     newest: Option<Newest>,
     received: u32,
     last_arrival: Option<Time>,
@@ -59,6 +61,7 @@ impl ChannelChecks {
             round_trips: VecDeque::new(),
             latest: None,
             seen: BTreeSet::new(),
+            far: 0,
             newest: None,
             received: 0,
             last_arrival: None,
@@ -71,6 +74,11 @@ impl ChannelChecks {
         let datagram = Datagram::decode(bytes, self.side.other()).ok()?;
         let number = datagram.envelope.number;
         let newest = self.newest.map_or(0, |newest| newest.number);
+        let too_far = number.saturating_sub(newest) >= WINDOW;
+        if too_far && (number == self.far || number.abs_diff(self.far) >= WINDOW) {
+            self.far = number;
+            return None;
+        }
         if number == 0 || newest.saturating_sub(number) >= WINDOW || !self.seen.insert(number) {
             return None;
         }

@@ -15,7 +15,7 @@ use mmt_shared::wire::{Command, Datagram, Message, Side};
 
 mod hand;
 
-use super::channel::ChannelChecks;
+use super::channel::{ChannelChecks, WINDOW};
 use super::{Invariant, Verdict};
 
 /// The contract's thresholds, not those of the code.
@@ -87,6 +87,8 @@ pub struct MasterChecks {
     /// Since the last tick.
     arrived: Vec<Arrived>,
     accepted: u32,
+    /// The last sequence that was too far ahead.
+    far: u32,
     /// One that came in the hair's breadth between.
     unsure: u32,
     applied: u32,
@@ -113,6 +115,7 @@ impl MasterChecks {
             link: LinkState::Fresh,
             arrived: Vec::new(),
             accepted: 0,
+            far: 0,
             unsure: 0,
             applied: 0,
             samples: VecDeque::new(),
@@ -136,8 +139,8 @@ impl MasterChecks {
         let Message::Update(update) = message else {
             return;
         };
-        let fresh = update.sequence > self.accepted;
-        if !fresh || update.accept(&self.about.settings.coupling).is_err() {
+        if !self.is_fresh(update.sequence) || update.accept(&self.about.settings.coupling).is_err()
+        {
             return;
         }
         let (silence, most) = self.channel.silence(at);
@@ -162,6 +165,16 @@ impl MasterChecks {
         } else if silence < STALE && !path.is_some_and(too_old) {
             self.unsure = update.sequence;
         }
+    }
+
+    /// Whether an update may be applied by its sequence: beyond the newest, and either near it or not alone there.
+    fn is_fresh(&mut self, sequence: u32) -> bool {
+        let ahead = sequence.saturating_sub(self.accepted);
+        let is_alone = ahead >= WINDOW && sequence.abs_diff(self.far) >= WINDOW;
+        if is_alone {
+            self.far = sequence;
+        }
+        ahead > 0 && !is_alone
     }
 
     /// How many ticks there have been since a stamp: where a process stood still nothing has moved.

@@ -76,6 +76,7 @@ impl DatagramChannel {
             Arrival::Newest | Arrival::Reordered => self.counts.received.count(message.kind()),
             Arrival::Duplicate => self.counts.datagrams_duplicate += 1,
             Arrival::TooOld => self.counts.datagrams_too_old += 1,
+            Arrival::Implausible => self.counts.datagrams_implausible += 1,
         }
         if self.peer.round_trip().histogram().total() > measured {
             self.control_rate(now);

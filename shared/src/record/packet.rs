@@ -36,6 +36,7 @@ impl PacketWatch {
                 Arrival::Reordered => "reordered",
                 Arrival::Duplicate => "duplicate",
                 Arrival::TooOld => "too_old",
+                Arrival::Implausible => "implausible",
             },
         };
         self.packet(stamp, from, bytes, decoded.ok().as_ref(), fate)
