@@ -42,8 +42,8 @@ impl Panics {
     /// A thread of this name panics.
     pub(crate) fn note(&self, thread: Option<&str>) {
         self.any.store(true, Ordering::Release);
-        let goes_on = LOOKED_AFTER.iter().chain(&OF_STRANGERS);
-        if goes_on.into_iter().any(|name| Some(*name) == thread) {
+        let mut goes_on = LOOKED_AFTER.iter().chain(&OF_STRANGERS);
+        if goes_on.any(|name| Some(*name) == thread) {
             return;
         }
         // a panic while the lock is held would wait for itself
