@@ -209,6 +209,12 @@ impl Slave {
         self.object.estimator.estimate()
     }
 
+    /// The noise of the measured force per axis, N, where (12) is judged by averages for it; else 0.
+    #[must_use]
+    pub fn force_noise_n(&self) -> f64 {
+        self.contact.noise_n()
+    }
+
     /// Estimates whose numbers were not accepted as parameters.
     #[must_use]
     pub fn refused_estimates(&self) -> u64 {

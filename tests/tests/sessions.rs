@@ -6,6 +6,7 @@ mod endure;
 mod harness;
 mod identity;
 mod independent_client;
+mod judged;
 mod live;
 mod observers;
 mod plugs;

@@ -3,9 +3,11 @@
 use std::collections::{BTreeSet, VecDeque};
 use std::time::Duration;
 
+use mmt_shared::channel::datagram_channel::DatagramChannel;
 use mmt_shared::time::Time;
 use mmt_shared::wire::{Datagram, Side};
 
+use super::both::Totals;
 use super::{Invariant, Verdict};
 
 /// At least this often something leaves.
@@ -44,6 +46,10 @@ pub(super) struct ChannelChecks {
     far: u32,
     newest: Option<Newest>,
     received: u32,
+    /// All that arrived, datagrams or not.
+    handled: u64,
+    /// What the end had counted as sent by the last tick.
+    sent: u64,
     last_arrival: Option<Time>,
     /// When the last tick's datagrams left.
     polled: Time,
@@ -64,6 +70,8 @@ impl ChannelChecks {
             far: 0,
             newest: None,
             received: 0,
+            handled: 0,
+            sent: 0,
             last_arrival: None,
             polled: began,
         }
@@ -71,6 +79,7 @@ impl ChannelChecks {
 
     /// A datagram that arrived at `at`; returns it if it is to be handled.
     pub(super) fn arrived(&mut self, at: Time, bytes: &[u8]) -> Option<Datagram> {
+        self.handled += 1;
         let datagram = Datagram::decode(bytes, self.side.other()).ok()?;
         let number = datagram.envelope.number;
         let newest = self.newest.map_or(0, |newest| newest.number);
@@ -154,6 +163,34 @@ impl ChannelChecks {
             format!("nothing left for {quiet:?}, {between:?} after the tick before")
         });
         self.polled = polled;
+    }
+
+    /// What it counted so far.
+    pub(super) fn totals(&self) -> Totals {
+        Totals {
+            sent: self.left.0,
+            received: self.received,
+            newest: self.newest.map_or(0, |newest| newest.number),
+        }
+    }
+
+    /// Whatever arrived or left is counted once: as received, or as dropped under its name; what neither is, is lost.
+    pub(super) fn balances(&mut self, now: Time, channel: &DatagramChannel, verdict: &mut Verdict) {
+        let (counts, incoming) = (channel.counts(), channel.peer().incoming());
+        let newest = self.newest.map_or(0, |newest| newest.number);
+        let (sent, left) = (counts.sent.total(), u64::from(self.left.0));
+        // a record shows an end after what left in the tick, the others show it before
+        let sent_before = std::mem::replace(&mut self.sent, sent);
+        let holds = counts.received.total() + counts.dropped() == self.handled
+            && (sent_before..=sent).contains(&left)
+            && (incoming.expected, incoming.received) == (newest, self.received)
+            && counts.received.total() == u64::from(self.received);
+        verdict.judge(Invariant::CountersBalance, now, holds, || {
+            format!(
+                "{} arrived, {} of them for the first time, the newest is {newest}, {left} left: {counts:?} {incoming:?}",
+                self.handled, self.received
+            )
+        });
     }
 
     /// A datagram that leaves at `at` while this side's emergency stop is set or not; returns it.

@@ -15,6 +15,7 @@ use mmt_shared::wire::{Command, Datagram, Message, Side};
 
 mod hand;
 
+use super::both::Totals;
 use super::channel::{ChannelChecks, WINDOW};
 use super::{Invariant, Verdict};
 
@@ -131,6 +132,10 @@ impl MasterChecks {
         &self.verdict
     }
 
+    pub(super) fn totals(&self) -> Totals {
+        self.channel.totals()
+    }
+
     /// A datagram that arrived.
     pub fn arrived(&mut self, at: Time, bytes: &[u8]) {
         let Some(Datagram { message, .. }) = self.channel.arrived(at, bytes) else {
@@ -196,6 +201,7 @@ impl MasterChecks {
         self.stops = tick.given.stops;
         self.channel
             .ticked(tick.now, tick.polled, &mut self.verdict);
+        self.judge_counters(tick);
         self.judge_link(tick);
         self.judge_updates(tick);
         self.judge_force(tick);
@@ -203,6 +209,24 @@ impl MasterChecks {
         self.judge_sample(tick);
         self.link = tick.done.link;
         self.force = tick.done.hand_force;
+    }
+
+    /// Each update that arrived was applied or dropped under its name.
+    fn judge_counters(&mut self, tick: &MasterTicked<'_>) {
+        let (now, end) = (tick.now, tick.end);
+        self.channel.balances(now, end.channel(), &mut self.verdict);
+        let arrived = end.channel().counts().received.updates;
+        let (applied, drops) = (end.master().applied(), end.update_drops());
+        let dropped = drops
+            .by_name()
+            .iter()
+            .map(|(_, number)| number)
+            .sum::<u64>();
+        let holds = applied.iter().sum::<u64>() + dropped == arrived;
+        self.verdict
+            .judge(Invariant::CountersBalance, now, holds, || {
+                format!("{arrived} updates arrived, {applied:?} by cause are applied, {drops:?}")
+            });
     }
 
     fn judge_link(&mut self, tick: &MasterTicked<'_>) {
