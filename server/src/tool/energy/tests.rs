@@ -95,7 +95,7 @@ fn a_hand_is_credited_with_what_its_device_can_have_shown_and_pays_back_what_it_
 #[test]
 fn a_tremor_that_a_sensor_shows_late_is_no_work() {
     let mut energy = bound(EnergyConfig::default());
-    let swing = |s: f64| 3e-4 * (std::f64::consts::TAU * 9.3 * s).sin();
+    let swing = |s: f64| 3e-4 * libm::sin(std::f64::consts::TAU * 9.3 * s);
     for n in 0..20_000 {
         let s = f64::from(n) * TICK_S;
         // 5 ms late, of a contact of 10 kN/m that is pressed with 5 N
