@@ -148,7 +148,7 @@ impl ToolDrive {
         } else {
             bounded
         };
-        let paid = self.paid(free);
+        let paid = self.paid(free, period_s);
         let allowed = self.force.allowed(paid, period_s, self.port.held());
         let held = allowed != free;
         let energy_holds = paid != free;
@@ -181,12 +181,22 @@ impl ToolDrive {
         }
     }
 
-    /// The part of a way (m) that the energy allows. Where the hand feels the tool, its port knows.
-    fn paid(&self, way: Vec2) -> Vec2 {
-        if self.passive || !self.touches {
+    /// The part of a way (m, in `period_s`) that the energy allows: along the force no faster than the tool can brake in the way
+    /// that is left. Where the hand feels the tool, its port knows.
+    fn paid(&self, way: Vec2, period_s: f64) -> Vec2 {
+        let force = self.port.held();
+        let left_m = self.energy.way_left_m(force);
+        if self.passive || !self.touches || left_m.is_infinite() {
             return way;
         }
-        self.energy.allowed(way, self.port.held())
+        let n = force.normalize();
+        let most = self.limits.braking_speed(left_m, period_s) * period_s;
+        let beyond = n.dot(&way) - most;
+        if beyond <= 0.0 {
+            return way;
+        }
+        let wanted = (way - n * beyond) / period_s;
+        self.limits.towards(self.force.velocity(), wanted, period_s) * period_s
     }
 
     /// The part of a way from `tool` (m) that leads no farther out of reach, whatever pushes the tool there.

@@ -12,8 +12,9 @@ use crate::setting::{MODES, paper_world};
 use crate::trial::{Running, Trial};
 use crate::world::{Given, WorldConfig};
 
-/// What the contact stores at the tool's limit comes back, and is in the tool's work until then, J: f²/(2 k_p).
-const STORED_J: f64 = 15.0 * 15.0 / 2000.0;
+/// What the budget has besides, J: f²/(2 k_p), which the contact stores at the tool's limit and gives back; 20 mJ from the beginning;
+/// and the tool's limit over the millimetre in which it brakes from 0.2 m/s.
+const BESIDES_J: f64 = 15.0 * 15.0 / 2000.0 + 0.02 + 15.0 * 1e-3;
 
 /// An object that needs five to ten times the force of the model, which is 0.4 kg and 1 N for good: see [`LIE`].
 fn adversary(seed: u64) -> WorldConfig {
@@ -54,7 +55,7 @@ fn against_twenty_adversaries_the_tool_gives_no_more_than_the_hand_and_the_budge
         let mut config = adversary(seed);
         let (ports, held) = run(&config, true);
         assert!(
-            ports.excess_j() <= STORED_J,
+            ports.excess_j() <= BESIDES_J,
             "{seed}: {} J",
             ports.excess_j()
         );
@@ -62,7 +63,7 @@ fn against_twenty_adversaries_the_tool_gives_no_more_than_the_hand_and_the_budge
         config.slave.tool_energy.bounded = false;
         let (ports, held) = run(&config, true);
         assert_eq!(held, 0);
-        unbounded += u32::from(ports.excess_j() > 2.0 * STORED_J);
+        unbounded += u32::from(ports.excess_j() > 2.0 * BESIDES_J);
     }
     assert!(
         unbounded >= 15,

@@ -10,7 +10,6 @@ use std::time::Duration;
 
 use mmt_shared::model::contact::Coupling;
 use mmt_shared::model::geometry::Vec2;
-use mmt_shared::passivity::admittance_controller;
 use mmt_shared::range::{OutOfRange, in_range};
 use mmt_shared::time::TICK_S;
 use serde::{Deserialize, Serialize};
@@ -24,6 +23,8 @@ const WAY_MAX_M: f64 = 0.01;
 /// By so much the tool may go to and fro without work, m: a sensor that lags gives a tremor on a stiff contact work that it does
 /// not do.
 const PLAY_M: f64 = 5e-4;
+/// In the budget from the beginning, J: as long as nobody knows the sensor's bias, that holds no free tool.
+const START_J: f64 = 0.02;
 /// Ticks for which the other side is told after the tool was held.
 const SHOWN_TICKS: u32 = 100;
 /// Accepted force of a hand, N.
@@ -168,7 +169,7 @@ impl ToolEnergy {
     /// How much more than the hand the tool may give so far, J.
     #[must_use]
     pub fn budget_j(&self) -> f64 {
-        self.config.share * self.hand_j.max(0.0) + self.force_max_n * self.way_max_m
+        self.config.share * self.hand_j.max(0.0) + self.force_max_n * self.way_max_m + START_J
     }
 
     /// The path takes so long, there and back.
@@ -209,15 +210,17 @@ impl ToolEnergy {
         self.way_max_m = self.way_max_m.max(self.way_m);
     }
 
-    /// The part of a way (m) of a tool that presses with `force` (N on the object, zero where it touches nothing) that the
-    /// energy allows. Only what leads along the force is shortened.
-    pub(super) fn allowed(&self, way: Vec2, force: Vec2) -> Vec2 {
-        if !self.config.bounded {
-            return way;
+    /// How far the tool may go along its force (N on the object), m: as far as what may still be given lasts. Without a bound or a
+    /// force as far as it likes.
+    pub(super) fn way_left_m(&self, force: Vec2) -> f64 {
+        let size = force.norm();
+        if !self.config.bounded || size <= 0.0 {
+            return f64::INFINITY;
         }
         // what the contact stores comes back
         let given_j = self.tool_j - self.stored_j(force);
-        admittance_controller(way, force, self.hand_j + self.budget_j() - given_j)
+        let left_j = self.hand_j + self.budget_j() - given_j;
+        left_j.max(0.0) / size
     }
 
     /// Notes whether the bound shortened the way of this tick.

@@ -28,7 +28,9 @@ impl SlaveChecks {
         let (now, slave) = (tick.now, tick.end.slave());
         let known = (slave.shadow().lost(), slave.shadow().newest_confirmed());
         // what is found to be lost is sent again in the same tick, whatever the scheme
-        let repeats = replace(&mut self.losses, known) != known;
+        let (lost, confirmed) = replace(&mut self.losses, known);
+        // an acknowledgement that leaves one out is a loss, or an overtaking
+        let repeats = known.0 != lost || known.1 > confirmed.saturating_add(1);
         let since = now.saturating_since(*self.updated.get_or_insert(now));
         let cause = done.update.map(|update| update.cause);
         if cause.is_some() {

@@ -19,6 +19,8 @@ const SOMETIMES: &[[&str; 4]] = &[
     ["operator.nudge_m", "operator.dwell_s = 0.5\n", "0.02", "there are no nudges"],
     ["slave.tool_force_max_n", "slave.environment.friction_coefficient = 1.0\n", "3.0", "the box is light"],
     ["slave.tool_energy.bounded", "slave.tool_energy.share = 0.0\nslave.tool_energy.hand_force_max_n = 0.1\n", "false", "the budget is kept"],
+    ["slave.tool_energy.share", "slave.tool_energy.hand_force_max_n = 0.1\n", "10.0", "the budget is kept"],
+    ["slave.tool_energy.hand_force_max_n", "slave.tool_energy.share = 0.0\n", "0.1", "the budget is kept"],
     ["slave.conditioning.follow_noise", "slave.sensing.force_noise_n = 0.1\n", "false", "the sensor is sound"],
     ["slave.conditioning.tare", "slave.sensing.force_bias_n = 0.2\n", "false", "the sensor is sound"],
     ["slave.environment.shape", "", "{ disc = { diameter_m = 0.3 } }", "a shape has measures"],
