@@ -1,7 +1,7 @@
 // A haptic device that CHAI3D knows (Novint, Force Dimension, 3D Systems, …) at mmt's device link (docs/plugs.md#chai3d).
 //
 //     c++ -std=c++17 -O2 -I CHAI3D/src … -o chai3d_hand contrib/chai3d_hand.cpp -lchai3d …      # the flags of CHAI3D's own examples
-//     ./chai3d_hand 'udp://127.0.0.1:PORT?token=…'
+//     ./chai3d_hand -      # asks for the address that mmt printed: udp://127.0.0.1:PORT?token=…
 //
 // CHAI3D's x points to the operator, y to the right, z up. In a horizontal plane that is, for --device-config:
 //     axes = ["-x", "-y"]
@@ -20,11 +20,11 @@ volatile std::sig_atomic_t ended = 0;
 
 int main(int count, char **words) {
   if (count < 2) {
-    std::fprintf(stderr, "usage: chai3d_hand 'udp://HOST:PORT?token=…'\n");
+    std::fprintf(stderr, "usage: chai3d_hand ADDRESS\n");
     return 2;
   }
   std::signal(SIGINT, [](int) { ended = 1; });
-  mmt::DevicePlug plug(words[1]);
+  mmt::DevicePlug plug(mmt::address_of(words[1]));
   chai3d::cHapticDeviceHandler handler;
   chai3d::cGenericHapticDevicePtr device;
   if (!handler.getDevice(device, 0) || !device->open() || !device->calibrate()) {

@@ -1,7 +1,7 @@
 // A Franka arm (libfranka) at mmt's plant link (docs/plugs.md#franka): the flange is the tool, under impedance control in torque mode.
 //
 //     c++ -std=c++17 -O2 -o franka_plant contrib/franka_plant.cpp -lfranka
-//     ./franka_plant ROBOT 'udp://127.0.0.1:PORT?token=…' X Y [SECONDS]
+//     ./franka_plant ROBOT - X Y [SECONDS]      # asks for the address that mmt printed: udp://127.0.0.1:PORT?token=…
 //
 // (X, Y), m in the robot's base frame, is the origin of mmt's world: put it where the slave's [environment] has the object. Height and
 // orientation stay as they are at the start. Limits: 0.25 m from the start along x and y, the force that the slave allows, libfranka's own
@@ -57,13 +57,13 @@ Vector turn(const std::array<double, 16> &pose, const std::array<double, 16> &wa
 
 int main(int count, char **words) {
   if (count < 5) {
-    std::fprintf(stderr, "usage: franka_plant ROBOT 'udp://HOST:PORT?token=…' X Y [SECONDS]\n");
+    std::fprintf(stderr, "usage: franka_plant ROBOT ADDRESS X Y [SECONDS]\n");
     return 2;
   }
   std::signal(SIGINT, [](int) { ended = 1; });
   const std::array<double, 2> origin{std::atof(words[3]), std::atof(words[4])};
   const double seconds = count > 5 ? std::atof(words[5]) : 1e9;
-  mmt::PlantPlug plug(words[2]);
+  mmt::PlantPlug plug(mmt::address_of(words[2]));
   try {
     franka::Robot robot(words[1]);
     robot.setCollisionBehavior({{20, 20, 20, 20, 20, 20, 20}}, {{20, 20, 20, 20, 20, 20, 20}}, {{20, 20, 20, 20, 20, 20}},

@@ -1,7 +1,7 @@
 // A scripted hand at mmt's device link in C++17 (docs/plugs.md), as contrib/hand.py: it grips, pushes along x, and lets go.
 //
 //     c++ -std=c++17 -O2 -o hand contrib/hand.cpp
-//     ./hand 'udp://127.0.0.1:PORT?token=…' [WAY_M]
+//     ./hand - [WAY_M]      # asks for the address that mmt printed: udp://127.0.0.1:PORT?token=…
 //
 // Where `position` is simulated here, a driver reads its device; where `force` moves it, the driver commands its motors.
 
@@ -14,13 +14,13 @@
 
 int main(int count, char **words) {
   if (count < 2) {
-    std::fprintf(stderr, "usage: hand 'udp://HOST:PORT?token=…' [WAY_M]\n");
+    std::fprintf(stderr, "usage: hand ADDRESS [WAY_M]\n");
     return 2;
   }
   constexpr std::uint16_t session = 1, engaged = 2, in_contact = 4, stopped = 8;
   const double way = count > 2 ? std::atof(words[2]) : 0.35, speed = 0.1, period = 1e-3;
   const double mass = 0.5, stiffness = 400.0, damping = 25.0;
-  mmt::DevicePlug plug(words[1]);
+  mmt::DevicePlug plug(mmt::address_of(words[1]));
   double position = 0.0, velocity = 0.0, wanted = 0.0, peak = 0.0, contact_s = 0.0;
   std::array<float, 6> force{};
   std::uint16_t state = 0;

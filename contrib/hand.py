@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """A scripted hand at mmt's device link (docs/plugs.md): it grips, pushes along the world's x, and lets go.
 
-    mmt master 'mmt://…' --device link           # prints: device: udp://127.0.0.1:PORT?token=…
-    python3 hand.py 'udp://127.0.0.1:PORT?token=…' --way 0.35
+    mmt master - --device link                   # asks for the pairing string; prints: device: udp://127.0.0.1:PORT?token=…
+    python3 hand.py --way 0.35                   # asks for that address
 
 Nothing but the standard library. The class Device is what a driver of a real device needs; the rest is a simulated one: a mass in
 a hand that is a spring and a damper, which the force of mmt moves.
@@ -13,6 +13,7 @@ import json
 import math
 import socket
 import struct
+import sys
 import time
 import urllib.parse
 
@@ -88,14 +89,23 @@ class Clutch:
         return self.packets > 5
 
 
+def asked(address, name):
+    """The address, from a line of standard input where it is `-`: it holds a token, which other users would see on a command line."""
+    if address != "-":
+        return address
+    if sys.stdin.isatty():
+        print(f"the address behind “{name}: ”, as mmt printed it:", file=sys.stderr)
+    return sys.stdin.readline().strip()
+
+
 def main():
     arguments = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    arguments.add_argument("address", help="as mmt printed it after “device: ”")
+    arguments.add_argument("address", nargs="?", default="-", help="as mmt printed it after “device: ”; `-`, the default, asks for it or reads it from standard input")
     arguments.add_argument("--way", type=float, default=0.35, help="how far the hand goes along x, m of the device")
     arguments.add_argument("--speed", type=float, default=0.1, help="how fast, m/s")
     arguments.add_argument("--duration", type=float, default=30.0, help="how long at the most, s")
     options = arguments.parse_args()
-    device, clutch = Device(options.address), Clutch()
+    device, clutch = Device(asked(options.address, "device")), Clutch()
     mass, stiffness, damping, period = 0.5, 400.0, 25.0, 0.001
     position, velocity = [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]
     wanted, engaged_s, peak_n, contact_s, reach, first, last = 0.0, 0.0, 0.0, 0.0, None, None, None

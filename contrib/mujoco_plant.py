@@ -3,7 +3,7 @@
 
     pip install -r contrib/requirements.txt
     mmt slave --listen 127.0.0.1:0 --plant link         # prints: plant: udp://127.0.0.1:PORT?token=…
-    python3 mujoco_plant.py 'udp://127.0.0.1:PORT?token=…' --object cylinder
+    python3 mujoco_plant.py --object cylinder           # asks for that address
 
 Real contact in three dimensions with friction: between the object and the table, and between the sphere and the object. The sphere
 is the tip of an arm under impedance control: a small mass on the spring and the damper that mmt asks for, and its place and its
@@ -18,7 +18,7 @@ import sys
 import mujoco
 import numpy
 
-from plant import Plant, serve
+from plant import Plant, asked, serve
 
 SUBSTEPS = 2
 OBJECTS = {
@@ -127,7 +127,7 @@ class World:
 
 def main():
     arguments = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    arguments.add_argument("address", help="as mmt printed it after “plant: ”")
+    arguments.add_argument("address", nargs="?", default="-", help="as mmt printed it after “plant: ”; `-`, the default, asks for it or reads it from standard input")
     arguments.add_argument("--object", choices=sorted(OBJECTS), default="cube")
     arguments.add_argument("--friction", type=float, default=0.3, help="of object and table")
     arguments.add_argument("--damping", type=float, default=3.0, help="b of the film under the object, N s/m")
@@ -137,7 +137,7 @@ def main():
     arguments.add_argument("--sensor-hz", type=float, default=20.0, help="corner frequency of the force sensor's own filter")
     arguments.add_argument("--seconds", type=float, default=math.inf, help="how long")
     options = arguments.parse_args()
-    world, plug = World(options), Plant(options.address)
+    world, plug = World(options), Plant(asked(options.address, "plant"))
     begin = world.pose()
     try:
         serve(plug, world, options.seconds)

@@ -1,7 +1,7 @@
 // A plant at mmt's plant link in C++17 (docs/plugs.md): a block on a table with friction, as contrib/plant.py.
 //
 //     c++ -std=c++17 -O2 -o plant contrib/plant.cpp
-//     ./plant 'udp://127.0.0.1:PORT?token=…' [SECONDS]
+//     ./plant - [SECONDS]      # asks for the address that mmt printed: udp://127.0.0.1:PORT?token=…
 
 #include <algorithm>
 #include <cmath>
@@ -43,11 +43,11 @@ struct Block {
 
 int main(int count, char **words) {
   if (count < 2) {
-    std::fprintf(stderr, "usage: plant 'udp://HOST:PORT?token=…' [SECONDS]\n");
+    std::fprintf(stderr, "usage: plant ADDRESS [SECONDS]\n");
     return 2;
   }
   const double seconds = count > 2 ? std::atof(words[2]) : 1e9;
-  mmt::PlantPlug plug(words[1]);
+  mmt::PlantPlug plug(mmt::address_of(words[1]));
   Block block;
   unsigned long long period = 0;
   for (const auto begin = mmt::now_ns(); static_cast<double>(mmt::now_ns() - begin) < seconds * 1e9;) {

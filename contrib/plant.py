@@ -2,7 +2,7 @@
 """A plant at mmt's plant link (docs/plugs.md): a block on a table with friction, pushed by a tool on a spring.
 
     mmt slave --listen 127.0.0.1:0 --plant link         # prints: plant: udp://127.0.0.1:PORT?token=…
-    python3 plant.py 'udp://127.0.0.1:PORT?token=…'
+    python3 plant.py                                    # asks for that address
 
 Nothing but the standard library. The class Plant is what a robot or a simulator needs; the class Block is the simplest object that
 shows how it is used. With `mmt bench plant --plant link` the same program runs in lock-step, as fast as it computes.
@@ -13,6 +13,7 @@ import collections
 import math
 import socket
 import struct
+import sys
 import time
 import urllib.parse
 
@@ -138,12 +139,21 @@ def serve(plug, world, seconds=math.inf, image_hz=30):
         plug.answer(*world.tool_state(), world.pose() if seen else None)
 
 
+def asked(address, name):
+    """The address, from a line of standard input where it is `-`: it holds a token, which other users would see on a command line."""
+    if address != "-":
+        return address
+    if sys.stdin.isatty():
+        print(f"the address behind “{name}: ”, as mmt printed it:", file=sys.stderr)
+    return sys.stdin.readline().strip()
+
+
 def main():
     arguments = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    arguments.add_argument("address", help="as mmt printed it after “plant: ”")
+    arguments.add_argument("address", nargs="?", default="-", help="as mmt printed it after “plant: ”; `-`, the default, asks for it or reads it from standard input")
     arguments.add_argument("--seconds", type=float, default=math.inf, help="how long")
     options = arguments.parse_args()
-    serve(Plant(options.address), Block(), options.seconds)
+    serve(Plant(asked(options.address, "plant")), Block(), options.seconds)
 
 
 if __name__ == "__main__":

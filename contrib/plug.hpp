@@ -14,6 +14,7 @@
 #include <chrono>
 #include <cstdint>
 #include <cstring>
+#include <iostream>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -47,6 +48,16 @@ T get(const unsigned char *place) {
   T value;
   std::memcpy(&value, &bits, sizeof value);
   return value;
+}
+
+// The address that a word of a command line gives, from a line of standard input where it is "-": it holds a token, which other
+// users would see on a command line.
+inline std::string address_of(const std::string &word) {
+  if (word != "-") return word;
+  if (isatty(STDIN_FILENO)) std::cerr << "the address, as mmt printed it:" << std::endl;
+  std::string line;
+  std::getline(std::cin, line);
+  return line;
 }
 
 // A packet of the other side: flags, number, the periods since the one before, and the numbers.

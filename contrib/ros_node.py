@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """A ROS 2 node at one of mmt's plugs (docs/plugs.md#ros-2): a robot becomes the plant of a slave, or a device the hand of a master.
 
-    python3 ros_node.py --ros-args -p 'plant:=udp://127.0.0.1:PORT?token=…'
-    python3 ros_node.py --ros-args -p 'hand:=udp://127.0.0.1:PORT?token=…'
+    python3 ros_node.py --ros-args -p plant:=ask        # asks for the address that mmt printed: udp://127.0.0.1:PORT?token=…
+    python3 ros_node.py --ros-args -p hand:=ask
 
 It needs rclpy, geometry_msgs and std_msgs, as every ROS 2 has them, and hand.py and plant.py beside it.
 """
@@ -19,11 +19,13 @@ from rclpy.qos import qos_profile_sensor_data
 from rclpy.time import Time
 from std_msgs.msg import Bool
 
-from hand import ENGAGED, Device
+from hand import ENGAGED, Device, asked
 from plant import Plant
 
 # a robot of which nothing came for so long is not there: mmt then holds the tool and takes the force from the hand
 SILENCE_S = 0.050
+# a lone `-` is no word for the parameters of ROS
+ASK = {"ask": "-"}
 
 
 class Speed:
@@ -59,7 +61,7 @@ class PlantNode(Node):
         address = self.declare_parameter("plant", "").value
         self.frame = self.declare_parameter("frame", "world").value
         self.height_m = self.declare_parameter("height_m", 0.0).value
-        self.plug, self.lock = Plant(address), threading.Lock()
+        self.plug, self.lock = Plant(asked(ASK.get(address, address), "plant")), threading.Lock()
         self.tool = self.seen = None
         self.force, self.speed, self.heard_s = (0.0, 0.0), Speed(2), -math.inf
         self.command = self.create_publisher(PoseStamped, "~/tool_command", qos_profile_sensor_data)
@@ -120,7 +122,7 @@ class HandNode(Node):
         super().__init__(node_name)
         address = self.declare_parameter("hand", "").value
         self.frame = self.declare_parameter("frame", "world").value
-        self.device, self.speed, self.down = Device(address), Speed(3), False
+        self.device, self.speed, self.down = Device(asked(ASK.get(address, address), "device")), Speed(3), False
         self.force = self.create_publisher(WrenchStamped, "~/force", qos_profile_sensor_data)
         self.create_subscription(PoseStamped, "~/device", self.take_device, qos_profile_sensor_data)
         self.create_subscription(Bool, "~/button", self.take_button, qos_profile_sensor_data)
@@ -153,12 +155,12 @@ class HandNode(Node):
 
 def role():
     """Which node the parameters ask for."""
-    asked = Node("mmt")
+    node = Node("mmt")
     names = ("plant", "hand")
-    plant, hand = (asked.declare_parameter(name, "").value for name in names)
-    asked.destroy_node()
+    plant, hand = (node.declare_parameter(name, "").value for name in names)
+    node.destroy_node()
     if bool(plant) == bool(hand):
-        raise SystemExit("give one address: -p plant:=… as mmt slave printed it, or -p hand:=… as mmt master did")
+        raise SystemExit("give one: -p plant:=ask for the address that mmt slave printed, or -p hand:=ask for that of mmt master")
     return PlantNode if plant else HandNode
 
 

@@ -16,6 +16,7 @@ mod failure;
 mod input;
 mod log;
 mod output;
+mod panics;
 mod progress;
 mod stderr;
 mod stop;
@@ -29,18 +30,19 @@ use clap::Parser;
 use args::{Arguments, Command};
 use failure::Failure;
 use log::Messages;
+use panics::PANICS;
 
 /// How long the end of the process waits for its last messages to be read.
 const LAST_WORDS: Duration = Duration::from_secs(1);
 
 /// Runs the command line of this process.
 pub fn run() -> ExitCode {
-    restore_terminal_on_panic();
+    note_panics();
     let arguments = match Arguments::try_parse() {
         Ok(arguments) => arguments,
         Err(error) => return answer(&error),
     };
-    let code = match execute(arguments.command) {
+    let code = match execute(arguments.command).and_then(|()| PANICS.judge()) {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
             output::note(&failure);
@@ -92,11 +94,12 @@ fn answer(error: &clap::Error) -> ExitCode {
     }
 }
 
-/// A panic is a bug and is reported as one, but on a terminal that can be read.
-fn restore_terminal_on_panic() {
+/// A panic is a bug and is reported as one, but on a terminal that can be read, and the run does not end well.
+fn note_panics() {
     let tell = std::panic::take_hook();
     std::panic::set_hook(Box::new(move |panic| {
         view::restore_terminal();
         tell(panic);
+        PANICS.note(std::thread::current().name());
     }));
 }

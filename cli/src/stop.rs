@@ -11,6 +11,7 @@ use tokio::signal::unix::{SignalKind, signal};
 use tokio::sync::watch;
 
 use crate::failure::{Failure, INTERRUPTED_TWICE};
+use crate::panics::PANICS;
 use crate::view::restore_terminal;
 
 /// Between two looks at whether a person asked for the end.
@@ -81,6 +82,7 @@ impl Stop {
             .name("signals".to_owned())
             .spawn(move || runtime.block_on(wait))
             .map_err(no_signals)?;
+        PANICS.end(&stop);
         Ok(stop)
     }
 
@@ -96,6 +98,12 @@ impl Stop {
         }
         self.wanted.send_replace(true);
         tracing::info!("ending; once more to quit at once");
+    }
+
+    /// Ends the run in order because of a defect of this process, as if the system had asked for it.
+    pub(crate) fn give_up(&self) {
+        self.asked.store(true, Ordering::Release);
+        self.wanted.send_replace(true);
     }
 
     /// The emergency stop of this side.

@@ -14,7 +14,7 @@ use mmt_shared::report::{
 };
 use mmt_shared::stats::session::UpdateDrops;
 use mmt_shared::time::{TICK, Time};
-use mmt_shared::wire::{Architecture, Command, Message, RawState, Side};
+use mmt_shared::wire::{Architecture, Command, Message, RawState, Side, ToolState};
 use serde::Serialize;
 
 use crate::commands::{CommandConfig, CommandPacker};
@@ -125,6 +125,7 @@ impl MasterEnd {
         UpdateDrops {
             duplicate: self.window.duplicate(),
             stale: self.window.stale(),
+            implausible: self.window.implausible(),
             rejected: self.counts.updates_rejected,
             superseded: self.counts.updates_superseded,
             frozen: self.counts.updates_frozen
@@ -160,6 +161,7 @@ impl MasterEnd {
             passivity: PassivityReport {
                 energy_injected_j: master.energy_injected_j().into(),
                 observer_min_j: master.port().least_j().into(),
+                hand_work_j: master.port().energy_j().into(),
             },
             ..MasterHalf::default()
         }
@@ -194,6 +196,12 @@ impl MasterEnd {
     /// Whose emergency stop is set; none if neither's.
     pub fn stopped_by(&self) -> Option<Side> {
         self.channel.stopped_by()
+    }
+
+    /// What the slave's tool does, by its newest datagram: whether it follows, and whether the limit of its energy holds it.
+    pub fn slave_tool(&self) -> (ToolState, bool) {
+        let other = self.channel.other();
+        (other.tool, other.energy_holds)
     }
 
     /// Takes in a datagram that arrived at `at`.

@@ -193,6 +193,7 @@ impl ObserverEnd {
         let drops = UpdateDrops {
             duplicate: self.window.duplicate(),
             stale: self.window.stale(),
+            implausible: self.window.implausible(),
             rejected: self.rejected,
             ..UpdateDrops::default()
         };

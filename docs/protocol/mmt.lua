@@ -41,8 +41,8 @@ declare("uint16", "flags", base.HEX)
 declare("uint32", "length number echo.number echo.received newest_update samples.ticks sequence")
 declare("uint64", "sent echo.sent echo.held_ns samples.stamp answers")
 declare("int32", "samples.x samples.y samples.force_x samples.force_y force.x force.y")
-declare("bool", "slave_in_contact in_contact stopped")
-declare("string", "cause role claim architecture program friction smoothing correction scheme refusal ending")
+declare("bool", "slave_in_contact in_contact stopped energy_holds")
+declare("string", "tool_state cause role claim architecture program friction smoothing correction scheme refusal ending")
 declare("bytes", "token resume report")
 declare("double", "object tool force in_j port.in_j hip stiffness_n_per_m damping_ns_per_m lambda tau_s")
 
@@ -386,9 +386,13 @@ local function message(r, road, from)
     demand(kind, "unknown type " .. number:uint())
     r.tree:add(fields.type, number, kind[1])
     r.tree:add_le(fields.flags, flags)
-    local stopped = flags:le_uint() == 1 and kind[3] == "datagram"
-    demand(flags:le_uint() == 0 or stopped, "unknown flags")
-    if stopped then r.tree:add(fields.stopped, flags, true) end
+    local bits = flags:le_uint()
+    local tool = math.floor(bits / 2) % 4
+    local of_slave = from ~= "master" and tool < 3 and bits < 16
+    demand(bits == 0 or (kind[3] == "datagram" and (bits == 1 or of_slave)), "flags that the sender may not set")
+    if bits % 2 == 1 then r.tree:add(fields.stopped, flags, true) end
+    if tool > 0 then r.tree:add(fields.tool_state, flags, ({ "hold", "disengaged" })[tool]) end
+    if bits >= 8 then r.tree:add(fields.energy_holds, flags, true) end
     demand(kind[3] == road, "not by this road")
     demand(not from or not kind[2] or kind[2] == from, "the " .. tostring(from) .. " must not send it")
     local info = kind[4](r) or ""

@@ -107,10 +107,14 @@ invariants! {
     UpdateTrue "update-true" "an update leaves as it was made, numbered one by one; repeats are copies of the newest";
     /// Cause of an update.
     UpdateCause "update-cause" "an update answers the tick's sample, and its cause fits the contact, unless it repeats a lost one";
+    /// The trigger.
+    TriggerFires "trigger-fires" "an update of cause deadband leaves only where (12) is violated, one of cause timer only after T_update; where a scheme asks for no more, it leaves then";
     /// Shadow.
     ShadowConfirmed "shadow-confirmed" "the slave takes for confirmed only what it sent and a command acknowledged";
     /// The network invents nothing.
     ArrivedWasSent "arrived-was-sent" "a datagram that arrives is bit for bit one that left under that number";
+    /// Counters.
+    CountersBalance "counters-balance" "what was sent was received, dropped under a name or lost; each update and sample that arrived was used or dropped under a name";
     /// One operator.
     OneOperator "one-operator" "sessions of a slave follow one another";
     /// Determinism.

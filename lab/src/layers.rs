@@ -3,6 +3,7 @@
 //! The keys are the fields of [`WorldConfig`]; no other list of them exists. Whatever a run could refuse is refused here,
 //! with its place in the file.
 
+mod idle;
 mod known;
 mod template;
 #[cfg(test)]
@@ -18,6 +19,7 @@ use serde::de::DeserializeOwned;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue, Deserializer};
 
+pub(crate) use idle::{DEVICE_STIFFNESS, MODEL_STIFFNESS, idle_in_sweep};
 pub use known::{Known, Origin};
 pub use template::template;
 
@@ -142,6 +144,9 @@ impl<'a> Layers<'a> {
     /// As [`Layers::config`].
     pub fn config_from(&self, start: Start) -> Result<WorldConfig, TextError> {
         let given = self.given()?;
+        if self.program == Program::Sweep {
+            idle::agree(self.file, given.get_ref())?;
+        }
         let config = self.laid(start, &given)?;
         self.check(start, &given, &config)?;
         Ok(match self.seed {
@@ -262,7 +267,7 @@ fn within(key: &str, table: &str) -> bool {
 }
 
 /// The value at a key written with dots.
-fn at<'t, 'i>(table: &'t DeTable<'i>, key: &str) -> Option<&'t Spanned<DeValue<'i>>> {
+pub(crate) fn at<'t, 'i>(table: &'t DeTable<'i>, key: &str) -> Option<&'t Spanned<DeValue<'i>>> {
     match key.split_once('.') {
         None => table.get(key),
         Some((first, rest)) => at(table.get(first)?.get_ref().as_table()?, rest),

@@ -26,6 +26,7 @@ pub mod table;
 pub mod text_error;
 pub mod transport;
 pub mod trial;
+mod two_ports;
 pub mod what_if;
 pub mod world;
 pub mod worlds;

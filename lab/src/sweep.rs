@@ -3,6 +3,7 @@
 //! Pure: a row is a function of the plan and the row's number. It must never depend on which rows ran before, on
 //! which machine or in which shard, so that results come out the same byte for byte however the work is cut.
 
+mod given;
 mod measures;
 mod placed;
 mod plan;

@@ -263,6 +263,9 @@ impl World {
 
     fn slave_tick(&mut self, others: Substitutes<'_>) -> Option<SlaveTick> {
         let now = self.slave_clock.at(self.now);
+        if others.scheme.is_some() {
+            self.checks.slave.other_scheme();
+        }
         let tick = self.slave.tick_with(now, others);
         if self.judges {
             let given = SlaveGiven {

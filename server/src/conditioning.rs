@@ -121,6 +121,12 @@ impl Conditioner {
         self.bias.begin();
     }
 
+    /// Noise per axis as measured, N, where it is more than thresholds are made for; else 0.
+    #[must_use]
+    pub fn noise_n(&self) -> f64 {
+        self.noise.beyond()
+    }
+
     /// Takes the measured force (N) of a tick with the tool at `tool` (m).
     pub fn step(&mut self, measured: Vec2, tool: Vec2) -> Conditioned {
         if self.config.follow_noise {

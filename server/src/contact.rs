@@ -91,6 +91,12 @@ impl ContactStage {
         self.conditioner.see_clear();
     }
 
+    /// The force's noise per axis as measured, N, where it is more than thresholds are made for; else 0.
+    #[must_use]
+    pub fn noise_n(&self) -> f64 {
+        self.conditioner.noise_n()
+    }
+
     /// One tick with the tool at `tool` (m), moving at `velocity` (m/s).
     pub fn step(&mut self, now: Time, tool: Vec2, velocity: Vec2) -> Contact {
         let met = self.plant.meet(now, tool, velocity, self.body);

@@ -11,7 +11,7 @@ use mmt_shared::metrics::UpdateCounts;
 use mmt_shared::model::tool::{Scene, Tool};
 use mmt_shared::model::update::Update;
 use mmt_shared::time::Time;
-use mmt_shared::wire::{Architecture, Command, Hello, Message, Side};
+use mmt_shared::wire::{Architecture, Command, Hello, Message, Side, ToolState};
 
 use crate::plant::{PlantAnswer, PlantCommand};
 use crate::repeats::{Repeating, Repeats};
@@ -23,6 +23,10 @@ mod transmit;
 /// Without a new sample for this long the tool is disengaged: it stands, and only a new session moves it. The hand was
 /// released a second before.
 pub const DISENGAGE: Duration = Duration::from_secs(2);
+
+/// Without a new sample for this long the tool is on hold: it brakes from 30 ms on ([`crate::playout`]) and stands by now, and the
+/// master is told.
+pub const HOLD: Duration = Duration::from_millis(100);
 
 /// How the slave's end of a session works.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -260,9 +264,15 @@ impl SlaveEnd {
     pub fn tick_with(&mut self, now: Time, others: Substitutes<'_>) -> Option<SlaveTick> {
         let silence = self.slave.playout().silence();
         self.disengaged |= silence.is_some_and(|silence| silence >= DISENGAGE);
+        let holds = silence.is_some_and(|silence| silence >= HOLD);
         let stands = self.stopped_by().is_some() || self.disengaged;
         self.slave.hold_tool(stands);
-        let tick = self.slave.tick_with(now, others)?;
+        if let Some(path) = self.channel.peer().round_trip().longest(now) {
+            self.slave.set_round_trip(path);
+        }
+        let tick = self.slave.tick_with(now, others);
+        self.show_tool(holds);
+        let tick = tick?;
         self.counts.updates.tick(tick.in_contact);
         if let Some(update) = tick.update {
             let overtaken = self.update.replace(update).is_some();
@@ -272,6 +282,19 @@ impl SlaveEnd {
         let looks = self.config.scene_hz > 0;
         self.scene = looks.then(|| self.slave.scene(&tick));
         Some(tick)
+    }
+
+    /// From the next datagram on the master is told what the tool does.
+    fn show_tool(&mut self, holds: bool) {
+        let state = if self.disengaged {
+            ToolState::Disengaged
+        } else if holds {
+            ToolState::Hold
+        } else {
+            ToolState::Nominal
+        };
+        let energy_holds = self.slave.tool_energy().holds();
+        self.channel.show_tool(state, energy_holds);
     }
 }
 

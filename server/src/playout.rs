@@ -25,6 +25,7 @@ use mmt_shared::range::OutOfRange;
 use mmt_shared::stats::histogram::Histogram;
 use mmt_shared::time::Time;
 
+use crate::tool::energy::HandSample;
 use interpolator::{Aim, Interpolator, around};
 use jitter_buffer::{JitterBuffer, WAIT};
 use motion_limiter::MotionLimiter;
@@ -134,6 +135,10 @@ impl PlayoutBuffer {
             hip: step.hip,
             velocity: step.velocity,
             force: aim.force.filter(|_| !limited),
+            hand: aim.force.map(|force| HandSample {
+                hip: aim.hip,
+                force,
+            }),
             status: aim.status,
             period_s: elapsed.as_secs_f64(),
             speed_max_m_per_s: step.speed_max_m_per_s,

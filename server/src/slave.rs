@@ -3,6 +3,8 @@
 //! Stage by stage: play-out, tool, contact, pose and parameters, shadow, trigger, update. Pure: the time is an
 //! argument, the seed comes with the configuration, and what it returns is all that it does.
 
+use std::time::Duration;
+
 use mmt_shared::metrics::ForceMetrics;
 use mmt_shared::model::contact::Coupling;
 use mmt_shared::model::geometry::{Pose, Twist, Vec2};
@@ -24,6 +26,7 @@ use crate::pose_observer::PoseObserver;
 use crate::shadow::Shadow;
 use crate::tool::ToolDrive;
 use crate::tool::compliance::Compliance;
+use crate::tool::energy::ToolEnergy;
 use crate::tool::force::ToolForce;
 use crate::tool::port::ToolPort;
 use crate::trigger::{Scheme, Trigger};
@@ -130,13 +133,25 @@ impl Slave {
             speed_max_m_per_s,
             ..config.playout
         };
+        let energy = ToolEnergy::try_new(
+            config.tool_energy,
+            config.tool_force_max_n,
+            coupling,
+            speed_max_m_per_s,
+        )?;
         let port = ToolPort::new(noise_n, speed_max_m_per_s);
         let plant = plant::of_config(config, environment, coupling, speed_max_m_per_s)?;
         let timer_carries_pose = config.trigger.timer_carries_pose;
         Ok(Self {
             settings,
             playout: PlayoutBuffer::try_new(playout)?,
-            tool: ToolDrive::new(port, limit, playout.limits(), config.playout.reach_m),
+            tool: ToolDrive::new(
+                port,
+                limit,
+                energy,
+                playout.limits(),
+                config.playout.reach_m,
+            ),
             compliance: Compliance::try_new(config.tool_compliance)?,
             contact: ContactStage::at(plant, config.conditioner(&coupling)),
             object,
@@ -192,6 +207,12 @@ impl Slave {
     #[must_use]
     pub fn estimate(&self) -> &Estimate {
         self.object.estimator.estimate()
+    }
+
+    /// The noise of the measured force per axis, N, where (12) is judged by averages for it; else 0.
+    #[must_use]
+    pub fn force_noise_n(&self) -> f64 {
+        self.contact.noise_n()
     }
 
     /// Estimates whose numbers were not accepted as parameters.
@@ -269,6 +290,17 @@ impl Slave {
     #[must_use]
     pub fn tool_force(&self) -> &ToolForce {
         self.tool.force()
+    }
+
+    /// The limit of the tool's energy, and what passed both ports.
+    #[must_use]
+    pub fn tool_energy(&self) -> &ToolEnergy {
+        self.tool.energy()
+    }
+
+    /// The path takes so long, there and back: the limit of the tool's energy allows for it.
+    pub fn set_round_trip(&mut self, path: Duration) {
+        self.tool.set_round_trip(path);
     }
 
     /// Takes in the state of the hand's port, newer than all before: the hand feels the tool, which from now on goes only

@@ -4,14 +4,18 @@
 //! f_m of a HIP that the tool is not at.
 
 pub(crate) mod compliance;
+pub mod energy;
 pub mod force;
 pub mod port;
+
+use std::time::Duration;
 
 use mmt_shared::model::geometry::Vec2;
 use mmt_shared::time::TICK_S;
 
 use crate::motion_limits::{BEHIND_M, Goal, MotionLimits};
 use crate::playout::Played;
+use energy::ToolEnergy;
 use force::ToolForce;
 use port::ToolPort;
 
@@ -27,8 +31,13 @@ pub(crate) struct ToolDrive {
     passive: bool,
     /// Whether the limit of the force keeps it there, or has and it is still catching up.
     held_back: bool,
+    /// The same of the limit of the energy.
+    energy_holds: bool,
     port: ToolPort,
     force: ToolForce,
+    energy: ToolEnergy,
+    /// Whether the tool touches something.
+    touches: bool,
     limits: MotionLimits,
     /// No farther than this from the origin, m.
     reach_m: f64,
@@ -38,6 +47,7 @@ impl ToolDrive {
     pub(crate) fn new(
         port: ToolPort,
         force: ToolForce,
+        energy: ToolEnergy,
         limits: MotionLimits,
         reach_m: f64,
     ) -> Self {
@@ -47,8 +57,11 @@ impl ToolDrive {
             own: None,
             passive: false,
             held_back: false,
+            energy_holds: false,
             port,
             force,
+            energy,
+            touches: false,
         }
     }
 
@@ -65,9 +78,23 @@ impl ToolDrive {
         self.passive
     }
 
-    /// Whether the limit of the force keeps the tool from the HIP.
+    pub(crate) fn energy(&self) -> &ToolEnergy {
+        &self.energy
+    }
+
+    /// The path takes so long, there and back.
+    pub(crate) fn set_round_trip(&mut self, path: Duration) {
+        self.energy.set_round_trip(path);
+    }
+
+    /// Whether a limit, of the force or of the energy, keeps the tool from the HIP.
     pub(crate) fn is_held_back(&self) -> bool {
         self.held_back
+    }
+
+    /// Whether it is the limit of the force, so that what the tool touches withstands that.
+    pub(crate) fn force_holds(&self) -> bool {
+        self.held_back && !self.energy_holds
     }
 
     /// Takes in E_in of the master's port, J: from now on the tool goes only as far as that pays for. `hip` is the HIP
@@ -82,12 +109,14 @@ impl ToolDrive {
     pub(crate) fn begin_at(&mut self, place: Vec2, force: Vec2) {
         self.own = Some(place);
         self.port.measured(force);
+        self.energy.begin_at(place, force);
     }
 
     /// One tick: the tool follows the played HIP from `before` (the one played last, m), or goes towards it. When it may
     /// follow again it catches up within the speed limit. The force of the master is that of the HIP, not of a tool that
     /// is held back.
     pub(crate) fn step(&mut self, before: Option<Vec2>, played: Played) -> Played {
+        self.energy.follow_hand(played.hand);
         let Some(tool) = self.own.or(before) else {
             return played;
         };
@@ -119,8 +148,11 @@ impl ToolDrive {
         } else {
             bounded
         };
-        let allowed = self.force.allowed(free, period_s, self.port.held());
+        let paid = self.paid(free, period_s);
+        let allowed = self.force.allowed(paid, period_s, self.port.held());
         let held = allowed != free;
+        let energy_holds = paid != free;
+        self.energy.note(energy_holds);
         if follows && !held {
             self.force.moved(played.velocity, false);
             return played;
@@ -136,6 +168,7 @@ impl ToolDrive {
         self.force.moved(velocity, held);
         let behind = (wanted - way).norm() > BEHIND_M;
         self.held_back = held || (self.held_back && behind);
+        self.energy_holds = energy_holds || (self.energy_holds && behind);
         // with the HIP's velocity, so that it goes on with it
         let joins = (velocity - played.velocity).norm() < SAME_VELOCITY_M_PER_S;
         let there = !self.passive && !played.stands && way == wanted && joins;
@@ -148,6 +181,24 @@ impl ToolDrive {
         }
     }
 
+    /// The part of a way (m, in `period_s`) that the energy allows: along the force no faster than the tool can brake in the way
+    /// that is left. Where the hand feels the tool, its port knows.
+    fn paid(&self, way: Vec2, period_s: f64) -> Vec2 {
+        let force = self.port.held();
+        let left_m = self.energy.way_left_m(force);
+        if self.passive || !self.touches || left_m.is_infinite() {
+            return way;
+        }
+        let n = force.normalize();
+        let most = self.limits.braking_speed(left_m, period_s) * period_s;
+        let beyond = n.dot(&way) - most;
+        if beyond <= 0.0 {
+            return way;
+        }
+        let wanted = (way - n * beyond) / period_s;
+        self.limits.towards(self.force.velocity(), wanted, period_s) * period_s
+    }
+
     /// The part of a way from `tool` (m) that leads no farther out of reach, whatever pushes the tool there.
     fn within_reach(&self, tool: Vec2, way: Vec2) -> Vec2 {
         let (most, far) = (self.reach_m.max(tool.norm()), (tool + way).norm());
@@ -158,15 +209,18 @@ impl ToolDrive {
         }
     }
 
-    /// Takes the force that is measured where the tool is, N.
-    pub(crate) fn measured(&mut self, force: Vec2) {
+    /// Takes the force (N) that is measured with the tool at `place` (m), and whether that is contact.
+    pub(crate) fn measured(&mut self, place: Vec2, force: Vec2, touches: bool) {
         self.port.measured(force);
         self.force.measured(force);
+        self.energy.measured(place, force);
+        self.touches = touches;
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use super::energy::EnergyConfig;
     use super::*;
     use crate::playout::Status;
     use mmt_shared::model::contact::Coupling;
@@ -179,7 +233,8 @@ mod tests {
             speed_m_per_s: 0.6,
             acceleration_m_per_s2: 20.0,
         };
-        ToolDrive::new(ToolPort::new(0.01, 0.6), force, limits, 2.0)
+        let energy = ToolEnergy::try_new(EnergyConfig::default(), 15.0, coupling, 0.6).unwrap();
+        ToolDrive::new(ToolPort::new(0.01, 0.6), force, energy, limits, 2.0)
     }
 
     fn played(x: f64, stands: bool) -> Played {
@@ -188,6 +243,7 @@ mod tests {
             hip: Vec2::new(x, 0.0),
             velocity: Vec2::zeros(),
             force: None,
+            hand: None,
             status: Status::Interpolated,
             period_s: TICK_S,
             speed_max_m_per_s: 0.6,
@@ -199,7 +255,7 @@ mod tests {
     #[test]
     fn a_tool_that_its_force_held_back_stands_when_it_has_to_and_gives_way_all_the_same() {
         let mut drive = drive();
-        drive.measured(Vec2::new(15.0, 0.0));
+        drive.measured(Vec2::zeros(), Vec2::new(15.0, 0.0), true);
         let at = |drive: &mut ToolDrive, stands| {
             drive.step(Some(Vec2::zeros()), played(0.05, stands)).hip.x
         };
@@ -207,13 +263,13 @@ mod tests {
         let held = at(&mut drive, false);
         assert!(held < 1e-3, "{held}");
         // what it pressed on is gone
-        drive.measured(Vec2::zeros());
+        drive.measured(Vec2::zeros(), Vec2::zeros(), true);
         for _ in 0..100 {
             assert_eq!(at(&mut drive, true), held, "nothing draws it");
         }
-        drive.measured(Vec2::new(26.0, 0.0));
+        drive.measured(Vec2::zeros(), Vec2::new(26.0, 0.0), true);
         assert!(at(&mut drive, true) < held, "it is pressed on");
-        drive.measured(Vec2::zeros());
+        drive.measured(Vec2::zeros(), Vec2::zeros(), true);
         // it brakes on its way back
         let before = (0..100).map(|_| at(&mut drive, true)).last().unwrap();
         assert!(at(&mut drive, false) > before, "it may follow again");
@@ -226,7 +282,7 @@ mod tests {
         let mut at = Vec2::zeros();
         for _ in 0..100 {
             // what is out there draws the tool outwards and along
-            drive.measured(Vec2::new(-26.0, -26.0));
+            drive.measured(Vec2::zeros(), Vec2::new(-26.0, -26.0), true);
             at = drive.step(None, played(2.0, true)).hip;
             assert!(at.norm() <= 2.0 + 1e-12, "{} m", at.norm());
         }

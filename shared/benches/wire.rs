@@ -12,7 +12,7 @@ use mmt_shared::model::sample::{ForceCounts, HipCounts, HipSample};
 use mmt_shared::model::update::{Cause, Update};
 use mmt_shared::time::Time;
 use mmt_shared::wire::{
-    Command, DATAGRAM_MAX, Datagram, Echo, Envelope, Message, SampleBlock, Side,
+    Command, DATAGRAM_MAX, Datagram, Echo, Envelope, Flags, Message, SampleBlock, Side,
 };
 
 const COUPLING: Coupling = Coupling {
@@ -65,7 +65,7 @@ fn update() -> Option<Update> {
 fn wire(criterion: &mut Criterion) {
     let mut out = [0; DATAGRAM_MAX];
     let datagram = |message| Datagram {
-        stopped: false,
+        flags: Flags::default(),
         envelope: ENVELOPE,
         message,
     };

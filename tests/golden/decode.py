@@ -231,14 +231,21 @@ def decode(data, channel, sender):
            f"the other side speaks version {version}, this side version {VERSION}", "version")
     demand(number in KINDS, "unknown type", "type")
     kind = KINDS[number]
-    demand(flags <= (kind in DATAGRAM_TYPES), "unknown flags", "flags")
+    stopped, tool, energy = flags & 1, flags >> 1 & 3, flags >> 3
+    slave = sender == "slave"
+    known = energy <= slave and tool <= 2 * slave and (kind in DATAGRAM_TYPES or not flags)
+    demand(known, "flags that the sender may not set", "flags")
     demand((kind in DATAGRAM_TYPES) == (channel == "datagram"), "wrong road", "road")
     demand(sender in SENDERS[kind], "wrong side", "side")
     reader = Reader(data[8:])
     fields = BODIES[kind](reader)
     demand(reader.at == len(reader.data), "bytes left after the body", "trailing")
-    if flags:
+    if stopped:
         fields["stopped"] = True
+    if tool:
+        fields["tool_state"] = ["nominal", "hold", "disengaged"][tool]
+    if energy:
+        fields["energy_holds"] = True
     return kind, fields
 
 

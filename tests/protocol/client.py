@@ -198,8 +198,11 @@ class Session:
         self.number = self.newest = self.newest_sent = self.newest_at = 0
         self.seen, self.last_sent, self.sequence = set(), 0, 0
         self.sent, self.received = (dict.fromkeys(KINDS.values(), 0) for _ in range(2))
-        self.drops = {"datagrams_duplicate": 0, "datagrams_too_old": 0, "datagrams_malformed": 0}
-        self.updates = {"duplicate": 0, "stale": 0, "rejected": 0, "superseded": 0, "frozen": 0}
+        causes = ("duplicate", "too_old", "implausible", "malformed")
+        self.drops = {f"datagrams_{why}": 0 for why in causes}
+        causes = ("duplicate", "stale", "implausible", "rejected", "superseded", "frozen")
+        self.updates = dict.fromkeys(causes, 0)
+        self.far = {"number": 0, "sequence": 0}  # the last ones that were too far ahead
         self.sequences, self.applied, self.causes, self.rtt_ns = set(), [], {}, []
         self.sent_at = {}
 
@@ -215,6 +218,9 @@ class Session:
             self.drops["datagrams_malformed"] += 1
             return
         number = fields["number"]
+        if number == self.far["number"] >= self.newest + 1024 or self.is_alone("number", number, self.newest):
+            self.drops["datagrams_implausible"] += 1
+            return
         if number + 1024 <= self.newest or number in self.seen:
             why = "too_old" if number + 1024 <= self.newest else "duplicate"
             self.drops[f"datagrams_{why}"] += 1
@@ -227,6 +233,14 @@ class Session:
         if kind == "update":
             self.take_update(fields)
 
+    def is_alone(self, what, number, newest):
+        """Whether a number is implausible: so far ahead, and no other one there before."""
+        before = self.far[what]
+        if number < newest + 1024 or abs(number - before) < 1024:
+            return False
+        self.far[what] = number
+        return True
+
     def take_echo(self, echo, now):
         if echo is None or self.sent_at.get(echo["number"]) != echo["sent"]:
             return
@@ -238,6 +252,9 @@ class Session:
         sequence = update["sequence"]
         if sequence <= self.sequence:
             self.updates["duplicate" if sequence in self.sequences else "stale"] += 1
+            return
+        if self.is_alone("sequence", sequence, self.sequence):
+            self.updates["implausible"] += 1
             return
         self.sequences.add(sequence)
         if not accepted(update["state"], self.coupling):

@@ -1,6 +1,6 @@
 //! No input breaks what a decoder or a file reader promises, and no sequence of operations what a session promises.
 //!
-//! The targets are those of `mmt_tests::fuzz`. An ordinary test run takes a million inputs over all decoders and two thousand
+//! The targets are those of `mmt_tests::fuzz`. An ordinary test run takes a million inputs over all decoders and ten thousand
 //! sequences; `.ci/fuzz` runs the same at length. `MMT_FUZZ_INPUTS`, `MMT_FUZZ_SEQUENCES`, `MMT_FUZZ_SEED`, `MMT_FUZZ_THREADS`
 //! and `MMT_FUZZ_TARGETS` (names with commas between) change the extent, `MMT_FUZZ_TABLE` names a file for the table.
 //! `MMT_FUZZ_CAREFUL` keeps each input in a file before it is run, for what ends the process. The result depends on seed and
@@ -28,7 +28,7 @@ use counting_allocator::peak_of;
 
 /// Inputs over all decoders, and sequences of the session, where nobody asks for others.
 const INPUTS: u64 = 1_000_000;
-const SEQUENCES: u64 = 2_000;
+const SEQUENCES: u64 = 10_000;
 /// Inputs of a target that run one after the other, each beginning with its seeds.
 const SHARD: u64 = 200_000;
 const SHARD_OF_SEQUENCES: u64 = 5000;

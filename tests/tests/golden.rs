@@ -142,8 +142,14 @@ fn of_datagram(read: &Datagram) -> Decoded {
     let mut fields = serde_json::to_value(read.envelope).unwrap();
     let both = fields.as_object_mut().unwrap();
     both.extend(of_message.as_object().unwrap().clone());
-    if read.stopped {
+    if read.flags.stopped {
         both.insert("stopped".into(), true.into());
+    }
+    if read.flags.tool != ToolState::Nominal {
+        both.insert("tool_state".into(), read.flags.tool.name().into());
+    }
+    if read.flags.energy_holds {
+        both.insert("energy_holds".into(), true.into());
     }
     Decoded {
         kind: read.message.kind(),

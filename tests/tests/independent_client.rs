@@ -116,7 +116,9 @@ fn it_pushed(client: &Value) {
 /// No message was malformed to either side, and what one sent the other received: nothing is lost here.
 fn both_counted_the_same(client: &Value, slave: &Value) {
     let theirs = "/slave_farewell/report/session";
-    for name in ["malformed", "too_old", "duplicate"].map(|why| format!("datagrams_{why}")) {
+    for name in
+        ["malformed", "too_old", "implausible", "duplicate"].map(|why| format!("datagrams_{why}"))
+    {
         assert_eq!(get(client, &format!("/{name}")), 0.0, "{name}");
         assert_eq!(
             get(client, &format!("{theirs}/drops/{name}")),

@@ -27,11 +27,12 @@ use crate::harness::{alone, root};
 /// For what takes seconds; the host may be busy.
 const GENEROUS: Duration = Duration::from_secs(120);
 
-fn contrib(python: &str, program: &str, arguments: &[&str]) -> Running {
+/// A program of `contrib`, which reads the address of its plug, no argument, from standard input.
+fn contrib(python: &str, program: &str, address: &str, arguments: &[&str]) -> Running {
     let mut command = Command::new(python);
     command.arg(root().join("contrib").join(program));
     command.args(arguments);
-    Running::start(command).unwrap()
+    Running::start_reading(command, &format!("{address}\n")).unwrap()
 }
 
 /// What stands behind these words on a line that the program prints.
@@ -80,7 +81,7 @@ fn a_hand_that_knows_only_the_document_is_plugged_in_and_pushes_the_box() {
         let mut master = Running::mmt(&device).unwrap();
         let address = announced(&mut master, "device: ");
         a_stranger_knocks(&address);
-        let hand = contrib(&python, "hand.py", &[&address, "--way", "0.45"]);
+        let hand = contrib(&python, "hand.py", &address, &["--way", "0.45"]);
         let hand = document(&hand.end(GENEROUS).unwrap(), 0);
         master.interrupt().unwrap();
         let master = document(&master.end(GENEROUS).unwrap(), 0);
@@ -154,7 +155,7 @@ fn bench(python: &str, program: &[&str], options: &[&str]) -> Value {
     let mut mmt = Running::mmt(&[&all[..], options].concat()).unwrap();
     let address = announced(&mut mmt, "plant: ");
     let (name, rest) = program.split_first().unwrap();
-    let _plant = contrib(python, name, &[&[address.as_str()], rest].concat());
+    let _plant = contrib(python, name, &address, rest);
     document(&mmt.end(GENEROUS).unwrap(), 0)
 }
 
@@ -235,7 +236,7 @@ fn a_plant_that_dies_stops_the_tool_and_the_master_is_told_and_its_return_ends_t
         ];
         let mut slave = Running::mmt(&[&options[..], &kept].concat()).unwrap();
         let address = announced(&mut slave, "plant: ");
-        let plant = contrib(&python, "plant.py", &[&address]);
+        let plant = contrib(&python, "plant.py", &address, &[]);
         let pairing = slave
             .wait_for_line(GENEROUS, |line| line.starts_with("mmt://"))
             .unwrap();
@@ -251,7 +252,7 @@ fn a_plant_that_dies_stops_the_tool_and_the_master_is_told_and_its_return_ends_t
         master
             .wait_for_line(GENEROUS, |line| line.contains("EMERGENCY STOP (slave)"))
             .unwrap();
-        let _plant = contrib(&python, "plant.py", &[&address]);
+        let _plant = contrib(&python, "plant.py", &address, &[]);
         slave
             .wait_for_next_line(GENEROUS, |line| line.contains("a plant is plugged in"))
             .unwrap();
@@ -301,8 +302,8 @@ fn a_hand_and_a_plant_in_cpp_meet_over_the_emulated_network() {
         };
         let start = |program: &str, address: &str, more: &str| {
             let mut command = Command::new(program);
-            command.args([address, more]);
-            Running::start(command).unwrap()
+            command.args(["-", more]);
+            Running::start_reading(command, &format!("{address}\n")).unwrap()
         };
         let identity = place.path().join("identity");
         let network = ["--netem", "delay 20ms loss 1%"];

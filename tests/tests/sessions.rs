@@ -1,10 +1,12 @@
 //! What is promised of sessions in real time: one at a time, because each wants two cores.
 
 mod devices;
+mod ends;
 mod endure;
 mod harness;
 mod identity;
 mod independent_client;
+mod judged;
 mod live;
 mod observers;
 mod plugs;

@@ -15,11 +15,10 @@ use mmt_shared::io::emergency::EmergencyStop;
 use mmt_shared::io::identity::Identity;
 use mmt_shared::io::transport::Transport;
 use mmt_shared::io::truth::{self, TruthReceiver, TruthSender};
-use mmt_shared::model::settings::Mode;
 use mmt_shared::pairing::Pairing;
 use mmt_shared::report::{Both, RunReport};
-use mmt_shared::wire::Architecture;
 
+use super::conclusion::conclude;
 use super::console::{self, Desk};
 use super::device::Device;
 use super::netem::wrap::{Emulation, effect};
@@ -36,7 +35,7 @@ use crate::view::{Caption, Screen};
 mod blind;
 mod setting;
 mod study;
-use setting::Setting;
+use setting::{Setting, caption};
 
 /// How long the slave may take to notice that the master has ended before it is asked to end as well.
 const FAREWELL: Duration = Duration::from_secs(3);
@@ -92,13 +91,15 @@ pub(crate) fn run(arguments: &DemoArguments, messages: &Messages) -> Result<(), 
         }
     };
     drop(viewer);
-    emulation.finish()?;
     let Some((report, end)) = ended? else {
         return Ok(());
     };
-    print_report(&report, arguments.json, arguments.full)?;
-    record.finish()?;
-    master::judge(end)
+    conclude([
+        print_report(&report, arguments.json, arguments.full),
+        emulation.finish(),
+        record.finish(),
+        master::judge(end),
+    ])
 }
 
 /// A session of a demo, and the wait for the next.
@@ -261,33 +262,6 @@ fn operated_at(desk: &Desk, options: &mut MasterOptions, blind: bool) {
             driver,
             device: None,
         };
-    }
-}
-
-fn caption(arguments: &DemoArguments, config: &WorldConfig, pairing: &Pairing) -> Caption {
-    let (slave, environment) = (&config.slave, &config.slave.environment);
-    let m = environment.mass_kg;
-    let c = environment.friction_coefficient * m * environment.gravity_m_per_s2;
-    let mode = match slave.mode {
-        Mode::Paper => "paper",
-        Mode::Recommended => "recommended",
-    };
-    let (scheme, seed) = (slave.trigger.scheme, config.seed);
-    let network = match (&config.up, &config.down) {
-        (up, down) if up == down => format!("network each way: {up}"),
-        (up, down) => format!("network up: {up}, down: {down}"),
-    };
-    let mode = match config.architecture {
-        Architecture::Mmt => mode.to_owned(),
-        other => format!("{mode}, {}", other.name()),
-    };
-    Caption {
-        command: "demo",
-        duration_s: Some(arguments.duration.as_secs_f64()),
-        setting: format!("{mode}, {scheme}; {network}; seed {seed}"),
-        slave: pairing.address.to_string(),
-        // of several bodies the one that is touched counts
-        truth: (slave.scene.bodies.is_empty()).then_some([m, environment.damping_ns_per_m, c]),
     }
 }
 

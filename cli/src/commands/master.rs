@@ -27,6 +27,7 @@ use mmt_shared::report::RunReport;
 use serde_json::json;
 use tokio::sync::watch;
 
+use super::conclusion::conclude;
 use super::console::{self, Desk};
 use super::device::{self, Device};
 use super::host::{Host, spawn};
@@ -110,13 +111,15 @@ pub(crate) fn run(arguments: MasterArguments, messages: &Messages) -> Result<(),
     }
     drop(viewer);
     let report = RunReport::from(host.join()?);
-    emulation.finish()?;
-    if let (Some(file), Some(path)) = (&arguments.record_path, &path) {
-        keep_path(file, path)?;
-    }
-    print_report(&report, arguments.json, arguments.full)?;
-    record.finish()?;
-    judge(live.borrow().ended)
+    let kept = arguments.record_path.as_deref().zip(path.as_ref());
+    let end = live.borrow().ended;
+    conclude([
+        print_report(&report, arguments.json, arguments.full),
+        kept.map_or(Ok(()), |(file, path)| keep_path(file, path)),
+        emulation.finish(),
+        record.finish(),
+        judge(end),
+    ])
 }
 
 /// A master host at work and its snapshots.

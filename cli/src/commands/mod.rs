@@ -2,6 +2,7 @@
 
 pub(crate) mod bench;
 pub(crate) mod check;
+mod conclusion;
 pub(crate) mod config;
 mod console;
 pub(crate) mod demo;

@@ -12,6 +12,7 @@ use mmt_netem::{Direction, Effect, LinkConfig};
 use mmt_shared::pairing::Address;
 use serde::Serialize;
 
+use super::conclusion::conclude;
 use crate::args::{NetemArguments, NetemCommand};
 use crate::failure::{Exit, Failure};
 use crate::log::Messages;
@@ -131,7 +132,6 @@ pub(crate) fn run(arguments: &NetemArguments, messages: &Messages) -> Result<(),
     let effects =
         effects.map_err(|_| Failure::failed("the effect of the networks is not known"))?;
     let (effect_up, effect_down) = effects.map_err(Failure::usage)?;
-    files.finish()?;
     let report = NetemReport {
         version: env!("CARGO_PKG_VERSION"),
         command: "netem",
@@ -151,11 +151,12 @@ pub(crate) fn run(arguments: &NetemArguments, messages: &Messages) -> Result<(),
             effect_down,
         },
     };
-    if arguments.json {
+    let printed = if arguments.json {
         print_json(&report)
     } else {
         print(format_args!("\n{report}"))
-    }
+    };
+    conclude([printed, files.finish()])
 }
 
 /// What the networks up and down will do, worked out and printed while they are at work already.

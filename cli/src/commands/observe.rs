@@ -7,6 +7,7 @@ use mmt_netem::Direction;
 use mmt_shared::report::RunReport;
 use tokio::sync::watch;
 
+use super::conclusion::conclude;
 use super::console::{self, Desk};
 use super::host::{Host, spawn};
 use super::master::{host_failure, judge, pairing};
@@ -64,9 +65,11 @@ pub(crate) fn run(arguments: &MasterArguments, messages: &Messages) -> Result<()
     }
     drop(viewer);
     let (report, end) = host.join()?;
-    emulation.finish()?;
-    print_report(&RunReport::from(report), arguments.json, arguments.full)?;
-    judge(Some(end))
+    conclude([
+        print_report(&RunReport::from(report), arguments.json, arguments.full),
+        emulation.finish(),
+        judge(Some(end)),
+    ])
 }
 
 fn options(arguments: &MasterArguments) -> Result<ObserverOptions, Failure> {

@@ -23,6 +23,7 @@ use mmt_shared::wire::Ending;
 use tokio::runtime::Runtime;
 use tokio::sync::watch;
 
+use super::conclusion::conclude;
 use super::host::{Host, spawn};
 use super::identity;
 use super::netem::wrap::{Emulation, effect};
@@ -80,12 +81,31 @@ pub(crate) fn run(arguments: SlaveArguments, messages: &Messages) -> Result<(), 
         watch_sessions(&host, &started.live, viewer);
     }
     let report = host.join()?.map(RunReport::from);
-    emulation.finish()?;
+    let judged = judge(arguments.once, report.as_ref());
     // without a session there is nothing to read
-    if let Some(report) = report.or(arguments.json.then_some(unserved)) {
-        print_report(&report, arguments.json, arguments.full)?;
+    let shown = report.or(arguments.json.then_some(unserved));
+    conclude([
+        shown.map_or(Ok(()), |report| {
+            print_report(&report, arguments.json, arguments.full)
+        }),
+        emulation.finish(),
+        record.finish(),
+        judged,
+    ])
+}
+
+/// Whether the one session that this slave was started for ended as it should. A slave that goes on serving is not judged by its
+/// last one.
+///
+/// # Errors
+/// It did not.
+fn judge<C>(once: bool, report: Option<&RunReport<C>>) -> Result<(), Failure> {
+    let failed = |report: &&RunReport<C>| report.ending == Some(Ending::Failed.name());
+    match report.filter(failed) {
+        Some(_) if once => Err(Failure::failed("the session ended early")
+            .remedy("the message before the report has the reason")),
+        _ => Ok(()),
     }
-    record.finish()
 }
 
 /// A plug for a plant, once one is plugged in; none if somebody ends the command before.
@@ -238,100 +258,4 @@ fn host_failure(error: &SlaveHostError) -> Failure {
 }
 
 #[cfg(test)]
-mod tests {
-    use clap::Parser;
-    use mmt_shared::model::settings::Mode;
-
-    use super::*;
-    use crate::args::{Arguments, Command};
-
-    fn options_of(words: &[&str]) -> SlaveOptions {
-        let home = tempfile::tempdir().unwrap();
-        let identity = home.path().display().to_string();
-        let all = [
-            "mmt",
-            "slave",
-            "--listen",
-            "127.0.0.1:0",
-            "--identity",
-            &identity,
-        ];
-        match Arguments::parse_from(all.iter().chain(words)).command {
-            Command::Slave(arguments) => options(&arguments, home.path()).unwrap(),
-            _ => panic!("not a slave"),
-        }
-    }
-
-    #[test]
-    fn the_command_line_comes_before_the_file_and_the_file_before_the_mode() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("slave.toml");
-        std::fs::write(&path, "seed = 5\nmode = \"paper\"\n").unwrap();
-        let file = path.display().to_string();
-        let from_file = options_of(&["--config", &file]);
-        assert_eq!(
-            (from_file.config.seed, from_file.config.mode),
-            (5, Mode::Paper)
-        );
-        assert_eq!(from_file.netem_seed, 5);
-        let scheme = [
-            "--scheme",
-            "timer 50ms",
-            "--seed",
-            "6",
-            "--mode",
-            "recommended",
-        ];
-        let both = options_of(&[&["--config", file.as_str()], &scheme[..]].concat());
-        assert_eq!((both.config.seed, both.config.mode), (6, Mode::Recommended));
-        assert_eq!(both.config.trigger.scheme.to_string(), "timer 50ms");
-    }
-
-    #[test]
-    fn repeats_and_stretch_are_the_modes_unless_the_file_or_the_command_line_says_otherwise() {
-        let of = |words: &[&str]| {
-            let config = options_of(words).config;
-            (config.repeats_ms.to_string(), config.stretch_max.get())
-        };
-        assert_eq!(of(&[]), ("10ms 30ms".to_owned(), 3.0));
-        assert_eq!(of(&["--mode", "paper"]), ("none".to_owned(), 1.0));
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("slave.toml");
-        std::fs::write(&path, "repeats_ms = [5, 20.5]\nstretch_max = 2\n").unwrap();
-        let file = path.display().to_string();
-        assert_eq!(of(&["--config", &file]), ("5ms 20.5ms".to_owned(), 2.0));
-        let both = ["--config", &file, "--repeats", "none", "--stretch-max", "1"];
-        assert_eq!(of(&both), ("none".to_owned(), 1.0));
-    }
-
-    #[test]
-    fn a_loop_that_has_hung_has_an_exit_code_of_its_own() {
-        assert_eq!(host_failure(&SlaveHostError::Hung).exit(), Exit::Hung);
-        assert_eq!(host_failure(&SlaveHostError::Panicked).exit(), Exit::Failed);
-    }
-
-    #[test]
-    fn a_slave_that_nobody_came_to_still_has_a_report() {
-        let report = unserved(&options_of(&["--once"]));
-        assert_eq!(report.ending, Some("interrupted"));
-        assert_eq!(report.seed, Some(1));
-    }
-
-    #[test]
-    fn a_slave_that_no_other_host_reaches_says_so_and_shows_no_secret() {
-        let pairing = |host: &str| {
-            let text = format!("mmt://{host}:4433?pin={0}&token={0}", "5a".repeat(32));
-            text.parse::<Pairing>().unwrap()
-        };
-        let lost = waiting(&pairing("127.0.0.1"), true);
-        assert!(lost.contains("--advertise"), "{lost}");
-        for (host, everywhere) in [("127.0.0.1", false), ("192.0.2.7", true), ("robot", true)] {
-            let text = waiting(&pairing(host), everywhere);
-            assert!(
-                !text.contains("--advertise") && !text.contains("5a5a"),
-                "{text}"
-            );
-            assert!(text.contains(&format!("{host}:4433")), "{text}");
-        }
-    }
-}
+mod tests;

@@ -52,6 +52,9 @@ pub(crate) fn line(caption: &Caption, history: &History) -> String {
     if let Some(stopped) = now.stopped() {
         let _ = write!(text, "  {stopped}");
     }
+    if let Some(holds) = now.tool_holds() {
+        let _ = write!(text, "  {holds}");
+    }
     if let Some(state) = now.link().filter(|state| *state != LinkState::Fresh) {
         let _ = write!(text, "  link {}", state.name());
     }

@@ -16,6 +16,7 @@ use mmt_server::io::SlaveLive;
 use mmt_shared::channel::peer::Loss;
 use mmt_shared::model::tool::Scene;
 use mmt_shared::model::update::Cause;
+use mmt_shared::wire::ToolState;
 
 pub(crate) use dashboard::render;
 pub(crate) use history::History;
@@ -166,6 +167,17 @@ impl Snapshot {
         let master = self.master.and_then(|master| master.stopped_by);
         let side = master.or(self.slave.and_then(|slave| slave.stopped_by));
         side.map(|side| format!("EMERGENCY STOP ({})", side.name()))
+    }
+
+    /// What keeps the tool from the HIP, in words, as the master knows it; none if nothing does.
+    fn tool_holds(&self) -> Option<&'static str> {
+        let master = self.master?;
+        match (master.tool_state, master.tool_energy_holds) {
+            (ToolState::Hold, _) => Some("tool on hold: it gets no samples"),
+            (ToolState::Disengaged, _) => Some("tool disengaged"),
+            (ToolState::Nominal, true) => Some("tool held by its energy"),
+            (ToolState::Nominal, false) => None,
+        }
     }
 
     /// What does not arrive, up and down.

@@ -28,8 +28,9 @@ pub(super) fn link(caption: &Caption, now: &Snapshot) -> Vec<String> {
     };
     let missing = now.missing();
     let ways = ["up", "down"].into_iter().zip(&missing).map(way);
+    let held = now.tool_holds().map(str::to_owned);
     let state = format!("{state}  rtt {}", shown(now.rtt_ms(), 1, " ms"));
-    std::iter::once(state).chain(ways).collect()
+    std::iter::once(state).chain(ways).chain(held).collect()
 }
 
 /// m, b, c: estimated, true, in use; the force on the hand, pushes.

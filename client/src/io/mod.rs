@@ -38,7 +38,7 @@ use mmt_shared::model::update::Cause;
 use mmt_shared::pairing::Pairing;
 use mmt_shared::range::OutOfRange;
 use mmt_shared::report::MasterSession;
-use mmt_shared::wire::{Architecture, Side};
+use mmt_shared::wire::{Architecture, Side, ToolState};
 use rtrb::Consumer;
 use serde::Serialize;
 
@@ -200,6 +200,10 @@ pub struct MasterLive {
     pub engaged: bool,
     /// Whose emergency stop is set.
     pub stopped_by: Option<Side>,
+    /// What the slave's tool does, by its newest datagram.
+    pub tool_state: ToolState,
+    /// Whether the limit of its energy holds the tool.
+    pub tool_energy_holds: bool,
     /// The person, where one operates.
     pub person: Option<PersonLive>,
     /// What the newest applied update found wrong in the model.

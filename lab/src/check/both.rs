@@ -8,6 +8,17 @@ use mmt_shared::wire::{Datagram, Side};
 
 use super::{Invariant, Verdict};
 
+/// What an end counted until the end.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Totals {
+    /// Datagrams that left.
+    pub(super) sent: u32,
+    /// Those that arrived, each once.
+    pub(super) received: u32,
+    /// Number of the newest.
+    pub(super) newest: u32,
+}
+
 /// One direction.
 #[derive(Clone, Debug)]
 pub struct Way {
@@ -58,6 +69,20 @@ impl Way {
         Some((datagram.envelope.number, digest.value()))
     }
 
+    /// Sent = received + lost + sent after the newest that arrived. Where an enemy sent as well nobody counts that.
+    fn judge_balance(&self, from: Totals, to: Totals, at: Time, verdict: &mut Verdict) {
+        if !self.forged.is_empty() {
+            return;
+        }
+        let (sent, lost) = (self.left.len(), to.newest.saturating_sub(to.received));
+        let after = self.left.range(to.newest.saturating_add(1)..).count();
+        let known = u64::from(to.received) + u64::from(lost) + after as u64;
+        let holds = from.sent as usize == sent && known == sent as u64;
+        verdict.judge(Invariant::CountersBalance, at, holds, || {
+            format!("{sent} datagrams left the {:?}, {after} after the newest that arrived: {from:?} {to:?}", self.from)
+        });
+    }
+
     fn judge(&self, verdict: &mut Verdict) {
         for (at, number, digest) in &self.arrived {
             let holds = self.left.get(number) == Some(digest) || self.forged.contains(digest);
@@ -92,12 +117,13 @@ impl Default for Both {
 }
 
 impl Both {
-    /// What is found of a session that began then, once both ends are known as far as they go.
-    #[must_use]
-    pub fn verdict(&self, began: Time) -> Verdict {
+    /// What is found of a session that began then, once both ends are known as far as they go, and what they counted.
+    pub(super) fn verdict(&self, began: Time, [master, slave]: [Totals; 2]) -> Verdict {
         let mut verdict = Verdict::since(began);
         self.up.judge(&mut verdict);
         self.down.judge(&mut verdict);
+        self.up.judge_balance(master, slave, began, &mut verdict);
+        self.down.judge_balance(slave, master, began, &mut verdict);
         verdict
     }
 }

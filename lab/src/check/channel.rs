@@ -3,15 +3,17 @@
 use std::collections::{BTreeSet, VecDeque};
 use std::time::Duration;
 
+use mmt_shared::channel::datagram_channel::DatagramChannel;
 use mmt_shared::time::Time;
 use mmt_shared::wire::{Datagram, Side};
 
+use super::both::Totals;
 use super::{Invariant, Verdict};
 
 /// At least this often something leaves.
 const HEARTBEAT: Duration = Duration::from_millis(50);
-/// Numbers so far behind the newest are not judged by an end.
-const WINDOW: u32 = 1024;
+/// Numbers so far behind the newest are not judged by an end, and one so far ahead waits for a second.
+pub(super) const WINDOW: u32 = 1024;
 /// An end remembers its departures 10 ms apart: the first without an answer may be this much older than the one it knows.
 const DEPARTURES: Duration = Duration::from_millis(20);
 const TENTH: Duration = Duration::from_millis(100);
@@ -40,8 +42,14 @@ pub(super) struct ChannelChecks {
     round_trips: VecDeque<(Time, Duration, Duration)>,
     latest: Option<Duration>,
     seen: BTreeSet<u32>,
+    /// The last number that was too far ahead.
+    far: u32,
     newest: Option<Newest>,
     received: u32,
+    /// All that arrived, datagrams or not.
+    handled: u64,
+    /// What the end had counted as sent by the last tick.
+    sent: u64,
     last_arrival: Option<Time>,
     /// When the last tick's datagrams left.
     polled: Time,
@@ -59,8 +67,11 @@ impl ChannelChecks {
             round_trips: VecDeque::new(),
             latest: None,
             seen: BTreeSet::new(),
+            far: 0,
             newest: None,
             received: 0,
+            handled: 0,
+            sent: 0,
             last_arrival: None,
             polled: began,
         }
@@ -68,9 +79,15 @@ impl ChannelChecks {
 
     /// A datagram that arrived at `at`; returns it if it is to be handled.
     pub(super) fn arrived(&mut self, at: Time, bytes: &[u8]) -> Option<Datagram> {
+        self.handled += 1;
         let datagram = Datagram::decode(bytes, self.side.other()).ok()?;
         let number = datagram.envelope.number;
         let newest = self.newest.map_or(0, |newest| newest.number);
+        let too_far = number.saturating_sub(newest) >= WINDOW;
+        if too_far && (number == self.far || number.abs_diff(self.far) >= WINDOW) {
+            self.far = number;
+            return None;
+        }
         if number == 0 || newest.saturating_sub(number) >= WINDOW || !self.seen.insert(number) {
             return None;
         }
@@ -88,7 +105,7 @@ impl ChannelChecks {
             self.newest = Some(Newest {
                 number,
                 sent: datagram.envelope.sent,
-                stopped: datagram.stopped,
+                stopped: datagram.flags.stopped,
             });
         }
         Some(datagram)
@@ -148,6 +165,34 @@ impl ChannelChecks {
         self.polled = polled;
     }
 
+    /// What it counted so far.
+    pub(super) fn totals(&self) -> Totals {
+        Totals {
+            sent: self.left.0,
+            received: self.received,
+            newest: self.newest.map_or(0, |newest| newest.number),
+        }
+    }
+
+    /// Whatever arrived or left is counted once: as received, or as dropped under its name; what neither is, is lost.
+    pub(super) fn balances(&mut self, now: Time, channel: &DatagramChannel, verdict: &mut Verdict) {
+        let (counts, incoming) = (channel.counts(), channel.peer().incoming());
+        let newest = self.newest.map_or(0, |newest| newest.number);
+        let (sent, left) = (counts.sent.total(), u64::from(self.left.0));
+        // a record shows an end after what left in the tick, the others show it before
+        let sent_before = std::mem::replace(&mut self.sent, sent);
+        let holds = counts.received.total() + counts.dropped() == self.handled
+            && (sent_before..=sent).contains(&left)
+            && (incoming.expected, incoming.received) == (newest, self.received)
+            && counts.received.total() == u64::from(self.received);
+        verdict.judge(Invariant::CountersBalance, now, holds, || {
+            format!(
+                "{} arrived, {} of them for the first time, the newest is {newest}, {left} left: {counts:?} {incoming:?}",
+                self.handled, self.received
+            )
+        });
+    }
+
     /// A datagram that leaves at `at` while this side's emergency stop is set or not; returns it.
     pub(super) fn left(
         &mut self,
@@ -161,7 +206,7 @@ impl ChannelChecks {
         let number = self.left.0 + 1;
         let holds = datagram.as_ref().is_some_and(|datagram| {
             let envelope = &datagram.envelope;
-            (envelope.number, envelope.sent, datagram.stopped) == (number, at, stops)
+            (envelope.number, envelope.sent, datagram.flags.stopped) == (number, at, stops)
         });
         verdict.judge(Invariant::Numbers, at, holds, || {
             format!("number {number} is due at {at:?} with stop {stops}, and {datagram:?} leaves")

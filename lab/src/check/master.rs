@@ -15,7 +15,8 @@ use mmt_shared::wire::{Command, Datagram, Message, Side};
 
 mod hand;
 
-use super::channel::ChannelChecks;
+use super::both::Totals;
+use super::channel::{ChannelChecks, WINDOW};
 use super::{Invariant, Verdict};
 
 /// The contract's thresholds, not those of the code.
@@ -87,6 +88,8 @@ pub struct MasterChecks {
     /// Since the last tick.
     arrived: Vec<Arrived>,
     accepted: u32,
+    /// The last sequence that was too far ahead.
+    far: u32,
     /// One that came in the hair's breadth between.
     unsure: u32,
     applied: u32,
@@ -113,6 +116,7 @@ impl MasterChecks {
             link: LinkState::Fresh,
             arrived: Vec::new(),
             accepted: 0,
+            far: 0,
             unsure: 0,
             applied: 0,
             samples: VecDeque::new(),
@@ -128,6 +132,10 @@ impl MasterChecks {
         &self.verdict
     }
 
+    pub(super) fn totals(&self) -> Totals {
+        self.channel.totals()
+    }
+
     /// A datagram that arrived.
     pub fn arrived(&mut self, at: Time, bytes: &[u8]) {
         let Some(Datagram { message, .. }) = self.channel.arrived(at, bytes) else {
@@ -136,8 +144,8 @@ impl MasterChecks {
         let Message::Update(update) = message else {
             return;
         };
-        let fresh = update.sequence > self.accepted;
-        if !fresh || update.accept(&self.about.settings.coupling).is_err() {
+        if !self.is_fresh(update.sequence) || update.accept(&self.about.settings.coupling).is_err()
+        {
             return;
         }
         let (silence, most) = self.channel.silence(at);
@@ -164,6 +172,16 @@ impl MasterChecks {
         }
     }
 
+    /// Whether an update may be applied by its sequence: beyond the newest, and either near it or not alone there.
+    fn is_fresh(&mut self, sequence: u32) -> bool {
+        let ahead = sequence.saturating_sub(self.accepted);
+        let is_alone = ahead >= WINDOW && sequence.abs_diff(self.far) >= WINDOW;
+        if is_alone {
+            self.far = sequence;
+        }
+        ahead > 0 && !is_alone
+    }
+
     /// How many ticks there have been since a stamp: where a process stood still nothing has moved.
     fn ticks_since(&self, stamp: Time) -> u32 {
         let before = self.stamps.partition_point(|tick| *tick <= stamp);
@@ -183,6 +201,7 @@ impl MasterChecks {
         self.stops = tick.given.stops;
         self.channel
             .ticked(tick.now, tick.polled, &mut self.verdict);
+        self.judge_counters(tick);
         self.judge_link(tick);
         self.judge_updates(tick);
         self.judge_force(tick);
@@ -190,6 +209,24 @@ impl MasterChecks {
         self.judge_sample(tick);
         self.link = tick.done.link;
         self.force = tick.done.hand_force;
+    }
+
+    /// Each update that arrived was applied or dropped under its name.
+    fn judge_counters(&mut self, tick: &MasterTicked<'_>) {
+        let (now, end) = (tick.now, tick.end);
+        self.channel.balances(now, end.channel(), &mut self.verdict);
+        let arrived = end.channel().counts().received.updates;
+        let (applied, drops) = (end.master().applied(), end.update_drops());
+        let dropped = drops
+            .by_name()
+            .iter()
+            .map(|(_, number)| number)
+            .sum::<u64>();
+        let holds = applied.iter().sum::<u64>() + dropped == arrived;
+        self.verdict
+            .judge(Invariant::CountersBalance, now, holds, || {
+                format!("{arrived} updates arrived, {applied:?} by cause are applied, {drops:?}")
+            });
     }
 
     fn judge_link(&mut self, tick: &MasterTicked<'_>) {

@@ -152,9 +152,13 @@ impl RecordChecks {
             .for_each(|(.., verdict)| sum.add(verdict.clone()));
         let whole = whole && self.again.ran().all(|(.., ran)| !ran.has_gap) && !self.differs;
         if whole && self.masters.len() == self.slaves.len() {
-            self.both
-                .values()
-                .for_each(|both| sum.add(both.verdict(Time::ZERO)));
+            for (session, both) in &self.both {
+                let (master, slave) = (self.masters.get(session), self.slaves.get(session));
+                if let (Some(master), Some(slave)) = (master, slave) {
+                    let ends = [master.totals(), slave.totals()];
+                    sum.add(both.verdict(Time::ZERO, ends));
+                }
+            }
         }
         let times: Vec<_> = self.times.values().collect();
         for pair in times.windows(2) {

@@ -110,7 +110,8 @@ impl SessionChecks {
 
     /// What was found so far.
     pub(crate) fn verdict(&self) -> Verdict {
-        let mut sum = self.both.verdict(self.began);
+        let ends = [self.master.totals(), self.slave.totals()];
+        let mut sum = self.both.verdict(self.began, ends);
         sum.add(self.master.verdict().clone());
         sum.add(self.slave.verdict().clone());
         sum

@@ -6,7 +6,6 @@ use std::time::Duration;
 use mmt_server::end::{SlaveEnd, SlaveGiven};
 use mmt_server::playout::PlayoutCounts;
 use mmt_server::slave::{SlaveConfig, SlaveTick};
-use mmt_server::trigger::MismatchMetric;
 use mmt_shared::model::contact::Coupling;
 use mmt_shared::model::geometry::Vec2;
 use mmt_shared::model::sample::ForceCounts;
@@ -15,7 +14,9 @@ use mmt_shared::time::{TICK, Time};
 use mmt_shared::wire::{Datagram, Message, RawState, Side};
 
 mod tool;
+mod trigger;
 
+use super::both::Totals;
 use super::channel::ChannelChecks;
 use super::{Invariant, Verdict};
 
@@ -87,12 +88,21 @@ pub struct SlaveChecks {
     /// What play-out had counted by the last tick.
     counts: PlayoutCounts,
     played: Option<Time>,
+    /// How many samples arrived, repeats as well, and how many updates were made.
+    arrived: u64,
+    updates: u64,
     acknowledged: BTreeSet<u32>,
     /// Numbers and causes of updates that no command has acknowledged, or of late: the samples say it later. And what had been ticked
     /// by then.
     unconfirmed: Vec<(u32, Duration, Cause)>,
     /// All that has been ticked.
     lived: Duration,
+    /// Updates that the slave knows to be lost, and the newest that it knows to be there.
+    losses: (u64, u32),
+    /// When the trigger last sent something, or began.
+    updated: Option<Time>,
+    /// Whether the slave's own trigger decides.
+    is_own_scheme: bool,
     /// The newest update as it was made, and as it left.
     made: Option<Update>,
     left: Option<Update<RawState>>,
@@ -119,7 +129,12 @@ impl SlaveChecks {
             doubtful: BTreeSet::new(),
             counts: PlayoutCounts::default(),
             played: None,
+            arrived: 0,
+            updates: 0,
             acknowledged: BTreeSet::from([0]),
+            losses: (0, 0),
+            updated: None,
+            is_own_scheme: true,
             unconfirmed: Vec::new(),
             lived: Duration::ZERO,
             made: None,
@@ -134,6 +149,10 @@ impl SlaveChecks {
         &self.verdict
     }
 
+    pub(super) fn totals(&self) -> Totals {
+        self.channel.totals()
+    }
+
     /// A datagram that arrived.
     pub fn arrived(&mut self, at: Time, bytes: &[u8]) {
         let Some(Datagram { message, .. }) = self.channel.arrived(at, bytes) else {
@@ -142,6 +161,7 @@ impl SlaveChecks {
         let Message::Command(command) = message else {
             return;
         };
+        self.arrived += command.samples.len() as u64;
         self.acknowledged.insert(command.newest_update);
         self.confirm(command.newest_update);
         if self.disengaged {
@@ -223,9 +243,11 @@ impl SlaveChecks {
                 self.judge_force(tick.now, done);
             }
             self.judge_play(tick.now, done);
+            self.judge_trigger(tick, done);
             self.judge_update(tick.now, done);
             self.tool = done.tool;
         }
+        self.judge_counters(tick);
         let confirmed = tick.end.slave().shadow().newest_confirmed();
         let sent = self.left.map_or(0, |left| left.sequence);
         let holds = confirmed <= sent && self.acknowledged.contains(&confirmed);
@@ -234,6 +256,20 @@ impl SlaveChecks {
                 format!("update {confirmed} is taken for confirmed, {sent} is the newest that left")
             });
         self.ticked = tick.now;
+    }
+
+    /// Each sample that arrived was played out or dropped, and each update but the one that waits left or was dropped.
+    fn judge_counters(&mut self, tick: &SlaveTicked<'_>) {
+        let (now, end, counts) = (tick.now, tick.end, tick.end.counts());
+        self.channel.balances(now, end.channel(), &mut self.verdict);
+        let samples = counts.samples + counts.samples_disengaged;
+        let became = counts.updates.total() + counts.updates_superseded + counts.updates_unsent;
+        let (arrived, made) = (self.arrived, self.updates);
+        let holds = samples == arrived && (became == made || became + 1 == made);
+        self.verdict
+            .judge(Invariant::CountersBalance, now, holds, || {
+                format!("{arrived} samples arrived, {made} updates were made: {counts:?}")
+            });
     }
 
     fn judge_play(&mut self, now: Time, done: &SlaveTick) {
@@ -280,39 +316,5 @@ impl SlaveChecks {
             .iter()
             .flat_map(|a| to.iter().map(move |b| mix(a.newtons(), b.newtons())));
         Some(pairs.collect())
-    }
-
-    fn judge_update(&mut self, now: Time, done: &SlaveTick) {
-        let Some(update) = done.update else {
-            return;
-        };
-        let touches = done.in_contact;
-        // what was lost is sent again, whatever is touched by now
-        let again = self
-            .unconfirmed
-            .iter()
-            .any(|(.., cause)| *cause == update.cause);
-        // a touch of another body shows the master that body, also after the touch
-        let lone = self.about.config.scene.bodies.len() < 2;
-        let metric = self.about.config.trigger.metric;
-        let fits = !lone
-            || match update.cause {
-                Cause::MasterOnlyContact | Cause::ContactLost | Cause::Elsewhere => !touches,
-                Cause::SlaveOnlyContact => touches,
-                // parameters and pose can differ in free space
-                Cause::Deadband => touches || metric != MismatchMetric::Force,
-                Cause::Timer | Cause::EverySample => true,
-            };
-        let holds =
-            (fits || again) && update.slave_in_contact == touches && update.answers == done.stamp;
-        self.verdict.judge(Invariant::UpdateCause, now, holds, || {
-            format!(
-                "{:?} with contact {touches} at {:?}, answering {:?}",
-                update.cause, done.stamp, update.answers
-            )
-        });
-        self.made = Some(update);
-        self.unconfirmed
-            .push((update.sequence, self.lived, update.cause));
     }
 }

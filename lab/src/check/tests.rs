@@ -11,6 +11,7 @@ use mmt_client::master::{Master, MasterTick};
 use mmt_server::end::{SlaveEnd, SlaveGiven};
 use mmt_server::slave::{SlaveConfig, SlaveTick};
 use mmt_shared::model::geometry::Vec2;
+use mmt_shared::model::update::Cause;
 use mmt_shared::pairing::Token;
 use mmt_shared::time::{TICK, Time};
 use mmt_shared::wire::{
@@ -18,6 +19,8 @@ use mmt_shared::wire::{
 };
 
 use super::*;
+
+mod trigger;
 
 /// What is changed between the ends and their judges.
 #[derive(Clone, Copy)]
@@ -58,8 +61,11 @@ fn hello() -> Hello {
 
 impl Shown {
     fn new(change: Change) -> Self {
+        Self::of(SlaveConfig::default(), change)
+    }
+
+    fn of(config: SlaveConfig, change: Change) -> Self {
         let (hello, began) = (hello(), Time::from_millis(10));
-        let config = SlaveConfig::default();
         let slave = SlaveEnd::of_session(began, &config, &hello, None).unwrap();
         let welcome = slave.slave().welcome(Token::new([0; 32]), "any", "test");
         let limits = DeviceProfile::default().limits();
@@ -206,6 +212,8 @@ fn a_session_that_keeps_its_promises_is_found_to_and_each_lie_is_found_out() {
         I::UpdateTrue,
         I::ToolStops,
         I::PlaysTrue,
+        I::TriggerFires,
+        I::CountersBalance,
     ] {
         let looked = verdict
             .judged()
@@ -249,7 +257,10 @@ fn a_session_that_keeps_its_promises_is_found_to_and_each_lie_is_found_out() {
             Change::Up(|of| command(of, |command| command.newest_update += 1)),
         ),
         (I::Numbers, Change::Up(|of| of.envelope.number += 1)),
-        (I::Numbers, Change::Down(|of| of.stopped = !of.stopped)),
+        (
+            I::Numbers,
+            Change::Down(|of| of.flags.stopped = !of.flags.stopped),
+        ),
         (I::EchoTrue, Change::Down(|of| of.envelope.echo = None)),
         (I::Heartbeat, Change::Hidden(|_| true)),
         (
@@ -277,7 +288,7 @@ fn a_session_that_keeps_its_promises_is_found_to_and_each_lie_is_found_out() {
             Change::Slave(|done| done.f_m = done.f_m.map(|f_m| f_m * 1.01)),
         ),
     ];
-    let more: [(Invariant, Change); 5] = [
+    let more: [(Invariant, Change); 8] = [
         (
             I::PlaysInOrder,
             Change::Slave(|done| {
@@ -295,6 +306,17 @@ fn a_session_that_keeps_its_promises_is_found_to_and_each_lie_is_found_out() {
             }),
         ),
         (I::UpdateTrue, Change::Slave(|done| done.update = None)),
+        (I::CountersBalance, Change::Slave(|done| done.update = None)),
+        (I::CountersBalance, Change::Hidden(|_| true)),
+        (
+            I::TriggerFires,
+            Change::Slave(|done| {
+                done.in_contact = false;
+                if let Some(update) = &mut done.update {
+                    update.cause = Cause::Timer;
+                }
+            }),
+        ),
         (
             I::ShadowConfirmed,
             Change::Arrives(|of| command(of, |command| command.newest_update = 0)),

@@ -264,7 +264,8 @@ fn sensing_judges_by_the_true_force_and_conditioning_changes_nothing_that_is_sou
 }
 
 #[test]
-fn stiffness_that_is_the_rendered_one_changes_nothing_and_a_compliant_tool_mends_a_stiffer_one() {
+fn stiffness_that_is_the_rendered_one_changes_nothing_a_compliant_tool_mends_a_stiffer_one_and_telling_a_softer_one()
+ {
     let done = Done::of(&stiffness::EXPERIMENT, 8000);
     let of = |tool, times, key| {
         done.number(
@@ -277,6 +278,15 @@ fn stiffness_that_is_the_rendered_one_changes_nothing_and_a_compliant_tool_mends
     for times in ["5", "10"] {
         let [stiff, compliant] = ["stiff", "compliant"].map(|tool| of(tool, times, "pmse_true"));
         assert!(compliant < 0.8 * stiff, "{times}: {compliant} and {stiff}");
+    }
+    // a device that is told the stiffness it has changes nothing; one that is told a softer one mends it
+    for key in ["pmse_true", "packet_rate_hz", "relative_error_true"] {
+        assert_eq!(of("told", "1", key), of("stiff", "1", key), "{key}");
+    }
+    for times in ["0.3", "0.5"] {
+        let [stiff, told] = ["stiff", "told"].map(|tool| of(tool, times, "pmse_true"));
+        assert!(told < 0.8 * stiff, "{times}: {told} and {stiff}");
+        assert!(of("told", times, "pmse_ratio") <= 2.0, "{times}");
     }
 }
 

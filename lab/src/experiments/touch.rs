@@ -113,10 +113,12 @@ impl Start {
     }
 
     fn slave(&self) -> Result<Slave, ExperimentError> {
-        let config = SlaveConfig {
+        let mut config = SlaveConfig {
             environment: self.environment,
             ..SlaveConfig::default()
         };
+        // this hand feels nothing, so it would be credited with no work
+        config.tool_energy.bounded = false;
         let made = Slave::try_new(&config, self.coupling);
         Ok(made.map_err(|wrong| TrialError::World(wrong.into()))?)
     }

@@ -8,6 +8,7 @@ use serde::Serialize;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
+use super::idle::idle;
 use super::{Layers, SEED_KEYS, at, named, within};
 use crate::overlay::{lay, lay_at};
 use crate::text_error::TextError;
@@ -79,7 +80,8 @@ impl Layers<'_> {
     /// As [`Layers::config`].
     pub fn known(&self) -> Result<Vec<Known>, TextError> {
         let given = self.given()?;
-        let whole = whole(&self.config()?);
+        let config = self.config()?;
+        let whole = whole(&config);
         let mut keys = Vec::new();
         let read = |error| TextError::of("", &error);
         let tree = toml::Value::try_from(&whole)
@@ -89,7 +91,7 @@ impl Layers<'_> {
             unit: unit_of(&key),
             accepted: accepted(&whole, &key, value.as_ref()),
             origin: self.origin(&given, &key),
-            in_force: self.program.uses(&key),
+            in_force: self.program.uses(&key) && idle(&config, &key).is_none(),
             value: value.map(|value| value.to_string()),
             key,
         });

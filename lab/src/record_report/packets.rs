@@ -83,10 +83,17 @@ struct Kind {
     sent: Option<u64>,
     repeated: Option<u64>,
     lost: Option<u64>,
-    fates: [u64; 5],
+    fates: [u64; 6],
 }
 
-const FATES: [&str; 5] = ["newest", "reordered", "duplicate", "too_old", "malformed"];
+const FATES: [&str; 6] = [
+    "newest",
+    "reordered",
+    "duplicate",
+    "too_old",
+    "implausible",
+    "malformed",
+];
 
 impl Matched<'_> {
     /// Whether a datagram was lost on the way; none if nobody can tell. What left after the newest that arrived may
@@ -149,7 +156,8 @@ impl Matched<'_> {
                 column("reordered", "", 0, fate::<1>),
                 column("duplicate", "", 0, fate::<2>),
                 column("too_old", "", 0, fate::<3>),
-                column("malformed", "", 0, fate::<4>),
+                column("implausible", "", 0, fate::<4>),
+                column("malformed", "", 0, fate::<5>),
             ],
         )
     }

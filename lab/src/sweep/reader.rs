@@ -10,6 +10,7 @@ use serde::de::IgnoredAny;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue, Deserializer};
 
+use super::given::{Given, outdone};
 use super::placed::{AxisHead, PlacedAxis, placed_axis};
 use super::plan::{Plan, ROWS_MAX, Seeds, Start, steps};
 use super::start::beginning;
@@ -140,6 +141,12 @@ impl<'i> Reader<'i> {
             axes: axes.collect::<Result<_, _>>()?,
         };
         reader.check_keys()?;
+        outdone(
+            text,
+            reader.below.get_ref(),
+            reader.base.get_ref(),
+            &reader.axes,
+        )?;
         Ok(reader)
     }
 
@@ -208,17 +215,21 @@ impl<'i> Reader<'i> {
     fn points(&self, change: Option<Change>) -> Result<Vec<WorldConfig>, TextError> {
         let sizes: Vec<usize> = self.axes.iter().map(|axis| axis.steps.len()).collect();
         let points = 0..sizes.iter().product();
-        points
+        let mut given = Given::of(self.base.get_ref(), &self.axes);
+        let points = points
             .map(|point| {
                 let steps: Vec<Option<usize>> =
                     steps(point, &sizes).into_iter().map(Some).collect();
                 let config = self.config(&steps)?;
                 match attempt(&config, change) {
-                    Ok(()) => Ok(config),
-                    Err(error) => Err(self.refused(&steps, change, &error)),
+                    Ok(()) => given.see(&config),
+                    Err(error) => return Err(self.refused(&steps, change, &error)),
                 }
+                Ok(config)
             })
-            .collect()
+            .collect::<Result<_, _>>()?;
+        given.refused(self.text)?;
+        Ok(points)
     }
 
     /// The configuration with each axis at a step, or left out.

@@ -36,12 +36,21 @@ impl SlaveEnd {
             force: slave.force().summary(),
             true_force: slave.true_force(),
             model: model(slave),
-            tool: ToolReport {
-                held_s: (slave.tool_force().held_ticks() as f64 * TICK_S).into(),
-                force_peak_n: slave.tool_force().peak_n().into(),
-            },
+            tool: tool(slave),
             playout_delay_ms: slave.playout().delays().into(),
         }
+    }
+}
+
+fn tool(slave: &Slave) -> ToolReport {
+    let (force, energy) = (slave.tool_force(), slave.tool_energy());
+    let seconds = |ticks: u64| (ticks as f64 * TICK_S).into();
+    ToolReport {
+        held_s: seconds(force.held_ticks()),
+        force_peak_n: force.peak_n().into(),
+        work_j: energy.tool_j().into(),
+        hand_work_j: energy.hand_j().into(),
+        energy_held_s: seconds(energy.held_ticks()),
     }
 }
 

@@ -417,3 +417,45 @@ fn a_hello_far_away_starts_within_reach() {
     slave.start_at(Vec2::new(-0.45, 0.0));
     assert_eq!(slave.tool_at(), Vec2::new(-0.45, 0.0));
 }
+
+#[test]
+fn a_slave_without_samples_shows_hold_after_100_ms_and_disengaged_after_2_s() {
+    let mut end = end("none", Architecture::Mmt, 0);
+    let mut master = DatagramChannel::new(Side::Master, Time::ZERO);
+    let bytes = command(&mut master, 10, 1..=10, 0, None);
+    end.handle_datagram(AT(10), &bytes);
+    let mut shown = Vec::new();
+    for ms in 11..=2200 {
+        end.tick(AT(ms));
+        sent(&mut end, &mut master, AT(ms));
+        let state = master.other().tool;
+        if shown.last().is_none_or(|(_, last)| *last != state) {
+            shown.push((ms, state));
+        }
+    }
+    let states: Vec<ToolState> = shown.iter().map(|(_, state)| *state).collect();
+    assert_eq!(states, ToolState::ALL);
+    let [(_, _), (hold, _), (disengaged, _)] = shown[..] else {
+        panic!("{shown:?}");
+    };
+    // with the next heartbeat, 50 ms later at the most
+    assert!((110..=170).contains(&hold), "{hold} ms");
+    assert!((2010..=2070).contains(&disengaged), "{disengaged} ms");
+    // a sample ends a hold
+    let mut end = self::end("none", Architecture::Mmt, 0);
+    let mut master = DatagramChannel::new(Side::Master, Time::ZERO);
+    for (from, until) in [(0, 300), (300, 400)] {
+        let bytes = command(&mut master, from + 10, from + 1..=from + 10, 0, None);
+        end.handle_datagram(AT(from + 10), &bytes);
+        for ms in from + 11..=until {
+            end.tick(AT(ms));
+            sent(&mut end, &mut master, AT(ms));
+            if ms == 290 {
+                assert_eq!(master.other().tool, ToolState::Hold);
+            }
+            if ms == 380 {
+                assert_eq!(master.other().tool, ToolState::Nominal);
+            }
+        }
+    }
+}

@@ -20,7 +20,7 @@ use mmt_shared::wire::{
     DecodeError, Hello, Refusal, Role, STREAM_MESSAGE_MAX, Side, StreamMessage,
 };
 use tokio::sync::{OwnedSemaphorePermit, mpsc, watch};
-use tokio::task::JoinSet;
+use tokio::task::{JoinError, JoinSet};
 use tokio::time::timeout;
 
 use super::crowd::{Crowd, Place};
@@ -67,6 +67,8 @@ pub(super) struct Refusals {
     pub(super) no_hello: AtomicU64,
     /// Had to leave before a token was shown, for others who came.
     pub(super) crowded: AtomicU64,
+    /// Judged, or looking on, when the task for it panicked: our bug.
+    pub(super) panicked: AtomicU64,
 }
 
 impl Refusals {
@@ -135,15 +137,39 @@ impl Acceptor {
 
     /// Judges everybody who connects until the endpoint is closed. Dropping it drops who is being judged.
     pub(super) async fn run(self, listener: Arc<Listener>) {
+        self.run_with(listener, Self::judge).await;
+    }
+
+    /// The same with a judge of the caller's making.
+    pub(super) async fn run_with<J>(
+        self,
+        listener: Arc<Listener>,
+        judge: impl Fn(Self, Handshake, Place) -> J,
+    ) where
+        J: Future<Output = ()> + Send + 'static,
+    {
         let mut judged = JoinSet::new();
-        while let Some(handshake) = listener.next().await {
-            while judged.try_join_next().is_some() {}
-            let place = self.crowd.enter(&handshake.address());
-            judged.spawn(self.clone().judge(handshake, place));
+        loop {
+            tokio::select! {
+                handshake = listener.next() => {
+                    let Some(handshake) = handshake else { return };
+                    let place = self.crowd.enter(&handshake.address());
+                    judged.spawn(judge(self.clone(), handshake, place));
+                }
+                Some(ended) = judged.join_next() => self.note_end(&ended),
+            }
         }
     }
 
-    async fn judge(self, handshake: Handshake, place: Place) {
+    /// A task that panicked ends nothing else: nobody who finds a bug of ours may end the owner's session.
+    fn note_end(&self, ended: &Result<(), JoinError>) {
+        if ended.as_ref().is_err_and(JoinError::is_panic) {
+            count(&self.refusals.panicked);
+            tracing::error!("the task of a connection panicked: please report what stands above");
+        }
+    }
+
+    pub(super) async fn judge(self, handshake: Handshake, place: Place) {
         let address = handshake.address();
         let finished = tokio::select! {
             finished = handshake.finish() => finished,

@@ -101,7 +101,7 @@ impl Context {
     }
 
     /// Who and what was turned away since the host was started, by name.
-    pub(super) fn refusals(&self) -> [(&'static str, u64); 11] {
+    pub(super) fn refusals(&self) -> [(&'static str, u64); 12] {
         let read = |counter: &AtomicU64| counter.load(Ordering::Relaxed);
         let refusals = &self.refusals;
         [
@@ -114,6 +114,7 @@ impl Context {
             ("masters_no_hello", read(&refusals.no_hello)),
             ("masters_crowded", read(&refusals.crowded)),
             ("handshakes_failed", read(&refusals.handshake)),
+            ("handshakes_panicked", read(&refusals.panicked)),
             ("handshakes_unreadable", self.listener.unreadable()),
             (
                 "observer_commands_refused",

@@ -7,6 +7,7 @@ mod master;
 mod observers;
 mod opening;
 mod relay;
+mod under_way;
 
 use std::sync::Arc;
 use std::time::Duration;

@@ -1,5 +1,6 @@
 //! What play-out gives in a tick, and the counts of what happened to the samples.
 
+use crate::tool::energy::HandSample;
 use mmt_shared::model::geometry::Vec2;
 use mmt_shared::time::Time;
 use serde::{Deserialize, Serialize};
@@ -29,6 +30,8 @@ pub struct Played {
     /// `f_m` that the master rendered for this HIP, N; none where the HIP is not the master's: extrapolated,
     /// stopped or held back by the limits of the tool.
     pub force: Option<Vec2>,
+    /// Where the master's hand is, whatever the limits of the tool are; none where no samples show it.
+    pub hand: Option<HandSample>,
     /// Where it comes from.
     pub status: Status,
     /// How long the tick took, s: more than a tick's period after ticks that were missed.

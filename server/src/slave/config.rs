@@ -15,6 +15,7 @@ use crate::playout::PlayoutConfig;
 use crate::repeats::Repeats;
 use crate::sensing::{SensingConfig, SensingError, VisionConfig};
 use crate::shadow::TriggerReference;
+use crate::tool::energy::EnergyConfig;
 use crate::tool::force::TOOL_FORCE_MAX_N;
 use crate::trigger::TriggerConfig;
 
@@ -66,6 +67,8 @@ pub struct SlaveConfig {
     pub playout: PlayoutConfig,
     /// The tool presses with no more than this on what it touches, N. Default 15: the hand's device gives 8.
     pub tool_force_max_n: f64,
+    /// The tool gives no more energy than the hand gave, and a budget.
+    pub tool_energy: EnergyConfig,
     /// A spring that the tool gives by under the measured force, for contacts that are stiffer than the rendered one.
     /// Default: none.
     pub tool_compliance: Option<Coupling>,
@@ -109,6 +112,10 @@ impl SlaveConfig {
             conditioning: ConditioningConfig::of_mode(mode),
             playout: PlayoutConfig::default(),
             tool_force_max_n: TOOL_FORCE_MAX_N,
+            tool_energy: EnergyConfig {
+                bounded: mode == Mode::Recommended,
+                ..EnergyConfig::default()
+            },
             tool_compliance: None,
             estimator: None,
             trigger: TriggerConfig::of_mode(mode),

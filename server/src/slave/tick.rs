@@ -43,13 +43,14 @@ impl Slave {
         let mut contact = self.contact.step(now, tool, played.velocity - rate);
         // the spring of the tool is part of the contact that the model renders
         contact.tool += back;
-        self.tool.measured(contact.force);
+        self.tool.measured(tool, contact.force, contact.in_contact);
         let held_back = self.tool.is_held_back();
         if self.object.follow_body(&contact) {
             // the master has the body that was touched before
             self.trigger.repeat(Cause::SlaveOnlyContact);
         }
-        let measured = self.object.step(now, &contact, held_back);
+        let force_holds = self.tool.force_holds();
+        let measured = self.object.step(now, &contact, force_holds);
         if self.object.observer.sees_clear() {
             self.contact.see_clear();
         }

@@ -9,7 +9,7 @@ use crate::channel::peer::{Arrival, NumbersSpent, Peer};
 use crate::channel::rate_control::{RateController, StretchMax};
 use crate::stats::session::ChannelCounts;
 use crate::time::Time;
-use crate::wire::{Datagram, Message, Side};
+use crate::wire::{Datagram, Flags, Message, Side, ToolState};
 
 /// Each side sends at least this often: what is needed to call a link dead within a second and to keep
 /// the round-trip time fresh, and twenty small packets a second at the most.
@@ -33,8 +33,9 @@ pub struct DatagramChannel {
     began: Time,
     last_sent: Time,
     rate: RateController,
-    stopped: bool,
-    other_stopped: bool,
+    /// What the datagrams of this side show of it, and what the other's newest shows.
+    flags: Flags,
+    other: Flags,
 }
 
 impl DatagramChannel {
@@ -52,8 +53,8 @@ impl DatagramChannel {
             began: now,
             last_sent: now,
             rate: RateController::new(stretch_max),
-            stopped: false,
-            other_stopped: false,
+            flags: Flags::default(),
+            other: Flags::default(),
         }
     }
 
@@ -65,7 +66,7 @@ impl DatagramChannel {
             return None;
         };
         let Datagram {
-            stopped,
+            flags,
             envelope,
             message,
         } = datagram;
@@ -75,12 +76,13 @@ impl DatagramChannel {
             Arrival::Newest | Arrival::Reordered => self.counts.received.count(message.kind()),
             Arrival::Duplicate => self.counts.datagrams_duplicate += 1,
             Arrival::TooOld => self.counts.datagrams_too_old += 1,
+            Arrival::Implausible => self.counts.datagrams_implausible += 1,
         }
         if self.peer.round_trip().histogram().total() > measured {
             self.control_rate(now);
         }
         if arrival == Arrival::Newest {
-            self.other_stopped = stopped;
+            self.other = flags;
         }
         matches!(arrival, Arrival::Newest | Arrival::Reordered).then_some(Received {
             message,
@@ -113,7 +115,7 @@ impl DatagramChannel {
     ) -> Result<Option<usize>, NumbersSpent> {
         let envelope = self.peer.stamp(now)?;
         let datagram = Datagram {
-            stopped: self.stopped,
+            flags: self.flags,
             envelope,
             message,
         };
@@ -128,13 +130,28 @@ impl DatagramChannel {
 
     /// Sets or clears this side's emergency stop, which every datagram from now on carries.
     pub fn stop(&mut self, stopped: bool) {
-        self.stopped = stopped;
+        self.flags.stopped = stopped;
+    }
+
+    /// What the tool does, which every datagram from now on carries: the slave's side alone has one.
+    pub fn show_tool(&mut self, tool: ToolState, energy_holds: bool) {
+        self.flags.tool = tool;
+        self.flags.energy_holds = energy_holds;
+    }
+
+    /// What the newest datagram of the other side shows of it.
+    pub fn other(&self) -> Flags {
+        self.other
     }
 
     /// Whose emergency stop is set, this side's before the other's, as far as its newest datagram shows; none if neither's.
     pub fn stopped_by(&self) -> Option<Side> {
-        let other = self.other_stopped.then(|| self.side.other());
-        if self.stopped { Some(self.side) } else { other }
+        let other = self.other.stopped.then(|| self.side.other());
+        if self.flags.stopped {
+            Some(self.side)
+        } else {
+            other
+        }
     }
 
     /// When a heartbeat must go out if nothing else does before.

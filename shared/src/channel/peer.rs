@@ -45,6 +45,8 @@ pub enum Arrival {
     Duplicate,
     /// So old that nobody knows whether it was received before: drop it. It stays counted as lost.
     TooOld,
+    /// So far beyond the newest that one datagram alone does not show that the numbers have gone on: drop it.
+    Implausible,
 }
 
 /// What has been counted in one direction.
@@ -142,6 +144,7 @@ impl Peer {
             window::Place::Gap => Arrival::Reordered,
             window::Place::Taken => Arrival::Duplicate,
             window::Place::Behind => Arrival::TooOld,
+            window::Place::Implausible => Arrival::Implausible,
         };
         if matches!(arrival, Arrival::Newest | Arrival::Reordered) {
             self.received = self.received.saturating_add(1);

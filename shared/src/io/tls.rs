@@ -146,8 +146,18 @@ mod tests {
     use super::*;
 
     fn verdict(verifier: &PinVerifier, certificate: &CertificateDer<'_>) -> Result<(), Error> {
+        verdict_in(0, verifier, certificate)
+    }
+
+    /// The same so many years after 1970.
+    fn verdict_in(
+        years: u64,
+        verifier: &PinVerifier,
+        certificate: &CertificateDer<'_>,
+    ) -> Result<(), Error> {
         let name = ServerName::try_from("anything").unwrap();
-        let now = UnixTime::since_unix_epoch(std::time::Duration::ZERO);
+        let year_s = 365 * 24 * 3600;
+        let now = UnixTime::since_unix_epoch(std::time::Duration::from_secs(years * year_s));
         verifier
             .verify_server_cert(certificate, &[], &name, &[], now)
             .map(|_| ())
@@ -164,6 +174,17 @@ mod tests {
         assert_eq!(verifier.refused(), None);
         assert!(verdict(&verifier, &other.certificate()).is_err());
         assert_eq!(verifier.refused(), Some(other.pin()));
+    }
+
+    #[test]
+    fn the_dates_of_a_certificate_do_not_count() {
+        let identity = Identity::ephemeral().unwrap();
+        let verifier = PinVerifier::new(identity.pin());
+        // it names 1975 to 4096
+        for years in [0, 50, 3000] {
+            let verdict = verdict_in(years, &verifier, &identity.certificate());
+            assert_eq!(verdict, Ok(()), "{years}");
+        }
     }
 
     #[test]

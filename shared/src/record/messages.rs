@@ -255,7 +255,7 @@ messages! {
         update: u32,
         /// Of an update why it was sent, else empty.
         cause: String,
-        /// sent or repeated; newest, reordered, duplicate, too_old or malformed where it arrived.
+        /// sent or repeated; newest, reordered, duplicate, too_old, implausible or malformed where it arrived.
         fate: String,
     }
     /// Parameters of the model.

@@ -36,6 +36,7 @@ impl PacketWatch {
                 Arrival::Reordered => "reordered",
                 Arrival::Duplicate => "duplicate",
                 Arrival::TooOld => "too_old",
+                Arrival::Implausible => "implausible",
             },
         };
         self.packet(stamp, from, bytes, decoded.ok().as_ref(), fate)
@@ -100,11 +101,11 @@ fn kind(message: &Message) -> &'static str {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::wire::{DATAGRAM_MAX, Envelope};
+    use crate::wire::{DATAGRAM_MAX, Envelope, Flags};
 
     fn heartbeat(number: u32) -> Vec<u8> {
         let datagram = Datagram {
-            stopped: false,
+            flags: Flags::default(),
             envelope: Envelope {
                 number,
                 sent: Time::from_millis(3),

@@ -128,4 +128,6 @@ pub struct PassivityReport {
     pub energy_injected_j: Number,
     /// The least that the passivity observer at the hand ever showed, J.
     pub observer_min_j: Number,
+    /// What it showed at the end, J: the work of the hand.
+    pub hand_work_j: Number,
 }

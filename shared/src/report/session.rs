@@ -62,6 +62,7 @@ impl SessionStats {
             incoming: peer.incoming(),
             drops: named([
                 ("datagrams_duplicate", counts.datagrams_duplicate),
+                ("datagrams_implausible", counts.datagrams_implausible),
                 ("datagrams_malformed", counts.datagrams_malformed),
                 ("datagrams_too_old", counts.datagrams_too_old),
                 ("echoes_implausible", peer.echoes_implausible()),

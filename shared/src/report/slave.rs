@@ -113,7 +113,7 @@ impl EstimateReport {
     }
 }
 
-/// The slave's tool and the limit of its force.
+/// The slave's tool and the limits of its force and of its energy.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct ToolReport {
@@ -121,4 +121,10 @@ pub struct ToolReport {
     pub held_s: Number,
     /// Largest force that was measured between tool and object, N.
     pub force_peak_n: Number,
+    /// Work of the tool on the object by the measured force, J.
+    pub work_j: Number,
+    /// Work of the hand on the model as the samples show it, J.
+    pub hand_work_j: Number,
+    /// For how long the limit of its energy shortened its way, s.
+    pub energy_held_s: Number,
 }

@@ -181,7 +181,8 @@ impl<C> RunReport<C> {
     fn tool(&self) -> Vec<Row> {
         vec![
             row("largest force", [number(self.tool.force_peak_n, 2, " N")]),
-            row("held back for", [number(self.tool.held_s, 3, " s")]),
+            row("held back for", [number(self.tool.held_s, 3, " s"), after("by its energy", number(self.tool.energy_held_s, 3, " s"))]),
+            row("work on the object", [number(self.tool.work_j, 3, " J"), after("hand", number(self.tool.hand_work_j, 3, " J"))]),
         ]
     }
 
@@ -190,6 +191,7 @@ impl<C> RunReport<C> {
         vec![
             row("injected by updates", [mj(self.passivity.energy_injected_j)]),
             row("observer, least", [mj(self.passivity.observer_min_j)]),
+            row("work of the hand", [number(self.passivity.hand_work_j, 3, " J")]),
         ]
     }
 

@@ -85,10 +85,14 @@ fn full() -> RunReport<Value> {
     report.tool = ToolReport {
         held_s: 0.25.into(),
         force_peak_n: 15.02.into(),
+        work_j: 1.5.into(),
+        hand_work_j: 1.25.into(),
+        energy_held_s: 0.125.into(),
     };
     report.passivity = PassivityReport {
         energy_injected_j: 0.0.into(),
         observer_min_j: (-0.2e-3).into(),
+        hand_work_j: 1.3.into(),
     };
     report.link.rtt_ms = DelayReport {
         p50: 100.2.into(),
@@ -172,8 +176,8 @@ const REQUIRED: &str = "version command seed duration_s ending configuration dro
     model.damping_ns_per_m.estimate model.damping_ns_per_m.truth \
     model.friction_n.estimate model.friction_n.truth \
     pose.position_rms_m pose.position_max_m pose.angle_rms_rad pose.angle_max_rad \
-    tool.held_s tool.force_peak_n \
-    passivity.energy_injected_j passivity.observer_min_j \
+    tool.held_s tool.force_peak_n tool.work_j tool.hand_work_j tool.energy_held_s \
+    passivity.energy_injected_j passivity.observer_min_j passivity.hand_work_j \
     link.rtt_ms.p50 link.rtt_ms.p99 link.loss_up link.loss_down link.unsent_up link.unsent_down \
     emulation.up.released emulation.up.late_us.p50 emulation.up.late_us.p99 \
     emulation.up.late_us.max emulation.up.degraded \

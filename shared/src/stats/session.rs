@@ -42,7 +42,7 @@ impl KindCounts {
 
 /// What one end of the datagram channel sent, received and dropped.
 ///
-/// What arrived is `received.total() + datagrams_duplicate + datagrams_too_old + datagrams_malformed`.
+/// What arrived is [`received.total() + dropped()`](Self::dropped).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ChannelCounts {
     /// Messages sent.
@@ -53,10 +53,22 @@ pub struct ChannelCounts {
     pub datagrams_duplicate: u64,
     /// Datagrams dropped because their number was too old to judge.
     pub datagrams_too_old: u64,
+    /// Datagrams dropped because their number was too far ahead of the newest.
+    pub datagrams_implausible: u64,
     /// Datagrams dropped because they did not decode.
     pub datagrams_malformed: u64,
     /// Messages that break a rule of the wire and were not sent.
     pub messages_unsendable: u64,
+}
+
+impl ChannelCounts {
+    /// How many datagrams that arrived were dropped, whatever the cause.
+    pub fn dropped(&self) -> u64 {
+        self.datagrams_duplicate
+            + self.datagrams_too_old
+            + self.datagrams_implausible
+            + self.datagrams_malformed
+    }
 }
 
 /// Updates that the master received and did not apply, by cause.
@@ -66,6 +78,8 @@ pub struct UpdateDrops {
     pub duplicate: u64,
     /// A newer one was received before.
     pub stale: u64,
+    /// Its sequence number was too far ahead of the newest.
+    pub implausible: u64,
     /// Its numbers were not accepted.
     pub rejected: u64,
     /// A newer one took its place before a tick could apply it.
@@ -76,10 +90,11 @@ pub struct UpdateDrops {
 
 impl UpdateDrops {
     /// Each cause by its name in reports.
-    pub fn by_name(&self) -> [(&'static str, u64); 5] {
+    pub fn by_name(&self) -> [(&'static str, u64); 6] {
         [
             ("duplicate", self.duplicate),
             ("stale", self.stale),
+            ("implausible", self.implausible),
             ("rejected", self.rejected),
             ("superseded", self.superseded),
             ("frozen", self.frozen),

@@ -6,20 +6,21 @@ use postcard::ser_flavors::Flavor;
 use serde::{Deserialize, Serialize};
 
 use super::error::{DecodeError, EncodeError, reason};
+use super::flags::Flags;
 use super::header::header;
 use super::kind::{HEADER_BYTES, Kind};
 
 /// Writes header and body to the front of `out`; returns how many bytes that took.
 pub(super) fn write(
     kind: Kind,
-    stopped: bool,
+    flags: Flags,
     body: &impl Serialize,
     out: &mut [u8],
 ) -> Result<usize, EncodeError> {
     let length = out.len();
     let too_small = EncodeError::BufferTooSmall { kind, length };
     let (head, rest) = out.split_at_mut_checked(HEADER_BYTES).ok_or(too_small)?;
-    head.copy_from_slice(&header(kind, stopped));
+    head.copy_from_slice(&header(kind, flags));
     let used = postcard::to_slice(body, rest).map_err(|_| too_small)?;
     Ok(HEADER_BYTES + used.len())
 }

@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::body::{read, write};
 use super::error::{DecodeError, EncodeError, FieldError, demand, finite};
+use super::flags::Flags;
 use super::header::open;
 use super::kind::{Channel, Kind, Side};
 use super::samples::SampleBlock;
@@ -85,8 +86,8 @@ impl Message {
 /// A datagram: its envelope and its message.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Datagram {
-    /// Whether the sender's emergency stop is set: a flag of the header.
-    pub stopped: bool,
+    /// What the header shows of the sender.
+    pub flags: Flags,
     /// Number, stamp and echo.
     pub envelope: Envelope,
     /// What it is about.
@@ -99,15 +100,15 @@ impl Datagram {
     /// # Errors
     /// Names the field that breaks a rule, or that `out` is too short; what is in `out` then must not be sent.
     pub fn encode(&self, out: &mut [u8]) -> Result<usize, EncodeError> {
-        let (kind, stopped, envelope) = (self.message.kind(), self.stopped, &self.envelope);
+        let (kind, flags, envelope) = (self.message.kind(), self.flags, &self.envelope);
         self.check()
             .map_err(|why| EncodeError::Field { kind, why })?;
         match &self.message {
-            Message::Command(command) => write(kind, stopped, &(envelope, command), out),
-            Message::Update(update) => write(kind, stopped, &(envelope, update), out),
-            Message::Scene(scene) => write(kind, stopped, &(envelope, scene), out),
-            Message::Tool(tool) => write(kind, stopped, &(envelope, tool), out),
-            Message::Heartbeat => write(kind, stopped, envelope, out),
+            Message::Command(command) => write(kind, flags, &(envelope, command), out),
+            Message::Update(update) => write(kind, flags, &(envelope, update), out),
+            Message::Scene(scene) => write(kind, flags, &(envelope, scene), out),
+            Message::Tool(tool) => write(kind, flags, &(envelope, tool), out),
+            Message::Heartbeat => write(kind, flags, envelope, out),
         }
     }
 
@@ -116,7 +117,7 @@ impl Datagram {
     /// # Errors
     /// Why the bytes are not exactly one message that `from` may send in a datagram.
     pub fn decode(bytes: &[u8], from: Side) -> Result<Self, DecodeError> {
-        let (kind, stopped, body) = open(bytes, from, Channel::Datagram)?;
+        let (kind, flags, body) = open(bytes, from, Channel::Datagram)?;
         let (envelope, message) = match kind {
             Kind::Command => with(Message::Command, read(kind, body)?),
             Kind::Update => with(Message::Update, read(kind, body)?),
@@ -128,7 +129,7 @@ impl Datagram {
             }
         };
         let datagram = Self {
-            stopped,
+            flags,
             envelope,
             message,
         };

@@ -88,8 +88,8 @@ pub enum DecodeError {
         /// The number in the header.
         number: u8,
     },
-    /// Flags are set that this version does not know.
-    #[error("a {} has the unknown flags {flags:#06x}: this version has one, 1 in datagrams", kind.name())]
+    /// Flags are set that this version does not know, or that the sender may not set.
+    #[error("a {} has the flags {flags:#06x}, which its sender may not set", kind.name())]
     Flags {
         /// The message.
         kind: Kind,

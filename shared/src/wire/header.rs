@@ -3,26 +3,22 @@
 //! The places of magic and version never change, so that every version can name every other. Holds no body.
 
 use super::error::DecodeError;
+use super::flags::Flags;
 use super::kind::{Channel, HEADER_BYTES, Kind, MAGIC, PROTOCOL_VERSION, Side};
 
-/// The one flag: the sender's emergency stop is set. Datagrams alone have it.
-const STOPPED: u16 = 1;
-
-/// The header of a message of this type, from a sender whose emergency stop is set or not.
-pub(super) const fn header(kind: Kind, stopped: bool) -> [u8; HEADER_BYTES] {
+/// The header of a message of this type with these flags: datagrams alone have any.
+pub(super) const fn header(kind: Kind, flags: Flags) -> [u8; HEADER_BYTES] {
     let [m, t, u, v] = MAGIC;
-    let flags = if stopped { STOPPED } else { 0 };
-    let [low, high] = flags.to_le_bytes();
+    let [low, high] = flags.to_bits().to_le_bytes();
     [m, t, u, v, PROTOCOL_VERSION, kind.number(), low, high]
 }
 
-/// Reads a header that came from `from` on `channel`; returns the type, whether the sender's emergency stop is set, and the
-/// body.
+/// Reads a header that came from `from` on `channel`; returns the type, the flags and the body.
 pub(super) fn open(
     message: &[u8],
     from: Side,
     channel: Channel,
-) -> Result<(Kind, bool, &[u8]), DecodeError> {
+) -> Result<(Kind, Flags, &[u8]), DecodeError> {
     let length = message.len();
     if length > channel.longest() {
         return Err(DecodeError::TooLong { length });
@@ -39,28 +35,34 @@ pub(super) fn open(
         return Err(DecodeError::OtherVersion { theirs });
     }
     let kind = Kind::from_number(number).ok_or(DecodeError::UnknownType { number })?;
-    let flags = u16::from_le_bytes([low, high]);
-    let stopped = flags == STOPPED && kind.channel() == Channel::Datagram;
-    if flags != 0 && !stopped {
-        return Err(DecodeError::Flags { kind, flags });
-    }
+    let bits = u16::from_le_bytes([low, high]);
+    let on_datagrams = |_: &Flags| bits == 0 || kind.channel() == Channel::Datagram;
+    let of_sender = |flags: &Flags| from == Side::Slave || flags.are_a_masters();
+    let flags = Flags::from_bits(bits)
+        .filter(on_datagrams)
+        .filter(of_sender)
+        .ok_or(DecodeError::Flags { kind, flags: bits })?;
     if kind.channel() != channel {
         return Err(DecodeError::WrongChannel { kind });
     }
     if !kind.is_sent_by(from) {
         return Err(DecodeError::WrongDirection { kind, from });
     }
-    Ok((kind, stopped, body))
+    Ok((kind, flags, body))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::wire::ToolState;
     use crate::wire::kind::ALPN;
 
     #[test]
     fn header_is_readable_by_eye() {
-        assert_eq!(&header(Kind::Welcome, false), b"MMTP\x03\x11\x00\x00");
+        assert_eq!(
+            &header(Kind::Welcome, Flags::default()),
+            b"MMTP\x03\x11\x00\x00"
+        );
         assert!(ALPN.ends_with(&PROTOCOL_VERSION.to_string()));
     }
 
@@ -82,7 +84,7 @@ mod tests {
     #[test]
     fn each_type_is_taken_on_its_own_road_and_in_its_own_direction_only() {
         for kind in Kind::ALL {
-            let bytes = header(kind, false);
+            let bytes = header(kind, Flags::default());
             for from in [Side::Master, Side::Slave] {
                 for channel in [Channel::Datagram, Channel::Stream] {
                     let opened = open(&bytes, from, channel);
@@ -110,7 +112,20 @@ mod tests {
             DecodeError::Flags { kind, flags }
         );
         let opened = open(b"MMTP\x03\x01\x01\0", Side::Master, Channel::Datagram);
-        assert_eq!(opened, Ok((kind, true, &[][..])));
+        let stopped = Flags {
+            stopped: true,
+            ..Flags::default()
+        };
+        assert_eq!(opened, Ok((kind, stopped, &[][..])));
+        // a master has no tool
+        let flags = 2;
+        assert_eq!(
+            read(b"MMTP\x03\x01\x02\0"),
+            DecodeError::Flags { kind, flags }
+        );
+        let opened = open(b"MMTP\x03\x04\x0a\0", Side::Slave, Channel::Datagram);
+        let (_, flags, _) = opened.unwrap();
+        assert_eq!((flags.tool, flags.energy_holds), (ToolState::Hold, true));
         let on_stream = open(b"MMTP\x03\x10\x01\0", Side::Master, Channel::Stream);
         let (kind, flags) = (Kind::Hello, 1);
         assert_eq!(on_stream, Err(DecodeError::Flags { kind, flags }));

@@ -7,6 +7,7 @@
 mod body;
 mod datagram;
 mod error;
+mod flags;
 mod header;
 mod kind;
 mod label;
@@ -18,6 +19,7 @@ mod tests;
 
 pub use datagram::{Command, Datagram, Echo, Envelope, Message};
 pub use error::{DecodeError, EncodeError, FieldError};
+pub use flags::{Flags, ToolState};
 pub use kind::{
     ALPN, Channel, DATAGRAM_MAX, HEADER_BYTES, Kind, MAGIC, PROTOCOL_VERSION, STREAM_MESSAGE_MAX,
     Side,

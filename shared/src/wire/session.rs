@@ -14,6 +14,7 @@ use serde::{Deserialize, Serialize};
 
 use super::body::{read, write};
 use super::error::{DecodeError, EncodeError, FieldError, finite};
+use super::flags::Flags;
 use super::header::open;
 use super::kind::{Channel, Kind, Side};
 use super::state::RawState;
@@ -96,14 +97,14 @@ impl<'a> StreamMessage<'a> {
     /// # Errors
     /// Names the field that breaks a rule, or that `out` is too short; what is in `out` then must not be sent.
     pub fn encode(&self, out: &mut [u8]) -> Result<usize, EncodeError> {
-        let kind = self.kind();
+        let (kind, none) = (self.kind(), Flags::default());
         self.check()
             .map_err(|why| EncodeError::Field { kind, why })?;
         match self {
-            Self::Hello(hello) => write(kind, false, hello, out),
-            Self::Welcome(welcome) => write(kind, false, welcome, out),
-            Self::Refused(refusal) => write(kind, false, refusal, out),
-            Self::Farewell(farewell) => write(kind, false, farewell, out),
+            Self::Hello(hello) => write(kind, none, hello, out),
+            Self::Welcome(welcome) => write(kind, none, welcome, out),
+            Self::Refused(refusal) => write(kind, none, refusal, out),
+            Self::Farewell(farewell) => write(kind, none, farewell, out),
         }
     }
 

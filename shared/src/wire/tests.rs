@@ -95,7 +95,7 @@ fn written(encode: impl FnOnce(&mut [u8]) -> Encoded) -> Vec<u8> {
 
 fn datagram(envelope: Envelope, message: Message) -> Vec<u8> {
     let datagram = Datagram {
-        stopped: false,
+        flags: Flags::default(),
         envelope,
         message,
     };

@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use super::{document, finish, mmt, start};
+use super::{document, finish, judged, mmt, start};
 
 /// The verdict on a subject, and what was found.
 fn finding<'a>(document: &'a Value, subject: &str) -> (&'a str, &'a str) {
@@ -66,12 +66,11 @@ fn a_slave_that_answers_is_looked_at_and_not_disturbed_and_one_with_another_key_
     assert_eq!(finding(&altered, "slave").0, "unfit");
     assert_eq!(altered["fit"], false);
     // it waits for a master still
-    let master = mmt(
+    let master = judged(mmt(
         &home,
         &["master", pairing.trim(), "--duration", "1s", "--json"],
-    )
-    .output();
-    assert_eq!(document(&master.unwrap())["ending"], "finished");
+    ));
+    assert_eq!(document(&master)["ending"], "finished");
     assert_eq!(finish(slave).1, Some(0));
 }
 

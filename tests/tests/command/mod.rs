@@ -12,6 +12,7 @@ use std::time::Duration;
 
 use serde_json::Value;
 
+use crate::harness::judge::judged;
 use crate::harness::process::{PROGRAM, Running};
 
 mod bench;

@@ -7,7 +7,8 @@ use std::time::Duration;
 
 use serde_json::Value;
 
-use super::{document, finish, mmt, start};
+use super::{document, finish, judged, mmt, start};
+use crate::harness::judge::Records;
 use crate::harness::process::did_not_run;
 use crate::harness::tshark::{TsharkError, tshark};
 
@@ -33,7 +34,7 @@ fn a_demo_records_what_its_packets_met_and_meets_it_again() {
         "run.bin",
         "--json",
     ];
-    let first = document(&mmt(&home, &first).output().unwrap());
+    let first = document(&judged(mmt(&home, &first)));
     for side in ["up", "down"] {
         let emulation = &first["emulation"][side];
         assert!(emulation["released"].as_u64().unwrap() > 0, "{side}");
@@ -68,7 +69,7 @@ fn a_demo_records_what_its_packets_met_and_meets_it_again() {
         "trace run.bin down",
         "--json",
     ];
-    let again = document(&mmt(&home, &again).output().unwrap());
+    let again = document(&judged(mmt(&home, &again)));
     let configuration = &again["configuration"];
     assert_eq!(configuration["master"]["netem"], "trace run.bin up");
     assert_eq!(configuration["slave"]["netem"], "trace run.bin down");
@@ -89,14 +90,14 @@ fn a_demo_at_work_takes_new_networks_from_stdin() {
         "--netem-control",
         "--json",
     ];
-    let mut child = mmt(&home, &arguments)
-        .stdin(Stdio::piped())
-        .spawn()
-        .unwrap();
+    let mut command = mmt(&home, &arguments);
+    let records = Records::of(&mut command).unwrap();
+    let mut child = command.stdin(Stdio::piped()).spawn().unwrap();
     let mut orders = child.stdin.take().unwrap();
     // it takes them as soon as it runs, whether or not the session has begun
     writeln!(orders, "sideways\nrebind\nup loss every 4").unwrap();
     let output = child.wait_with_output().unwrap();
+    records.judge().unwrap();
     let stderr = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(stderr.contains("no command \"sideways\""), "{stderr}");
     assert!(stderr.contains("only the relay"), "{stderr}");
@@ -178,7 +179,7 @@ fn a_master_keeps_the_path_that_it_met_as_a_trace() {
         "path.csv",
         "--json",
     ];
-    let master = document(&mmt(&home, &arguments).output().unwrap());
+    let master = document(&judged(mmt(&home, &arguments)));
     assert_eq!(master["ending"], "finished");
     let (_, code) = finish(slave);
     assert_eq!(code, Some(0));

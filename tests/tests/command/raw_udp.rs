@@ -6,7 +6,7 @@ use serde_json::Value;
 
 fn mmt(arguments: &[&str]) -> Output {
     let home = tempfile::tempdir().unwrap();
-    super::mmt(&home, arguments).output().unwrap()
+    super::judged(super::mmt(&home, arguments))
 }
 
 fn errors(output: &Output) -> String {

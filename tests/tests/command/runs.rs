@@ -3,7 +3,7 @@
 use serde_json::Value;
 use std::fmt::Write;
 
-use super::{document, finish, mmt, start};
+use super::{document, finish, judged, mmt, start};
 
 /// A recording of pushes along +x of a block that takes 2 N, each 1 cm long.
 pub(super) fn recording(pushes: u32) -> String {
@@ -131,7 +131,7 @@ fn a_slave_and_a_master_as_processes_both_end_with_a_report() {
     ));
     let pairing = line;
     let arguments = ["master", &pairing, "--duration", "2s", "--json"];
-    let output = mmt(&home, &arguments).output().unwrap();
+    let output = judged(mmt(&home, &arguments));
     let text = String::from_utf8_lossy(&output.stderr);
     let master = document(&output);
     let (rest, code) = finish(slave);

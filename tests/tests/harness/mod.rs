@@ -13,6 +13,7 @@ use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 pub(crate) mod hosts;
+pub(crate) mod judge;
 pub(crate) mod process;
 pub(crate) mod python;
 pub(crate) mod tshark;

@@ -12,6 +12,8 @@ use rustix::process::{Pid, Signal, kill_process};
 use serde_json::Value;
 use thiserror::Error;
 
+use super::judge::Records;
+
 /// How often a process is asked whether it has ended.
 const ASK: Duration = Duration::from_millis(10);
 
@@ -36,6 +38,16 @@ pub(crate) enum ProcessError {
         /// Its standard output and error.
         printed: String,
     },
+    /// A session that it recorded does not keep what is promised, or cannot be judged.
+    #[error("{name}: {broken}\nit printed:\n{printed}")]
+    Broken {
+        /// The command.
+        name: String,
+        /// What is broken.
+        broken: String,
+        /// Its standard error.
+        printed: String,
+    },
     /// It ended with another document than one of JSON.
     #[error("no JSON document ({source}) in:\n{printed}")]
     Document {
@@ -49,7 +61,7 @@ pub(crate) enum ProcessError {
 /// The program `mmt`, as it was built with this test.
 pub(crate) const PROGRAM: &str = env!("CARGO_BIN_EXE_mmt-under-test");
 
-/// A running process whose output is collected; killed when dropped.
+/// A running process whose output is collected; killed when dropped. What it recorded of its sessions is judged then.
 #[derive(Debug)]
 pub(crate) struct Running {
     name: String,
@@ -57,6 +69,8 @@ pub(crate) struct Running {
     lines: Receiver<Line>,
     out: Vec<String>,
     err: Vec<String>,
+    /// What it, and whatever it starts, records of its sessions.
+    records: Option<Records>,
 }
 
 #[derive(Debug)]
@@ -74,6 +88,8 @@ pub(crate) struct Ended {
     pub(crate) out: Vec<String>,
     /// Its standard error.
     pub(crate) err: String,
+    /// When that was seen.
+    pub(crate) at: Instant,
 }
 
 impl Ended {
@@ -95,14 +111,29 @@ impl Running {
     ///
     /// # Errors
     /// The system does not start it.
-    pub(crate) fn start(mut command: Command) -> Result<Self, ProcessError> {
+    pub(crate) fn start(command: Command) -> Result<Self, ProcessError> {
+        Self::start_reading(command, "")
+    }
+
+    /// Starts a command whose standard input is this.
+    ///
+    /// # Errors
+    /// The system does not start it.
+    pub(crate) fn start_reading(mut command: Command, input: &str) -> Result<Self, ProcessError> {
         let name = format!("{command:?}");
+        let records = Records::of(&mut command);
+        let records = records.map_err(|source| system(format!("a folder for {name}"), source))?;
         let mut child = command
-            .stdin(Stdio::null())
+            .stdin(Stdio::piped())
             .stdout(Stdio::piped())
             .stderr(Stdio::piped())
             .spawn()
             .map_err(|source| system(format!("starting {name}"), source))?;
+        // one that reads nothing may have ended before
+        let _ = child
+            .stdin
+            .take()
+            .map(|mut stdin| stdin.write_all(input.as_bytes()));
         let (send, lines) = channel();
         let (out, err) = (child.stdout.take(), child.stderr.take());
         let send_err = send.clone();
@@ -114,6 +145,7 @@ impl Running {
             lines,
             out: Vec::new(),
             err: Vec::new(),
+            records: Some(records),
         })
     }
 
@@ -236,13 +268,31 @@ impl Running {
                 None => thread::sleep(ASK),
             }
         };
+        let at = Instant::now();
         // both readers end with the process, unless a child of it lives on
         while self.take_line(Duration::from_secs(1)).is_ok() {}
+        self.judge()?;
         Ok(Ended {
             status,
             out: std::mem::take(&mut self.out),
             err: self.err.join("\n"),
+            at,
         })
+    }
+
+    /// Judges the sessions that were recorded, once.
+    ///
+    /// # Errors
+    /// One does not keep what is promised.
+    fn judge(&mut self) -> Result<(), ProcessError> {
+        let judged = self.records.take().map(Records::judge);
+        judged
+            .unwrap_or(Ok(()))
+            .map_err(|broken| ProcessError::Broken {
+                name: self.name.clone(),
+                broken,
+                printed: self.err.join("\n"),
+            })
     }
 
     fn late(&self, what: &str, within: Duration) -> ProcessError {
@@ -259,6 +309,11 @@ impl Drop for Running {
         // one that has ended cannot be killed, and that is well
         let _ = self.child.kill();
         let _ = self.child.wait();
+        // a test that fails already says why
+        if !thread::panicking() {
+            let judged = self.judge();
+            assert!(judged.is_ok(), "{judged:?}");
+        }
     }
 }
 

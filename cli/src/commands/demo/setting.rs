@@ -6,6 +6,7 @@ use mmt_lab::world::WorldConfig;
 use mmt_netem::LinkConfig;
 use mmt_server::plant::PlantConfig;
 use mmt_shared::model::settings::Mode;
+use mmt_shared::pairing::Pairing;
 use mmt_shared::range::in_range;
 use mmt_shared::wire::Architecture;
 use serde_json::{Value, json};
@@ -13,6 +14,7 @@ use serde_json::{Value, json};
 use crate::args::DemoArguments;
 use crate::config::configuration;
 use crate::failure::Failure;
+use crate::view::Caption;
 
 /// Masses that a viewer may choose, kg: what a force of 8 N moves well.
 const MASS_KG: (f64, f64) = (0.1, 3.0);
@@ -136,6 +138,38 @@ impl Setting {
             }
         }
         Ok(next)
+    }
+}
+
+/// What a view has above the numbers of a session with this setting.
+pub(super) fn caption(
+    arguments: &DemoArguments,
+    config: &WorldConfig,
+    pairing: &Pairing,
+) -> Caption {
+    let (slave, environment) = (&config.slave, &config.slave.environment);
+    let m = environment.mass_kg;
+    let c = environment.friction_coefficient * m * environment.gravity_m_per_s2;
+    let mode = match slave.mode {
+        Mode::Paper => "paper",
+        Mode::Recommended => "recommended",
+    };
+    let (scheme, seed) = (slave.trigger.scheme, config.seed);
+    let network = match (&config.up, &config.down) {
+        (up, down) if up == down => format!("network each way: {up}"),
+        (up, down) => format!("network up: {up}, down: {down}"),
+    };
+    let mode = match config.architecture {
+        Architecture::Mmt => mode.to_owned(),
+        other => format!("{mode}, {}", other.name()),
+    };
+    Caption {
+        command: "demo",
+        duration_s: Some(arguments.duration.as_secs_f64()),
+        setting: format!("{mode}, {scheme}; {network}; seed {seed}"),
+        slave: pairing.address.to_string(),
+        // of several bodies the one that is touched counts
+        truth: (slave.scene.bodies.is_empty()).then_some([m, environment.damping_ns_per_m, c]),
     }
 }
 

@@ -83,7 +83,7 @@ pub(super) fn run(arguments: &NetemShellArguments, messages: &Messages) -> Resul
     let duration_s = began.elapsed().as_secs_f64();
     let counters = tunnel.stop().map_err(Failure::failed)?;
     let _ = effects.join();
-    files.finish()?;
+    let kept = files.finish();
     let degraded = counters.lateness.degraded();
     if degraded {
         note(DEGRADED);
@@ -116,10 +116,12 @@ pub(super) fn run(arguments: &NetemShellArguments, messages: &Messages) -> Resul
         })?;
     }
     if exit_code != 0 {
+        // the exit code is the command's
+        kept.unwrap_or_else(note);
         settle(SETTLE);
         std::process::exit(exit_code);
     }
-    Ok(())
+    kept
 }
 
 /// Runs the command at the near end, and what was given for the far end beside it, to its end.

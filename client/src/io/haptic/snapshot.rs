@@ -14,6 +14,7 @@ impl HapticLoop {
         let state = master.model().state();
         let params = &state.params;
         let rtt = peer.round_trip().histogram().quantile(0.5);
+        let (tool_state, tool_energy_holds) = self.end.slave_tool();
         let age = |scene: &Scene| now.saturating_since(scene.answers).as_secs_f64();
         MasterLive {
             elapsed_s: self.elapsed.as_secs_f64(),
@@ -27,6 +28,8 @@ impl HapticLoop {
             proxy: done.rendered.touch.map(|touch| touch.proxy),
             engaged: master.limiter().engaged(),
             stopped_by: self.end.stopped_by(),
+            tool_state,
+            tool_energy_holds,
             person: self.operator.person().map(PersonLive::from),
             change: self.end.change().copied(),
             updates_applied: master.applied(),

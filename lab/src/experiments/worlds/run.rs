@@ -1,6 +1,5 @@
 //! One random world, run and measured.
 
-use std::collections::VecDeque;
 use std::time::Duration;
 
 use mmt_shared::model::geometry::Vec2;
@@ -8,20 +7,15 @@ use mmt_shared::time::TICK_S;
 
 use crate::experiment::findings::ExperimentError;
 use crate::trial::TrialError;
+use crate::two_ports::{TwoPorts, WORKING_S};
 use crate::world::{World, WorldConfig, WorldTick};
 
-/// What a round trip takes besides the path: packing, play-out, a tick each, s.
-const WORKING_S: f64 = 0.05;
 /// Beyond the hand's way in a round trip the pose is off by no more than this, m.
 const POSE_M: f64 = 0.1;
-/// The tool may give as much more than the hand gave as it takes to press with its limit over the hand's way in a round trip.
-const PRESS_N: f64 = 15.0;
 /// Below this a force has no direction, N.
 const LEAST_N: f64 = 0.5;
 /// No body moves as far in a tick, m: the tool has touched another one.
 const OTHER_BODY_M: f64 = 0.01;
-/// And this share of the hand's work.
-const WORK_SHARE: f64 = 0.25;
 
 /// What a world came to.
 pub(super) struct Measured {
@@ -42,6 +36,8 @@ pub(super) struct Measured {
     pub(super) injected_j: f64,
     /// The most by which the tool's work on the object exceeded the hand's work and the budget, J.
     pub(super) work_excess_j: f64,
+    /// For how long the limit of the tool's energy held the tool, s.
+    pub(super) energy_held_s: f64,
     /// Share of the time in contact at both ends in which f_m opposes the true force.
     pub(super) opposed_share: Option<f64>,
     pub(super) force_peak_n: Option<f64>,
@@ -57,7 +53,7 @@ pub(super) fn reach(config: &WorldConfig, duration: Duration) -> Result<Measured
     let slow_s = (config.up.delay.quantile(0.99) + config.down.delay.quantile(0.99)).as_secs_f64();
     let first = world.master().model().state().pose.position;
     let body = TouchedBody::new(first, slow_s + WORKING_S);
-    let mut seen = Seen::new(path_s + WORKING_S, body);
+    let mut seen = Seen::new(TwoPorts::new(path_s), body);
     for _ in 0..duration.as_millis() {
         let tick = world.step();
         seen.take(&world, &tick);
@@ -77,7 +73,8 @@ pub(super) fn reach(config: &WorldConfig, duration: Duration) -> Result<Measured
         pose_max_m: outcome.pose.position_max_m().unwrap_or_default(),
         pose_excess_m: seen.pose_excess_m,
         injected_j: outcome.energy_injected_j,
-        work_excess_j: seen.work_excess_j,
+        work_excess_j: seen.ports.excess_j(),
+        energy_held_s: world.slave().tool_energy().held_ticks() as f64 * TICK_S,
         opposed_share: seen.opposed_share(),
         force_peak_n: outcome.on_hand.largest_n(),
         broken: broken.join(" "),
@@ -87,66 +84,34 @@ pub(super) fn reach(config: &WorldConfig, duration: Duration) -> Result<Measured
 
 /// What is summed up tick by tick.
 struct Seen {
-    /// Ways of the HIP of the last round trip, m a tick, and their sum.
-    ways: VecDeque<f64>,
-    way_m: f64,
-    round_trip_ticks: usize,
-    hip: Option<Vec2>,
-    tool: Option<Vec2>,
-    /// Work of the tool on the object, J.
-    tool_j: f64,
-    /// The hand's way in a round trip at its longest, m.
-    way_max_m: f64,
+    ports: TwoPorts,
     body: TouchedBody,
     pose_excess_m: f64,
-    work_excess_j: f64,
     opposed_ticks: u64,
     paired_ticks: u64,
 }
 
 impl Seen {
-    fn new(round_trip_s: f64, body: TouchedBody) -> Self {
+    fn new(ports: TwoPorts, body: TouchedBody) -> Self {
         Self {
-            ways: VecDeque::new(),
-            way_m: 0.0,
-            round_trip_ticks: (round_trip_s / TICK_S) as usize,
-            hip: None,
-            tool: None,
-            tool_j: 0.0,
-            way_max_m: 0.0,
+            ports,
             body,
             pose_excess_m: -POSE_M,
-            work_excess_j: 0.0,
             opposed_ticks: 0,
             paired_ticks: 0,
         }
     }
 
     fn take(&mut self, world: &World, tick: &WorldTick) {
-        let hip = tick.master.sample.hip.metres();
-        let way = self
-            .hip
-            .replace(hip)
-            .map_or(0.0, |before| (hip - before).norm());
-        self.ways.push_back(way);
-        self.way_m += way;
-        while self.ways.len() > self.round_trip_ticks {
-            self.way_m -= self.ways.pop_front().unwrap_or_default();
-        }
-        self.way_max_m = self.way_max_m.max(self.way_m);
+        self.ports.take(world, tick);
         let Some(slave) = &tick.slave else {
             return;
         };
-        let before = self.tool.replace(slave.tool).unwrap_or(slave.tool);
-        self.tool_j += slave.true_force.dot(&(slave.tool - before));
-        let hand_j = world.master().port().energy_j();
-        let budget_j = WORK_SHARE * hand_j.max(0.0) + PRESS_N * self.way_max_m;
-        self.work_excess_j = self.work_excess_j.max(self.tool_j - hand_j - budget_j);
         let known = self.body.is_known(slave.truth.position);
         let then = world.master().model().history().at(slave.stamp);
         if let Some(then) = then.filter(|_| known) {
             let off = (then.motion.pose.position - slave.truth.position).norm();
-            self.pose_excess_m = self.pose_excess_m.max(off - POSE_M - self.way_m);
+            self.pose_excess_m = self.pose_excess_m.max(off - POSE_M - self.ports.way_m());
         }
         let paired = slave
             .f_m

@@ -30,6 +30,7 @@ pub(super) fn columns<'a>() -> Vec<Column<'a, Row>> {
         column("pose_excess_mm", "mm", 1, |row| mm(row.reached.pose_excess_m)),
         column("injected_j", "J", 6, |row| row.reached.injected_j),
         column("work_excess_j", "J", 3, |row| row.reached.work_excess_j),
+        column("energy_held_s", "s", 3, |row| row.reached.energy_held_s),
         column("opposed_share", "", 4, |row| row.reached.opposed_share),
         column("force_peak_n", "N", 2, |row| row.reached.force_peak_n),
         column("broken", "", 0, |row| row.reached.broken.clone()),

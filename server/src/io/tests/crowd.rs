@@ -53,9 +53,9 @@ async fn welcome(pairing: &Pairing) -> Option<Master> {
 }
 
 /// How many of the holder's attempts, one after the other, succeed at once.
-pub(super) async fn times_let_in(pairing: &Pairing) -> usize {
+pub(super) async fn times_let_in(pairing: &Pairing, comes: usize) -> usize {
     let mut let_in = 0;
-    for _ in 0..COMES {
+    for _ in 0..comes {
         if let Ok(Some(master)) = timeout(PATIENCE, welcome(pairing)).await {
             let_in += 1;
             patiently(master.farewell()).await;
@@ -71,7 +71,7 @@ async fn let_in(from: impl Fn(u32) -> IpAddr) -> usize {
     let come = async {
         // they have been at it for a while
         sleep(Duration::from_secs(1)).await;
-        times_let_in(&pairing).await
+        times_let_in(&pairing, COMES).await
     };
     let let_in = tokio::select! {
         let_in = come => let_in,

@@ -1,4 +1,6 @@
-//! How a host begins: where it listens, and whom it lets in.
+//! How a host begins: where it listens, whom it lets in, and what a bug of ours on the way costs.
+
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::*;
 
@@ -110,4 +112,60 @@ async fn raw_udp_beyond_this_host_is_refused_unless_somebody_insists() {
     };
     assert!(matches!(bind(false), Err(SlaveHostError::Insecure(_))));
     assert!(bind(true).is_ok());
+}
+
+#[tokio::test]
+async fn a_panic_of_ours_that_a_stranger_brings_about_is_counted_and_ends_nobodys_session() {
+    const STRANGERS: u64 = 3;
+    let host = SlaveHost::bind(options()).unwrap();
+    let (stop, mut stopped) = watch::channel(false);
+    let context = &host.context;
+    let (acceptor, mut masters) = Acceptor::new(
+        host.tokens.clone(),
+        Arc::clone(&context.observers),
+        Arc::clone(&context.refusals),
+        stop.subscribe(),
+    );
+    let is_owner = AtomicBool::new(true);
+    let keeper = acceptor.run_with(
+        Arc::clone(&context.listener),
+        move |acceptor, handshake, place| {
+            let owner = is_owner.swap(false, Ordering::Relaxed);
+            async move {
+                if !owner {
+                    std::panic::resume_unwind(Box::new("on purpose"));
+                }
+                acceptor.judge(handshake, place).await;
+            }
+        },
+    );
+    let (pairing, refusals) = (host.pairing(None), Arc::clone(&context.refusals));
+    let owner = async {
+        let (mut master, _) = Master::operate(&pairing).await;
+        for n in 1..=STRANGERS {
+            let _stranger = Master::try_connect(&pairing).await;
+            while refusals.panicked.load(Ordering::Relaxed) < n {
+                sleep(Duration::from_millis(5)).await;
+            }
+            master.push(10).await;
+        }
+        master.farewell().await
+    };
+    let serve = async {
+        let admitted = masters.recv().await.unwrap();
+        let (meter, live) = (context.meter.snapshot(), watch::Sender::default());
+        session::serve(context, admitted, None, meter, &mut stopped, &live).await
+    };
+    let work = async { tokio::join!(owner, serve) };
+    let ((ending, totals), served) = tokio::select! {
+        work = patiently(work) => work,
+        () = keeper => unreachable!("the endpoint is open"),
+    };
+    assert_eq!(ending, Ending::Finished);
+    assert_eq!(
+        totals.session.drops.get("handshakes_panicked"),
+        Some(&STRANGERS)
+    );
+    let report = RunReport::from(served.unwrap().unwrap().report);
+    assert_eq!(report.ending, Some("finished"));
 }

@@ -1,5 +1,7 @@
 //! Two peers talk over a link that loses, reorders and duplicates by a fixed plan.
 
+use proptest::prelude::*;
+
 use super::*;
 
 const HOLD: u64 = 7;
@@ -77,11 +79,12 @@ fn loss_reordering_and_duplicates_are_told_apart() {
 #[test]
 fn what_comes_too_late_to_tell_is_dropped_and_stays_lost() {
     let mut peer = Peer::default();
+    peer.handle(ms(0), &plain(3));
     peer.handle(ms(0), &plain(WINDOW + 1));
     assert_eq!(peer.handle(ms(0), &plain(1)), Arrival::TooOld);
     assert_eq!(peer.handle(ms(0), &plain(2)), Arrival::Reordered);
-    assert_eq!(peer.received, 2);
-    assert_eq!(peer.incoming().lost(), WINDOW - 1);
+    assert_eq!(peer.received, 3);
+    assert_eq!(peer.incoming().lost(), WINDOW - 2);
 }
 
 #[test]
@@ -186,5 +189,67 @@ fn an_echo_counts_the_newest_and_says_how_long_it_was_held() {
         peer.last_arrival(),
         Some(ms(11)),
         "a duplicate is no sign of life"
+    );
+}
+
+fn is_taken(arrival: Arrival) -> bool {
+    matches!(arrival, Arrival::Newest | Arrival::Reordered)
+}
+
+proptest! {
+    #[test]
+    fn one_hostile_number_never_silences_what_follows(
+        before in 0_u32..3000,
+        hostile in prop_oneof![any::<u32>(), (u32::MAX - 2000)..=u32::MAX, 1_u32..10_000],
+        after in prop::collection::vec(1_u32..3, 1..200),
+    ) {
+        let mut peer = Peer::default();
+        (1..=before).for_each(|number| assert!(is_taken(peer.handle(ms(0), &plain(number)))));
+        peer.handle(ms(0), &plain(hostile));
+        let mut number = before;
+        for step in after {
+            number += step;
+            let arrival = peer.handle(ms(1), &plain(number));
+            prop_assert!(is_taken(arrival) || number == hostile, "{number}: {arrival:?}");
+        }
+    }
+
+    #[test]
+    fn an_outage_of_any_length_is_followed_from_its_second_datagram_on(
+        before in 0_u32..3000,
+        lost in 0_u32..100_000_000,
+        after in prop::collection::vec(1_u32..500, 1..100),
+    ) {
+        let mut peer = Peer::default();
+        (1..=before).for_each(|number| assert!(is_taken(peer.handle(ms(0), &plain(number)))));
+        let mut number = before + lost;
+        for (n, step) in after.into_iter().enumerate() {
+            number += step;
+            let arrival = peer.handle(ms(1), &plain(number));
+            let may_be_refused = n == 0 && number - before >= WINDOW;
+            prop_assert!(arrival == Arrival::Newest || may_be_refused, "{number}: {arrival:?}");
+        }
+    }
+}
+
+#[test]
+fn a_number_so_far_ahead_is_taken_and_one_further_waits_for_a_second() {
+    let mut peer = Peer::default();
+    assert_eq!(peer.handle(ms(0), &plain(WINDOW - 1)), Arrival::Newest);
+    let far = 2 * WINDOW - 1;
+    assert_eq!(peer.handle(ms(0), &plain(far)), Arrival::Implausible);
+    assert_eq!(
+        peer.handle(ms(0), &plain(far)),
+        Arrival::Implausible,
+        "twice"
+    );
+    assert_eq!(peer.incoming().expected, WINDOW - 1);
+    assert_eq!(
+        peer.handle(ms(0), &plain(far + WINDOW)),
+        Arrival::Implausible
+    );
+    assert_eq!(
+        peer.handle(ms(0), &plain(far + 2 * WINDOW - 1)),
+        Arrival::Newest
     );
 }

@@ -17,12 +17,20 @@ pub(super) enum Place {
     Taken,
     /// Below all that is remembered.
     Behind,
+    /// [`WINDOW`] or more beyond the newest, and alone there.
+    Implausible,
 }
 
 /// The newest number and one bit for each of the [`WINDOW`] last ones, at the number's remainder.
+///
+/// One number never takes the newest further ahead than the window reaches back: whatever it was, those that follow
+/// are still told apart. Where the numbers have really gone on (an outage, a host that stood still) the second that arrives
+/// shows it, however many were lost.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Window {
     newest: u32,
+    /// The last number that was too far ahead, 0 before the first.
+    far: u32,
     seen: [u64; WORDS],
 }
 
@@ -31,6 +39,7 @@ impl Default for Window {
     fn default() -> Self {
         let mut window = Self {
             newest: 0,
+            far: 0,
             seen: [0; WORDS],
         };
         window.set(0, true);
@@ -43,23 +52,36 @@ impl Window {
         self.newest
     }
 
-    /// Where `number` lies; from now on it has been seen.
+    /// Where `number` lies; from now on it has been seen, unless it is implausible.
     pub(super) fn note(&mut self, number: u32) -> Place {
         let place = match number.checked_sub(self.newest) {
             Some(0) => Place::Taken,
-            Some(ahead) => {
-                self.forget(ahead);
-                self.newest = number;
-                Place::Ahead
+            Some(ahead) if ahead < WINDOW || self.is_second(number) && number != self.far => {
+                self.go_on(number);
+                return Place::Ahead;
             }
-            None if self.newest - number >= WINDOW => Place::Behind,
+            Some(_) => {
+                self.far = number;
+                return Place::Implausible;
+            }
+            None if self.newest - number >= WINDOW => return Place::Behind,
             None if self.bit(number) => Place::Taken,
             None => Place::Gap,
         };
-        if place != Place::Behind {
-            self.set(number, true);
-        }
+        self.set(number, true);
         place
+    }
+
+    /// Whether a number lies where another one was too far ahead.
+    fn is_second(&self, number: u32) -> bool {
+        self.far > 0 && number.abs_diff(self.far) < WINDOW
+    }
+
+    /// Makes `number` the newest; it is beyond the one before.
+    fn go_on(&mut self, number: u32) {
+        self.forget(number - self.newest);
+        self.newest = number;
+        self.set(number, true);
     }
 
     /// Clears the bits of the `ahead` numbers after the newest.
@@ -101,6 +123,8 @@ pub enum Freshness {
     Duplicate,
     /// A newer one was received: it is out of date. Drop it.
     Stale,
+    /// Further ahead than one update alone shows: drop it. The next one there, or its repeat, is fresh.
+    Implausible,
 }
 
 /// Lets updates through in strictly increasing sequence and counts what it stops.
@@ -111,21 +135,28 @@ pub struct SequenceWindow {
     window: Window,
     duplicate: u64,
     stale: u64,
+    implausible: u64,
 }
 
 impl SequenceWindow {
     /// Judges an update's sequence number. Only [`Freshness::Fresh`] may go on, to be [accepted](Self::accept) or not.
     pub fn judge(&mut self, sequence: u32) -> Freshness {
-        if sequence > self.window.newest() {
-            return Freshness::Fresh;
+        let window = &mut self.window;
+        let ahead = sequence.saturating_sub(window.newest);
+        if ahead > 0 {
+            if ahead < WINDOW || window.is_second(sequence) {
+                return Freshness::Fresh;
+            }
+            window.far = sequence;
+            self.implausible += 1;
+            return Freshness::Implausible;
         }
-        match self.window.note(sequence) {
-            Place::Ahead => Freshness::Fresh,
+        match window.note(sequence) {
             Place::Taken => {
                 self.duplicate += 1;
                 Freshness::Duplicate
             }
-            Place::Gap | Place::Behind => {
+            _ => {
                 self.stale += 1;
                 Freshness::Stale
             }
@@ -134,7 +165,9 @@ impl SequenceWindow {
 
     /// Takes note of an update that was accepted: nothing up to its number is fresh any more.
     pub fn accept(&mut self, sequence: u32) {
-        self.window.note(sequence);
+        if sequence > self.window.newest {
+            self.window.go_on(sequence);
+        }
     }
 
     /// The greatest sequence number accepted, 0 before the first.
@@ -145,6 +178,11 @@ impl SequenceWindow {
     /// How many were stopped as seen before.
     pub fn duplicate(&self) -> u64 {
         self.duplicate
+    }
+
+    /// How many were stopped as too far ahead.
+    pub fn implausible(&self) -> u64 {
+        self.implausible
     }
 
     /// How many were stopped as older than one seen.
@@ -184,6 +222,7 @@ mod tests {
     fn a_window_forgets_exactly_after_its_length() {
         let mut window = Window::default();
         assert_eq!(window.note(2), Place::Ahead);
+        assert_eq!(window.note(4), Place::Ahead);
         assert_eq!(window.note(1 + WINDOW), Place::Ahead);
         assert_eq!(window.note(2), Place::Taken, "{} back", WINDOW - 1);
         assert_eq!(window.note(1), Place::Behind, "{WINDOW} back");
@@ -193,8 +232,27 @@ mod tests {
     }
 
     #[test]
+    fn a_sequence_far_ahead_is_fresh_when_a_second_update_is_there_too() {
+        let mut window = SequenceWindow::default();
+        assert_eq!(window.offer(WINDOW - 1), Freshness::Fresh);
+        let far = u32::MAX - 7;
+        assert_eq!(window.offer(far), Freshness::Implausible);
+        assert_eq!(window.offer(WINDOW), Freshness::Fresh);
+        assert_eq!((window.newest(), window.implausible()), (WINDOW, 1));
+        assert_eq!(window.judge(far), Freshness::Fresh, "its repeat");
+        assert_eq!(
+            window.judge(WINDOW + 1),
+            Freshness::Fresh,
+            "it was not accepted"
+        );
+        assert_eq!(window.offer(far), Freshness::Fresh);
+        assert_eq!(window.judge(WINDOW + 2), Freshness::Stale);
+    }
+
+    #[test]
     fn the_last_numbers_of_all_work_and_do_not_wrap() {
         let mut window = SequenceWindow::default();
+        assert_eq!(window.offer(u32::MAX - 2), Freshness::Implausible);
         assert_eq!(window.offer(u32::MAX - 1), Freshness::Fresh);
         assert_eq!(window.offer(u32::MAX), Freshness::Fresh);
         assert_eq!(window.offer(0), Freshness::Stale);
@@ -222,15 +280,38 @@ mod tests {
 
     proptest! {
         #[test]
+        fn one_hostile_sequence_makes_no_more_stale_than_a_window(
+            before in 0_u32..3000,
+            hostile in any::<u32>(),
+            after in prop::collection::vec(1_u32..20, 1..200),
+        ) {
+            let mut window = SequenceWindow::default();
+            (1..=before).for_each(|sequence| assert_eq!(window.offer(sequence), Freshness::Fresh));
+            window.offer(hostile);
+            let mut sequence = before;
+            for step in after {
+                sequence += step;
+                let fresh = window.offer(sequence) == Freshness::Fresh;
+                let in_reach = (before..before + WINDOW).contains(&hostile);
+                prop_assert!(fresh || in_reach && sequence <= hostile, "{}", sequence);
+            }
+        }
+
+        #[test]
         fn a_window_agrees_with_a_set_that_remembers_all(
             start in prop_oneof![Just(0_u32), Just(u32::MAX - 6000)],
             numbers in prop::collection::vec(1_u32..6000, 1..300),
         ) {
             let (mut window, mut all) = (Window::default(), BTreeSet::new());
-            let mut newest = 0;
+            let (mut newest, mut far) = (0, 0);
             for number in numbers.into_iter().map(|n| start + n) {
                 let place = window.note(number);
-                let expected = if number > newest {
+                let second = number != far && number.abs_diff(far) < WINDOW;
+                let expected = if number > newest && number - newest >= WINDOW && !second {
+                    far = number;
+                    prop_assert_eq!(place, Place::Implausible, "{}", number);
+                    continue;
+                } else if number > newest {
                     Place::Ahead
                 } else if newest - number >= WINDOW {
                     Place::Behind

@@ -54,7 +54,7 @@ fn what_the_other_side_would_refuse_is_not_written() {
         let envelope = ENVELOPE;
         refused(
             Datagram {
-                stopped: false,
+                flags: Flags::default(),
                 envelope,
                 message,
             }
@@ -88,7 +88,7 @@ fn what_the_other_side_would_refuse_is_not_written() {
     }) {
         let message = Message::Heartbeat;
         let encoded = Datagram {
-            stopped: false,
+            flags: Flags::default(),
             envelope,
             message,
         }

@@ -77,7 +77,7 @@ proptest! {
         let message = Message::Command(Command { port, ..command });
         let bytes = datagram(envelope, message);
         prop_assert!(bytes.len() <= DATAGRAM_MAX);
-        prop_assert_eq!(Datagram::decode(&bytes, Side::Master), Ok(Datagram { stopped: false, envelope, message }));
+        prop_assert_eq!(Datagram::decode(&bytes, Side::Master), Ok(Datagram { flags: Flags::default(), envelope, message }));
     }
 
     #[test]
@@ -117,7 +117,7 @@ proptest! {
             for from in [Side::Master, Side::Slave] {
                 let read = Datagram::decode(&bytes, from);
                 if message.kind().is_sent_by(from) {
-                    prop_assert_eq!(read, Ok(Datagram { stopped: false, envelope, message }));
+                    prop_assert_eq!(read, Ok(Datagram { flags: Flags::default(), envelope, message }));
                 } else {
                     prop_assert!(read.is_err());
                 }
@@ -188,11 +188,14 @@ proptest! {
     fn random_bodies_read_as_themselves_or_not_at_all(
         kind in 0..9_usize,
         stopped: bool,
+        tool in 0..3_usize,
+        energy_holds: bool,
         body in prop::collection::vec(any::<u8>(), 0..300),
         small in prop::collection::vec(0..3_u8, 0..40),
     ) {
+        let flags = Flags { stopped, tool: ToolState::ALL[tool], energy_holds };
         for body in [body, small] {
-            let message = [&header::header(Kind::ALL[kind], stopped)[..], &body[..]].concat();
+            let message = [&header::header(Kind::ALL[kind], flags)[..], &body[..]].concat();
             for from in [Side::Master, Side::Slave] {
                 reads_only_what_it_writes(&message, from);
                 reads_only_what_it_writes(&body, from);

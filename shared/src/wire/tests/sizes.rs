@@ -7,7 +7,7 @@ fn no_buffer_is_too_short_without_an_error() {
     let (envelope, message) = (ENVELOPE, messages()[0]);
     for length in 0..datagram(envelope, message).len() {
         let encoded = Datagram {
-            stopped: false,
+            flags: Flags::default(),
             envelope,
             message,
         }

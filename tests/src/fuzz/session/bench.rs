@@ -20,8 +20,8 @@ use mmt_shared::model::settings::Mode;
 use mmt_shared::pairing::Token;
 use mmt_shared::time::{TICK, Time};
 use mmt_shared::wire::{
-    Architecture, Claim, DATAGRAM_MAX, Datagram, Ending, Farewell, Hello, Label, Message, Role,
-    STREAM_MESSAGE_MAX, Side, StreamMessage,
+    Architecture, Claim, DATAGRAM_MAX, Ending, Farewell, Hello, Label, Role, STREAM_MESSAGE_MAX,
+    Side, StreamMessage,
 };
 
 use super::HEAD;
@@ -353,23 +353,12 @@ impl Bench {
         let ends = &mut self.ends;
         match to {
             Side::Master => {
-                ends.master_judge.handled += 1;
                 ends.master.handle_datagram(self.master_now, &bytes);
                 ends.master_checks.arrived(self.master_now, &bytes);
             }
             Side::Slave => {
-                let commands = ends.slave.channel().counts().received.commands;
-                ends.slave_judge.handled += 1;
                 ends.slave.handle_datagram(self.slave_now, &bytes);
                 ends.slave_checks.arrived(self.slave_now, &bytes);
-                if ends.slave.channel().counts().received.commands > commands
-                    && let Ok(Datagram {
-                        message: Message::Command(command),
-                        ..
-                    }) = Datagram::decode(&bytes, Side::Master)
-                {
-                    ends.slave_judge.samples += command.samples.len() as u64;
-                }
             }
         }
     }
@@ -437,8 +426,8 @@ impl Bench {
     /// What holds of the session as a whole.
     pub(super) fn judge_all(&self) {
         let ends = &self.ends;
-        ends.master_judge.balances(&ends.master);
-        ends.slave_judge.balances(&ends.slave);
+        MasterJudge::reports(&ends.master);
+        SlaveJudge::reports(&ends.slave);
         for verdict in [ends.master_checks.verdict(), ends.slave_checks.verdict()] {
             assert!(verdict.holds(), "{verdict}");
         }

@@ -43,7 +43,7 @@ pub(super) fn forged(bytes: &[u8], from: Side, draws: &mut Substream) -> Option<
         envelope.sent = time(envelope.sent, draws);
     }
     envelope.echo = envelope.echo.map(|echo| false_echo(echo, draws));
-    datagram.stopped ^= draws.chance(0.05);
+    datagram.flags.stopped ^= draws.chance(0.05);
     datagram.message = match datagram.message {
         Message::Command(mut command) => {
             command.newest_update = sequence(command.newest_update, draws);

@@ -179,7 +179,10 @@ function banner() {
   const ended = about.state === "ended" && !about.study ? `The session ended: ${about.why}.` : null;
   const stopped = { master: "Emergency stop: no force on the hand, and the tool stands.", slave: "The slave's emergency stop is set: it is cleared there.",
     either: "An emergency stop is set: the tool stands." };
-  const text = lost ?? ended ?? stopped[link.frame?.master.stopped_by] ?? about.note;
+  const master = link.frame?.master;
+  const held = { hold: "The tool stands: no samples reach it.", disengaged: "The tool is disengaged." }[master?.tool_state]
+    ?? (master?.tool_energy_holds ? "The tool is held: it gave more energy than the hand." : null);
+  const text = lost ?? ended ?? stopped[master?.stopped_by] ?? held ?? about.note;
   if (text === banner.text && link.operates === banner.operates) return;
   [banner.text, banner.operates] = [text, link.operates];
   $("banner").hidden = !text;

@@ -1,0 +1,92 @@
+//! A panic is our bug. In whatever thread of this process it happens, the run ends in order, and its exit code is that of a failure.
+//!
+//! Two kinds of threads end nothing: those whose panic somebody else notices, who fails the session by name, and those in which
+//! strangers are served, because nobody who finds a bug of ours may end a session that is not theirs.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Mutex, PoisonError};
+
+use crate::failure::Failure;
+use crate::stop::Stop;
+
+/// Whose panics fail the session by name: the hosts, which are joined, and the 1 kHz loops, which their hosts look after.
+const LOOKED_AFTER: [&str; 5] = ["main", "master", "observer", "mmt-haptic", "mmt-slave"];
+/// Where strangers are served beside the session: judges and observers on the thread of the slave's host, pages.
+const OF_STRANGERS: [&str; 2] = ["slave", "mmt-console"];
+
+/// Those of this process.
+pub(crate) static PANICS: Panics = Panics::new();
+
+/// The panics of a process.
+#[derive(Debug)]
+pub(crate) struct Panics {
+    any: AtomicBool,
+    /// The run that they end.
+    stop: Mutex<Option<Stop>>,
+}
+
+impl Panics {
+    pub(crate) const fn new() -> Self {
+        Self {
+            any: AtomicBool::new(false),
+            stop: Mutex::new(None),
+        }
+    }
+
+    /// This run ends when a thread panics that nobody looks after.
+    pub(crate) fn end(&self, stop: &Stop) {
+        let mut ends = self.stop.lock().unwrap_or_else(PoisonError::into_inner);
+        *ends = Some(stop.clone());
+    }
+
+    /// A thread of this name panics.
+    pub(crate) fn note(&self, thread: Option<&str>) {
+        self.any.store(true, Ordering::Release);
+        let mut goes_on = LOOKED_AFTER.iter().chain(&OF_STRANGERS);
+        if goes_on.any(|name| Some(*name) == thread) {
+            return;
+        }
+        // a panic while the lock is held would wait for itself
+        if let Ok(ends) = self.stop.try_lock()
+            && let Some(stop) = &*ends
+        {
+            stop.give_up();
+        }
+    }
+
+    /// What a run came to that went well but for a panic.
+    ///
+    /// # Errors
+    /// There was one.
+    pub(crate) fn judge(&self) -> Result<(), Failure> {
+        if self.any.load(Ordering::Acquire) {
+            return Err(Failure::failed("a thread of mmt panicked")
+                .remedy("this is a defect of mmt: please report it with what stands above"));
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_panic_that_nobody_looks_after_ends_the_run_and_every_one_is_a_failure() {
+        for (thread, ends) in [
+            (Some("mmt-device"), true),
+            (Some("signals"), true),
+            (None, true),
+            (Some("mmt-haptic"), false),
+            (Some("slave"), false),
+        ] {
+            let (panics, stop) = (Panics::new(), Stop::new());
+            panics.end(&stop);
+            assert_eq!(panics.judge(), Ok(()));
+            panics.note(thread);
+            assert_eq!(*stop.receiver().borrow(), ends, "{thread:?}");
+            assert_eq!(stop.asked(), ends, "{thread:?}");
+            assert!(panics.judge().is_err());
+        }
+    }
+}
