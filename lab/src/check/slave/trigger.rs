@@ -2,7 +2,7 @@
 //!
 //! Each direction is judged where it follows from the contract alone. An update of cause `deadband` needs (12), one of cause `timer`
 //! needs T_update. Under the schemes that ask for nothing more, (12) and T_update need an update. Not judged: where the force is
-//! averaged because its sensor is noisy; other metrics and references than the paper's; what `useful` and `adaptive` leave out as
+//! averaged because its sensor is noisy or by `judged_over`; other metrics and references than the paper's; what `useful` and `adaptive` leave out as
 //! not felt; and (12) in a tick in which the model pushes harder than the tool, whose limit may hold it back then.
 
 use std::mem::replace;
@@ -110,7 +110,8 @@ impl SlaveChecks {
             Scheme::Timer { .. } | Scheme::EverySample => f64::INFINITY,
         };
         let is_rule = config.trigger.metric == MismatchMetric::Force
-            && config.trigger_reference == TriggerReference::Shadow;
+            && config.trigger_reference == TriggerReference::Shadow
+            && config.trigger.judged_over.is_zero();
         // (12)
         is_rule.then_some((done.f_s - done.f_shadow).norm() - allowed)
     }
