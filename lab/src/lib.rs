@@ -26,6 +26,7 @@ pub mod table;
 pub mod text_error;
 pub mod transport;
 pub mod trial;
+#[cfg(feature = "io")]
 mod two_ports;
 pub mod what_if;
 pub mod world;
