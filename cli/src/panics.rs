@@ -7,7 +7,6 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
 
 use crate::failure::Failure;
-use crate::stop::Stop;
 
 /// Whose panics fail the session by name: the hosts, which are joined, and the 1 kHz loops, which their hosts look after.
 const LOOKED_AFTER: [&str; 5] = ["main", "master", "observer", "mmt-haptic", "mmt-slave"];
@@ -18,25 +17,24 @@ const OF_STRANGERS: [&str; 2] = ["slave", "mmt-console"];
 pub(crate) static PANICS: Panics = Panics::new();
 
 /// The panics of a process.
-#[derive(Debug)]
 pub(crate) struct Panics {
     any: AtomicBool,
-    /// The run that they end.
-    stop: Mutex<Option<Stop>>,
+    /// Ends the run.
+    end: Mutex<Option<Box<dyn Fn() + Send>>>,
 }
 
 impl Panics {
     pub(crate) const fn new() -> Self {
         Self {
             any: AtomicBool::new(false),
-            stop: Mutex::new(None),
+            end: Mutex::new(None),
         }
     }
 
-    /// This run ends when a thread panics that nobody looks after.
-    pub(crate) fn end(&self, stop: &Stop) {
-        let mut ends = self.stop.lock().unwrap_or_else(PoisonError::into_inner);
-        *ends = Some(stop.clone());
+    /// When a thread panics that nobody looks after, `end` ends the run.
+    pub(crate) fn end_by(&self, end: impl Fn() + Send + 'static) {
+        let mut ends = self.end.lock().unwrap_or_else(PoisonError::into_inner);
+        *ends = Some(Box::new(end));
     }
 
     /// A thread of this name panics.
@@ -47,10 +45,10 @@ impl Panics {
             return;
         }
         // a panic while the lock is held would wait for itself
-        if let Ok(ends) = self.stop.try_lock()
-            && let Some(stop) = &*ends
+        if let Ok(ends) = self.end.try_lock()
+            && let Some(end) = &*ends
         {
-            stop.give_up();
+            end();
         }
     }
 
@@ -70,6 +68,7 @@ impl Panics {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::stop::Stop;
 
     #[test]
     fn a_panic_that_nobody_looks_after_ends_the_run_and_every_one_is_a_failure() {
@@ -81,7 +80,8 @@ mod tests {
             (Some("slave"), false),
         ] {
             let (panics, stop) = (Panics::new(), Stop::new());
-            panics.end(&stop);
+            let ended = stop.clone();
+            panics.end_by(move || ended.give_up());
             assert_eq!(panics.judge(), Ok(()));
             panics.note(thread);
             assert_eq!(*stop.receiver().borrow(), ends, "{thread:?}");

@@ -82,7 +82,8 @@ impl Stop {
             .name("signals".to_owned())
             .spawn(move || runtime.block_on(wait))
             .map_err(no_signals)?;
-        PANICS.end(&stop);
+        let ended = stop.clone();
+        PANICS.end_by(move || ended.give_up());
         Ok(stop)
     }
 
