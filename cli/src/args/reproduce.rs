@@ -21,7 +21,7 @@ pub(crate) struct ReproduceArguments {
     /// Folder for CSV, SVG and manifest.json; made if it is not there
     #[arg(long, global = true, value_name = "DIR", default_value = "figures")]
     pub(crate) out: PathBuf,
-    /// Seeds 1 to N [default: each experiment's own]
+    /// N seeds, from 5001 on [default: each experiment's own number]
     #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=10_000))]
     pub(crate) seeds: Option<u64>,
     /// Length of a run.

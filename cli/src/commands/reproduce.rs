@@ -5,7 +5,7 @@ use std::path::Path;
 use std::sync::mpsc::Sender;
 
 use mmt_lab::experiment::findings::{ExperimentError, Section};
-use mmt_lab::io::{Folder, Runner};
+use mmt_lab::io::{FRESH_SEED, Folder, Runner};
 use serde::Serialize;
 
 use crate::args::ReproduceArguments;
@@ -76,7 +76,7 @@ fn every_experiment(
     done: &Sender<Manifest>,
 ) -> Result<(), Failure> {
     let progress = |what: &str, done, whole| bar.show(what, done, whole);
-    let runner = Runner::new(folder, arguments.jobs, &progress);
+    let runner = Runner::new(folder, arguments.jobs, &progress).from_seed(FRESH_SEED);
     let mut manifest = Manifest {
         program: "mmt",
         version: env!("CARGO_PKG_VERSION"),

@@ -56,6 +56,7 @@ impl Experiment {
         Ok(Section {
             experiment: self.name,
             extent: request.extent,
+            first_seed: runner.first_seed(),
             findings: (self.run)(runner, request)?,
         })
     }

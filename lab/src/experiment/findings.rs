@@ -13,7 +13,7 @@ use crate::world::WorldConfig;
 /// How much of an experiment is done.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Extent {
-    /// Seeds 1 to this.
+    /// So many seeds, from the runner's first one on.
     pub seeds: u64,
     /// Length of a run.
     #[serde(rename = "duration_s", serialize_with = "seconds")]
@@ -42,6 +42,8 @@ pub struct Section {
     pub experiment: &'static str,
     /// How much of it was done.
     pub extent: Extent,
+    /// The first seed; of `tuned`, which has seeds of its own, without meaning.
+    pub first_seed: u64,
     /// What it found.
     #[serde(flatten)]
     pub findings: Findings,

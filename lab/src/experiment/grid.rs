@@ -5,7 +5,7 @@ use crate::statistics::{Interval, median};
 use crate::table::{Cell, Column};
 use crate::trial::Measured;
 
-/// A case of a grid with what was measured of it, seed by seed from 1.
+/// A case of a grid with what was measured of it, seed by seed from the first.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Group<C, R> {
     /// What the runs have in common.
@@ -58,15 +58,21 @@ impl<C, R> Group<C, R> {
     }
 }
 
-/// Every run of some groups.
-pub fn runs<C, R>(groups: &[Group<C, R>]) -> Vec<Run<'_, C, R>> {
+/// Every run of some groups, of which the first seed is given.
+pub fn runs<C, R>(groups: &[Group<C, R>], first_seed: u64) -> Vec<Run<'_, C, R>> {
     let mut runs = Vec::new();
     for group in groups {
-        runs.extend(group.runs.iter().zip(1..).map(|(measured, seed)| Run {
-            case: &group.case,
-            seed,
-            measured,
-        }));
+        runs.extend(
+            group
+                .runs
+                .iter()
+                .zip(first_seed..)
+                .map(|(measured, seed)| Run {
+                    case: &group.case,
+                    seed,
+                    measured,
+                }),
+        );
     }
     runs
 }

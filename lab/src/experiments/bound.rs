@@ -82,7 +82,11 @@ fn run(runner: &Runner, request: &Request) -> Result<Findings, ExperimentError> 
     let groups = runner.grid("bound", extent.seeds, Case::all(), |case, seed| {
         Bounded::of(&case.world().seeded(seed), extent.duration)
     })?;
-    let runs = Table::of("Runs", &grid::runs(&groups), &columns());
+    let runs = Table::of(
+        "Runs",
+        &grid::runs(&groups, runner.first_seed()),
+        &columns(),
+    );
     runner.keep_table("bound.csv", &runs)?;
     runner.keep_figure("bound.svg", &figure::figure(&groups))?;
     let runs = groups.iter().flat_map(|group| &group.runs);

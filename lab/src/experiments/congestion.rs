@@ -40,7 +40,7 @@ fn world(master: StretchMax, slave: StretchMax) -> Result<WorldConfig, Experimen
     Ok(WorldConfig::over(link).stretched(master, slave))
 }
 
-/// Keeps `congestion.csv` (a row a bin) and `congestion.svg` (seed 1).
+/// Keeps `congestion.csv` (a row a bin) and `congestion.svg` (the first seed).
 fn run(runner: &Runner, request: &Request) -> Result<Findings, ExperimentError> {
     let extent = request.extent;
     let variants = VARIANTS.map(|(name, master, slave)| {
@@ -51,7 +51,7 @@ fn run(runner: &Runner, request: &Request) -> Result<Findings, ExperimentError> 
     let groups = runner.grid("congestion", extent.seeds, variants?, |variant, seed| {
         bins::run(&variant.world.clone().seeded(seed), extent.duration)
     })?;
-    let runs = grid::runs(&groups);
+    let runs = grid::runs(&groups, runner.first_seed());
     let bins = runs.iter().flat_map(|run| {
         let bins = run.measured.bins.iter();
         bins.map(move |bin| (run.case.name, run.seed, bin))

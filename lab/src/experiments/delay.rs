@@ -45,7 +45,7 @@ fn run(runner: &Runner, request: &Request) -> Result<Findings, ExperimentError> 
     };
     let groups = measure(runner, request, "delay", points)?;
     let limits = limits::table(&groups);
-    runner.keep_table("delay.csv", &tables::runs(&groups))?;
+    runner.keep_table("delay.csv", &tables::runs(&groups, runner.first_seed()))?;
     runner.keep_table("delay-limits.csv", &limits)?;
     runner.keep_figure("delay.svg", &figure::figure(&groups))?;
 

@@ -42,7 +42,11 @@ fn run(runner: &Runner, request: &Request) -> Result<Findings, ExperimentError> 
         }
         Ok(measured)
     })?;
-    let runs = Table::of("Runs of fig. 5", &grid::runs(&groups), &columns());
+    let runs = Table::of(
+        "Runs of fig. 5",
+        &grid::runs(&groups, runner.first_seed()),
+        &columns(),
+    );
     runner.keep_table("fig5.csv", &runs)?;
     runner.keep_figure("fig5.svg", &figure(&groups))?;
     Ok(Findings {

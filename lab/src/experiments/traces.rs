@@ -30,7 +30,8 @@ fn run(
     curve: Curve,
 ) -> Result<Findings, ExperimentError> {
     let extent = request.extent;
-    let world = paper_world(Mode::Paper, curve.at(DEADBAND)).seeded(extent.seeds);
+    let seed = runner.first_seed() + extent.seeds.saturating_sub(1);
+    let world = paper_world(Mode::Paper, curve.at(DEADBAND)).seeded(seed);
     let groups = runner.grid(name, 1, vec![world.clone()], |world, _| {
         runner.trial(&Trial {
             traced: true,

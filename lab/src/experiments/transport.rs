@@ -23,7 +23,8 @@ pub(super) const TRANSPORT: Experiment = Experiment {
 /// Keeps `transport.csv` and `transport.svg`.
 fn run(runner: &Runner, request: &Request) -> Result<Findings, ExperimentError> {
     let extent = request.extent;
-    let grids = (1..=extent.seeds).map(|seed| grid::cases(extent.duration, seed));
+    let seeds = (runner.first_seed()..).zip(0..extent.seeds);
+    let grids = seeds.map(|(seed, _)| grid::cases(extent.duration, seed));
     // a case has its seed, so that the rows of a seed stand together
     let groups = runner.grid("transport", 1, grids.flatten().collect(), |case, _| {
         let outcome = virtual_time::run(case);

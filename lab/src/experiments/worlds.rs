@@ -43,9 +43,11 @@ struct Row {
 fn run(runner: &Runner, request: &Request) -> Result<Findings, ExperimentError> {
     let extent = request.extent;
     let one = request.number("world").filter(|number| *number >= 1.0);
-    let (seeds, first) = one.map_or((extent.seeds, 1), |number| (1, number as u64));
-    let groups = runner.grid("worlds", seeds, vec![first], |first, seed| {
-        let mut world = RandomWorld::new(first + seed - 1);
+    let (seeds, first) = one.map_or((extent.seeds, runner.first_seed()), |number| {
+        (1, number as u64)
+    });
+    let groups = runner.grid_from(first, "worlds", seeds, vec![()], |(), number| {
+        let mut world = RandomWorld::new(number);
         if request.flag("stiff-tool") {
             world.config.slave.tool_compliance = None;
         }
@@ -69,7 +71,7 @@ fn run(runner: &Runner, request: &Request) -> Result<Findings, ExperimentError> 
     Ok(Findings {
         digest,
         tables: vec![
-            tables::distribution(&rows, extent),
+            tables::distribution(&rows, first, extent),
             tables::targets(&rows),
             tables::worst(&rows),
         ],

@@ -19,6 +19,6 @@ pub mod virtual_time;
 pub use cost::estimator_tick_ms;
 pub use failure::Failure;
 pub use folder::Folder;
-pub use runner::{Progress, Runner};
+pub use runner::{FRESH_SEED, Progress, Runner};
 pub use swarm::{Repeated, swarm_of};
 pub use sweep_dir::{SweepDir, SweepError};

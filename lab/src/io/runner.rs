@@ -19,9 +19,14 @@ use crate::trial::{Measured, Trial};
 /// Receives what runs, how many runs are done and how many there are; from any thread.
 pub type Progress<'a> = &'a (dyn Fn(&str, usize, usize) + Sync);
 
+/// The first seed of what documents quote. No test uses seeds from here on, and nothing is tuned on them: tests and defaults
+/// were made with seeds below 5000, architectures are tuned on 10001 and judged on 20001 and on.
+pub const FRESH_SEED: u64 = 5001;
+
 /// Threads, a folder, and the results of the trials so far.
 pub struct Runner<'a> {
     threads: Option<NonZero<usize>>,
+    first_seed: u64,
     folder: Folder,
     progress: Progress<'a>,
     /// By seed: trials of different seeds have different results.
@@ -34,10 +39,23 @@ impl<'a> Runner<'a> {
     pub fn new(folder: Folder, threads: Option<NonZero<usize>>, progress: Progress<'a>) -> Self {
         Self {
             threads,
+            first_seed: 1,
             folder,
             progress,
             known: Mutex::default(),
         }
+    }
+
+    /// The same from another first seed on than 1.
+    #[must_use]
+    pub fn from_seed(self, first_seed: u64) -> Self {
+        Self { first_seed, ..self }
+    }
+
+    /// Its first seed.
+    #[must_use]
+    pub fn first_seed(&self) -> u64 {
+        self.first_seed
     }
 
     /// Where its files go.
@@ -46,7 +64,7 @@ impl<'a> Runner<'a> {
         &self.folder
     }
 
-    /// Runs every case with the seeds from 1 to `seeds`, on all threads.
+    /// Runs every case with as many seeds, from its first one on, on all threads.
     ///
     /// # Errors
     /// An error of a run. After it no new run begins.
@@ -57,7 +75,26 @@ impl<'a> Runner<'a> {
         cases: Vec<C>,
         run: impl Fn(&C, u64) -> Result<R, ExperimentError> + Sync + Send,
     ) -> Result<Vec<Group<C, R>>, ExperimentError> {
-        let of_case = |case| (1..=seeds).map(move |seed| (case, seed));
+        self.grid_from(self.first_seed, what, seeds, cases, run)
+    }
+
+    /// The same from a seed on that is not the runner's.
+    ///
+    /// # Errors
+    /// As [`Self::grid`].
+    pub fn grid_from<C: Sync, R: Send>(
+        &self,
+        first_seed: u64,
+        what: &str,
+        seeds: u64,
+        cases: Vec<C>,
+        run: impl Fn(&C, u64) -> Result<R, ExperimentError> + Sync + Send,
+    ) -> Result<Vec<Group<C, R>>, ExperimentError> {
+        let of_case = |case| {
+            (first_seed..)
+                .zip(0..seeds)
+                .map(move |(seed, _)| (case, seed))
+        };
         let items: Vec<(&C, u64)> = cases.iter().flat_map(of_case).collect();
         let done = AtomicUsize::new(0);
         let work = |(case, seed): &(&C, u64)| -> Result<R, ExperimentError> {
@@ -75,7 +112,7 @@ impl<'a> Runner<'a> {
         Ok(cases.into_iter().map(group).collect())
     }
 
-    /// Runs a trial of every case with the seeds from 1 to that of the extent, as [`Self::grid`].
+    /// Runs a trial of every case with as many seeds, as [`Self::grid`].
     ///
     /// # Errors
     /// When a trial cannot be run. After it no new run begins.
@@ -146,5 +183,35 @@ impl<'a> Runner<'a> {
             why,
         })?;
         self.keep(name, svg.as_bytes())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::experiment::grid::runs;
+
+    #[test]
+    fn a_runner_gives_the_seeds_from_its_first_one_on_and_the_runs_have_their_names() {
+        let folder = tempfile::tempdir().unwrap();
+        let quiet = |_: &str, _: usize, _: usize| {};
+        let runner = |first| {
+            let folder = Folder::open(folder.path()).unwrap();
+            Runner::new(folder, None, &quiet).from_seed(first)
+        };
+        let seeds = |first| {
+            let groups = runner(first).grid("seeds", 3, vec!["a", "b"], |_, seed| Ok(seed));
+            let groups = groups.unwrap();
+            let named = runs(&groups, first).into_iter();
+            named
+                .map(|run| (run.seed, *run.measured))
+                .collect::<Vec<_>>()
+        };
+        let fresh = FRESH_SEED;
+        let once = [fresh, fresh + 1, fresh + 2].map(|seed| (seed, seed));
+        assert_eq!(seeds(fresh), [once, once].concat());
+        assert_eq!(seeds(1)[0], (1, 1));
+        let own = runner(fresh).grid_from(10_001, "seeds", 2, vec![()], |(), seed| Ok(seed));
+        assert_eq!(own.unwrap()[0].runs, [10_001, 10_002]);
     }
 }

@@ -8,10 +8,10 @@ use crate::experiment::prelude::*;
 
 /// A row a run.
 #[rustfmt::skip]
-pub(super) fn runs(groups: &[Group]) -> Table {
+pub(super) fn runs(groups: &[Group], first_seed: u64) -> Table {
     Table::of(
         "Runs",
-        &grid::runs(groups),
+        &grid::runs(groups, first_seed),
         &[
             column("architecture", "", 0, |run| run.case.architecture.name()),
             column("one_way_ms", "ms", 0, |run| run.case.one_way_ms),

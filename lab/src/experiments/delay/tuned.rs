@@ -25,9 +25,9 @@ pub(in crate::experiments) const TUNED: Experiment = Experiment {
 const DELAYS_MS: [u64; 9] = [0, 5, 10, 20, 50, 100, 250, 500, 1000];
 /// Most seeds that a value is tried with.
 const TUNING_SEEDS: u64 = 3;
-/// Before the first seed that tunes, and before the first that judges.
-const TUNING: u64 = 10_000;
-const JUDGING: u64 = 20_000;
+/// The first seed that tunes, and the first that judges, whatever the runner's.
+const TUNING: u64 = 10_001;
+const JUDGING: u64 = 20_001;
 
 /// An architecture at a delay: what it is run with where nobody tunes it, and tuned.
 pub(super) struct Judged<'a> {
@@ -38,10 +38,10 @@ pub(super) struct Judged<'a> {
 /// Keeps `tuned.csv`, `tuned-choices.csv` and `tuned.svg`.
 fn run(runner: &Runner, request: &Request) -> Result<Findings, ExperimentError> {
     let extent = request.extent;
-    let measure = |what, seeds, before: u64, choices| {
-        runner.grid(what, seeds, choices, |choice: &Choice, seed| {
+    let measure = |what, seeds, first: u64, choices| {
+        runner.grid_from(first, what, seeds, choices, |choice: &Choice, seed| {
             let (tuning, world) = choice.setting()?;
-            let (world, of) = (world.seeded(before + seed), choice.point.architecture);
+            let (world, of) = (world.seeded(seed), choice.point.architecture);
             let row = run_tuned(of, &tuning, &world, extent.duration);
             row.map_err(|error| TrialError::from(error).into())
         })

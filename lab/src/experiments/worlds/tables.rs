@@ -82,7 +82,7 @@ fn sorted(rows: &[Row], chosen: fn(&Row) -> bool, of: fn(&Row) -> Option<f64>) -
 }
 
 /// Quantiles of each measure in each part.
-pub(super) fn distribution(rows: &[Row], extent: Extent) -> Table {
+pub(super) fn distribution(rows: &[Row], first: u64, extent: Extent) -> Table {
     let parts: Vec<Part> = PARTS
         .iter()
         .flat_map(|(part, chosen)| {
@@ -94,8 +94,8 @@ pub(super) fn distribution(rows: &[Row], extent: Extent) -> Table {
         })
         .collect();
     let title = format!(
-        "Random worlds 1 to {}, {} s each",
-        extent.seeds,
+        "Random worlds {first} to {}, {} s each",
+        first + extent.seeds.saturating_sub(1),
         extent.duration.as_secs()
     );
     let at = |share: f64| move |part: &Part| quantile(&part.sorted, share);

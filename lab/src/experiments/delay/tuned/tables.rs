@@ -30,10 +30,10 @@ pub(super) fn choices(tried: &[Tried], judged: &[Judged<'_>]) -> Table {
 
 /// A row a run of a judged value.
 #[rustfmt::skip]
-pub(super) fn runs(groups: &[Tried], judged: &[Judged<'_>], before: u64) -> Table {
+pub(super) fn runs(groups: &[Tried], judged: &[Judged<'_>], first_seed: u64) -> Table {
     Table::of(
         "Runs",
-        &grid::runs(groups),
+        &grid::runs(groups, first_seed),
         &[
             column("architecture", "", 0, |run| run.case.point.architecture.name()),
             column("one_way_ms", "ms", 0, |run| run.case.point.one_way_ms),
@@ -45,7 +45,7 @@ pub(super) fn runs(groups: &[Tried], judged: &[Judged<'_>], before: u64) -> Tabl
             Column::new("is_tuned", "", 0, |run: &grid::Run<'_, _, DelayRow>| {
                 u64::from(judged.iter().any(|judged| judged.tuned.case == *run.case)).into()
             }),
-            Column::new("seed", "", 0, move |run: &grid::Run<'_, _, DelayRow>| (before + run.seed).into()),
+            column("seed", "", 0, |run| run.seed),
             column("relative_error", "", 3, |run| run.measured.relative_error),
             column("aligned_error", "", 3, |run| run.measured.aligned_error),
             column("breaks_per_push", "", 2, |run| run.measured.breaks_per_push),
