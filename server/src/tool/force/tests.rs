@@ -10,6 +10,8 @@ const SOFT: Coupling = Coupling {
 };
 /// The way of a tick at 0.6 m/s, m.
 const QUICK: f64 = 6e-4;
+/// What a tool with a limit of 15 N presses with, N: the rest is the margin.
+const PRESSED_N: f64 = 14.4;
 
 /// A tool at x that wants to be at a place behind a wall at 0; what it exerts, and whether it was held.
 struct Press {
@@ -62,20 +64,20 @@ fn a_press_on_a_wall_comes_to_the_limit_and_stays_there() {
     for (coupling, aim) in [
         (SOFT, 0.2),
         (Coupling::for_stiffness(3000.0), 0.2),
-        (SOFT, 0.0151),
+        (SOFT, 0.0145),
     ] {
         let mut press = Press::new(15.0, coupling, None);
         let forces: Vec<f64> = (0..2000).map(|_| press.tick(aim)).collect();
         let most = forces.iter().copied().fold(0.0, f64::max);
-        assert!(most <= 15.0 + 1e-9, "{most} N");
-        assert!(forces[1999] > 14.99, "{} N", forces[1999]);
+        assert!(most <= PRESSED_N + 1e-9, "{most} N");
+        assert!(forces[1999] > PRESSED_N - 0.01, "{} N", forces[1999]);
         assert!(press.limit.held_ticks() > 100);
     }
     let mut press = Press::new(15.0, SOFT, None);
     (0..2500).for_each(|n| {
-        press.tick(f64::from(n.min(2000)) * 7.4e-6);
+        press.tick(f64::from(n.min(2000)) * 7.1e-6);
     });
-    assert_eq!(press.limit.held_ticks(), 0, "14.8 N are allowed");
+    assert_eq!(press.limit.held_ticks(), 0, "14.2 N are allowed");
 }
 
 #[test]
@@ -120,7 +122,7 @@ fn a_first_touch_costs_no_more_than_the_limit_for_every_accepted_coupling() {
         }
     }
     assert!(unbound > 46.0, "the effect exists: {unbound} N");
-    assert!(worst <= 15.0 + 1e-9, "{worst} N");
+    assert!(worst <= PRESSED_N + 1e-9, "{worst} N");
 }
 
 #[test]
@@ -143,7 +145,7 @@ fn a_first_touch_after_missed_ticks_costs_no_more_than_the_limit() {
             let way = limit.allowed(wanted, period_s, Vec2::new(bias, 0.0));
             let force = coupling.force(way.x, way.x / period_s);
             assert!(
-                force <= 15.0 + 1e-9,
+                force <= PRESSED_N + 1e-9,
                 "{force} N after {missed} missed ticks, with a bias of {bias} N"
             );
         }
@@ -163,8 +165,8 @@ fn a_coupling_that_leaves_less_than_a_tenth_of_a_metre_a_second_is_refused() {
             .unwrap()
             .approach_speed()
     };
-    assert!((speed(12.0, 100.0).unwrap() - 0.1).abs() < 1e-12);
-    assert!(speed(11.9, 100.0).is_err() && speed(1.0, 0.0).is_err());
+    assert!((speed(12.5, 100.0).unwrap() - 0.1).abs() < 1e-12);
+    assert!(speed(12.4, 100.0).is_err() && speed(1.0, 0.0).is_err());
 }
 
 #[test]
@@ -175,9 +177,9 @@ fn a_noisy_sensor_makes_the_force_no_more_unsteady_than_it_is() {
     let mean = forces.iter().sum::<f64>() / n;
     let deviation = (forces.iter().map(|f| (f - mean).powi(2)).sum::<f64>() / n).sqrt();
     let most = forces.iter().copied().fold(0.0, f64::max);
-    assert!((mean - 15.0).abs() < 1e-3, "{mean} N");
+    assert!((mean - PRESSED_N).abs() < 1e-3, "{mean} N");
     assert!(deviation < 0.0105, "{deviation} N at a noise of 0.01 N");
-    assert!(most < 15.05, "{most} N");
+    assert!(most < PRESSED_N + 0.05, "{most} N");
 }
 
 #[test]
@@ -204,7 +206,8 @@ fn a_tool_that_is_pressed_on_gives_way() {
     let mut limit = ToolForce::try_new(15.0, SOFT).unwrap();
     limit.moved(Vec2::zeros(), false);
     let way = limit.allowed(Vec2::zeros(), TICK_S, Vec2::new(0.0, 26.0));
-    assert!((way - Vec2::new(0.0, -1e-3)).norm() < 1e-12, "{way}");
+    let back = (PRESSED_N - 26.0) / (1000.0 + 10.0 / TICK_S);
+    assert!((way - Vec2::new(0.0, back)).norm() < 1e-12, "{way}");
 }
 
 #[test]
