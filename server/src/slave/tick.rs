@@ -60,6 +60,7 @@ impl Slave {
             self.object.replace(found);
         }
         self.follow_master(played.stamp);
+        self.tool.set_returnable(self.shadow.ahead().returnable_j());
         self.reference.take_echo(played.force);
         self.errors.push(&contact, played.force);
         let input =

@@ -96,7 +96,10 @@ pub struct ToolEnergy {
     /// The tool goes no faster, m/s.
     speed_max_m_per_s: f64,
     hand: Option<HandSample>,
+    /// Work of the hand, J.
     hand_j: f64,
+    /// It is no less than this, J: the model is passive, so the hand gets no more back than the model holds.
+    hand_least_j: f64,
     /// Work of the tool, J.
     tool_j: f64,
     trail: Option<Trail>,
@@ -131,6 +134,7 @@ impl ToolEnergy {
             speed_max_m_per_s,
             hand: None,
             hand_j: 0.0,
+            hand_least_j: f64::NEG_INFINITY,
             tool_j: 0.0,
             trail: None,
             ways: VecDeque::with_capacity(ticks + 1),
@@ -178,6 +182,11 @@ impl ToolEnergy {
         self.round_trip_ticks = (s / TICK_S) as usize;
     }
 
+    /// After the newest sample the master's model can give the hand so much back, J.
+    pub(super) fn set_returnable(&mut self, returnable_j: f64) {
+        self.hand_least_j = self.hand_least_j.max(self.hand_j - returnable_j);
+    }
+
     /// Begins at a place (m) where an earlier session left the tool with this force on it, N.
     pub(super) fn begin_at(&mut self, place: Vec2, force: Vec2) {
         self.trail = Some(Trail { place, force });
@@ -198,6 +207,8 @@ impl ToolEnergy {
             // E(k) = E(k−1) + f(k−1)·(x(k) − x(k−1)), of the force that the device may have shown
             let shown = self.config.hand_force_max_n / before.force.norm();
             self.hand_j += before.force.dot(&way) * shown.min(1.0);
+            // a box that is carried back takes the HIP with it: the hand does not get what that looks like
+            self.hand_j = self.hand_j.max(self.hand_least_j);
         }
     }
 

@@ -92,6 +92,11 @@ impl LocalModel {
         self.injected_j
     }
 
+    /// All that the hand could get back, J: what spring and box hold, and what the tank has for corrections.
+    pub fn returnable_j(&self) -> f64 {
+        self.energy_now() + self.correction.tank.level_j()
+    }
+
     /// Times that a number of the box was none, so that it went back to where it last was good.
     pub fn not_finite(&self) -> u64 {
         self.not_finite

@@ -91,6 +91,21 @@ fn a_hand_is_credited_with_what_its_device_can_have_shown_and_pays_back_what_it_
     assert_eq!(energy.hand_j(), before);
 }
 
+/// The model holds a spring's 32 mJ at the most, so what the samples show beyond is a box that is carried back with the HIP.
+#[test]
+fn the_hand_gets_no_more_back_than_the_model_holds() {
+    let mut energy = bound(EnergyConfig::default());
+    for _ in 0..10 {
+        let before = energy.hand_j();
+        // the box slides at 1 N, and is carried back while the hand presses with 8 N
+        hand_goes(&mut energy, 0.1, 1.0, 500);
+        energy.set_returnable(0.032);
+        hand_goes(&mut energy, -0.1, 8.0, 500);
+        let gave = energy.hand_j() - before;
+        assert!((gave - (0.1 - 0.032)).abs() < 1e-9, "{gave} J");
+    }
+}
+
 #[test]
 fn a_tremor_that_a_sensor_shows_late_is_no_work() {
     let mut energy = bound(EnergyConfig::default());
