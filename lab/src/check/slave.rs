@@ -68,8 +68,8 @@ pub struct SlaveChecks {
     tool: Vec2,
     /// The tool's velocity in the tick before, m/s; none where that tick was missed or the tool touched something.
     velocity: Option<Vec2>,
-    /// The tool's speed in the tick before, m/s.
-    speed_before: f64,
+    /// The tool's velocity as if it had gone its way in one tick, m/s.
+    velocity_before: Vec2,
     /// Whether an emergency stop was set in the tick before.
     stopped: bool,
     stops: bool,
@@ -118,7 +118,7 @@ impl SlaveChecks {
             ticked: about.began,
             tool: about.tool,
             velocity: Some(Vec2::zeros()),
-            speed_before: 0.0,
+            velocity_before: Vec2::zeros(),
             stopped: false,
             stops: false,
             newest: None,

@@ -53,9 +53,10 @@ impl ToolForce {
         })
     }
 
-    /// The force that no predicted one exceeds, N.
-    fn aim_n(&self) -> f64 {
-        self.max_n * (1.0 - MARGIN)
+    /// The force that no predicted one exceeds where this is the limit, N.
+    #[must_use]
+    pub fn aim_n(max_n: f64) -> f64 {
+        max_n * (1.0 - MARGIN)
     }
 
     /// The speed at which a touch that nobody foresaw costs the limit at most, m/s: f_max less the margin, over (k_d + 2 k_p T). The tool is
@@ -68,7 +69,7 @@ impl ToolForce {
             stiffness_n_per_m: k_p,
             damping_ns_per_m: k_d,
         } = self.coupling;
-        let speed = self.aim_n() / (k_d + 2.0 * k_p * TICK_S);
+        let speed = Self::aim_n(self.max_n) / (k_d + 2.0 * k_p * TICK_S);
         in_range(APPROACH_NAME, "m/s", speed, APPROACH_M_PER_S)?;
         Ok(speed)
     }
@@ -112,7 +113,7 @@ impl ToolForce {
         } = self.coupling;
         // f(k+1) = f(k) + (k_p + k_d/T) n·way − k_d n·v(k) ≤ f_max less the margin
         let at_rest = size - k_d * n.dot(&self.velocity);
-        let most = (self.aim_n() - at_rest) / (k_p + k_d / period_s);
+        let most = (Self::aim_n(self.max_n) - at_rest) / (k_p + k_d / period_s);
         let along = n.dot(&way);
         if along <= most {
             return way;
@@ -132,7 +133,7 @@ impl ToolForce {
             stiffness_n_per_m: k_p,
             damping_ns_per_m: k_d,
         } = self.coupling;
-        let most = self.aim_n() / (k_p + (k_d + k_p * TICK_S) / period_s);
+        let most = Self::aim_n(self.max_n) / (k_p + (k_d + k_p * TICK_S) / period_s);
         let length = way.norm();
         if length <= most {
             way

@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use mmt_server::slave::SlaveTick;
+use mmt_server::tool::force::ToolForce;
 use mmt_shared::model::contact::Coupling;
 use mmt_shared::model::geometry::Vec2;
 use mmt_shared::time::{TICK, TICK_S, Time};
@@ -94,7 +95,7 @@ impl SlaveChecks {
             stiffness_n_per_m: k_p,
             damping_ns_per_m: k_d,
         } = self.about.coupling;
-        self.about.config.tool_force_max_n / (k_d + k_p * (period_s + TICK_S))
+        ToolForce::aim_n(self.about.config.tool_force_max_n) / (k_d + k_p * (period_s + TICK_S))
     }
 
     /// Hold, disengaged and emergency stop: the tool stands, or brakes as hard as it may. One that is pressed on may give way.
@@ -110,11 +111,14 @@ impl SlaveChecks {
             || self.about.config.tool_compliance.is_some();
         let playout = &self.about.config.playout;
         let period = elapsed.max(TICK).as_secs_f64();
-        let speed = way.norm() / period;
+        let velocity = way / period;
         let slower = playout.acceleration_max_m_per_s2 * period * (1.0 - CLOCKS);
-        let stands = stands || speed <= self.speed_before - slower;
+        // a limit of the tool's may have it brake along a face before it brakes across it
+        let brakes = velocity.norm() <= self.velocity_before.norm() - 0.5 * slower
+            && (velocity - self.velocity_before).norm() >= slower;
+        let stands = stands || brakes;
         // after ticks that were missed the way may have been gone in the last of them
-        self.speed_before = way.norm() / TICK_S;
+        self.velocity_before = way / TICK_S;
         let ramp =
             playout.extrapolation_ms * 1e-3 + self.speed() / playout.acceleration_max_m_per_s2;
         let ramp = Duration::from_secs_f64(ramp) + SLACK;
