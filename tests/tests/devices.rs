@@ -22,7 +22,7 @@ use serde_json::Value;
 
 use crate::harness::process::{Ended, Running, number};
 use crate::harness::python::python;
-use crate::harness::{alone, root};
+use crate::harness::{in_real_time, root};
 
 /// For what takes seconds; the host may be busy.
 const GENEROUS: Duration = Duration::from_secs(120);
@@ -112,7 +112,7 @@ fn tested(python: &str, emulated: (&str, &str, &[&str]), options: &[&str]) -> (E
 
 #[test]
 fn each_device_of_its_own_protocol_is_read_and_pulled_gently_and_let_go_at_the_end() {
-    alone(|| {
+    in_real_time(|| {
         let Some(python) = python("emulated devices", "socket") else {
             return;
         };
@@ -155,7 +155,7 @@ fn each_device_of_its_own_protocol_is_read_and_pulled_gently_and_let_go_at_the_e
 
 #[test]
 fn garbage_and_silence_of_a_device_end_in_no_force_and_it_goes_on() {
-    alone(|| {
+    in_real_time(|| {
         let Some(python) = python("emulated devices", "socket") else {
             return;
         };
@@ -180,7 +180,7 @@ fn garbage_and_silence_of_a_device_end_in_no_force_and_it_goes_on() {
 
 #[test]
 fn a_hand_at_a_device_of_its_own_protocol_pushes_the_box_over_the_emulated_network() {
-    alone(|| {
+    in_real_time(|| {
         let Some(python) = python("emulated devices", "socket") else {
             return;
         };
@@ -252,7 +252,7 @@ fn a_hand_at_a_device_of_its_own_protocol_pushes_the_box_over_the_emulated_netwo
 
 #[test]
 fn the_link_is_tested_by_the_same_command() {
-    alone(|| {
+    in_real_time(|| {
         let Some(python) = python("a hand in Python", "socket") else {
             return;
         };

@@ -16,7 +16,7 @@ use rustix::process::Signal;
 use serde_json::Value;
 
 use crate::harness::process::{Ended, PROGRAM, Running, did_not_run, number};
-use crate::harness::{alone, root};
+use crate::harness::{in_real_time, root};
 
 /// For what needs no more than a start or an end, on a host that stands still for a while.
 const SOON: Duration = Duration::from_secs(60);
@@ -64,7 +64,7 @@ fn promptly(ended: &Ended, since: Instant) {
 
 #[test]
 fn the_master_that_is_interrupted_ends_both_sides_with_their_reports() {
-    alone(|| {
+    in_real_time(|| {
         let (slave, pairing) = slave(&["--once"]);
         let master = master(&pairing, &["--duration", "60s"]);
         std::thread::sleep(Duration::from_secs(10));
@@ -84,7 +84,7 @@ fn the_master_that_is_interrupted_ends_both_sides_with_their_reports() {
 
 #[test]
 fn the_slave_that_is_interrupted_ends_both_sides_with_their_reports() {
-    alone(|| {
+    in_real_time(|| {
         let (slave, pairing) = slave(&[]);
         let master = master(&pairing, &["--duration", "60s"]);
         std::thread::sleep(Duration::from_secs(3));
@@ -118,7 +118,7 @@ fn slave_of_a_killed_master(options: &[&str]) -> Running {
 
 #[test]
 fn a_slave_of_one_session_whose_master_is_killed_ends_with_its_report_and_exit_code_1() {
-    alone(|| {
+    in_real_time(|| {
         let slave = slave_of_a_killed_master(&["--once"]).end(SOON).unwrap();
         ended_with(1, &slave);
         let report = slave.document(1).unwrap();
@@ -130,7 +130,7 @@ fn a_slave_of_one_session_whose_master_is_killed_ends_with_its_report_and_exit_c
 
 #[test]
 fn a_slave_that_goes_on_serving_is_not_judged_by_its_last_session() {
-    alone(|| {
+    in_real_time(|| {
         let slave = slave_of_a_killed_master(&[]);
         slave.interrupt().unwrap();
         let slave = slave.end(SOON).unwrap();
@@ -151,7 +151,7 @@ fn on_a_small_disk(blocks: u32, arguments: &[&str]) -> Running {
 
 #[test]
 fn a_record_of_packets_on_a_full_disk_does_not_cost_the_report() {
-    alone(|| {
+    in_real_time(|| {
         let place = tempfile::tempdir().unwrap();
         let record = place.path().join("packets.csv");
         let record = record.to_str().unwrap();
@@ -196,7 +196,7 @@ fn a_relay_whose_record_is_on_a_full_disk_prints_its_report() {
 
 #[test]
 fn a_path_that_cannot_be_written_does_not_cost_the_report() {
-    alone(|| {
+    in_real_time(|| {
         let (slave, pairing) = slave(&["--once"]);
         let path = ["--duration", "2s", "--record-path", "/dev/full"];
         let master = master(&pairing, &path).end(SOON).unwrap();
@@ -225,7 +225,7 @@ fn hang(place: &Path) -> Option<PathBuf> {
 
 #[test]
 fn a_slave_whose_tick_hangs_ends_with_exit_code_6_and_its_master_with_1() {
-    alone(|| {
+    in_real_time(|| {
         let place = tempfile::tempdir().unwrap();
         let Some(shim) = hang(place.path()) else {
             return;

@@ -8,7 +8,7 @@
 use std::process::Command;
 
 use crate::harness::process::{PROGRAM, did_not_run};
-use crate::harness::{alone, root};
+use crate::harness::{in_real_time, root};
 
 /// Parts of the names of the rows.
 const ROWS: [&str; 8] = [
@@ -28,7 +28,7 @@ fn what_befalls_processes_hosts_and_networks_breaks_no_promise() {
     if !rustix::process::geteuid().is_root() {
         return did_not_run(test, "it needs root to make network namespaces");
     }
-    alone(|| {
+    in_real_time(|| {
         let mut command = Command::new("python3");
         command
             .arg(root().join(".ci/endure"))

@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::{Duration, Instant};
 
-use crate::harness::alone;
+use crate::harness::in_real_time;
 use crate::harness::process::{Ended, PROGRAM, Running};
 use rustix::process::Signal;
 
@@ -232,7 +232,7 @@ fn secrets(hosts: &Hosts, tokens: &[(&'static str, &str)]) -> Vec<Secret> {
 
 #[test]
 fn tokens_change_while_a_session_goes_on_and_nothing_that_is_kept_holds_a_secret() {
-    alone(|| {
+    in_real_time(|| {
         let mut hosts = Hosts::new();
         let (slave, first) = hosts.slave();
         let mut operating = hosts.master("first", &first, "4s");

@@ -12,7 +12,7 @@ use std::time::Duration;
 use crate::harness::process::{Ended, ProcessError, Running, did_not_run, number};
 use crate::harness::python::python;
 use crate::harness::tshark::{TsharkError, tshark};
-use crate::harness::{alone, root};
+use crate::harness::{in_real_time, root};
 use serde_json::{Value, json};
 
 /// For what takes seconds; the host may be busy.
@@ -70,7 +70,7 @@ fn altered(pairing: &str, key: &str) -> String {
 
 #[test]
 fn a_master_that_knows_only_the_document_pushes_the_box_of_the_real_slave() {
-    alone(|| {
+    in_real_time(|| {
         let test = "the session of the independent client";
         let Some(python) = python(test, "aioquic") else {
             return;
@@ -193,7 +193,7 @@ fn the_dissector_shows_it(test: &str, client: &Value, capture: &Path, keys: &Pat
 
 #[test]
 fn who_has_another_pin_or_token_or_version_gets_no_session() {
-    alone(|| {
+    in_real_time(|| {
         let Some(python) = python("the refusals of the independent client", "aioquic") else {
             return;
         };
@@ -224,7 +224,7 @@ fn who_has_another_pin_or_token_or_version_gets_no_session() {
 
 #[test]
 fn an_observer_that_knows_only_the_document_sees_what_the_master_beside_it_is_sent() {
-    alone(|| {
+    in_real_time(|| {
         let Some(python) = python("the observer of the independent client", "aioquic") else {
             return;
         };

@@ -14,13 +14,13 @@ use std::process::Command;
 use mmt_shared::io::record::{RecordError, RecordWriter, read};
 use mmt_shared::record::messages::{Arrival, MasterTick, Message, Session, SlaveTick, Stamp};
 
-use crate::harness::alone;
+use crate::harness::in_real_time;
 use crate::harness::judge::{Records, judge};
 use crate::harness::process::PROGRAM;
 
 #[test]
 fn a_session_that_was_not_asked_for_its_record_is_judged_and_a_broken_promise_fails_its_test() {
-    alone(|| {
+    in_real_time(|| {
         let mut demo = Command::new(PROGRAM);
         demo.args(["demo", "--duration", "2s", "--json"]);
         let records = Records::of(&mut demo).unwrap();

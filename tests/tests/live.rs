@@ -6,7 +6,7 @@
 use std::time::Duration;
 
 use crate::harness::process::{Ended, PROGRAM, ProcessError, Running, number};
-use crate::harness::{alone, is_by_chance};
+use crate::harness::{in_real_time, is_by_chance};
 use rustix::process::Signal;
 use serde_json::Value;
 
@@ -67,7 +67,7 @@ fn nothing_is_nan(value: &Value, path: &str) {
 
 #[test]
 fn the_demonstration_ends_with_a_report_whose_numbers_belong_together() {
-    alone(|| {
+    in_real_time(|| {
         let arguments = ["demo", "--duration", "15s", "--seed", "1", "--json"];
         let ended = ok(ok(Running::mmt(&arguments)).end(Duration::from_secs(90)));
         ended_with(0, &ended);
@@ -162,7 +162,7 @@ fn forces_obey_their_limits_and_definitions(get: impl Fn(&str) -> f64) {
 
 #[test]
 fn with_tdpa_the_hand_feels_the_tool_from_the_first_sample() {
-    alone(|| {
+    in_real_time(|| {
         let tdpa = ["demo", "--architecture", "tdpa", "--duration", "12s"];
         let arguments = [&tdpa[..], &["--netem", "delay 2ms", "--json"]].concat();
         let ended = ok(ok(Running::mmt(&arguments)).end(Duration::from_secs(90)));
@@ -198,7 +198,7 @@ fn with_tdpa_the_hand_feels_the_tool_from_the_first_sample() {
 
 #[test]
 fn an_emergency_stop_of_either_side_is_shown_on_both_until_it_is_cleared_there() {
-    alone(|| {
+    in_real_time(|| {
         let (mut slave, pairing) = slave(&["--once"]);
         let mut master = master(&pairing, "600s");
         ok(master.wait_for_line(SOON, |line| line.contains("the session begins")));
@@ -229,7 +229,7 @@ fn an_emergency_stop_of_either_side_is_shown_on_both_until_it_is_cleared_there()
 
 #[test]
 fn a_second_master_is_refused_by_name_and_disturbs_nobody() {
-    alone(|| {
+    in_real_time(|| {
         let (slave, pairing) = slave(&["--once"]);
         let first = master(&pairing, "5s");
         std::thread::sleep(Duration::from_secs(2));
@@ -248,7 +248,7 @@ fn a_second_master_is_refused_by_name_and_disturbs_nobody() {
 
 #[test]
 fn a_wrong_pairing_string_is_told_with_what_is_right_and_exit_code_2() {
-    alone(|| {
+    in_real_time(|| {
         let good = "mmt://127.0.0.1:4433?pin=00&token=00";
         for wrong in [
             "",
@@ -269,7 +269,7 @@ fn a_wrong_pairing_string_is_told_with_what_is_right_and_exit_code_2() {
 
 #[test]
 fn a_token_of_another_slave_is_refused_by_name() {
-    alone(|| {
+    in_real_time(|| {
         let (slave, pairing) = slave(&["--once"]);
         let (_, token) = pairing.rsplit_once("token=").unwrap();
         // a token is read in either case
@@ -297,7 +297,7 @@ fn of_operator(state: &std::path::Path, arguments: &[&str]) -> Running {
 
 #[test]
 fn a_master_that_was_killed_is_back_at_once_and_another_operator_has_to_ask() {
-    alone(|| {
+    in_real_time(|| {
         let (here, elsewhere) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
         let arguments = ["slave", "--listen", "127.0.0.1:0", "--json", "--once"];
         let mut slave = of_operator(here.path(), &arguments);

@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use harness::process::{Running, number};
 use harness::python::python;
-use harness::{alone, root};
+use harness::{in_real_time, root};
 
 mod harness;
 
@@ -19,7 +19,7 @@ fn a_viewer_that_knows_only_foxgloves_protocol_sees_a_session_as_it_runs_and_can
     let Some(python) = python("a viewer of a running session", "websockets, rosbags") else {
         return;
     };
-    alone(|| {
+    in_real_time(|| {
         let folder = tempfile::tempdir().unwrap();
         let record = folder.path().join("run.mcap");
         let record = record.to_str().unwrap();

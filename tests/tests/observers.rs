@@ -6,7 +6,7 @@
 use std::path::Path;
 use std::time::Duration;
 
-use crate::harness::alone;
+use crate::harness::in_real_time;
 use crate::harness::process::{Ended, ProcessError, Running, number};
 use rustix::process::Signal;
 
@@ -32,7 +32,7 @@ fn observer(pairing: &str) -> Running {
 
 #[test]
 fn who_looks_on_sees_the_operators_work_stops_nothing_and_goes_when_its_token_is_revoked() {
-    alone(|| {
+    in_real_time(|| {
         let folder = tempfile::tempdir().unwrap();
         let place = folder.path().display().to_string();
         let listen = ["slave", "--listen", "127.0.0.1:0"];

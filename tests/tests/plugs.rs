@@ -22,7 +22,7 @@ use serde_json::Value;
 
 use crate::harness::process::{Ended, Running, did_not_run, number};
 use crate::harness::python::python;
-use crate::harness::{alone, root};
+use crate::harness::{in_real_time, root};
 
 /// For what takes seconds; the host may be busy.
 const GENEROUS: Duration = Duration::from_secs(120);
@@ -68,7 +68,7 @@ fn get(document: &Value, path: &str) -> f64 {
 
 #[test]
 fn a_hand_that_knows_only_the_document_is_plugged_in_and_pushes_the_box() {
-    alone(|| {
+    in_real_time(|| {
         let Some(python) = python("a hand in Python", "socket") else {
             return;
         };
@@ -212,7 +212,7 @@ fn objects_of_mujoco_are_pushed_over_the_emulated_network_within_the_contract() 
 
 #[test]
 fn a_plant_that_dies_stops_the_tool_and_the_master_is_told_and_its_return_ends_that() {
-    alone(|| {
+    in_real_time(|| {
         let Some(python) = python("a plant in Python", "socket") else {
             return;
         };
@@ -291,7 +291,7 @@ fn compiled(place: &Path, name: &str) -> Option<String> {
 
 #[test]
 fn a_hand_and_a_plant_in_cpp_meet_over_the_emulated_network() {
-    alone(|| {
+    in_real_time(|| {
         let place = tempfile::tempdir().unwrap();
         let programs = (
             compiled(place.path(), "hand"),

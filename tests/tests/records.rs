@@ -21,7 +21,7 @@ use serde_json::Value;
 
 use crate::harness::process::{Ended, Running, number};
 use crate::harness::python::python;
-use crate::harness::{alone, root};
+use crate::harness::{in_real_time, root};
 
 /// For what takes seconds; the host may be busy.
 const GENEROUS: Duration = Duration::from_secs(120);
@@ -96,7 +96,7 @@ fn column(table: &Path, name: &str) -> Vec<String> {
 
 #[test]
 fn a_demo_is_recorded_runs_again_and_is_read_by_decoders_that_know_nothing_of_it() {
-    alone(|| {
+    in_real_time(|| {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("demo.mcap");
         let record = path.to_str().unwrap();
@@ -219,7 +219,7 @@ fn decoded(record: &str, tables: &Path) {
 
 #[test]
 fn each_host_of_two_keeps_a_record_that_runs_again_by_itself() {
-    alone(|| {
+    in_real_time(|| {
         let folder = tempfile::tempdir().unwrap();
         let place = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
         let (identity, of_slave, of_master) = (place("identity"), place("s.mcap"), place("m.mcap"));
@@ -251,7 +251,7 @@ fn each_host_of_two_keeps_a_record_that_runs_again_by_itself() {
 
 #[test]
 fn a_full_disk_costs_the_record_and_neither_the_session_nor_its_report() {
-    alone(|| {
+    in_real_time(|| {
         let ended = mmt(&[
             "demo",
             "--duration",
@@ -286,7 +286,7 @@ fn a_record_that_cannot_be_written_is_refused_before_anything_runs() {
 
 #[test]
 fn what_was_recorded_before_a_kill_runs_again() {
-    alone(|| {
+    in_real_time(|| {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("killed.mcap");
         let record = path.to_str().unwrap();

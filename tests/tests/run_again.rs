@@ -37,7 +37,7 @@ use mmt_shared::record::messages::{Arrival, Message, Session, SlaveTick};
 use mmt_shared::wire::Architecture;
 use tokio::sync::watch;
 
-use crate::harness::alone;
+use crate::harness::in_real_time;
 
 const DURATION: Duration = Duration::from_secs(4);
 
@@ -144,7 +144,7 @@ fn written(message: &impl Message) -> Vec<u8> {
 
 #[test]
 fn a_live_session_runs_again_to_the_same_bits_at_each_tick_of_both_ends() {
-    alone(|| {
+    in_real_time(|| {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("session.mcap");
         for architecture in Architecture::ALL {

@@ -1,4 +1,4 @@
-//! What is promised of sessions in real time: one at a time, because each wants two cores.
+//! What is promised of sessions in real time.
 
 mod devices;
 mod ends;

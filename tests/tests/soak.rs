@@ -14,7 +14,7 @@ use std::time::Duration;
 
 use serde_json::Value;
 
-use crate::harness::alone;
+use crate::harness::in_real_time;
 use crate::harness::process::{Ended, Running, number};
 
 /// Four cycles and their proofs; the host may be busy.
@@ -33,7 +33,7 @@ fn soak(hours: &str, ends: impl FnOnce(&Running)) -> (Ended, Value, tempfile::Te
 
 #[test]
 fn a_short_soak_keeps_its_promises_counts_what_it_did_and_leaves_nothing() {
-    alone(|| {
+    in_real_time(|| {
         let (ended, document, folder) = soak("0.0056", |_| {});
         assert_eq!(document["holds"], true, "{document:#}");
         assert_eq!(ended.status.code(), Some(0), "{}", ended.err);
@@ -55,7 +55,7 @@ fn a_short_soak_keeps_its_promises_counts_what_it_did_and_leaves_nothing() {
 
 #[test]
 fn a_soak_that_is_interrupted_ends_with_its_table_and_its_processes() {
-    alone(|| {
+    in_real_time(|| {
         let (ended, document, folder) = soak("1", |running| {
             std::thread::sleep(Duration::from_secs(3));
             running.interrupt().unwrap();

@@ -7,7 +7,7 @@
 
 use crate::harness::hosts::{Hosts, HostsError, Session};
 use crate::harness::process::{did_not_run, number};
-use crate::harness::{alone, is_by_chance};
+use crate::harness::{in_real_time, is_by_chance};
 use serde_json::Value;
 
 /// How long the master operates, s.
@@ -33,7 +33,7 @@ fn get(report: &Value, path: &str) -> f64 {
 
 #[test]
 fn two_hosts_report_the_same_session_and_agree_with_their_cables() {
-    alone(|| {
+    in_real_time(|| {
         let test = "two_hosts";
         let hosts = match Hosts::try_new() {
             Err(HostsError::Unavailable(why)) => return did_not_run(test, &why),

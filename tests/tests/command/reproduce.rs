@@ -70,7 +70,7 @@ fn fig5_is_the_same_bytes_again_and_its_samples_say_what_its_rows_say() {
     );
 
     // and the check can fail
-    let sample = once.join("samples/paper-deadband-0-0.1-1.csv");
+    let sample = once.join("samples/paper-deadband-0-0.1-5001.csv");
     let text = fs::read_to_string(&sample).unwrap();
     let wrong: Vec<String> = text
         .lines()

@@ -9,7 +9,6 @@
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 pub(crate) mod hosts;
@@ -27,11 +26,9 @@ pub(crate) fn root() -> PathBuf {
 /// A host whose threads wait so long for their turn is no host for a session.
 const STOOD_STILL: Duration = Duration::from_millis(100);
 
-/// Runs a test of sessions while no other one runs: each wants two cores in real time. A session ends when its host stands
-/// still for a second, as it must; so a test that fails while the host stands still runs again, three times at most.
-pub(crate) fn alone(test: impl Fn()) {
-    static TURN: Mutex<()> = Mutex::new(());
-    let _turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
+/// Runs a test of sessions. A session ends when its host stands still for a second, as it must; so a test that fails while the
+/// host stands still runs again, three times at most.
+pub(crate) fn in_real_time(test: impl Fn()) {
     for _ in 0..3 {
         let (ended, stood) = watched(&test);
         let Err(why) = ended else { return };
