@@ -42,12 +42,12 @@ pub(super) fn paper_estimator(world: &mut WorldConfig, change: impl FnOnce(&mut 
     world.slave.estimator = Some(EstimatorConfig::Paper(paper));
 }
 
-/// The readings: two hours of one core, and so no part of `all`.
+/// The readings: 75 minutes of one core, and so no part of `all`.
 pub(super) const EXPERIMENT: Experiment = Experiment {
     in_all: false,
     ..Experiment::new(
         "readings",
-        "The claims in every reading of the paper's text (two hours of one core; not in `all`)",
+        "The claims in every reading of the paper's text (75 minutes of one core; not in `all`)",
         40,
         run,
     )
