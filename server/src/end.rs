@@ -69,6 +69,8 @@ pub struct SlaveCounts {
     pub acknowledgements_implausible: u64,
     /// Updates that could not be sent: they break a rule of the wire, or the datagram numbers are used up.
     pub updates_unsent: u64,
+    /// Ports of the hand that came after a newer datagram.
+    pub messages_overtaken: u64,
 }
 
 /// The slave of a session that a master opens with `hello`: play-out waits as long as its packing needs.
@@ -209,9 +211,11 @@ impl SlaveEnd {
         self.newest_acknowledged = self.newest_acknowledged.max(newest_update);
         self.handle_samples(at, &command, newest_update);
         self.slave.stretch(self.channel.stretch());
-        let counts = received.is_newest && self.config.architecture.feels_tool();
-        if let Some(port) = command.port.filter(|_| counts) {
-            self.slave.handle_hand_port(&port);
+        let feels_tool = self.config.architecture.feels_tool();
+        match command.port.filter(|_| feels_tool) {
+            Some(port) if received.is_newest => self.slave.handle_hand_port(&port),
+            Some(_) => self.counts.messages_overtaken += 1,
+            None => {}
         }
     }
 

@@ -2,6 +2,7 @@
 
 use mmt_client::io::MasterLive;
 use mmt_client::io::console::{Console, NetworkWish, Order, Source};
+use mmt_client::io::hand_events::HandEvents;
 use mmt_client::observer::ObserverLive;
 use mmt_client::operator::pointer::HandEvent;
 use mmt_netem::Direction;
@@ -10,7 +11,6 @@ use mmt_netem::presets::PRESETS;
 use mmt_server::io::SlaveLive;
 use mmt_shared::io::emergency::EmergencyStop;
 use mmt_shared::model::update::Cause;
-use rtrb::Consumer;
 use serde::Serialize;
 use serde_json::{Map, Value, json};
 
@@ -110,7 +110,7 @@ impl Desk {
     }
 
     /// What a person does in the session that begins.
-    pub(super) fn events(&self) -> Consumer<HandEvent> {
+    pub(super) fn events(&self) -> HandEvents {
         self.console.events()
     }
 

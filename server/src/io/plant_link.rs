@@ -7,7 +7,7 @@ mod lock_step;
 
 use std::io;
 use std::net::SocketAddr;
-use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
@@ -54,6 +54,8 @@ struct Known {
     newest: Option<Taken>,
     to_loop: Option<Producer<Taken>>,
     counts: PlugCounts,
+    /// Answers for which the loop had no room.
+    ring_full: u64,
 }
 
 #[derive(Debug)]
@@ -62,6 +64,8 @@ struct Shared {
     clock: Clock,
     /// Commands sent so far.
     sent: AtomicU32,
+    /// Answers that a newer one overtook before a tick took them.
+    superseded: AtomicU64,
     known: Mutex<Known>,
     first: Condvar,
 }
@@ -89,6 +93,7 @@ impl PlantHost {
             socket,
             clock: Clock::start(),
             sent: AtomicU32::new(0),
+            superseded: AtomicU64::new(0),
             known: Mutex::default(),
             first: Condvar::new(),
         });
@@ -140,6 +145,13 @@ impl PlantHost {
     pub(super) fn counts(&self) -> PlugCounts {
         self.0.known().counts
     }
+
+    /// Answers that came as they should and that no tick was given, by name.
+    pub(super) fn not_given(&self) -> [(&'static str, u64); 2] {
+        let superseded = self.0.superseded.load(Ordering::Relaxed);
+        let ring_full = self.0.known().ring_full;
+        [("superseded", superseded), ("ring_full", ring_full)]
+    }
 }
 
 /// The loop's end of the plug.
@@ -160,7 +172,9 @@ impl PlantPort {
         let mut newest = None;
         while let Ok(taken) = self.answers.pop() {
             anew |= taken.answer.anew;
-            newest = Some(taken);
+            if newest.replace(taken).is_some() {
+                self.shared.superseded.fetch_add(1, Ordering::Relaxed);
+            }
         }
         let taken = newest?;
         (self.newest, self.heard) = (newest, Some(now));
@@ -206,10 +220,10 @@ fn serve(shared: &Shared) {
         known.counts = peer.counts;
         if let Some(taken) = taken {
             known.newest = Some(taken);
-            // a full ring is a loop that stands: it takes the newest later
-            if let Some(to_loop) = &mut known.to_loop {
-                let _ = to_loop.push(taken);
-            }
+            // a full ring is a loop that stands: it takes what waits later
+            let to_loop = known.to_loop.as_mut().filter(|ring| !ring.is_abandoned());
+            let is_full = to_loop.is_some_and(|ring| ring.push(taken).is_err());
+            known.ring_full += u64::from(is_full);
             shared.first.notify_all();
         }
     }

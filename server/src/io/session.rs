@@ -311,7 +311,8 @@ impl Session<'_> {
         self.task.add_to(session);
         session.add_drops(self.context.refusals());
         if let Some(plant) = &self.context.plant {
-            for (name, count) in plant.counts().dropped() {
+            let dropped = plant.counts().dropped();
+            for (name, count) in dropped.into_iter().chain(plant.not_given()) {
                 session.add_drops([(format!("plant_{name}").as_str(), count)]);
             }
         }
