@@ -149,14 +149,14 @@ impl Desk {
             serde_json::to_string(&ObserverFrame { observer }).unwrap_or_default()
         };
         self.begin(caption, Box::new(source));
-        self.tell([("observes", json!(true))]);
+        self.show_about([("observes", json!(true))]);
     }
 
     fn begin(&mut self, caption: &Caption, source: Source) {
         self.sessions += 1;
         let blind = self.blind;
         self.console.show(source);
-        self.tell([
+        self.show_about([
             ("command", json!((!blind).then_some(caption.command))),
             ("setting", json!((!blind).then_some(&caption.setting))),
             ("truth", json!(caption.truth.filter(|_| !blind))),
@@ -168,20 +168,20 @@ impl Desk {
     }
 
     /// Shows what has changed.
-    pub(super) fn tell<const N: usize>(&mut self, changes: [(&str, Value); N]) {
+    pub(super) fn show_about<const N: usize>(&mut self, changes: [(&str, Value); N]) {
         for (key, value) in changes {
             self.about.insert(key.to_owned(), value);
         }
         let about = json!({"about": self.about});
-        self.console.tell(about.to_string());
+        self.console.show_about(about.to_string());
     }
 
     /// Shows that no session runs, and why.
-    pub(super) fn tell_end(&mut self, why: &str) {
-        self.tell([("state", json!("ended")), ("why", json!(why))]);
+    pub(super) fn show_end(&mut self, why: &str) {
+        self.show_about([("state", json!("ended")), ("why", json!(why))]);
     }
 
-    /// What a viewer wants done.
+    /// What a viewer asks for.
     pub(super) fn next_order(&mut self) -> Option<Order> {
         self.console.next_order()
     }
@@ -218,6 +218,6 @@ impl Desk {
                 Err(error) => wrong = Some(error),
             }
         }
-        self.tell([("note", json!(wrong))]);
+        self.show_about([("note", json!(wrong))]);
     }
 }

@@ -48,7 +48,7 @@ struct Taken {
     answer: PlantAnswer,
 }
 
-/// What the thread knows, under a lock that no tick takes.
+/// What the thread keeps, under a lock that no tick takes.
 #[derive(Debug, Default)]
 struct Known {
     newest: Option<Taken>,
@@ -137,7 +137,7 @@ impl PlantHost {
             shared: Arc::clone(&self.0),
             answers,
             newest: known.newest,
-            heard: None,
+            last_answer: None,
         }
     }
 
@@ -161,13 +161,13 @@ pub(super) struct PlantPort {
     answers: Consumer<Taken>,
     newest: Option<Taken>,
     /// When the newest answer was taken; none before the first tick.
-    heard: Option<Time>,
+    last_answer: Option<Time>,
 }
 
 impl PlantPort {
     /// The newest answer, if one has come since the tick before; `now` is this one's deadline.
     pub(super) fn receive(&mut self, now: Time) -> Option<PlantAnswer> {
-        self.heard.get_or_insert(now);
+        self.last_answer.get_or_insert(now);
         let mut anew = false;
         let mut newest = None;
         while let Ok(taken) = self.answers.pop() {
@@ -177,7 +177,7 @@ impl PlantPort {
             }
         }
         let taken = newest?;
-        (self.newest, self.heard) = (newest, Some(now));
+        (self.newest, self.last_answer) = (newest, Some(now));
         Some(PlantAnswer {
             anew,
             ..taken.answer
@@ -186,8 +186,8 @@ impl PlantPort {
 
     /// Whether the plant is silent at `now`.
     pub(super) fn is_silent(&self, now: Time) -> bool {
-        self.heard
-            .is_some_and(|heard| now.saturating_since(heard) >= SILENCE)
+        self.last_answer
+            .is_some_and(|last_answer| now.saturating_since(last_answer) >= SILENCE)
     }
 
     /// Sends the tool on.

@@ -171,7 +171,7 @@ impl Console {
     }
 
     /// Shows what changes seldom, a JSON object.
-    pub fn tell(&self, about: String) {
+    pub fn show_about(&self, about: String) {
         self.shared.about.send_replace(about.into());
     }
 
@@ -190,7 +190,7 @@ impl Console {
         self.shared.stage().give(event);
     }
 
-    /// What a viewer wants done.
+    /// What a viewer asks for.
     pub fn next_order(&mut self) -> Option<Order> {
         self.orders.try_recv().ok()
     }
@@ -263,7 +263,7 @@ async fn page(State(shared): Served, headers: HeaderMap, uri: Uri) -> Response {
 
 async fn file(State(shared): Served, headers: HeaderMap, Path(name): Path<String>) -> Response {
     match shared.admission.file(&headers) {
-        // the page itself wants the token
+        // the page itself needs the token
         Ok(()) if name != PAGE => shared.assets.answer(&name),
         Ok(()) => refuse(Refusal::Token),
         Err(refusal) => refuse(refusal),
