@@ -100,7 +100,7 @@ impl HapticLoop {
         }
     }
 
-    /// The same with what reports want: the true pose, where the slave lives in this process, and a recorder of the path.
+    /// The same with what reports need: the true pose, where the slave lives in this process, and a recorder of the path.
     #[must_use]
     pub fn observed_by(mut self, truth: Option<TruthReceiver>, path: Option<PathRecorder>) -> Self {
         (self.truth, self.path) = (truth, path);

@@ -164,7 +164,7 @@ impl ObjectEstimate {
         self.observer = PoseObserver::new(self.observer_config, pose, found.footprint);
     }
 
-    /// One tick; what the estimator was given. `held_back` says whether the limit of the tool's force keeps the tool from
+    /// One tick; what the estimator was given. `held_back`: whether the limit of the tool's force keeps the tool from
     /// the HIP.
     pub(super) fn step(&mut self, now: Time, contact: &Contact, held_back: bool) -> Measured {
         let observer = &mut self.observer;

@@ -278,7 +278,7 @@ impl Drop for DeviceHost {
     fn drop(&mut self) {
         self.shared.ended.store(true, Ordering::Release);
         if let Some(thread) = self.speaks.take() {
-            // a thread that panicked has said so, and says no more
+            // a thread that panicked has reported it, and sends no more
             let _ = thread.join();
         }
     }
