@@ -36,8 +36,8 @@ int main(int count, char **words) {
                info.m_maxLinearForce, info.m_maxLinearStiffness);
   device->setEnableGripperUserSwitch(true);
   chai3d::cVector3d place, velocity, force(0.0, 0.0, 0.0);
-  auto due = std::chrono::steady_clock::now(), heard = due;
-  // a device that cannot be read gets no force, and mmt hears nothing of it any more
+  auto due = std::chrono::steady_clock::now(), last_answer = due;
+  // a device that cannot be read gets no force, and mmt receives nothing of it any more
   while (ended == 0 && device->getPosition(place) && device->getLinearVelocity(velocity)) {
     bool is_down = false;
     device->getUserSwitch(0, is_down);
@@ -45,8 +45,8 @@ int main(int count, char **words) {
     plug.send(is_down ? 1 : 0, {f(place.x()), f(place.y()), f(place.z()), f(velocity.x()), f(velocity.y()), f(velocity.z())});
     if (const auto taken = plug.receive(0)) {
       force.set(taken->numbers[0], taken->numbers[1], taken->numbers[2]);
-      heard = due;
-    } else if (due - heard > std::chrono::milliseconds(20)) {
+      last_answer = due;
+    } else if (due - last_answer > std::chrono::milliseconds(20)) {
       force.zero();
     }
     device->setForce(force);

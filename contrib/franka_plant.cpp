@@ -72,14 +72,14 @@ int main(int count, char **words) {
     const auto start = robot.readOnce().O_T_EE;
     std::array<double, 2> goal{start[12], start[13]}, goal_speed{};
     double stiffness = 0.0, damping = 0.0, force_max = 0.0, peak_n = 0.0, way_m = 0.0;
-    std::uint64_t heard = 0;
+    std::uint64_t last_command = 0;
     bool stands = false;
     const auto begin = mmt::now_ns();
     robot.control([&](const franka::RobotState &state, franka::Duration) -> franka::Torques {
       const auto now = mmt::now_ns();
       const Vector at = column(state.O_T_EE, 3);
       if (const auto taken = plug.receive(0)) {
-        heard = now;
+        last_command = now;
         stands = false;
         for (std::size_t axis = 0; axis < 2; ++axis) {
           goal[axis] = std::clamp(origin[axis] + taken->numbers[axis], start[12 + axis] - room_m, start[12 + axis] + room_m);
@@ -88,7 +88,7 @@ int main(int count, char **words) {
         stiffness = std::clamp(taken->numbers[4], 0.0, 2000.0);
         damping = std::max(taken->numbers[5], critical(stiffness, arm_kg));
         force_max = taken->numbers[6];
-      } else if (!stands && now - heard > silence_ns) {
+      } else if (!stands && now - last_command > silence_ns) {
         // nobody commands: the tool stands where it is, on the spring that it had
         goal = {at[0], at[1]};
         goal_speed = {};

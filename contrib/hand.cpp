@@ -25,13 +25,13 @@ int main(int count, char **words) {
   std::array<float, 6> force{};
   std::uint16_t state = 0;
   int since_up = 0;
-  auto due = std::chrono::steady_clock::now(), heard = due, begin = due;
+  auto due = std::chrono::steady_clock::now(), last_answer = due, begin = due;
   while (wanted < way && due - begin < std::chrono::seconds(30)) {
     if (const auto taken = plug.receive(0)) {
       force = taken->numbers;
       state = taken->flags;
-      heard = due;
-    } else if (due - heard > std::chrono::milliseconds(20)) {
+      last_answer = due;
+    } else if (due - last_answer > std::chrono::milliseconds(20)) {
       // nobody answers: no force
       force = {};
       state = 0;

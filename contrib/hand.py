@@ -37,7 +37,7 @@ class Device:
         self.socket.setblocking(False)
         self.sequence = self.newest = self.received = self.lost_down = 0
         self.state, self.force, self.hip, self.lost_up = 0, (0.0, 0.0, 0.0), (0.0, 0.0), 0
-        self.heard = -math.inf
+        self.last_answer = -math.inf
 
     def send(self, position, velocity, buttons, stamp_ns=None):
         """A reading: m and m/s along the device's axes, a bit for each button; when it was taken, if that is not now."""
@@ -64,9 +64,9 @@ class Device:
             self.lost_down += sequence - self.newest - 1
             self.received += 1
             x, y, z, hip_x, hip_y, lost = FORCE.unpack_from(packet, HEAD.size)
-            self.newest, self.state, self.heard = sequence, state, time.monotonic()
+            self.newest, self.state, self.last_answer = sequence, state, time.monotonic()
             self.force, self.hip, self.lost_up = (x, y, z), (hip_x, hip_y), int(lost)
-        if time.monotonic() - self.heard > SILENCE_S:
+        if time.monotonic() - self.last_answer > SILENCE_S:
             self.state, self.force = 0, (0.0, 0.0, 0.0)
 
 

@@ -42,13 +42,13 @@ pub fn run() -> ExitCode {
         Ok(arguments) => arguments,
         Err(error) => return answer(&error),
     };
-    let code = match execute(arguments.command).and_then(|()| PANICS.judge()) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(failure) => {
-            output::note(&failure);
-            ExitCode::from(failure.exit().code())
-        }
-    };
+    let outcomes = [execute(arguments.command), PANICS.judge()];
+    let mut code = ExitCode::SUCCESS;
+    // the last one is the first cause: a panic fails what else was under way
+    for failure in outcomes.into_iter().filter_map(Result::err) {
+        output::note(&failure);
+        code = ExitCode::from(failure.exit().code());
+    }
     stderr::settle(LAST_WORDS);
     code
 }
@@ -96,10 +96,10 @@ fn answer(error: &clap::Error) -> ExitCode {
 
 /// A panic is a bug and is reported as one, but on a terminal that can be read, and the run does not end well.
 fn note_panics() {
-    let tell = std::panic::take_hook();
+    let print = std::panic::take_hook();
     std::panic::set_hook(Box::new(move |panic| {
         view::restore_terminal();
-        tell(panic);
+        print(panic);
         PANICS.note(std::thread::current().name());
     }));
 }

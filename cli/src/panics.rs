@@ -1,4 +1,5 @@
-//! A panic is our bug. In whatever thread of this process it happens, the run ends in order, and its exit code is that of a failure.
+//! A panic is our bug. In whatever thread of this process it happens, the run ends in order, and its exit code is
+//! that of a failure.
 //!
 //! Two kinds of threads end nothing: those whose panic somebody else notices, who fails the session by name, and those in which
 //! strangers are served, because nobody who finds a bug of ours may end a session that is not theirs.
@@ -67,6 +68,8 @@ impl Panics {
 
 #[cfg(test)]
 mod tests {
+    use mmt_shared::io::wish::Wish;
+
     use super::*;
     use crate::stop::Stop;
 
@@ -84,7 +87,8 @@ mod tests {
             panics.end_by(move || ended.give_up());
             assert_eq!(panics.judge(), Ok(()));
             panics.note(thread);
-            assert_eq!(*stop.receiver().borrow(), ends, "{thread:?}");
+            let wish = if ends { Wish::Fail } else { Wish::GoOn };
+            assert_eq!(*stop.receiver().borrow(), wish, "{thread:?}");
             assert_eq!(stop.asked(), ends, "{thread:?}");
             assert!(panics.judge().is_err());
         }

@@ -7,6 +7,8 @@ use std::sync::mpsc::{self, RecvTimeoutError, Sender};
 use std::time::Duration;
 
 use mmt_shared::io::emergency::EmergencyStop;
+use mmt_shared::io::wish::Wish;
+use mmt_shared::wire::Ending;
 use tokio::signal::unix::{SignalKind, signal};
 use tokio::sync::watch;
 
@@ -20,7 +22,7 @@ const LOOK: Duration = Duration::from_millis(50);
 /// The wish that the run ends. Copies are the same wish.
 #[derive(Clone, Debug)]
 pub(crate) struct Stop {
-    wanted: Arc<watch::Sender<bool>>,
+    wanted: Arc<watch::Sender<Wish>>,
     asked: Arc<AtomicBool>,
     emergency: EmergencyStop,
 }
@@ -29,7 +31,7 @@ impl Stop {
     /// A wish that nobody has yet.
     pub(crate) fn new() -> Self {
         Self {
-            wanted: Arc::new(watch::Sender::new(false)),
+            wanted: Arc::default(),
             asked: Arc::default(),
             emergency: EmergencyStop::default(),
         }
@@ -97,14 +99,23 @@ impl Stop {
             restore_terminal();
             std::process::exit(INTERRUPTED_TWICE);
         }
-        self.wanted.send_replace(true);
+        self.end();
         tracing::info!("ending; once more to quit at once");
     }
 
-    /// Ends the run in order because of a defect of this process, as if the system had asked for it.
+    /// Ends the run in order, as failed: a thread of this process panicked.
     pub(crate) fn give_up(&self) {
         self.asked.store(true, Ordering::Release);
-        self.wanted.send_replace(true);
+        self.wanted.send_replace(Wish::Fail);
+    }
+
+    /// What the end of a run is called in its report that goes on until it is asked to end, or until `finished`.
+    pub(crate) fn ending(&self) -> Ending {
+        match *self.wanted.borrow() {
+            Wish::Fail => Ending::Failed,
+            _ if self.asked() => Ending::Interrupted,
+            _ => Ending::Finished,
+        }
     }
 
     /// The emergency stop of this side.
@@ -114,7 +125,13 @@ impl Stop {
 
     /// Ends the run without counting as asked by a person.
     pub(crate) fn end(&self) {
-        self.wanted.send_replace(true);
+        self.wanted.send_if_modified(|wish| {
+            let goes_on = !wish.ends();
+            if goes_on {
+                *wish = Wish::End;
+            }
+            goes_on
+        });
     }
 
     /// Whether a person or the system asked for the end.
@@ -151,8 +168,8 @@ impl Stop {
         }
     }
 
-    /// Turns true when the run shall end.
-    pub(crate) fn receiver(&self) -> watch::Receiver<bool> {
+    /// What is wanted of the run.
+    pub(crate) fn receiver(&self) -> watch::Receiver<Wish> {
         self.wanted.subscribe()
     }
 }
@@ -176,13 +193,20 @@ mod tests {
     use super::*;
 
     #[test]
-    fn asking_once_tells_every_receiver_and_ending_is_not_asking() {
+    fn asking_once_reaches_every_receiver_and_neither_ending_nor_failing_is_asking() {
         let stop = Stop::new();
         let receiver = stop.receiver();
         stop.end();
-        assert!(*receiver.borrow() && !stop.asked());
+        assert!(receiver.borrow().ends() && !stop.asked());
         stop.ask();
-        assert!(*stop.receiver().borrow() && stop.asked());
+        assert_eq!((*stop.receiver().borrow(), stop.asked()), (Wish::End, true));
+        assert_eq!(stop.ending(), Ending::Interrupted);
+        stop.give_up();
+        stop.end();
+        assert_eq!(
+            (*receiver.borrow(), stop.ending()),
+            (Wish::Fail, Ending::Failed)
+        );
     }
 
     #[test]

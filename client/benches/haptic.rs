@@ -63,7 +63,7 @@ impl Haptic {
     }
 
     /// A message of the slave arrives.
-    fn hear(&mut self, message: Message) {
+    fn receive(&mut self, message: Message) {
         let mut out = [0; DATAGRAM_MAX];
         let length = self.slave.encode(self.now, message, &mut out);
         let length = length.unwrap().unwrap();
@@ -71,7 +71,7 @@ impl Haptic {
             .handle_datagram(self.now, out.get(..length).unwrap());
     }
 
-    /// What the model is, as an update would tell it.
+    /// What the model is, as an update would carry it.
     fn state(&self) -> ModelState {
         let BodyState {
             params,
@@ -91,7 +91,7 @@ impl Haptic {
         let phase_ms = self.now.as_nanos() / 1_000_000 % 100;
         if phase_ms == 0 {
             // a silent link would release the hand
-            self.hear(Message::Heartbeat);
+            self.receive(Message::Heartbeat);
         }
         let tick = self.end.tick(self.now, reading);
         self.hand_force = tick.hand_force;
@@ -176,7 +176,7 @@ fn replay(criterion: &mut Criterion) {
                 slave_in_contact: true,
                 state: haptic.state(),
             };
-            haptic.hear(Message::Update(black_box(&update).into()));
+            haptic.receive(Message::Update(black_box(&update).into()));
             haptic.tick(&mut out);
             while !haptic.end.master().model().is_replayed() {
                 haptic.tick(&mut out);

@@ -50,10 +50,14 @@ pub struct MasterCounts {
     pub newest_applied: u32,
     /// Updates whose numbers were not accepted.
     pub updates_rejected: u64,
-    /// Updates that came while the link was stale, or that answer a sample of too long ago.
-    pub updates_frozen: u64,
+    /// Updates that came while the link was stale.
+    pub updates_link_stale: u64,
+    /// Updates that answer a sample of too long ago.
+    pub updates_answer_too_old: u64,
     /// Updates that a newer one overtook before a tick could apply them.
     pub updates_superseded: u64,
+    /// Scenes and tool messages that came after a newer datagram.
+    pub messages_overtaken: u64,
 }
 
 /// What a tick of the master's end is given besides its deadline.
@@ -119,8 +123,7 @@ impl MasterEnd {
         &self.counts
     }
 
-    /// Updates that arrived and were not applied, by cause. One that waits for a tick counts as frozen: at the end of a
-    /// session none will come.
+    /// Updates that arrived and were not applied, by cause.
     pub fn update_drops(&self) -> UpdateDrops {
         UpdateDrops {
             duplicate: self.window.duplicate(),
@@ -128,9 +131,10 @@ impl MasterEnd {
             implausible: self.window.implausible(),
             rejected: self.counts.updates_rejected,
             superseded: self.counts.updates_superseded,
-            frozen: self.counts.updates_frozen
-                + u64::from(self.master.frozen())
-                + u64::from(self.update.is_some()),
+            link_stale: self.counts.updates_link_stale,
+            answer_too_old: self.counts.updates_answer_too_old,
+            hand_released: self.master.updates_after_release(),
+            unapplied: self.update.is_some().into(),
         }
     }
 
@@ -147,6 +151,7 @@ impl MasterEnd {
         session.add_drops(self.commands.drops());
         session.add_drops([
             ("bad_readings", master.bad_readings()),
+            ("messages_overtaken", counts.messages_overtaken),
             ("forces_not_finite", master.limiter().rejected()),
             ("model_not_finite", master.model().not_finite()),
         ]);
@@ -213,7 +218,8 @@ impl MasterEnd {
             Message::Update(update) => self.handle_update(at, &update),
             Message::Scene(scene) if received.is_newest => self.scene = Some(scene),
             Message::Tool(tool) if received.is_newest => self.master.handle_tool_state(at, &tool),
-            Message::Scene(_) | Message::Tool(_) | Message::Command(_) | Message::Heartbeat => {}
+            Message::Scene(_) | Message::Tool(_) => self.counts.messages_overtaken += 1,
+            Message::Command(_) | Message::Heartbeat => {}
         }
     }
 
@@ -224,8 +230,12 @@ impl MasterEnd {
             return;
         }
         let stale = LinkState::of_silence(self.channel.silence(at)) >= LinkState::Stale;
-        if stale || self.is_too_old(at, update.answers) {
-            self.counts.updates_frozen += 1;
+        if stale {
+            self.counts.updates_link_stale += 1;
+            return;
+        }
+        if self.is_too_old(at, update.answers) {
+            self.counts.updates_answer_too_old += 1;
             return;
         }
         let coupling = &self.master.model().settings().coupling;

@@ -62,7 +62,7 @@ pub struct Master {
     offset: Vec2,
     bad_readings: u64,
     applied: [u64; Cause::ALL.len()],
-    frozen: u32,
+    updates_after_release: u64,
 }
 
 impl Master {
@@ -90,7 +90,7 @@ impl Master {
             offset: Vec2::zeros(),
             bad_readings: 0,
             applied: [0; Cause::ALL.len()],
-            frozen: 0,
+            updates_after_release: 0,
         }
     }
 
@@ -120,8 +120,8 @@ impl Master {
     }
 
     /// Updates that came after the hand had been released and were not applied.
-    pub fn frozen(&self) -> u32 {
-        self.frozen
+    pub fn updates_after_release(&self) -> u64 {
+        self.updates_after_release
     }
 
     /// Energy that updates have added to the model so far beyond what its tank paid, J.
@@ -188,7 +188,7 @@ impl Master {
                 *count += 1;
             }
         } else {
-            self.frozen = self.frozen.saturating_add(1);
+            self.updates_after_release += 1;
         }
         alive
     }

@@ -69,6 +69,7 @@ pub struct ObserverEnd {
     change: Option<Change>,
     updates: [u64; Cause::ALL.len()],
     rejected: u64,
+    messages_overtaken: u64,
     scene: Option<Scene>,
     /// When it came.
     scene_at: Time,
@@ -85,6 +86,7 @@ impl ObserverEnd {
             change: None,
             updates: [0; Cause::ALL.len()],
             rejected: 0,
+            messages_overtaken: 0,
             scene: None,
             scene_at: now,
         }
@@ -110,7 +112,8 @@ impl ObserverEnd {
             Message::Scene(scene) if received.is_newest => {
                 (self.scene, self.scene_at) = (Some(scene), at);
             }
-            Message::Scene(_) | Message::Tool(_) | Message::Command(_) | Message::Heartbeat => {}
+            Message::Scene(_) | Message::Tool(_) => self.messages_overtaken += 1,
+            Message::Command(_) | Message::Heartbeat => {}
         }
     }
 
@@ -197,8 +200,11 @@ impl ObserverEnd {
             rejected: self.rejected,
             ..UpdateDrops::default()
         };
+        let mut session =
+            SessionStats::new(Side::Master, &self.channel, drops.duplicate, duration_s);
+        session.add_drops([("messages_overtaken", self.messages_overtaken)]);
         MasterHalf {
-            session: SessionStats::new(Side::Master, &self.channel, drops.duplicate, duration_s),
+            session,
             updates: ReceivedUpdates {
                 applied: Some(self.updates.iter().sum()),
                 dropped: Some(named(drops.by_name())),

@@ -1,17 +1,17 @@
--- Dissects mmt's messages in Wireshark and tshark, by what docs/protocol.md says (version 3 of the protocol).
+-- Dissects mmt's messages in Wireshark and tshark, by docs/protocol.md (version 3 of the protocol).
 --
 --   tshark -X lua_script:mmt.lua -o tls.keylog_file:KEYS -r SESSION.pcap -Y mmt
 --
 -- Messages inside of QUIC show once Wireshark has the session's keys. A bare message in a UDP datagram shows
 -- by its magic, or by "Decode As" mmt (a datagram) or mmt_stream (a message behind its length).
--- Must never show bytes that docs/protocol.md refuses without saying so: the expert info mmt.malformed.
+-- Must never show bytes that docs/protocol.md refuses without the expert info mmt.malformed.
 
 local mmt = Proto("mmt", "Model-Mediated Teleoperation")
 local mmt_stream = Proto("mmt_stream", "Model-Mediated Teleoperation, stream")
 local mmt_quic = Proto("mmt_quic", "Model-Mediated Teleoperation, QUIC datagrams")
 
 mmt.prefs.slave_port = Pref.uint("Slave's UDP port", 4433,
-    "Tells which side sent a message; if neither port is this one, senders are not checked")
+    "Shows which side sent a message; if neither port is this one, senders are not checked")
 
 local malformed = ProtoExpert.new("mmt.malformed.expert", "Not a message",
     expert.group.MALFORMED, expert.severity.ERROR)
@@ -24,7 +24,7 @@ local POSITION_COUNT_M, FORCE_COUNT_N = 1e-7, 1e-4
 
 -- Fields ------------------------------------------------------------------------------------------------
 
--- By name: mmt.NAME is what a display filter says.
+-- By name: mmt.NAME in a display filter.
 local fields, listed = {}, {}
 
 local function declare(kind, names, ...)
@@ -364,7 +364,7 @@ local TYPES = {
     [19] = { "farewell", nil, "stream", farewell },
 }
 
--- Which side sent the packet; nil if its ports do not tell.
+-- Which side sent the packet; nil if its ports do not show it.
 local function sender(pinfo)
     local slave = mmt.prefs.slave_port
     if pinfo.src_port == pinfo.dst_port then return nil end
@@ -373,7 +373,7 @@ local function sender(pinfo)
     return nil
 end
 
--- Header and body of one message; its name and what to say about it.
+-- Header and body of one message; its name and what to show of it.
 local function message(r, road, from)
     demand(r.length <= (road == "datagram" and DATAGRAM_MAX or STREAM_MAX), "longer than may be")
     demand(r.length >= HEADER_BYTES, "shorter than a header")
@@ -409,18 +409,18 @@ local function dissect(range, pinfo, tree, road)
         body = range:range(4)
     end
     local reader = Reader.new(body, top)
-    local read, said = pcall(message, reader, road, sender(pinfo))
+    local read, shown = pcall(message, reader, road, sender(pinfo))
     if not read then
-        if getmetatable(said) ~= Refused then error(said, 0) end
-        said = said.why
-        top:add(fields.malformed, range, said):add_proto_expert_info(malformed, said)
-        said = "malformed: " .. said
+        if getmetatable(shown) ~= Refused then error(shown, 0) end
+        shown = shown.why
+        top:add(fields.malformed, range, shown):add_proto_expert_info(malformed, shown)
+        shown = "malformed: " .. shown
     end
-    top:append_text(": " .. said)
+    top:append_text(": " .. shown)
     pinfo.cols.protocol = "MMT"
     local info = tostring(pinfo.cols.info)
     local more = info:find("^mmt: ") and info .. "; " or "mmt: "
-    pinfo.cols.info = more .. said
+    pinfo.cols.info = more .. shown
 end
 
 function mmt.dissector(buffer, pinfo, tree)

@@ -2,7 +2,7 @@
 //!
 //! Each invariant has a name, a promise, one predicate and, where it is broken, the instant and the values. The same judges read a
 //! record (`mmt check`), a world in virtual time and the swarm. They compute from the contract and from bytes and ticks, and never
-//! from what an end knows of itself, but for the numbers that no tick has: the update in use and the model's numbers.
+//! from what an end reports of itself, but for the numbers that no tick has: the update in use and the model's numbers.
 
 mod both;
 mod channel;

@@ -25,7 +25,7 @@ pub struct Tick {
     pub is_judged: bool,
 }
 
-/// What an oracle knows: all that happened, and what it may tell a model.
+/// What an oracle knows: all that happened, and what it may give a model.
 #[derive(Clone, Debug)]
 pub struct Oracle<'a> {
     /// How the model is run.

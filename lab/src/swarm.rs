@@ -1,7 +1,8 @@
 //! The swarm: a minute of sessions in a random world, with random faults of link, time, data, sensors, people and processes.
 //!
 //! Everything that decides anything is the live system's own core; what the shells decide (when a session ends, when the next one
-//! begins, what a process that stood still finds in its queues) is written here once more, briefly. A run is a function of its seed.
+//! begins, what a process that stood still finds in its queues) is written here once more, briefly. A run is a
+//! function of its seed.
 
 mod faults;
 mod hostile;
@@ -60,7 +61,8 @@ pub enum SwarmError {
 /// A world of the generator is not accepted.
 pub fn swarm(seed: u64, duration: Duration) -> Result<Swarmed, SwarmError> {
     let mut world = RandomWorld::new(seed);
-    // the limit of the tool's force is a promise for contacts that are as stiff as the session knows, and a sensor that does not lag
+    // the limit of the tool's force is a promise for contacts that are as stiff as the session knows, and a sensor
+    // that does not lag
     if seed.is_multiple_of(2) {
         world.config.slave.environment.contact = None;
         world.config.slave.tool_compliance = None;

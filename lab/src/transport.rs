@@ -3,7 +3,7 @@
 //! A case is one flow of messages over one path by stock quinn or by quinn as mmt sets it. Delay added is the time
 //! from the application that sends to the one that receives, without what the path itself takes for the packet that
 //! brought the message: its serialisation, propagation and jitter. Waiting counts, before the socket and at a
-//! bottleneck. Pure: who runs a case reports to the log what happened, and nothing here knows QUIC.
+//! bottleneck. Pure: who runs a case reports to the log what happened, and nothing here uses QUIC.
 
 mod log;
 

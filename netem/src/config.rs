@@ -114,7 +114,7 @@ pub struct Profile {
     pub repeat: Option<Duration>,
 }
 
-/// From a time on the link has these settings, all of them: what a step does not say is not there.
+/// From a time on the link has these settings, all of them: what a step does not name is not there.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Step {
     /// When.

@@ -1,6 +1,6 @@
 //! Which link of a path: its direction, and which path of one seed.
 //!
-//! It knows nothing of what a link does.
+//! It does not depend on what a link does.
 
 use serde::{Deserialize, Serialize};
 

@@ -39,7 +39,7 @@ pub struct Effect {
     pub p99_ms: f64,
     /// How much of the mean is waiting for predecessors (`order fifo`), ms.
     pub waiting_ms: f64,
-    /// Share of packets lost on the way, 0 to 1: what the settings say in the long run; sampled where
+    /// Share of packets lost on the way, 0 to 1: what the settings give in the long run; sampled where
     /// it depends on the number or the time of a packet.
     pub loss: f64,
     /// Mean length of runs of lost packets, packets; 0 if none is lost. Sampled where the model has no

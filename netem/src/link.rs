@@ -4,7 +4,8 @@
 //! dropped by now, and [`Link::poll_timeout`] returns when to poll next. No departure is promised at the offer:
 //! packets wait before the bottleneck and leave at the rate of the moment. The order of the stages is that of
 //! a real path: MTU, copy, loss, limit, corruption, bottleneck with its queue, propagation with jitter, order,
-//! slots. Links in a chain ([`LinkConfig::then`]) stand one behind the other. All times are theoretical: lateness of whoever polls changes none of them, so it does not add up.
+//! slots. Links in a chain ([`LinkConfig::then`]) stand one behind the other. All times are theoretical: lateness of
+//! whoever polls changes none of them, so it does not add up.
 //!
 //! It must never sleep, read a clock or touch a socket.
 
@@ -121,7 +122,7 @@ impl<T: Clone> Link<T> {
         own.into_iter().chain(next).min()
     }
 
-    /// Nothing that is offered from `now` on leaves before this, as far as the settings and the order tell. A bound: it may
+    /// Nothing that is offered from `now` on leaves before this, as far as the settings and the order show. A bound: it may
     /// well leave later.
     #[must_use]
     pub fn earliest_of_later(&self, now: Time) -> Time {

@@ -25,7 +25,7 @@ mod transmit;
 pub const DISENGAGE: Duration = Duration::from_secs(2);
 
 /// Without a new sample for this long the tool is on hold: it brakes from 30 ms on ([`crate::playout`]) and stands by now, and the
-/// master is told.
+/// master receives that.
 pub const HOLD: Duration = Duration::from_millis(100);
 
 /// How the slave's end of a session works.
@@ -39,7 +39,7 @@ pub struct SlaveEndConfig {
     pub samples_per_command: u8,
     /// What the master's hand feels, by its hello.
     pub architecture: Architecture,
-    /// Scenes that the master wants, 1/s, by its hello.
+    /// Scenes that the master asks for, 1/s, by its hello.
     pub scene_hz: u8,
 }
 
@@ -69,6 +69,8 @@ pub struct SlaveCounts {
     pub acknowledgements_implausible: u64,
     /// Updates that could not be sent: they break a rule of the wire, or the datagram numbers are used up.
     pub updates_unsent: u64,
+    /// Ports of the hand that came after a newer datagram.
+    pub messages_overtaken: u64,
 }
 
 /// The slave of a session that a master opens with `hello`: play-out waits as long as its packing needs.
@@ -196,7 +198,7 @@ impl SlaveEnd {
         self.disengaged
     }
 
-    /// Takes in a datagram that arrived at `at`. The hand's port counts only where the hello has spoken of one and no
+    /// Takes in a datagram that arrived at `at`. The hand's port counts only where the hello names one and no
     /// newer datagram has been there: an older one knows nothing that counts.
     pub fn handle_datagram(&mut self, at: Time, bytes: &[u8]) {
         let Some(received) = self.channel.handle(at, bytes) else {
@@ -209,9 +211,11 @@ impl SlaveEnd {
         self.newest_acknowledged = self.newest_acknowledged.max(newest_update);
         self.handle_samples(at, &command, newest_update);
         self.slave.stretch(self.channel.stretch());
-        let counts = received.is_newest && self.config.architecture.feels_tool();
-        if let Some(port) = command.port.filter(|_| counts) {
-            self.slave.handle_hand_port(&port);
+        let feels_tool = self.config.architecture.feels_tool();
+        match command.port.filter(|_| feels_tool) {
+            Some(port) if received.is_newest => self.slave.handle_hand_port(&port),
+            Some(_) => self.counts.messages_overtaken += 1,
+            None => {}
         }
     }
 
@@ -225,7 +229,7 @@ impl SlaveEnd {
     }
 
     /// A command's samples, oldest first, each with the newest update that the master had by then as far as the
-    /// command says: none (0) of a sample that is repeated from an earlier command.
+    /// command shows: none (0) of a sample that is repeated from an earlier command.
     fn handle_samples(&mut self, at: Time, command: &Command, newest_update: u32) {
         if self.disengaged {
             self.counts.samples_disengaged += command.samples.len() as u64;
@@ -284,7 +288,7 @@ impl SlaveEnd {
         Some(tick)
     }
 
-    /// From the next datagram on the master is told what the tool does.
+    /// The datagrams from now on show what the tool does.
     fn show_tool(&mut self, holds: bool) {
         let state = if self.disengaged {
             ToolState::Disengaged

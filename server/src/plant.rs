@@ -107,6 +107,14 @@ impl Plant {
         }
     }
 
+    /// How many images no tick was given.
+    pub(crate) fn images_dropped(&self) -> u64 {
+        match self {
+            Self::World { sensing, .. } => sensing.images_dropped(),
+            Self::Linked(plant) => plant.images_dropped,
+        }
+    }
+
     /// The bodies: the truth, or what stands for a plant's object where it was seen last.
     pub(crate) fn environment(&self) -> &Environment {
         match self {
@@ -153,6 +161,8 @@ pub(crate) struct LinkedPlant {
     newest: Option<PlantAnswer>,
     /// An image that no tick has taken yet.
     image: Option<VisionSample>,
+    /// Images that a newer one took the place of before a tick took them.
+    images_dropped: u64,
     command: Option<PlantCommand>,
 }
 
@@ -178,6 +188,7 @@ impl LinkedPlant {
             is_stiff,
             newest: None,
             image: None,
+            images_dropped: 0,
             command: None,
         }
     }
@@ -193,10 +204,12 @@ impl LinkedPlant {
         if let Some(pose) = answer.object {
             self.stand_in.place(&[pose]);
             let age_ns = (answer.image_age_s * 1e9) as i64;
-            self.image = Some(VisionSample {
+            let image = VisionSample {
                 taken: now.offset_by(-age_ns),
                 pose,
-            });
+            };
+            let overtaken = self.image.replace(image).is_some();
+            self.images_dropped += u64::from(overtaken);
         }
         self.newest = Some(*answer);
     }

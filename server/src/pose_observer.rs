@@ -356,7 +356,7 @@ impl PoseObserver {
             self.centre.let_go(LET_GO.0 * LET_GO.0);
             self.angle.hold(LET_GO.1 * LET_GO.1);
         }
-        // without images the friction alone says where the box stops
+        // without images the friction alone shows where the box stops
         let coasts = self.config.learn && self.motion.twist != Twist::default();
         let (linear, angular) = if coasts { COAST } else { (0.0, 0.0) };
         self.centre.predict(linear);

@@ -1,4 +1,4 @@
-//! Spaced repeats of an update: when the same is said again, unless something newer was said.
+//! Spaced repeats of an update: when the same is sent again, unless something newer was sent.
 //!
 //! Pure and of fixed size. A repeat must never outlive the update that it repeats, and never be a new update.
 
@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 
 /// Most repeats of one update.
 pub const REPEATS_MAX: usize = 4;
-/// Accepted times, ms. After a second the heartbeats' acknowledgement has long said what is lost.
+/// Accepted times, ms. After a second the acknowledgements have long shown what is lost.
 const AFTER_MS: (f64, f64) = (1.0, 1000.0);
 
 /// When an update is sent again: times after it, increasing; none, or up to [`REPEATS_MAX`].
@@ -44,7 +44,7 @@ pub enum RepeatsError {
 }
 
 impl Repeats {
-    /// Nothing is said twice.
+    /// Nothing is sent twice.
     pub const NONE: Self = Self {
         after: [Duration::ZERO; REPEATS_MAX],
         count: 0,

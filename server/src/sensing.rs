@@ -1,9 +1,9 @@
 //! Sensing: the tool's position, the contact force and the object's pose as the slave measures them.
 //!
-//! Adds seeded Gaussian noise to position and force at 1 kHz and the force sensor's other errors, and sees the object through "vision":
-//! a slow, noisy, delayed camera. Every tick takes the same number of draws whatever the settings, and
-//! vision's image k has noise of its own number, so that changing one setting leaves every other noise
-//! alone. It must never use anything but its arguments.
+//! Adds seeded Gaussian noise to position and force at 1 kHz and the force sensor's other errors, and sees the object
+//! through "vision": a slow, noisy, delayed camera. Every tick takes the same number of draws whatever the settings,
+//! and vision's image k has noise of its own number, so that changing one setting leaves every other noise alone. It
+//! must never use anything but its arguments.
 
 mod force;
 
@@ -71,8 +71,8 @@ pub struct VisionConfig {
     pub angle_noise_rad: f64,
     /// Time from the image to its pose, ms. Default 30: one frame.
     pub latency_ms: f64,
-    /// Images before the session show how far each face is from the centre, with this error, m r.m.s.; without the key they show the
-    /// pose only. Default: without.
+    /// Images before the session show how far each face is from the centre, with this error, m r.m.s.; without the
+    /// key they show the pose only. Default: without.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub size_noise_m: Option<f64>,
 }

@@ -221,6 +221,18 @@ impl Slave {
         self.object.refused
     }
 
+    /// Images that no tick was given: a newer one was due, they showed another body, or the clock was set back.
+    #[must_use]
+    pub fn images_dropped(&self) -> u64 {
+        self.contact.plant().images_dropped()
+    }
+
+    /// Images that showed a moment of longer ago than the slave remembers (256 ms).
+    #[must_use]
+    pub fn images_too_old(&self) -> u64 {
+        self.object.images_too_old
+    }
+
     /// Updates whose state lay beyond what a master accepts and was brought to the edge of it.
     #[must_use]
     pub fn clamped_states(&self) -> u64 {

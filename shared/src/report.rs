@@ -76,7 +76,7 @@ pub struct RunReport<C> {
     pub configuration: C,
 }
 
-/// A session as one end knows it: its own half, and the other's if that end's farewell came.
+/// A session as one end reports it: its own half, and the other's if that end's farewell came.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SessionReport<C, Own, Other> {
     /// Seed of everything that this end drew.
@@ -93,9 +93,9 @@ pub struct SessionReport<C, Own, Other> {
     pub configuration: C,
 }
 
-/// A session as the master knows it.
+/// A session as the master reports it.
 pub type MasterSession<C> = SessionReport<C, MasterHalf, SlaveHalf>;
-/// A session as the slave knows it.
+/// A session as the slave reports it.
 pub type SlaveSession<C> = SessionReport<C, SlaveHalf, MasterHalf>;
 
 /// The configurations of both ends.

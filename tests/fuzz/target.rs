@@ -1,7 +1,7 @@
 //! The targets of `mmt_tests::fuzz` under libFuzzer; `MMT_FUZZ_TARGET` names the one that runs.
 //!
-//! With `MMT_FUZZ_SEEDS` it runs none: it writes the seeds and the words of all of them to that folder and prints a line each, with name
-//! and longest input.
+//! With `MMT_FUZZ_SEEDS` it runs none: it writes the seeds and the words of all of them to that folder and prints a
+//! line each, with name and longest input.
 #![no_main]
 
 use std::io::Write as _;

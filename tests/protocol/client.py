@@ -200,7 +200,8 @@ class Session:
         self.sent, self.received = (dict.fromkeys(KINDS.values(), 0) for _ in range(2))
         causes = ("duplicate", "too_old", "implausible", "malformed")
         self.drops = {f"datagrams_{why}": 0 for why in causes}
-        causes = ("duplicate", "stale", "implausible", "rejected", "superseded", "frozen")
+        causes = ("duplicate", "stale", "implausible", "rejected", "superseded", "link_stale", "answer_too_old",
+                  "hand_released", "unapplied")
         self.updates = dict.fromkeys(causes, 0)
         self.far = {"number": 0, "sequence": 0}  # the last ones that were too far ahead
         self.sequences, self.applied, self.causes, self.rtt_ns = set(), [], {}, []

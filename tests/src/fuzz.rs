@@ -1,7 +1,8 @@
 //! Fuzz targets: one for each decoder and file reader, and one for the state machine of a session.
 //!
 //! A target is a function of bytes that decodes them and asserts what must hold of whatever it accepts; that nothing panics is
-//! the least of it. The same functions are run by the ordinary test `tests/fuzz.rs` and by `.ci/fuzz` at length. None of them reads a clock or a file: an input that failed once fails again.
+//! the least of it. The same functions are run by the ordinary test `tests/fuzz.rs` and by `.ci/fuzz` at length. None
+//! of them reads a clock or a file: an input that failed once fails again.
 #![allow(
     clippy::unwrap_used,
     clippy::indexing_slicing,

@@ -37,7 +37,8 @@ fn main() -> ExitCode {
     mmt_cli::run()
 }
 
-/// Whether these arguments run a session that can be recorded and is not: one who looks on has none, and a blind comparison keeps its own.
+/// Whether these arguments run a session that can be recorded and is not: one who looks on has none, and a blind
+/// comparison keeps its own.
 fn is_recordable(given: &[OsString]) -> bool {
     let runs = ["demo", "master", "slave"];
     let not = ["--record", "--observe", "--blind"];

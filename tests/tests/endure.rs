@@ -1,4 +1,5 @@
-//! What goes wrong with real processes, hosts and networks, done by `.ci/endure`: here a few of its rows, in seconds; `.ci/long` does them all.
+//! What goes wrong with real processes, hosts and networks, done by `.ci/endure`: here a few of its rows, in seconds;
+//! `.ci/long` does them all.
 //!
 //! Needs root, `python3`, `ip`, `nft` and `prlimit`: without, it says so, and with `CI` set it fails.
 

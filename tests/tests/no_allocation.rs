@@ -19,6 +19,7 @@ use mmt_client::again::MasterSetting;
 use mmt_client::commands::CommandConfig;
 use mmt_client::device::DeviceProfile;
 use mmt_client::io::MasterLive;
+use mmt_client::io::hand_events::{HandEventSender, HandEvents, hand_events};
 use mmt_client::io::haptic::HapticLoop;
 use mmt_client::io::record;
 use mmt_client::operator::Operator;
@@ -44,7 +45,6 @@ use mmt_shared::model::settings::Mode;
 use mmt_shared::pairing::Token;
 use mmt_shared::time::{TICK, Time};
 use mmt_shared::wire::{Architecture, DATAGRAM_MAX, Label, Message, Side, Welcome};
-use rtrb::{Consumer, Producer, RingBuffer};
 
 use counting_allocator::counted;
 
@@ -89,8 +89,8 @@ impl Loop {
     }
 
     /// One whose hand a person at a pointer has, who does what is put into the ring.
-    fn held_by_a_person() -> (Producer<HandEvent>, Self) {
-        let (events, to_loop) = RingBuffer::new(64);
+    fn held_by_a_person() -> (HandEventSender, Self) {
+        let (events, to_loop) = hand_events(64);
         let person = |scripted| {
             let person = Person::new(scripted, Driver::Pointer, HandTuning::POINTER);
             Operator::Person(Box::new(person))
@@ -102,7 +102,7 @@ impl Loop {
 
     fn operated_by(
         operator: impl Fn(Scripted) -> Operator,
-        events: Option<Consumer<HandEvent>>,
+        events: Option<HandEvents>,
         mode: Mode,
         architecture: Architecture,
     ) -> Self {
@@ -245,7 +245,7 @@ fn a_tick_that_a_pointer_feeds_never_allocates() {
             1500 => HandEvent::Release,
             _ => HandEvent::Move(sample),
         };
-        events.push(event).unwrap();
+        events.send(event);
         let ((), calls) = counted(|| sides.haptic_tick(now));
         assert_eq!(calls, 0, "allocator called in tick {tick}");
         sides.slave_tick(now);

@@ -32,6 +32,7 @@ use mmt_shared::io::emergency::EmergencyStop;
 use mmt_shared::io::identity::Identity;
 use mmt_shared::io::record::{Ended, RecordError, RecordOutcome, Recorder, read};
 use mmt_shared::io::transport::Transport;
+use mmt_shared::io::wish::Wish;
 use mmt_shared::record::cdr::CdrWriter;
 use mmt_shared::record::messages::{Arrival, Message, Session, SlaveTick};
 use mmt_shared::wire::Architecture;
@@ -85,7 +86,7 @@ async fn session(architecture: Architecture, path: &Path) {
         truth: None,
         emergency: emergency.clone(),
     };
-    let (_stop, stopped) = watch::channel(false);
+    let (_stop, stopped) = watch::channel(Wish::GoOn);
     let (live, mut shown) = watch::channel(MasterLive::default());
     tokio::spawn(async move {
         for (from_s, stops) in [(2.0, true), (2.5, false)] {

@@ -2,6 +2,7 @@
 
 use mmt_client::io::MasterLive;
 use mmt_client::io::console::{Console, NetworkWish, Order, Source};
+use mmt_client::io::hand_events::HandEvents;
 use mmt_client::observer::ObserverLive;
 use mmt_client::operator::pointer::HandEvent;
 use mmt_netem::Direction;
@@ -10,7 +11,6 @@ use mmt_netem::presets::PRESETS;
 use mmt_server::io::SlaveLive;
 use mmt_shared::io::emergency::EmergencyStop;
 use mmt_shared::model::update::Cause;
-use rtrb::Consumer;
 use serde::Serialize;
 use serde_json::{Map, Value, json};
 
@@ -110,7 +110,7 @@ impl Desk {
     }
 
     /// What a person does in the session that begins.
-    pub(super) fn events(&self) -> Consumer<HandEvent> {
+    pub(super) fn events(&self) -> HandEvents {
         self.console.events()
     }
 
@@ -149,14 +149,14 @@ impl Desk {
             serde_json::to_string(&ObserverFrame { observer }).unwrap_or_default()
         };
         self.begin(caption, Box::new(source));
-        self.tell([("observes", json!(true))]);
+        self.show_about([("observes", json!(true))]);
     }
 
     fn begin(&mut self, caption: &Caption, source: Source) {
         self.sessions += 1;
         let blind = self.blind;
         self.console.show(source);
-        self.tell([
+        self.show_about([
             ("command", json!((!blind).then_some(caption.command))),
             ("setting", json!((!blind).then_some(&caption.setting))),
             ("truth", json!(caption.truth.filter(|_| !blind))),
@@ -168,20 +168,20 @@ impl Desk {
     }
 
     /// Shows what has changed.
-    pub(super) fn tell<const N: usize>(&mut self, changes: [(&str, Value); N]) {
+    pub(super) fn show_about<const N: usize>(&mut self, changes: [(&str, Value); N]) {
         for (key, value) in changes {
             self.about.insert(key.to_owned(), value);
         }
         let about = json!({"about": self.about});
-        self.console.tell(about.to_string());
+        self.console.show_about(about.to_string());
     }
 
     /// Shows that no session runs, and why.
-    pub(super) fn tell_end(&mut self, why: &str) {
-        self.tell([("state", json!("ended")), ("why", json!(why))]);
+    pub(super) fn show_end(&mut self, why: &str) {
+        self.show_about([("state", json!("ended")), ("why", json!(why))]);
     }
 
-    /// What a viewer wants done.
+    /// What a viewer asks for.
     pub(super) fn next_order(&mut self) -> Option<Order> {
         self.console.next_order()
     }
@@ -218,6 +218,6 @@ impl Desk {
                 Err(error) => wrong = Some(error),
             }
         }
-        self.tell([("note", json!(wrong))]);
+        self.show_about([("note", json!(wrong))]);
     }
 }

@@ -114,7 +114,7 @@ struct Round<'a> {
     desk: Option<&'a mut Desk>,
     /// Whether this is a part of a blind comparison: the hand is the person's, the duration holds, nothing is shown.
     blind: bool,
-    /// The session that a viewer wants next.
+    /// The session that a viewer asked for next.
     again: Option<Setting>,
 }
 
@@ -160,7 +160,7 @@ impl Round<'_> {
             let connected = move || Some(*slave.borrow()).filter(|slave| slave.connected);
             desk.show(&caption, move || *master.borrow(), connected);
             if !self.blind {
-                desk.tell(self.setting.shown());
+                desk.show_about(self.setting.shown());
             }
             caption.setting = format!("{}  {}", desk.address(), caption.setting);
         }
@@ -191,7 +191,7 @@ impl Round<'_> {
         let report = RunReport::of_both(master?, slave?);
         let end = master_live.borrow().ended;
         if let Some(desk) = &mut self.desk {
-            desk.tell_end(&end.map(|end| end.to_string()).unwrap_or_default());
+            desk.show_end(&end.map(|end| end.to_string()).unwrap_or_default());
         }
         Ok(Some((report, end)))
     }
@@ -219,7 +219,7 @@ impl Round<'_> {
         }
     }
 
-    /// Does what viewers want.
+    /// Does what viewers ask for.
     fn attend(&mut self, stop: &Stop) {
         let Some(desk) = &mut self.desk else {
             return;
@@ -233,13 +233,13 @@ impl Round<'_> {
                 Order::Network(wish) => {
                     match self.setting.networks() {
                         Ok(ways) => desk.change_networks(&wish, self.emulation, ways.map(Some)),
-                        Err(what) => desk.tell([("note", what.to_string().into())]),
+                        Err(what) => desk.show_about([("note", what.to_string().into())]),
                     }
-                    desk.tell(self.setting.shown());
+                    desk.show_about(self.setting.shown());
                 }
                 Order::Restart(wish) => match self.setting.wished(&wish) {
                     Ok(setting) => self.again = Some(setting),
-                    Err(what) => desk.tell([("note", what.into())]),
+                    Err(what) => desk.show_about([("note", what.into())]),
                 },
             }
         }

@@ -136,7 +136,7 @@ fn make(arguments: &RotateArguments) -> Result<(), Failure> {
     load_existing(&directory).map_err(|error| failure(&error))?;
     let address = arguments.address.clone();
     let address = address.or_else(|| advertised(&directory)).ok_or_else(|| {
-        let what = "mmt does not know where the slave listens, and a pairing string names that";
+        let what = "nothing here shows where the slave listens, and a pairing string names that";
         Failure::usage(what).remedy("give --address HOST:PORT, or start `mmt slave` once")
     })?;
     let changed = rotate(&directory, &arguments.name, arguments.role);

@@ -1,4 +1,4 @@
-//! `mmt completions` and `mmt man`: what shells and `man` want to know of the command line.
+//! `mmt completions` and `mmt man`: what shells and `man` need of the command line.
 
 use std::io::Write;
 

@@ -21,6 +21,7 @@ use mmt_shared::clean::clean;
 use mmt_shared::io::connect::ConnectError;
 use mmt_shared::io::emergency::EmergencyStop;
 use mmt_shared::io::identity_file::default_directory;
+use mmt_shared::io::wish::Wish;
 use mmt_shared::model::geometry::Vec2;
 use mmt_shared::pairing::Pairing;
 use mmt_shared::report::RunReport;
@@ -89,7 +90,7 @@ pub(crate) fn run(arguments: MasterArguments, messages: &Messages) -> Result<(),
     if let Some(desk) = &mut desk {
         let shown = live.clone();
         desk.show(&caption, move || *shown.borrow(), || None);
-        desk.tell([("network", json!({"up": link.to_string()}))]);
+        desk.show_about([("network", json!({"up": link.to_string()}))]);
         caption.setting = format!("{}  {}", desk.address(), caption.setting);
     }
     let mut viewer = Viewer::new(caption, dashboard, messages, &stop);
@@ -102,7 +103,7 @@ pub(crate) fn run(arguments: MasterArguments, messages: &Messages) -> Result<(),
                 Order::Network(wish) => {
                     let Some(desk) = &mut desk else { continue };
                     desk.change_networks(&wish, &emulation, [Some(&mut link), None]);
-                    desk.tell([("network", json!({"up": link.to_string()}))]);
+                    desk.show_about([("network", json!({"up": link.to_string()}))]);
                 }
                 // the object is another host's
                 Order::Restart(_) | Order::Study(_) => {}
@@ -131,7 +132,7 @@ type Started = (Host<MasterReport>, watch::Receiver<MasterLive>);
 /// No thread; joining the host returns why it failed.
 pub(super) fn start(
     options: MasterOptions,
-    stop: watch::Receiver<bool>,
+    stop: watch::Receiver<Wish>,
 ) -> Result<Started, Failure> {
     let (live, looks) = watch::channel(MasterLive::default());
     let work = async move { mmt_client::io::run(options, stop, live).await };

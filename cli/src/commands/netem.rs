@@ -122,11 +122,7 @@ pub(crate) fn run(arguments: &NetemArguments, messages: &Messages) -> Result<(),
         },
     );
     let duration_s = began.elapsed().as_secs_f64();
-    let ending = if stop.asked() {
-        "interrupted"
-    } else {
-        "finished"
-    };
+    let ending = stop.ending().name();
     let counters = relay.stop().map_err(Failure::failed)?;
     let effects = effects.join();
     let effects =

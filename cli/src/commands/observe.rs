@@ -4,6 +4,7 @@ use mmt_client::io::{MasterHostError, ObserverOptions, ObserverReport, SessionEn
 use mmt_client::observer::ObserverLive;
 use mmt_lab::layers::Program;
 use mmt_netem::Direction;
+use mmt_shared::io::wish::Wish;
 use mmt_shared::report::RunReport;
 use tokio::sync::watch;
 
@@ -92,7 +93,7 @@ type Started = (
     watch::Receiver<ObserverLive>,
 );
 
-fn start(options: ObserverOptions, stop: watch::Receiver<bool>) -> Result<Started, Failure> {
+fn start(options: ObserverOptions, stop: watch::Receiver<Wish>) -> Result<Started, Failure> {
     let (live, looks) = watch::channel(ObserverLive::default());
     let work = async move { mmt_client::io::observe(options, stop, live).await };
     let failed = |error: MasterHostError| host_failure(&error);

@@ -17,6 +17,7 @@ use mmt_shared::clean::clean;
 use mmt_shared::io::emergency::EmergencyStop;
 use mmt_shared::io::identity_file::{advertise, load_or_create};
 use mmt_shared::io::plug_socket::PlugSocketError;
+use mmt_shared::io::wish::Wish;
 use mmt_shared::pairing::{Host as HostName, Pairing};
 use mmt_shared::report::RunReport;
 use mmt_shared::wire::Ending;
@@ -55,7 +56,7 @@ pub(crate) fn run(arguments: SlaveArguments, messages: &Messages) -> Result<(), 
     if !options.netem.is_transparent() {
         note(effect(Direction::Down, &options.netem)?);
     }
-    let unserved = unserved(&options);
+    let mut unserved = unserved(&options);
     arguments.transport.warning().into_iter().for_each(note);
     let stop = Stop::on_signals()?;
     options.emergency = stop.emergency().clone();
@@ -82,6 +83,9 @@ pub(crate) fn run(arguments: SlaveArguments, messages: &Messages) -> Result<(), 
     }
     let report = host.join()?.map(RunReport::from);
     let judged = judge(arguments.once, report.as_ref());
+    if stop.ending() == Ending::Failed {
+        unserved.ending = Some(Ending::Failed.name());
+    }
     // without a session there is nothing to read
     let shown = report.or(arguments.json.then_some(unserved));
     conclude([
@@ -173,7 +177,7 @@ type Started = (Host<Option<SlaveReport>>, mpsc::Receiver<Listening>);
 pub(super) fn start(
     options: SlaveOptions,
     advertise: Option<HostName>,
-    stop: watch::Receiver<bool>,
+    stop: watch::Receiver<Wish>,
 ) -> Result<Started, Failure> {
     let (sender, receiver) = mpsc::channel();
     let work = move |runtime: &Runtime| {
@@ -192,7 +196,7 @@ pub(super) fn start(
     Ok((spawn("slave", work)?, receiver))
 }
 
-/// Keeps where the slave is reached for `mmt identity rotate`, which has to be told where this fails.
+/// Keeps where the slave is reached for `mmt identity rotate`, whose user has to give it where this fails.
 fn keep_address(directory: &Path, pairing: &Pairing) {
     if let Err(error) = advertise(directory, &pairing.address) {
         tracing::debug!("mmt identity rotate will need --address: {error}");

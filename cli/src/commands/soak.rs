@@ -64,11 +64,7 @@ pub(crate) fn run(arguments: &SoakArguments) -> Result<(), Failure> {
     let mut tally = Tally::new();
     let soaked = soak(arguments, &out, &stop, &mut tally);
     tidy(&out);
-    let ending = if stop.asked() {
-        "interrupted"
-    } else {
-        "finished"
-    };
+    let ending = stop.ending().name();
     let processes = tally.rows();
     let grows = processes.iter().any(|row| !row.grows.is_empty());
     let document = Document {

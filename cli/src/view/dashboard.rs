@@ -139,7 +139,7 @@ fn render_charts(frame: &mut Frame<'_>, area: Rect, history: &History) {
     }
 }
 
-/// The chart wants whole numbers; the cast saturates.
+/// The chart takes whole numbers; the cast saturates.
 fn centinewtons(force_n: Option<f64>) -> Option<u64> {
     force_n.map(|force| (force * 100.0) as u64)
 }

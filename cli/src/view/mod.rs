@@ -35,7 +35,7 @@ pub(crate) struct Caption {
     pub(crate) setting: String,
     /// The slave that the master connects to, as HOST:PORT; empty where there is none.
     pub(crate) slave: String,
-    /// True m, b, c where this process knows them.
+    /// True m, b, c where this process has them.
     pub(crate) truth: Option<[f64; 3]>,
 }
 
@@ -56,7 +56,7 @@ pub(crate) struct Snapshot {
 struct Missing {
     /// Share, 0 to 1: of what the sender sent where its own count is known, else of what it numbered.
     share: Option<f64>,
-    /// Datagrams that the sender itself overtook or could not send, where this process knows it.
+    /// Datagrams that the sender itself overtook or could not send, where this process counts them.
     unsent: Option<u64>,
 }
 
@@ -169,7 +169,7 @@ impl Snapshot {
         side.map(|side| format!("EMERGENCY STOP ({})", side.name()))
     }
 
-    /// What keeps the tool from the HIP, in words, as the master knows it; none if nothing does.
+    /// What keeps the tool from the HIP, in words, as the master received it; none if nothing does.
     fn tool_holds(&self) -> Option<&'static str> {
         let master = self.master?;
         match (master.tool_state, master.tool_energy_holds) {

@@ -17,7 +17,7 @@ use crate::operator::pointer::{Driver, HandEvent, Person};
 use crate::operator::scripted::{Scripted, ScriptedConfig, View};
 use rigs::{Rig, rigs};
 
-/// What the model wants to press with where a test asks for a force that no limit touches, N, world.
+/// What the model presses with where a test asks for a force that no limit touches, N, world.
 const GENTLE: Vec2 = Vec2::new(0.6, -0.8);
 /// And where it asks for more than any device may give.
 const WILD: Vec2 = Vec2::new(60.0, -80.0);
@@ -230,8 +230,8 @@ fn silence_of_any_device_lets_the_hand_go_and_leaves_no_force() {
         plugged.nothing(2);
         assert!(!plugged.held(), "{name}");
         // a device at the link gets no packet then; one that is asked gets zero
-        let told = plugged.config.kind != DeviceKind::Link;
-        assert!(!(told && plugged.pushed()), "{name}: at once");
+        let direct = plugged.config.kind != DeviceKind::Link;
+        assert!(!(direct && plugged.pushed()), "{name}: at once");
         plugged.nothing(250);
         assert!(!plugged.pushed(), "{name}");
         assert!(plugged.hip_is(hip), "{name}: the HIP stays");

@@ -85,7 +85,7 @@ pub(super) struct Hand {
     /// The newest tick that was seen, and when it was new.
     ticked: (u64, Time),
     /// When something came last over a line that is the device's own.
-    heard: Option<Time>,
+    last_packet: Option<Time>,
     seen: Option<Reading>,
 }
 
@@ -115,7 +115,7 @@ impl Hand {
             rests: None,
             held: None,
             ticked: (0, Time::ZERO),
-            heard: None,
+            last_packet: None,
             seen: None,
         })
     }
@@ -151,17 +151,17 @@ impl Hand {
     }
 
     /// Something comes over a line that is the device's own: after a silence everything begins anew.
-    pub(super) fn hear(&mut self, now: Time, give: impl FnMut(HandEvent)) {
+    pub(super) fn note_packet(&mut self, now: Time, give: impl FnMut(HandEvent)) {
         if self.is_silent(now) {
             self.anew(give);
         }
-        self.heard = Some(now);
+        self.last_packet = Some(now);
     }
 
     /// Whether nothing has come for too long over a line that is the device's own.
     pub(super) fn is_silent(&self, now: Time) -> bool {
         let silence = self.config.tuning().silence;
-        self.heard
+        self.last_packet
             .is_none_or(|at| now.saturating_since(at) >= silence)
     }
 

@@ -44,7 +44,7 @@ pub struct Inverse3 {
     counts: PlugCounts,
     /// Its number at the service; none before it was seen, and once it is gone.
     device: Option<String>,
-    /// Whether we have told the service who we are.
+    /// Whether the service has received who we are.
     greeted: bool,
 }
 
@@ -169,7 +169,7 @@ impl Inverse3 {
         self.hand.seen()
     }
 
-    /// A connection begins, to a service of this version such as 3.5.0.0; none where it does not say.
+    /// A connection begins, to a service of this version such as 3.5.0.0; none where it reports none.
     pub fn begin(&mut self, version: Option<&str>, give: impl FnMut(HandEvent)) {
         let mut numbers = version.unwrap_or_default().split('.').map(str::parse);
         self.dialect = match (self.wanted, numbers.next(), numbers.next()) {
@@ -185,7 +185,7 @@ impl Inverse3 {
 
     /// Takes in a message, and gives what the hand does by it.
     pub fn handle(&mut self, now: Time, message: &str, mut give: impl FnMut(HandEvent)) {
-        self.hand.hear(now, &mut give);
+        self.hand.note_packet(now, &mut give);
         let Ok(frame) = serde_json::from_str::<Frame>(message) else {
             self.counts.malformed += 1;
             self.lose(give);
@@ -225,7 +225,7 @@ impl Inverse3 {
 
     /// Something came that is no text.
     pub fn handle_other(&mut self, now: Time, mut give: impl FnMut(HandEvent)) {
-        self.hand.hear(now, &mut give);
+        self.hand.note_packet(now, &mut give);
         self.counts.malformed += 1;
         self.lose(give);
     }
@@ -274,7 +274,7 @@ impl Inverse3 {
             commands,
         });
         let inverse3: Vec<_> = inverse3.collect();
-        // older services know no profiles
+        // older services have no profiles
         let greets = !self.greeted && self.dialect == Dialect::Vector;
         let session = match (inverse3.is_empty(), greets) {
             (true, _) => Some(Session::ForceRenderFullState {}),

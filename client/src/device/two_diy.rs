@@ -12,7 +12,7 @@
 //! ```
 //!
 //! Motor 1 and encoder 1 are at port 2, motor 2 and encoder 2 at port 1. The board keeps the torques that it got last: it has to be
-//! told zero. Its encoders count from where the arms stand when it is set up: they have to be at the vendor's start then.
+//! sent zero. Its encoders count from where the arms stand when it is set up: they have to be at the vendor's start then.
 //!
 //! Pure. The answer has no stamp: its arrival is one. Velocity is the difference of the angles between two answers through a
 //! low-pass of 20 Hz (first order), times the Jacobian: a step of an encoder is 0.1 mm at the tool, 0.1 m/s in a millisecond.
@@ -106,7 +106,7 @@ impl TwoDiy {
     /// Takes in what came in answer to torques, and gives what the hand does by it. Of several answers the last is the newest: a
     /// board that was late answers all that it was asked.
     pub fn handle(&mut self, now: Time, answers: &[u8], mut give: impl FnMut(HandEvent)) {
-        self.hand.hear(now, &mut give);
+        self.hand.note_packet(now, &mut give);
         let (whole, rest) = answers.as_chunks::<ANSWER_BYTES>();
         let newest = whole.split_last().filter(|_| rest.is_empty());
         let Some(([ID, numbers @ ..], late)) = newest else {

@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use mmt_shared::io::wish::Wish;
 use mmt_shared::wire::Ending;
 use serde::Serialize;
 
@@ -15,6 +16,8 @@ pub enum SessionEnd {
     OperatorFinished,
     /// A person or the system asked for it here.
     Stopped,
+    /// A thread of this process panicked.
+    ThreadPanicked,
     /// The slave sent its farewell first.
     SlaveEnded(Ending),
     /// One of the two ways was silent for so long that the hand was released.
@@ -40,10 +43,20 @@ impl SessionEnd {
             Self::SlaveEnded(ending) => ending,
             Self::LinkSilent
             | Self::ModelBroken
+            | Self::ThreadPanicked
             | Self::TakenOver
             | Self::Revoked
             | Self::ConnectionLost
             | Self::StreamBroken => Ending::Failed,
+        }
+    }
+}
+
+impl From<Wish> for SessionEnd {
+    fn from(wish: Wish) -> Self {
+        match wish {
+            Wish::Fail => Self::ThreadPanicked,
+            Wish::GoOn | Wish::End => Self::Stopped,
         }
     }
 }
@@ -54,6 +67,9 @@ impl fmt::Display for SessionEnd {
             Self::DurationOver => "the duration is over",
             Self::OperatorFinished => "the operator has finished",
             Self::Stopped => "it was asked to end",
+            Self::ThreadPanicked => {
+                "a thread of mmt panicked: this is a defect of mmt; please report it with what stands above"
+            }
             Self::SlaveEnded(Ending::Finished) => "the slave has finished",
             Self::SlaveEnded(Ending::Interrupted) => "the slave was asked to end",
             Self::SlaveEnded(Ending::Failed) => "the slave failed: see its own log",

@@ -16,9 +16,9 @@ use mmt_shared::io::truth::TruthReceiver;
 use mmt_shared::metrics::PoseError;
 use mmt_shared::model::geometry::Vec2;
 use mmt_shared::time::Time;
-use rtrb::Consumer;
 
 use super::device::DevicePort;
+use super::hand_events::HandEvents;
 use super::record::{self, MasterSink};
 use super::{MasterLive, SessionEnd};
 use crate::device::link::HandOutput;
@@ -26,7 +26,6 @@ use crate::end::{MasterEnd, MasterGiven};
 use crate::failsafe::LinkState;
 use crate::master::MasterTick;
 use crate::operator::Operator;
-use crate::operator::pointer::HandEvent;
 use crate::path::PathRecorder;
 
 mod snapshot;
@@ -50,7 +49,7 @@ pub struct HapticLoop {
     /// Where the HIP was read last, m.
     pub(super) reading: Vec2,
     /// What a person does, where one operates.
-    events: Option<Consumer<HandEvent>>,
+    events: Option<HandEvents>,
     /// The device that is plugged in, where one is.
     pub(super) device: Option<DevicePort>,
     /// How long; for ever if absent.
@@ -101,7 +100,7 @@ impl HapticLoop {
         }
     }
 
-    /// The same with what reports want: the true pose, where the slave lives in this process, and a recorder of the path.
+    /// The same with what reports need: the true pose, where the slave lives in this process, and a recorder of the path.
     #[must_use]
     pub fn observed_by(mut self, truth: Option<TruthReceiver>, path: Option<PathRecorder>) -> Self {
         (self.truth, self.path) = (truth, path);
@@ -110,7 +109,7 @@ impl HapticLoop {
 
     /// The same, operated by whoever fills these events.
     #[must_use]
-    pub fn operated_through(mut self, events: Option<Consumer<HandEvent>>) -> Self {
+    pub fn operated_through(mut self, events: Option<HandEvents>) -> Self {
         self.events = events;
         self
     }
@@ -225,11 +224,18 @@ impl HapticLoop {
         &self.end
     }
 
+    /// What a person or a device did and found no room on its way here.
+    pub(super) fn hand_events_lost(&self) -> u64 {
+        let events = self.events.as_ref().map(HandEvents::lost);
+        let device = self.device.as_ref().map(DevicePort::events_lost);
+        events.into_iter().chain(device).sum()
+    }
+
     /// Where a device is plugged in it is the one hand.
     fn handle_events(&mut self, now: Time) {
         let has_device = self.device.is_some();
         let others = self.events.iter_mut();
-        let others = others.flat_map(|events| std::iter::from_fn(|| events.pop().ok()));
+        let others = others.flat_map(|events| std::iter::from_fn(|| events.next_event()));
         let others = others.take(EVENTS_PER_TICK);
         let others = others.filter(|event| !has_device || !event.is_of_the_hand());
         let device = self.device.iter_mut();

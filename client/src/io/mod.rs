@@ -12,6 +12,7 @@ pub mod console;
 pub mod device;
 mod end;
 mod error;
+pub mod hand_events;
 pub mod haptic;
 mod observe;
 mod open;
@@ -39,7 +40,6 @@ use mmt_shared::pairing::Pairing;
 use mmt_shared::range::OutOfRange;
 use mmt_shared::report::MasterSession;
 use mmt_shared::wire::{Architecture, Side, ToolState};
-use rtrb::Consumer;
 use serde::Serialize;
 
 use crate::commands::CommandConfig;
@@ -47,7 +47,7 @@ use crate::device::DeviceProfile;
 use crate::end::Change;
 use crate::failsafe::LinkState;
 use crate::operator::Operator;
-use crate::operator::pointer::{Driver, HandEvent, HandTuning, Person};
+use crate::operator::pointer::{Driver, HandTuning, Person};
 use crate::operator::scripted::{Scripted, ScriptedConfig, View};
 use crate::operator::trace::Trace;
 use crate::path::PathRecorder;
@@ -55,6 +55,7 @@ use crate::path::PathRecorder;
 use device::DevicePort;
 pub use end::SessionEnd;
 pub use error::MasterHostError;
+use hand_events::HandEvents;
 pub use observe::{ObserverConfiguration, ObserverOptions, ObserverReport, observe};
 pub use resume::ResumeFile;
 pub use session::run;
@@ -140,7 +141,7 @@ pub struct MasterOptions {
     /// Who operates.
     pub operator: OperatorChoice,
     /// What a person does, where one operates; the session takes it.
-    pub events: Mutex<Option<Consumer<HandEvent>>>,
+    pub events: Mutex<Option<HandEvents>>,
     /// The device that is plugged in, where one is; the session takes it.
     pub device_port: Mutex<Option<DevicePort>>,
     /// How long; until the operator has finished or a person ends it if absent.

@@ -14,10 +14,11 @@ use mmt_shared::io::congestion::RateCap;
 use mmt_shared::io::farewell::{
     FarewellError, ReceivedFarewell, answer, farewell_wait, receive_farewell, send_farewell,
 };
-use mmt_shared::io::network_task::{BEAT, asked_to_stop};
+use mmt_shared::io::network_task::BEAT;
 use mmt_shared::io::quic::Traffic;
 use mmt_shared::io::stream::delivered;
 use mmt_shared::io::transport::{Connection, SendStream, Transport};
+use mmt_shared::io::wish::{Wish, asked_to_stop};
 use mmt_shared::model::geometry::Vec2;
 use mmt_shared::pairing::Pairing;
 use mmt_shared::report::{MasterHalf, MasterSession, SlaveHalf};
@@ -90,13 +91,13 @@ type FarewellRead = Result<ReceivedFarewell<SlaveHalf>, FarewellError>;
 /// The slave did not let it look on; see [`MasterHostError`].
 pub async fn observe(
     options: ObserverOptions,
-    mut stop: watch::Receiver<bool>,
+    mut stop: watch::Receiver<Wish>,
     live: watch::Sender<ObserverLive>,
 ) -> Result<(ObserverReport, SessionEnd), MasterHostError> {
     let opening = opening(&options);
     let opened = tokio::select! {
         opened = open(&opening, &TIMEOUTS) => opened?,
-        () = asked_to_stop(&mut stop) => return Err(MasterHostError::Interrupted),
+        _ = asked_to_stop(&mut stop) => return Err(MasterHostError::Interrupted),
     };
     let Opened {
         connected,
@@ -209,7 +210,7 @@ impl Sight<'_> {
     async fn until_end<F: Future<Output = FarewellRead>>(
         &mut self,
         mut farewell: Pin<&mut F>,
-        stop: &mut watch::Receiver<bool>,
+        stop: &mut watch::Receiver<Wish>,
         mut over: Pin<&mut impl Future<Output = ()>>,
         live: &watch::Sender<ObserverLive>,
     ) -> (SessionEnd, Option<ReceivedFarewell<SlaveHalf>>) {
@@ -223,7 +224,7 @@ impl Sight<'_> {
             tokio::select! {
                 biased;
                 read = farewell.as_mut() => return self.farewell(read),
-                () = asked_to_stop(stop) => return (SessionEnd::Stopped, None),
+                wish = asked_to_stop(stop) => return (wish.into(), None),
                 () = over.as_mut() => return (SessionEnd::DurationOver, None),
                 _ = beat.tick() => {
                     live.send_replace(self.end.live(self.clock.now()));

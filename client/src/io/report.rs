@@ -22,6 +22,8 @@ pub(super) fn half(
     if let Some(completed) = haptic.operator.pushes_completed() {
         half.pushes = PushesReport::new(completed, &haptic.end.counts().breaks);
     }
+    let lost = haptic.hand_events_lost();
+    half.session.add_drops([("hand_events_ring_full", lost)]);
     if let Some(device) = &haptic.device {
         for (name, count) in device.counts().dropped() {
             half.session

@@ -8,8 +8,9 @@ use mmt_shared::io::farewell::{
     FarewellError, ReceivedFarewell, farewell_wait, receive_farewell, send_farewell,
 };
 use mmt_shared::io::loop_thread;
-use mmt_shared::io::network_task::{Event, NetworkTask, asked_to_stop};
+use mmt_shared::io::network_task::{Event, NetworkTask};
 use mmt_shared::io::stream::delivered;
+use mmt_shared::io::wish::{Wish, asked_to_stop};
 use mmt_shared::model::geometry::{BoxFootprint, Pose};
 use mmt_shared::report::SlaveHalf;
 use mmt_shared::wire::{Ending, Side};
@@ -45,7 +46,7 @@ const THREAD: &str = "mmt-haptic";
 /// There was no session, or the haptic loop broke; see [`MasterHostError`].
 pub async fn run(
     options: MasterOptions,
-    stop: watch::Receiver<bool>,
+    stop: watch::Receiver<Wish>,
     live: watch::Sender<MasterLive>,
 ) -> Result<MasterReport, MasterHostError> {
     run_with(options, stop, live, TIMEOUTS).await
@@ -62,7 +63,7 @@ fn first_view() -> View {
 
 pub(super) async fn run_with(
     mut options: MasterOptions,
-    mut stop: watch::Receiver<bool>,
+    mut stop: watch::Receiver<Wish>,
     live: watch::Sender<MasterLive>,
     timeouts: Timeouts,
 ) -> Result<MasterReport, MasterHostError> {
@@ -73,7 +74,7 @@ pub(super) async fn run_with(
     let opening = Opening::of_operator(&options, start);
     let opened = tokio::select! {
         opened = open(&opening, &timeouts) => opened?,
-        () = asked_to_stop(&mut stop) => return Err(MasterHostError::Interrupted),
+        _ = asked_to_stop(&mut stop) => return Err(MasterHostError::Interrupted),
     };
     let welcome = &opened.welcome;
     tracing::info!(
@@ -121,7 +122,7 @@ pub(super) async fn operate(
     body: impl FnOnce(loop_thread::LoopSide<MasterLive>, mmt_shared::io::ticker::Ticker) -> HapticLoop
     + Send
     + 'static,
-    mut stop: watch::Receiver<bool>,
+    mut stop: watch::Receiver<Wish>,
     live: watch::Sender<MasterLive>,
     timeouts: &Timeouts,
 ) -> Result<MasterReport, MasterHostError> {
@@ -148,7 +149,7 @@ pub(super) async fn operate(
         return Err(MasterHostError::of_loop(session.task.handle()));
     };
     let duration = (clock.now()).saturating_since(haptic.end.channel().began());
-    // the loop knows its own reasons, the network task the others; one without a reason was asked to end
+    // the loop keeps its own reasons, the network task the others; one without a reason was asked to end
     let why = haptic.why.or(session.why).unwrap_or(SessionEnd::Stopped);
     tracing::info!("the session ends: {why}");
     if session.task.is_connected() {
@@ -189,7 +190,7 @@ pub(super) async fn operate(
     })
 }
 
-/// What a session knows outside of its haptic loop.
+/// What a session keeps outside of its haptic loop.
 struct Session<'a> {
     task: NetworkTask<MasterLive, HapticLoop>,
     live: &'a watch::Sender<MasterLive>,
@@ -207,13 +208,13 @@ impl Session<'_> {
     async fn run<F: Future<Output = FarewellRead>>(
         &mut self,
         mut farewell: Pin<&mut F>,
-        stop: &mut watch::Receiver<bool>,
+        stop: &mut watch::Receiver<Wish>,
     ) -> Option<HapticLoop> {
         loop {
             match self.task.next(farewell.as_mut(), stop).await {
                 Event::LoopEnded(ended) => return ended,
                 Event::Beat => self.show(None),
-                Event::Stopped => self.end(SessionEnd::Stopped),
+                Event::Stopped(wish) => self.end(wish.into()),
                 Event::Farewell(read) => self.handle_farewell(read),
                 Event::Disconnected(error) => {
                     if self.farewell.is_none() {

@@ -6,6 +6,7 @@ use mmt_netem::LinkConfig;
 use mmt_shared::io::clock::Clock;
 use mmt_shared::io::connect::ConnectError;
 use mmt_shared::io::transport::Transport;
+use mmt_shared::io::wish::Wish;
 use mmt_shared::metrics::ForceSummary;
 use mmt_shared::model::contact::Coupling;
 use mmt_shared::model::geometry::{Pose, Twist, Vec2};
@@ -59,12 +60,12 @@ fn scripted(fake: &Fake) -> MasterOptions {
 /// A running master: its end, the switch that stops it, and what a screen sees.
 struct Running {
     done: tokio::task::JoinHandle<Result<MasterReport, MasterHostError>>,
-    stop: watch::Sender<bool>,
+    stop: watch::Sender<Wish>,
     live: watch::Receiver<MasterLive>,
 }
 
 fn start(options: MasterOptions, timeouts: Timeouts) -> Running {
-    let (stop, stop_to) = watch::channel(false);
+    let (stop, stop_to) = watch::channel(Wish::GoOn);
     let (live_from, live) = watch::channel(MasterLive::default());
     let done = tokio::spawn(run_with(options, stop_to, live_from, timeouts));
     Running { done, stop, live }
@@ -158,22 +159,27 @@ async fn a_session_goes_from_hello_to_farewell_and_both_sides_are_in_the_report(
 }
 
 #[tokio::test]
-async fn a_stop_in_the_session_releases_the_hand_and_says_farewell() {
-    let fake = Fake::new();
-    let mut options = scripted(&fake);
-    options.duration = None;
-    let mut master = start(options, TIMEOUTS);
-    let mut slave = Session::welcomed(&fake).await;
-    slave.serve_for(Duration::from_millis(100)).await;
-    master.stop.send_replace(true);
-    let told = slave.serve().await;
-    slave.say_farewell(Ending::Interrupted, totals()).await;
-    let report = master.end().await.unwrap();
-    assert_eq!(told.ending, Ending::Interrupted);
-    assert_eq!(report.ending, Some("interrupted"));
-    let last = *master.live.borrow_and_update();
-    assert_eq!(last.ended, Some(SessionEnd::Stopped));
-    assert_eq!(last.hand_force, Vec2::zeros());
+async fn a_stop_in_the_session_releases_the_hand_and_sends_a_farewell_with_its_cause() {
+    for (wish, ended) in [
+        (Wish::End, SessionEnd::Stopped),
+        (Wish::Fail, SessionEnd::ThreadPanicked),
+    ] {
+        let fake = Fake::new();
+        let mut options = scripted(&fake);
+        options.duration = None;
+        let mut master = start(options, TIMEOUTS);
+        let mut slave = Session::welcomed(&fake).await;
+        slave.serve_for(Duration::from_millis(100)).await;
+        master.stop.send_replace(wish);
+        let farewell = slave.serve().await;
+        slave.say_farewell(ended.ending(), totals()).await;
+        let report = master.end().await.unwrap();
+        assert_eq!(farewell.ending, ended.ending());
+        assert_eq!(report.ending, Some(ended.ending().name()));
+        let last = *master.live.borrow_and_update();
+        assert_eq!(last.ended, Some(ended));
+        assert_eq!(last.hand_force, Vec2::zeros());
+    }
 }
 
 #[tokio::test]
@@ -201,7 +207,7 @@ async fn who_asks_for_scenes_sees_the_last_that_came_and_how_old_it_is() {
     while master.live.borrow().scene.is_none() {
         slave.serve_for(Duration::from_millis(100)).await;
     }
-    master.stop.send_replace(true);
+    master.stop.send_replace(Wish::End);
     slave.serve().await;
     slave.say_farewell(Ending::Interrupted, totals()).await;
     master.end().await.unwrap();

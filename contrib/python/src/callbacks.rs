@@ -42,10 +42,11 @@ pub(crate) fn vector(given: &Bound<'_, PyAny>, what: &str) -> PyResult<Vec2> {
 /// time: stamp of the HIP sample, s. f_s: measured force on the object, (x, y), N. f_m: force of the master's model, as the
 /// slave knows it, (x, y), N. noise_n: standard deviation of f_s per axis where it is more than the default sensor's, else 0, N.
 /// slave_in_contact, shadow_in_contact: whether the tool touches the object, and the HIP the master's model. hip_stands:
-/// whether the HIP is where it was a sample before. sticking: whether the object stands although it is pushed. speed, acceleration: of the object along the push, m/s and m/s^2. force_deviation:
-/// standard deviation of the force that the estimate predicts, N. parameters: (m, b, c) that an update would carry, kg, N s/m, N.
-/// shift: by how much it would move the master's object, (x, y), m. shift_deviation: its standard deviation per axis while nobody
-/// touches the object, else 0, m. turn: by how much it would turn the object, rad.
+/// whether the HIP is where it was a sample before. sticking: whether the object stands although it is pushed. speed,
+/// acceleration: of the object along the push, m/s and m/s^2. force_deviation: standard deviation of the force that
+/// the estimate predicts, N. parameters: (m, b, c) that an update would carry, kg, N s/m, N. shift: by how much it
+/// would move the master's object, (x, y), m. shift_deviation: its standard deviation per axis while nobody touches
+/// the object, else 0, m. turn: by how much it would turn the object, rad.
 #[pyclass(frozen, get_all, module = "mmt")]
 pub(crate) struct TriggerInput {
     time: f64,

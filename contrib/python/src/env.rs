@@ -53,19 +53,21 @@ struct Action {
 ///
 /// config, start: as those of `run`. duration: of an episode, s. ticks: milliseconds of a step, 1 to 1000.
 ///
-/// An action is the HIP, m: (2,), to which the hand goes evenly over the step, or (ticks, 2), a row a millisecond. Or a dict: "hip",
-/// such an array; "parameters", (m, b, c) in kg, N s/m, N, which the slave takes in the place of its estimate in this step, if they
-/// are accepted; "send", True, False or a cause ("deadband", "timer", "every_sample"), in the place of the update scheme: once, in the
-/// first sample of the step. What a dict leaves out is mmt's own, for "hip" the scripted operator.
+/// An action is the HIP, m: (2,), to which the hand goes evenly over the step, or (ticks, 2), a row a millisecond. Or
+/// a dict: "hip", such an array; "parameters", (m, b, c) in kg, N s/m, N, which the slave takes in the place of its
+/// estimate in this step, if they are accepted; "send", True, False or a cause ("deadband", "timer", "every_sample"),
+/// in the place of the update scheme: once, in the first sample of the step. What a dict leaves out is mmt's own, for
+/// "hip" the scripted operator.
 ///
 /// An observation is what the hand feels and sees, float64, (11,), of the names in OBSERVATION: the HIP, the force on the hand, the
-/// master's model and its parameters. The reward is always 0.0: what is good is for the user to say, in a wrapper. Terminated: the
+/// master's model and its parameters. The reward is always 0.0: what is good the user decides, in a wrapper. Terminated: the
 /// link was silent for so long that the hand was released. Truncated: the duration is over.
 ///
-/// info: time, s; from the first sample on that the slave plays, its stamp, s, and the slave's tool, f_s and f_shadow, (2,), m and N,
-/// in_contact, and f_m_played, (2,), where the sample was not lost; pose_true, (3,), m and rad; parameters_estimate,
-/// parameters_true, (3,); parameters_refused, how often m, b, c were not accepted so far; updates, the causes of those sent in the
-/// step; link, "fresh", "late", "stale" or "released"; and at the end metrics, as those of `Run`.
+/// info: time, s; from the first sample on that the slave plays, its stamp, s, and the slave's tool, f_s and
+/// f_shadow, (2,), m and N, in_contact, and f_m_played, (2,), where the sample was not lost; pose_true, (3,), m and
+/// rad; parameters_estimate, parameters_true, (3,); parameters_refused, how often m, b, c were not accepted so far;
+/// updates, the causes of those sent in the step; link, "fresh", "late", "stale" or "released"; and at the end
+/// metrics, as those of `Run`.
 #[pyclass(module = "mmt")]
 pub(crate) struct Env {
     config: WorldConfig,

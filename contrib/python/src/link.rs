@@ -23,10 +23,10 @@ const BYTES: usize = 100;
 
 /// A packet that left the link, or was dropped by it.
 ///
-/// number: of its offer, from 0. offered, time: when it was offered, and when it left or was dropped, s. payload: its bytes, one bit
-/// flipped where it is corrupted. fate: "delivered" or the cause of the drop: "loss", "outage", "mtu", "queue", "codel", "limit".
-/// copy: whether it is a second one of its offer. corrupted: whether a bit is flipped. marked: whether it met congestion (ECN).
-/// queued: how long it waited before the bottleneck, s.
+/// number: of its offer, from 0. offered, time: when it was offered, and when it left or was dropped, s. payload: its
+/// bytes, one bit flipped where it is corrupted. fate: "delivered" or the cause of the drop: "loss", "outage", "mtu",
+/// "queue", "codel", "limit". copy: whether it is a second one of its offer. corrupted: whether a bit is flipped.
+/// marked: whether it met congestion (ECN). queued: how long it waited before the bottleneck, s.
 #[pyclass(frozen, get_all, module = "mmt")]
 pub(crate) struct Departure {
     number: u64,
@@ -227,8 +227,8 @@ impl Link {
     /// Sends many packets and waits until the last of them has left or was dropped, which is the link's time then.
     ///
     /// times: when each is offered, s, (N,), not falling. sizes: bytes of each, (N,) or one number; 100 if None.
-    /// Returns (arrived, fate): when each came, s, (N,), NaN where it did not; and "delivered", "corrupted" or the cause of the drop,
-    /// (N,). A copy changes neither. Releases the GIL.
+    /// Returns (arrived, fate): when each came, s, (N,), NaN where it did not; and "delivered", "corrupted" or the
+    /// cause of the drop, (N,). A copy changes neither. Releases the GIL.
     #[pyo3(signature = (times, sizes=None))]
     fn send<'py>(
         &mut self,

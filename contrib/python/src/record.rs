@@ -12,7 +12,7 @@ use pyo3::types::{PyBytes, PyDict, PyList};
 
 use crate::arrays::{column, rows, words};
 
-/// The field of every message that says when it was.
+/// The field of every message that holds its time.
 const STAMP: &str = "stamp";
 
 /// A column that is being filled.
@@ -135,7 +135,8 @@ impl Record {
     }
 }
 
-/// Reads a record that `mmt demo`, `mmt slave` or `mmt master` made with --record; one whose session ended in the middle up to there.
+/// Reads a record that `mmt demo`, `mmt slave` or `mmt master` made with --record; one whose session ended in the
+/// middle up to there.
 ///
 /// record: a path. Raises OSError if it cannot be read, ValueError if it is no sound record. Releases the GIL.
 #[pyfunction]

@@ -81,8 +81,9 @@ macro_rules! arrays {
 
             /// Every datagram in the order of sending, a structured array with the fields direction ("up": master to slave,
             /// "down"), number (from 1, of its direction), kind ("command", "update", "scene", "tool", "heartbeat"), update (its
-            /// number, else 0), cause (of an update), repeat (whether it repeats an earlier one), bytes, sent (s), arrived (s, NaN if
-            /// it did not), fate ("delivered", "corrupted", "loss", "outage", "mtu", "queue", "codel", "limit", "under_way").
+            /// number, else 0), cause (of an update), repeat (whether it repeats an earlier one), bytes, sent (s),
+            /// arrived (s, NaN if it did not), fate ("delivered", "corrupted", "loss", "outage", "mtu", "queue",
+            /// "codel", "limit", "under_way").
             #[getter]
             fn packets(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
                 let made = || Ok::<_, PyErr>(table(py, &self.packets.read())?.unbind());
@@ -178,13 +179,14 @@ pub(crate) fn refused(error: &TrialError) -> PyErr {
 /// duration: s of virtual time, 0.001 to 604800.
 /// start: what lies below the configuration: "live", the live system's defaults, or "paper-experiment", the paper's.
 /// seed: of everything random; the configuration's if None.
-/// hip: (K, 2), m: the way of the hand, a row a millisecond, whatever it feels; after the last it stands. None: the scripted operator.
-/// operator: called each millisecond as operator(time, hip, force_on_hand, pose) with the time of the sample to come, s, and the
-/// HIP (x, y), m, the force on the hand (x, y), N, and the pose of the master's model (x, y, angle), m and rad, of the millisecond
-/// before; returns the HIP (x, y), m.
-/// trigger: called as trigger(input: TriggerInput) in each sample in the place of the update scheme; returns True to send an update,
-/// or the cause that it is to have: "deadband", "timer" or "every_sample". Updates of contact and loss are sent all the same.
-/// estimator: called as estimator(measured: Measured) in each sample; returns (m, b, c), kg, N s/m, N, or None where mmt's own stands.
+/// hip: (K, 2), m: the way of the hand, a row a millisecond, whatever it feels; after the last it stands. None: the
+/// scripted operator. operator: called each millisecond as operator(time, hip, force_on_hand, pose) with the time of
+/// the sample to come, s, and the HIP (x, y), m, the force on the hand (x, y), N, and the pose of the master's model
+/// (x, y, angle), m and rad, of the millisecond before; returns the HIP (x, y), m. trigger: called as trigger(input:
+/// TriggerInput) in each sample in the place of the update scheme; returns True to send an update, or the cause that
+/// it is to have: "deadband", "timer" or "every_sample". Updates of contact and loss are sent all the same.
+/// estimator: called as estimator(measured: Measured) in each sample; returns (m, b, c), kg, N s/m, N, or None where
+/// mmt's own stands.
 ///
 /// Releases the GIL where none of these functions is given. Raises ValueError with key, line and range of what is wrong with the
 /// configuration, OSError of a file that cannot be read, and whatever a function raises.

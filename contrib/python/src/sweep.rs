@@ -32,16 +32,18 @@ fn failed(error: SweepError) -> PyErr {
 
 /// Runs the rows of a plan (docs/sweep.md) that the folder does not hold yet, and returns those that it holds then.
 ///
-/// plan: a text in TOML, a path to a file, or a dict of the same keys. out: the folder; it is left as `mmt sweep` leaves it, byte by
-/// byte, and a sweep that was begun by the one goes on with the other. config: the configuration below the plan, as that of `run`.
-/// jobs: threads; all cores if None. shard: "I/N" runs every N-th row from the I-th on.
+/// plan: a text in TOML, a path to a file, or a dict of the same keys. out: the folder; it is left as `mmt sweep`
+/// leaves it, byte by byte, and a sweep that was begun by the one goes on with the other. config: the configuration
+/// below the plan, as that of `run`. jobs: threads; all cores if None. shard: "I/N" runs every N-th row from the I-th
+/// on.
 ///
-/// Returns a dict of columns, a row a row of the plan that is done: "row", a column per key of the axes, "seed", the measured columns.
-/// Numbers are float64, NaN where a measure has no meaning; "row" and "seed" are uint64; "digest" and the keys of axes that are not
-/// numbers are words.
+/// Returns a dict of columns, a row a row of the plan that is done: "row", a column per key of the axes, "seed", the
+/// measured columns. Numbers are float64, NaN where a measure has no meaning; "row" and "seed" are uint64; "digest"
+/// and the keys of axes that are not numbers are words.
 ///
-/// Releases the GIL. Ctrl-C ends it at once; the rows that are done stay, and the same call goes on. Raises ValueError with line and
-/// caret of what is wrong with the plan, and where the folder holds another plan's rows; OSError where it cannot be written.
+/// Releases the GIL. Ctrl-C ends it at once; the rows that are done stay, and the same call goes on. Raises
+/// ValueError with line and caret of what is wrong with the plan, and where the folder holds another plan's rows;
+/// OSError where it cannot be written.
 #[pyfunction]
 #[pyo3(signature = (plan, out, *, config=None, jobs=None, shard=None))]
 pub(crate) fn sweep<'py>(

@@ -67,7 +67,8 @@ pub struct Bilateral {
     down: Link<ToMaster>,
     picture: DelayedPicture,
     picture_delay: Duration,
-    /// From a tick of the tool's to the tick in which the hand has its force: what is sent in a tick is there in the next at the soonest.
+    /// From a tick of the tool's to the tick in which the hand has its force: what is sent in a tick is there in the
+    /// next at the soonest.
     way_down: Duration,
     /// What the run has come to so far.
     pub(super) outcome: BilateralOutcome,

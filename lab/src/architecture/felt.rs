@@ -17,7 +17,7 @@ const CORNER_RAD_PER_S: f64 = 40.0;
 const SPEED_MIN_M_PER_S: f64 = 0.03;
 /// Ticks of pushing before a sample counts: five time constants of the filter's three stages, and the touch is over.
 const SETTLING_TICKS: u32 = 150;
-/// Fewer samples than this say nothing: a second.
+/// Fewer samples than this show nothing: a second.
 const SAMPLES_MIN: u64 = 1000;
 
 /// A tool that feels less than this, kg, does not push the box but bounces on it: nothing to compare with.

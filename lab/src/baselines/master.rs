@@ -1,8 +1,8 @@
 //! The master's core of a bilateral architecture: HIP in, the slave's force out.
 //!
-//! Position–force holds the newest force that came (zero order), and may damp the hand's own motion; TDPA damps it where the energy is not covered; waves
-//! turn the hand's velocity and the wave that came back into a force. It must never wait, allocate or read a clock,
-//! and force leaves it through the limiter only.
+//! Position–force holds the newest force that came (zero order), and may damp the hand's own motion; TDPA damps it
+//! where the energy is not covered; waves turn the hand's velocity and the wave that came back into a force. It must
+//! never wait, allocate or read a clock, and force leaves it through the limiter only.
 
 use mmt_client::limiter::ForceLimiter;
 use mmt_shared::model::geometry::Vec2;

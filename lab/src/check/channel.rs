@@ -14,7 +14,7 @@ use super::{Invariant, Verdict};
 const HEARTBEAT: Duration = Duration::from_millis(50);
 /// Numbers so far behind the newest are not judged by an end, and one so far ahead waits for a second.
 pub(super) const WINDOW: u32 = 1024;
-/// An end remembers its departures 10 ms apart: the first without an answer may be this much older than the one it knows.
+/// An end remembers its departures 10 ms apart: the first without an answer may be this much older than the one it remembers.
 const DEPARTURES: Duration = Duration::from_millis(20);
 const TENTH: Duration = Duration::from_millis(100);
 /// The path before a round trip has been measured.
@@ -115,7 +115,7 @@ impl ChannelChecks {
         let Some(echo) = datagram.envelope.echo else {
             return;
         };
-        // an end believes no answer to what never left
+        // an end takes no answer to what never left
         if echo.number > self.left.0 || echo.received > echo.number {
             return;
         }
@@ -233,10 +233,10 @@ impl ChannelChecks {
         self.newest.is_some_and(|newest| newest.stopped)
     }
 
-    /// For how long one of the ways has been silent at `now`: at least and at most. An end knows its departures 10 ms apart and its
-    /// least round trip by the second.
+    /// For how long one of the ways has been silent at `now`: at least and at most. An end remembers its departures
+    /// 10 ms apart and its least round trip by the second.
     pub(super) fn silence(&self, now: Time) -> (Duration, Duration) {
-        let heard = now.saturating_since(self.last_arrival.unwrap_or(self.began));
+        let since_arrival = now.saturating_since(self.last_arrival.unwrap_or(self.began));
         let unanswered = |slack: Duration, window: Duration| {
             let Some((_, sent)) = self.unanswered.front() else {
                 return Duration::ZERO;
@@ -246,7 +246,7 @@ impl ChannelChecks {
         };
         let least = unanswered(DEPARTURES, Duration::from_secs(9));
         let most = unanswered(Duration::ZERO, Duration::from_secs(10) + TENTH);
-        (heard.max(least), heard.max(most))
+        (since_arrival.max(least), since_arrival.max(most))
     }
 
     /// The least round trip of the last seconds; the last one if there is none in that time.

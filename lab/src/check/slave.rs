@@ -75,11 +75,11 @@ pub struct SlaveChecks {
     stops: bool,
     /// Stamp of the newest sample.
     newest: Option<Time>,
-    /// For how long there has been no sample that was not there before, as ticks count it: also one behind a stamp that an enemy put
-    /// ahead is new.
+    /// For how long there has been no sample that was not there before, as ticks count it: also one behind a stamp
+    /// that an enemy put ahead is new.
     quiet: Duration,
     disengaged: bool,
-    /// Forces by stamp; an enemy may have sent another one with a stamp that the slave did not believe then.
+    /// Forces by stamp; an enemy may have sent another one with a stamp that the slave did not accept then.
     samples: BTreeMap<Time, Vec<ForceCounts>>,
     /// Stamps of samples that came since the last tick.
     fresh: Vec<Time>,
@@ -92,12 +92,12 @@ pub struct SlaveChecks {
     arrived: u64,
     updates: u64,
     acknowledged: BTreeSet<u32>,
-    /// Numbers and causes of updates that no command has acknowledged, or of late: the samples say it later. And what had been ticked
-    /// by then.
+    /// Numbers and causes of updates that no command has acknowledged, or of late: the samples show it later. And
+    /// what had been ticked by then.
     unconfirmed: Vec<(u32, Duration, Cause)>,
     /// All that has been ticked.
     lived: Duration,
-    /// Updates that the slave knows to be lost, and the newest that it knows to be there.
+    /// Updates that the slave counts as lost, and the newest that was acknowledged to it.
     losses: (u64, u32),
     /// When the trigger last sent something, or began.
     updated: Option<Time>,
@@ -184,7 +184,7 @@ impl SlaveChecks {
         self.doubtful = self.doubtful.split_off(&(newest - REMEMBERED));
     }
 
-    /// Takes in what play-out counts: it did not believe a sample, had no room for it, or learned the clock anew and dropped all.
+    /// Takes in what play-out counts: it did not accept a sample, had no room for it, or learned the clock anew and dropped all.
     fn doubt(&mut self, counts: PlayoutCounts) {
         let before = std::mem::replace(&mut self.counts, counts);
         let fresh = self.fresh.drain(..);
@@ -293,8 +293,8 @@ impl SlaveChecks {
         }
     }
 
-    /// f_m at a stamp, N: linear between the samples around it, by each of the forces that came with their stamps. None where play-out
-    /// may not have these samples.
+    /// f_m at a stamp, N: linear between the samples around it, by each of the forces that came with their stamps.
+    /// None where play-out may not have these samples.
     fn rendered_at(&self, stamp: Time) -> Option<Vec<Vec2>> {
         let (before, from) = self.samples.range(..=stamp).next_back()?;
         let (after, to) = if *before == stamp {

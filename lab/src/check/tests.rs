@@ -36,8 +36,8 @@ enum Change {
     Hidden(fn(&Datagram) -> bool),
 }
 
-/// A hand that pushes the box for three seconds over a perfect network, and an emergency stop of the slave in the last; what the judges
-/// say of it, where from 2.2 s on they are shown something else.
+/// A hand that pushes the box for three seconds over a perfect network, and an emergency stop of the slave in the
+/// last; what the judges say of it, where from 2.2 s on they are shown something else.
 struct Shown {
     checks: SessionChecks,
     master: MasterEnd,

@@ -50,7 +50,7 @@ pub(super) struct Claim {
     /// What was measured, in words.
     quantity: &'static str,
     expected: Expected,
-    /// None if no run could tell.
+    /// None if no run could show it.
     pub(super) measured: Option<Interval>,
 }
 

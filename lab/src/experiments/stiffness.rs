@@ -1,5 +1,5 @@
 //! A contact whose stiffness nobody knows: from a third to ten times the rendered one, with a stiff and a compliant tool;
-//! and a soft one that the device is told.
+//! and a soft one whose stiffness the device is given.
 
 use mmt_shared::model::contact::Coupling;
 
@@ -8,14 +8,14 @@ use crate::experiment::prelude::*;
 /// The stiffnesses.
 pub(super) const EXPERIMENT: Experiment = Experiment::new(
     "stiffness",
-    "What a real contact that is stiffer or softer than the rendered one costs, and what a compliant tool or telling the device mends",
+    "What a real contact that is stiffer or softer than the rendered one costs, and what a compliant tool or a device that is given it mends",
     10,
     run,
 );
 
 /// Stiffness of the real contact over k_p of the default device.
 const TIMES: [f64; 7] = [0.3, 0.5, 1.0, 2.0, 3.0, 5.0, 10.0];
-/// Those of them that the device is told: the softer ones, and its own, which must change nothing.
+/// Those of them whose stiffness the device is given: the softer ones, and its own, which must change nothing.
 const TOLD: [f64; 3] = [0.3, 0.5, 1.0];
 /// k_p and k_d of the default device, and k_d of every real contact.
 const DEVICE: Coupling = Coupling {

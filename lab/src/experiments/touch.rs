@@ -1,7 +1,7 @@
-//! First touch: the largest force of the tool over random starts, couplings and hands, on contacts as stiff as the session knows and
-//! stiffer.
+//! First touch: the largest force of the tool over random starts, couplings and hands, on contacts as stiff as the
+//! session knows and stiffer.
 //!
-//! The slave's core alone, without a network: whatever the samples say, the tool is what is judged.
+//! The slave's core alone, without a network: whatever the samples are, the tool is what is judged.
 
 use std::f64::consts::TAU;
 
@@ -42,7 +42,7 @@ const DRAWS: u64 = 1000;
 struct Start {
     coupling: Coupling,
     environment: EnvironmentConfig,
-    /// Where the hello says that the hand is, m.
+    /// Where the hello has the hand, m.
     hip: Vec2,
     /// The hand's velocity, m/s.
     velocity: Vec2,

@@ -14,7 +14,7 @@ use crate::overlay::{lay, lay_at};
 use crate::text_error::TextError;
 use crate::world::{World, WorldConfig};
 
-/// How keys end, and the units that they say; the longest first.
+/// How keys end, and the units that they name; the longest first.
 const UNITS: [(&str, &str); 19] = [
     ("_n_per_m", "N/m"),
     ("_n_per_s", "N/s"),
@@ -133,7 +133,7 @@ pub(super) fn whole(config: &WorldConfig) -> WorldConfig {
     whole
 }
 
-/// The unit that a key says.
+/// The unit that a key names.
 fn unit_of(key: &str) -> &'static str {
     let unit = UNITS.iter().find(|(end, _)| key.ends_with(end));
     unit.map_or("", |(_, unit)| unit)
@@ -227,7 +227,7 @@ fn range_of_type(message: &str) -> Option<String> {
     named.next().map(|(_, range)| range.to_owned())
 }
 
-/// What the checks say to a value of a key; none if they take it.
+/// Why the checks refuse a value of a key; none if they take it.
 fn answer(whole: &WorldConfig, key: &str, value: &str) -> Option<String> {
     let mut given = DeTable::new();
     let value = DeValue::parse(value).ok()?;

@@ -27,7 +27,7 @@ impl Delays {
         }
     }
 
-    /// With what both ends together tell.
+    /// With what both ends together show.
     pub(super) fn with(&self, packets: &Matched<'_>) -> Spreads {
         let [up, down] = [false, true].map(|down| packets.delays(down));
         let all = [

@@ -96,7 +96,7 @@ const FATES: [&str; 6] = [
 ];
 
 impl Matched<'_> {
-    /// Whether a datagram was lost on the way; none if nobody can tell. What left after the newest that arrived may
+    /// Whether a datagram was lost on the way; none if nobody can know. What left after the newest that arrived may
     /// still be on its way.
     fn is_lost(&self, key: &Key) -> Option<bool> {
         let [up, down] = self.newest_ns;

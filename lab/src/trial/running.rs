@@ -69,7 +69,7 @@ impl Running {
     /// The next millisecond.
     ///
     /// # Errors
-    /// When the object cannot be changed as the trial wants it.
+    /// When the object cannot be changed as the trial requires.
     pub fn step(&mut self, given: Given<'_>) -> Result<WorldTick, TrialError> {
         let tick = self.world.step_given(given);
         self.left = self.left.saturating_sub(1);

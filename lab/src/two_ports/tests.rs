@@ -12,8 +12,8 @@ use crate::setting::{MODES, paper_world};
 use crate::trial::{Running, Trial};
 use crate::world::{Given, WorldConfig};
 
-/// What the budget has besides, J: f²/(2 k_p), which the contact stores at the tool's limit and gives back; 20 mJ from the beginning;
-/// and the tool's limit over the millimetre in which it brakes from 0.2 m/s.
+/// What the budget has besides, J: f²/(2 k_p), which the contact stores at the tool's limit and gives back; 20 mJ
+/// from the beginning; and the tool's limit over the millimetre in which it brakes from 0.2 m/s.
 const BESIDES_J: f64 = 15.0 * 15.0 / 2000.0 + 0.02 + 15.0 * 1e-3;
 
 /// An object that needs five to ten times the force of the model, which is 0.4 kg and 1 N for good: see [`LIE`].

@@ -88,7 +88,7 @@ pub struct RelaySnapshot {
     pub up: DirectionCounters,
     /// From the target (slave) to the clients (masters).
     pub down: DirectionCounters,
-    /// Clients that the relay knows now.
+    /// Clients that have a place at the relay now.
     pub clients: u64,
     /// Clients that the relay met since its start.
     pub clients_met: u64,

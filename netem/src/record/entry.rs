@@ -1,6 +1,6 @@
 //! What is on record of a packet, and of the run that it is of.
 //!
-//! It knows neither form of a record.
+//! It depends on neither form of a record.
 
 use mmt_shared::time::Time;
 use serde::{Deserialize, Serialize};
@@ -11,7 +11,7 @@ use crate::packet::{Departure, DropCause, Fate};
 /// Why a heading is none.
 pub(super) const NO_LINE: &str = "the words of a link in the heading are not one line";
 
-/// What a record knows of its run.
+/// What a record holds of its run.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Heading {
     /// The seed of both links.

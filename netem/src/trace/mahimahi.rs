@@ -46,7 +46,8 @@ impl Opportunities {
         }
         let period_ms = times_ms.last().copied().unwrap_or(0);
         if period_ms == 0 {
-            let why = "the trace must end after 0 ms: its last line says when it begins again";
+            let why =
+                "the trace must end after 0 ms: its last line is the time at which it begins again";
             return Err(TraceError::at(last_line, why));
         }
         Ok(Self {

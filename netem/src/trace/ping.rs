@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use super::{Sample, TraceError};
 
-/// Reads it. Half of each round trip is taken for one way: ping cannot tell more. A sequence number that
+/// Reads it. Half of each round trip is taken for one way: ping does not show more. A sequence number that
 /// is missing was lost, at the time at which it would have been sent.
 ///
 /// # Errors

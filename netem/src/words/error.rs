@@ -40,7 +40,7 @@ pub enum Reason {
         /// Why.
         reason: String,
     },
-    /// tc knows this, this emulator does not yet.
+    /// tc has this, this emulator does not yet.
     #[error("{feature}: tc knows this, this emulator does not support it yet")]
     NotSupportedYet {
         /// What the word asks for.

@@ -192,8 +192,8 @@ fn an_object_that_does_not_move_is_touched_as_long_as_it_is_whatever_the_noise()
     pressed_and_eased(Press::new(0.1, Vec2::zeros(), Vec2::zeros()));
 }
 
-/// Presses, while the bias drifts to 0.12 N, goes back by 1.5 mm, too little to be found out, and is seen there `seen` times. In how many
-/// of the next 50 ticks there was contact.
+/// Presses, while the bias drifts to 0.12 N, goes back by 1.5 mm, too little to be found out, and is seen there
+/// `seen` times. In how many of the next 50 ticks there was contact.
 fn seen_clear(depth: f64, seen: u32) -> u32 {
     let mut press = Press::new(0.005, Vec2::zeros(), Vec2::new(0.03, 0.0));
     press.stay(FREE, 500);

@@ -21,6 +21,7 @@ impl SlaveEnd {
         session.architecture = ArchitectureReport::new(self.config.architecture, None);
         let waiting = u64::from(self.update.is_some());
         session.add_drops([
+            ("messages_overtaken", counts.messages_overtaken),
             ("samples_disengaged", counts.samples_disengaged),
             ("updates_superseded", counts.updates_superseded),
             ("updates_unsent", counts.updates_unsent + waiting),
@@ -54,13 +55,15 @@ fn tool(slave: &Slave) -> ToolReport {
     }
 }
 
-fn drops(slave: &Slave) -> [(&'static str, u64); 9] {
+fn drops(slave: &Slave) -> [(&'static str, u64); 11] {
     let playout = slave.playout().counts();
     [
         ("samples_late", playout.late),
         ("samples_duplicate", playout.duplicate),
         ("samples_overflow", playout.overflow),
         ("samples_implausible", playout.implausible),
+        ("images_dropped", slave.images_dropped()),
+        ("images_too_old", slave.images_too_old()),
         ("estimates_refused", slave.refused_estimates()),
         ("states_clamped", slave.clamped_states()),
         ("wrenches_refused", slave.environment().refused()),

@@ -77,8 +77,8 @@ struct Minimum {
 
 impl Patch {
     /// The velocity (m/s, m/s, rad/s; body frame) after one period T under ground friction, from the
-    /// velocity `free` that the body would have without it. `before` is the velocity that it had: where the search starts, since a sliding body changes little in 1 ms. All
-    /// numbers must be finite.
+    /// velocity `free` that the body would have without it. `before` is the velocity that it had: where the search
+    /// starts, since a sliding body changes little in 1 ms. All numbers must be finite.
     pub(super) fn step(
         &self,
         load: &Load,

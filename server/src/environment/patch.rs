@@ -194,7 +194,7 @@ impl Patch {
         }
     }
 
-    /// Weighs each point by its area and by what `weight` says of its place in the body frame.
+    /// Weighs each point by its area and by the `weight` of its place in the body frame.
     pub(super) fn weigh(&mut self, weight: impl Fn(Vec2) -> f64) {
         for ((row, areas), weights) in self.points.iter().zip(&self.areas).zip(&mut self.weights) {
             let places = row.x.iter().zip(row.y.iter());

@@ -1,7 +1,8 @@
 //! The tool on the real surface: a god-object proxy for the box, for discs and for convex polygons.
 //!
-//! parry's nearest point serves bodies with notches; it forgets by which face the tool came. The box is followed by the proxy that the local model has too. It must never let the proxy change
-//! edge while the HIP stays behind the edge that it entered by, nor stop it on a round surface.
+//! parry's nearest point serves bodies with notches; it forgets by which face the tool came. The box is followed by
+//! the proxy that the local model has too. It must never let the proxy change edge while the HIP stays behind the
+//! edge that it entered by, nor stop it on a round surface.
 
 use mmt_shared::model::contact::{GodObject, Touch};
 use mmt_shared::model::geometry::{BoxFootprint, Face, Pose, Vec2, cross, rotate};
@@ -72,7 +73,7 @@ impl Surface {
         })
     }
 
-    /// Follows the tool (m, world frame) and says what it touches. On a disc or a polygon the face told
+    /// Follows the tool (m, world frame) and returns what it touches. On a disc or a polygon the face given
     /// is the one of the bounding box that the surface's normal is nearest to.
     pub(super) fn follow(&mut self, pose: &Pose, tool: Vec2) -> Option<Touch> {
         let local = |pose: &Pose| pose.point_to_object(tool);

@@ -93,7 +93,7 @@ pub struct Estimate {
     /// Condition number of the data in memory with every regressor scaled to length 1 (√3 is perfect);
     /// infinite before there are data.
     pub condition: f64,
-    /// Whether this tick brought data from which m, b and c can be told; if not, values are held.
+    /// Whether this tick brought data from which m, b and c can be found; if not, values are held.
     pub excited: bool,
     /// Ticks that counted, so far.
     pub samples: u64,

@@ -17,7 +17,7 @@ use super::quadratic::{condition, inverse_of_gram, minimum_above};
 const LEAST: Vector3<f64> = Vector3::new(MASS_KG.0, 0.0, 0.0);
 /// Least variance of a filtered row's error, N²: 1 mN r.m.s., the default force noise after the filter.
 const ROW_VARIANCE_MIN: f64 = 1e-6;
-/// Least speed (m/s) at which a row tells b from c: half of the gate's.
+/// Least speed (m/s) at which a row separates b from c: half of the gate's.
 const TELLING_SPEED: f64 = 0.010;
 /// Pull of m towards the prior in powers of the noise: five times the scatter of the noise's power over
 /// a memory, so that the matrix stays positive when the noise is taken away.
@@ -73,7 +73,7 @@ pub struct RecursiveConfig {
     /// Standard deviation of the prior's b (N s/m) and c (N).
     pub prior_deviation: [f64; 2],
     /// By how much (standard deviation, same units) b and c may have moved away from their last well
-    /// founded values while the data cannot tell them apart.
+    /// founded values while the data cannot separate them.
     pub held_deviation: [f64; 2],
     /// How many times the power of the noise the acceleration must have for m to count as seen.
     pub excitation: f64,
@@ -115,7 +115,7 @@ pub(super) struct RecursiveLeastSquares {
     pub(super) covariance: Matrix3<f64>,
     /// Condition number of the data in memory: see [`condition`].
     pub(super) condition: f64,
-    /// Whether the last tick brought data from which m, b and c can all be told.
+    /// Whether the last tick brought data from which m, b and c can all be found.
     pub(super) excited: bool,
     /// Rows so far.
     pub(super) samples: u64,
@@ -237,7 +237,7 @@ impl RecursiveLeastSquares {
     }
 
     /// The pull towards the held value: for m as strong as the least acceleration that counts, for b and
-    /// c as the prior deviations say. Before anything was well founded the held value is only the prior,
+    /// c by the prior deviations. Before anything was well founded the held value is only the prior,
     /// and m is pulled just enough to outweigh the noise.
     fn pull(&self, variance: f64) -> Matrix3<f64> {
         let (excitation, [b, c]) = if self.founded {

@@ -163,7 +163,7 @@ mod tests {
     }
 
     /// Largest relative error of m, b and c after a noise-free push of 2 s, `aside` m from the centre.
-    fn worst_error(aside: f64, told: bool) -> f64 {
+    fn worst_error(aside: f64, is_seen: bool) -> f64 {
         let mut config = RecommendedConfig::new(COUPLING);
         config.position_noise_m = 0.0;
         let mut estimator = Estimator::new(&EstimatorConfig::Recommended(config), COUPLING);
@@ -174,7 +174,7 @@ mod tests {
             let modulation = 1.0 + 0.3 * libm::sin(5.0 * t) + 0.12 * libm::sin(14.0 * t);
             tool.x += 0.15 * modulation * (t / 0.3).min(1.0) * TICK_S;
             let mut measured = pushed.push(tool);
-            measured.seen = measured.seen.filter(|_| told);
+            measured.seen = measured.seen.filter(|_| is_seen);
             estimator.step(&measured);
             turned = turned.max(pushed.twist.angular.abs());
         }
@@ -195,9 +195,9 @@ mod tests {
         assert!(straight < 1e-6);
         // what is left out (v_c·t) and taken in finite steps shows as the lever grows
         for (aside, most) in [(0.02, 1e-3), (-0.04, 4e-3)] {
-            let (told, not_told) = (worst_error(aside, true), worst_error(aside, false));
-            println!("{aside} m aside: {told:.5}, without turning {not_told:.5}");
-            assert!(told < most && not_told > 10.0 * told);
+            let (seen, unseen) = (worst_error(aside, true), worst_error(aside, false));
+            println!("{aside} m aside: {seen:.5}, without turning {unseen:.5}");
+            assert!(seen < most && unseen > 10.0 * seen);
         }
     }
 

@@ -15,6 +15,7 @@ use mmt_shared::io::transport::{
     CLOSE_FINISHED, CLOSE_NO_HELLO, CLOSE_NOT_A_HELLO, Connection, ConnectionError, Handshake,
     Listener, RecvStream, SendStream,
 };
+use mmt_shared::io::wish::Wish;
 use mmt_shared::pairing::{Token, TokenName};
 use mmt_shared::wire::{
     DecodeError, Hello, Refusal, Role, STREAM_MESSAGE_MAX, Side, StreamMessage,
@@ -93,7 +94,7 @@ pub(super) struct Acceptor {
     leases: Leases,
     observers: Arc<Observers>,
     refusals: Arc<Refusals>,
-    stop: watch::Receiver<bool>,
+    stop: watch::Receiver<Wish>,
     admitted: mpsc::Sender<Admitted>,
 }
 
@@ -120,7 +121,7 @@ impl Acceptor {
         tokens: TokenList,
         observers: Arc<Observers>,
         refusals: Arc<Refusals>,
-        stop: watch::Receiver<bool>,
+        stop: watch::Receiver<Wish>,
     ) -> (Self, mpsc::Receiver<Admitted>) {
         let (admitted, receiver) = mpsc::channel(1);
         let acceptor = Self {
@@ -302,7 +303,7 @@ impl Acceptor {
             tracing::warn!("the hello of {address}: {error}");
             Refusal::BadHello
         })?;
-        if *self.stop.borrow() {
+        if self.stop.borrow().ends() {
             return Err(Refusal::Ending);
         }
         if hello.role == Role::Observer {

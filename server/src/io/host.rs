@@ -9,10 +9,10 @@ use mmt_netem::link::LinkId;
 use mmt_shared::io::clock::Clock;
 use mmt_shared::io::congestion::RateCap;
 use mmt_shared::io::identity_file::TokenList;
-use mmt_shared::io::network_task::asked_to_stop;
 use mmt_shared::io::quic::Traffic;
 use mmt_shared::io::socket;
 use mmt_shared::io::transport::{CLOSE_FINISHED, Endpoint, Listener};
+use mmt_shared::io::wish::{Wish, asked_to_stop};
 use mmt_shared::model::contact::Coupling;
 use mmt_shared::pairing::{Address, Host, Pairing};
 use nix::ifaddrs::{InterfaceAddress, getifaddrs};
@@ -126,7 +126,7 @@ impl SlaveHost {
         pairing
     }
 
-    /// Serves masters until `stop` becomes true or its sender is gone, or, with `once`, until the first session
+    /// Serves masters until `stop` ends the run or its sender is gone, or, with `once`, until the first session
     /// is over. The report is that of the last session, none if there was none.
     ///
     /// # Errors
@@ -134,7 +134,7 @@ impl SlaveHost {
     /// closes the connection.
     pub async fn run(
         self,
-        mut stop: watch::Receiver<bool>,
+        mut stop: watch::Receiver<Wish>,
         live: Arc<watch::Sender<SlaveLive>>,
     ) -> Result<Option<SlaveReport>, SlaveHostError> {
         let (tokens, refusals) = (self.tokens.clone(), Arc::clone(&self.context.refusals));
@@ -144,7 +144,8 @@ impl SlaveHost {
         let (served, ()) = tokio::join!(
             async {
                 let served = self.serve(masters, &mut stop, &live).await;
-                self.context.observers.end().await;
+                let wish = *stop.borrow();
+                self.context.observers.end(wish).await;
                 self.endpoint.close(CLOSE_FINISHED, b"the slave has ended");
                 served
             },
@@ -159,7 +160,7 @@ impl SlaveHost {
     async fn serve(
         &self,
         mut masters: mpsc::Receiver<Admitted>,
-        stop: &mut watch::Receiver<bool>,
+        stop: &mut watch::Receiver<Wish>,
         live: &watch::Sender<SlaveLive>,
     ) -> Result<Option<SlaveReport>, SlaveHostError> {
         let (mut last, mut memory) = (None, None);
@@ -167,7 +168,7 @@ impl SlaveHost {
         loop {
             let admitted = tokio::select! {
                 biased;
-                () = asked_to_stop(stop) => return Ok(last),
+                _ = asked_to_stop(stop) => return Ok(last),
                 admitted = masters.recv() => admitted,
             };
             let Some(admitted) = admitted else {

@@ -75,7 +75,7 @@ pub struct SlaveOptions {
     pub record: Option<Recorder>,
     /// The emergency stop of this side; it outlives sessions.
     pub emergency: EmergencyStop,
-    /// The plant that is plugged in, where the configuration wants one.
+    /// The plant that is plugged in, where the configuration asks for one.
     pub plant: Option<PlantHost>,
 }
 

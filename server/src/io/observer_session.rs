@@ -1,6 +1,6 @@
 //! One observer's session: from its welcome to its farewell, on tokio's side.
 //!
-//! Its end is nobody else's: the operator's session knows nothing of it.
+//! Its end is nobody else's: the operator's session does not depend on it.
 
 use std::pin::{Pin, pin};
 use std::time::Duration;
@@ -15,6 +15,7 @@ use mmt_shared::io::identity_file::TokenList;
 use mmt_shared::io::transport::{
     CLOSE_FINISHED, CLOSE_REVOKED, Connection, ConnectionError, RecvStream, SendStream,
 };
+use mmt_shared::io::wish::Wish;
 use mmt_shared::pairing::{Token, TokenName};
 use mmt_shared::report::{MasterHalf, SlaveHalf};
 use mmt_shared::time::Time;
@@ -49,6 +50,8 @@ pub(super) struct Observer {
 enum End {
     #[error("this side was asked to end")]
     Asked,
+    #[error("a thread of this side panicked")]
+    ThreadPanicked,
     #[error("it has left")]
     Farewell(Ending),
     #[error("its token was replaced or revoked")]
@@ -123,7 +126,9 @@ async fn part<F: Future<Output = ObserversFarewell>>(
     let sent = send_farewell(send, ending, half, wait).await;
     let theirs = async {
         match end {
-            End::Asked | End::Silence | End::Numbers(_) if sent.is_ok() => farewell.await.ok(),
+            End::Asked | End::ThreadPanicked | End::Silence | End::Numbers(_) if sent.is_ok() => {
+                farewell.await.ok()
+            }
             // it came, or nothing can come any more
             _ => None,
         }
@@ -169,7 +174,10 @@ impl Sight<'_> {
                 read = farewell.as_mut() => {
                     return read.map_or_else(End::Stream, |theirs| End::Farewell(theirs.ending));
                 }
-                () = ending.as_mut() => return End::Asked,
+                wish = ending.as_mut() => return match wish {
+                    Wish::Fail => End::ThreadPanicked,
+                    Wish::GoOn | Wish::End => End::Asked,
+                },
                 () = revoked.as_mut() => return End::Revoked,
                 // its sender is this host's own
                 _ = looks.changed() => {}

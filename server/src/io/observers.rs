@@ -9,7 +9,7 @@ use std::time::Duration;
 
 use mmt_shared::io::clock::Clock;
 use mmt_shared::io::emergency::EmergencyStop;
-use mmt_shared::io::network_task::asked_to_stop;
+use mmt_shared::io::wish::{Wish, asked_to_stop};
 use mmt_shared::model::contact::Coupling;
 use mmt_shared::model::settings::ModelSettings;
 use mmt_shared::pairing::Token;
@@ -34,7 +34,7 @@ pub(super) struct Observers {
     /// As the newest session began.
     welcome: Mutex<Welcome>,
     look: watch::Sender<Look>,
-    ending: watch::Sender<bool>,
+    ending: watch::Sender<Wish>,
     commands_refused: AtomicU64,
 }
 
@@ -61,7 +61,7 @@ impl Observers {
         if self.most == 0 {
             return Err(Refusal::WrongRole);
         }
-        if *self.ending.borrow() {
+        if self.ending.borrow().ends() {
             return Err(Refusal::Ending);
         }
         let place = Arc::clone(&self.places).try_acquire_owned();
@@ -100,9 +100,10 @@ impl Observers {
         });
     }
 
-    /// Ends all observers with a farewell, and waits until they are gone.
-    pub(super) async fn end(&self) {
-        self.ending.send_replace(true);
+    /// Ends all observers with a farewell, and waits until they are gone. They learn whether this host fails.
+    pub(super) async fn end(&self, wish: Wish) {
+        let why = if wish.ends() { wish } else { Wish::End };
+        self.ending.send_replace(why);
         // who does not answer is left alone
         let _ = timeout(END_WAIT, self.places.acquire_many(self.most.into())).await;
     }
@@ -117,14 +118,14 @@ impl Observers {
         self.clock
     }
 
-    /// Where each change of what is to be seen is told.
+    /// Reports each change of what is to be seen.
     pub(super) fn looks(&self) -> watch::Receiver<Look> {
         self.look.subscribe()
     }
 
-    /// Returns once the host wants all observers to end.
-    pub(super) async fn ending(&self) {
-        asked_to_stop(&mut self.ending.subscribe()).await;
+    /// Returns once all observers are to end, and why.
+    pub(super) async fn ending(&self) -> Wish {
+        asked_to_stop(&mut self.ending.subscribe()).await
     }
 
     /// Counts what an observer was refused.

@@ -7,7 +7,7 @@ mod lock_step;
 
 use std::io;
 use std::net::SocketAddr;
-use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
@@ -48,12 +48,14 @@ struct Taken {
     answer: PlantAnswer,
 }
 
-/// What the thread knows, under a lock that no tick takes.
+/// What the thread keeps, under a lock that no tick takes.
 #[derive(Debug, Default)]
 struct Known {
     newest: Option<Taken>,
     to_loop: Option<Producer<Taken>>,
     counts: PlugCounts,
+    /// Answers for which the loop had no room.
+    ring_full: u64,
 }
 
 #[derive(Debug)]
@@ -62,6 +64,8 @@ struct Shared {
     clock: Clock,
     /// Commands sent so far.
     sent: AtomicU32,
+    /// Answers that a newer one overtook before a tick took them.
+    superseded: AtomicU64,
     known: Mutex<Known>,
     first: Condvar,
 }
@@ -89,6 +93,7 @@ impl PlantHost {
             socket,
             clock: Clock::start(),
             sent: AtomicU32::new(0),
+            superseded: AtomicU64::new(0),
             known: Mutex::default(),
             first: Condvar::new(),
         });
@@ -132,13 +137,20 @@ impl PlantHost {
             shared: Arc::clone(&self.0),
             answers,
             newest: known.newest,
-            heard: None,
+            last_answer: None,
         }
     }
 
     /// What became of the plant's packets.
     pub(super) fn counts(&self) -> PlugCounts {
         self.0.known().counts
+    }
+
+    /// Answers that came as they should and that no tick was given, by name.
+    pub(super) fn not_given(&self) -> [(&'static str, u64); 2] {
+        let superseded = self.0.superseded.load(Ordering::Relaxed);
+        let ring_full = self.0.known().ring_full;
+        [("superseded", superseded), ("ring_full", ring_full)]
     }
 }
 
@@ -149,21 +161,23 @@ pub(super) struct PlantPort {
     answers: Consumer<Taken>,
     newest: Option<Taken>,
     /// When the newest answer was taken; none before the first tick.
-    heard: Option<Time>,
+    last_answer: Option<Time>,
 }
 
 impl PlantPort {
     /// The newest answer, if one has come since the tick before; `now` is this one's deadline.
     pub(super) fn receive(&mut self, now: Time) -> Option<PlantAnswer> {
-        self.heard.get_or_insert(now);
+        self.last_answer.get_or_insert(now);
         let mut anew = false;
         let mut newest = None;
         while let Ok(taken) = self.answers.pop() {
             anew |= taken.answer.anew;
-            newest = Some(taken);
+            if newest.replace(taken).is_some() {
+                self.shared.superseded.fetch_add(1, Ordering::Relaxed);
+            }
         }
         let taken = newest?;
-        (self.newest, self.heard) = (newest, Some(now));
+        (self.newest, self.last_answer) = (newest, Some(now));
         Some(PlantAnswer {
             anew,
             ..taken.answer
@@ -172,8 +186,8 @@ impl PlantPort {
 
     /// Whether the plant is silent at `now`.
     pub(super) fn is_silent(&self, now: Time) -> bool {
-        self.heard
-            .is_some_and(|heard| now.saturating_since(heard) >= SILENCE)
+        self.last_answer
+            .is_some_and(|last_answer| now.saturating_since(last_answer) >= SILENCE)
     }
 
     /// Sends the tool on.
@@ -206,10 +220,10 @@ fn serve(shared: &Shared) {
         known.counts = peer.counts;
         if let Some(taken) = taken {
             known.newest = Some(taken);
-            // a full ring is a loop that stands: it takes the newest later
-            if let Some(to_loop) = &mut known.to_loop {
-                let _ = to_loop.push(taken);
-            }
+            // a full ring is a loop that stands: it takes what waits later
+            let to_loop = known.to_loop.as_mut().filter(|ring| !ring.is_abandoned());
+            let is_full = to_loop.is_some_and(|ring| ring.push(taken).is_err());
+            known.ring_full += u64::from(is_full);
             shared.first.notify_all();
         }
     }

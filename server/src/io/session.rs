@@ -20,6 +20,7 @@ use mmt_shared::io::ticker::Ticker;
 use mmt_shared::io::transport::{
     CLOSE_FINISHED, CLOSE_TAKEN_OVER, Connection, RecvStream, SendStream,
 };
+use mmt_shared::io::wish::Wish;
 use mmt_shared::model::contact::Coupling;
 use mmt_shared::pairing::TokenName;
 use mmt_shared::report::{MasterHalf, SlaveHalf};
@@ -69,14 +70,15 @@ struct Session<'a> {
     plant_silent: bool,
 }
 
-/// Serves an admitted master, from where an `earlier` session ended. Nothing if no session came about. `socket_before` is what the socket had
-/// counted when nobody had connected for this session yet: the handshake is part of what a session costs.
+/// Serves an admitted master, from where an `earlier` session ended. Nothing if no session came about.
+/// `socket_before` is what the socket had counted when nobody had connected for this session yet: the handshake is
+/// part of what a session costs.
 pub(super) async fn serve(
     context: &Context,
     admitted: Admitted,
     earlier: Option<&Memory>,
     socket_before: SocketCounters,
-    stop: &mut watch::Receiver<bool>,
+    stop: &mut watch::Receiver<Wish>,
     live: &watch::Sender<SlaveLive>,
 ) -> Result<Option<Served>, SlaveHostError> {
     let body = |slave_loop: SlaveLoop, side, ticker, clock| slave_loop.run(side, ticker, clock);
@@ -89,7 +91,7 @@ pub(super) async fn serve_with(
     admitted: Admitted,
     earlier: Option<&Memory>,
     socket_before: SocketCounters,
-    stop: &mut watch::Receiver<bool>,
+    stop: &mut watch::Receiver<Wish>,
     live: &watch::Sender<SlaveLive>,
     body: impl FnOnce(SlaveLoop, LoopSide<Snapshot>, Ticker, Clock) -> Finished + Send + 'static,
 ) -> Result<Option<Served>, SlaveHostError> {
@@ -161,7 +163,7 @@ impl Session<'_> {
     async fn operate(
         mut self,
         mut receive: RecvStream,
-        stop: &mut watch::Receiver<bool>,
+        stop: &mut watch::Receiver<Wish>,
         live: &watch::Sender<SlaveLive>,
     ) -> Result<Served, SlaveHostError> {
         let began = self.context.clock.now();
@@ -249,7 +251,7 @@ impl Session<'_> {
     async fn until_end<F>(
         &mut self,
         mut farewell: Pin<&mut F>,
-        stop: &mut watch::Receiver<bool>,
+        stop: &mut watch::Receiver<Wish>,
         live: &watch::Sender<SlaveLive>,
     ) -> End
     where
@@ -263,7 +265,8 @@ impl Session<'_> {
             match event {
                 Event::Farewell(Ok(farewell)) => return End::Farewell(Box::new(farewell)),
                 Event::Farewell(Err(error)) => return End::Stream(error),
-                Event::Stopped => return End::Asked,
+                Event::Stopped(Wish::Fail) => return End::ThreadPanicked,
+                Event::Stopped(_) => return End::Asked,
                 Event::LoopEnded(_) => return End::LoopFailed,
                 Event::Disconnected(error) => return End::Disconnected(error),
                 Event::Beat => {
@@ -291,7 +294,7 @@ impl Session<'_> {
                 tracing::warn!("the plant is silent: the tool stands, and no force is on the hand");
             }
         }
-        let silent = |heard| now.saturating_since(heard) > SILENCE_MAX;
+        let silent = |last_arrival| now.saturating_since(last_arrival) > SILENCE_MAX;
         if snapshot.numbers_spent {
             Some(End::Numbers(NumbersSpent))
         } else if snapshot.disengaged {
@@ -311,7 +314,8 @@ impl Session<'_> {
         self.task.add_to(session);
         session.add_drops(self.context.refusals());
         if let Some(plant) = &self.context.plant {
-            for (name, count) in plant.counts().dropped() {
+            let dropped = plant.counts().dropped();
+            for (name, count) in dropped.into_iter().chain(plant.not_given()) {
                 session.add_drops([(format!("plant_{name}").as_str(), count)]);
             }
         }

@@ -16,6 +16,7 @@ use mmt_netem::LinkConfig;
 use mmt_shared::io::emergency::EmergencyStop;
 use mmt_shared::io::identity::Identity;
 use mmt_shared::io::transport::{CLOSE_TAKEN_OVER, Transport};
+use mmt_shared::io::wish::Wish;
 use mmt_shared::pairing::{Pairing, Token};
 use mmt_shared::report::RunReport;
 use mmt_shared::wire::{Architecture, Claim, Ending, Refusal};
@@ -33,7 +34,7 @@ type Served = Result<Option<SlaveReport>, SlaveHostError>;
 struct Running {
     pairing: Pairing,
     live: Arc<watch::Sender<SlaveLive>>,
-    stop: watch::Sender<bool>,
+    stop: watch::Sender<Wish>,
     served: JoinHandle<Served>,
 }
 
@@ -57,7 +58,7 @@ fn options() -> SlaveOptions {
 
 fn run(options: SlaveOptions) -> Running {
     let host = SlaveHost::bind(options).unwrap();
-    let (stop, stopped) = watch::channel(false);
+    let (stop, stopped) = watch::channel(Wish::GoOn);
     let live = Arc::<watch::Sender<SlaveLive>>::default();
     Running {
         pairing: host.pairing(None),
@@ -69,7 +70,7 @@ fn run(options: SlaveOptions) -> Running {
 
 impl Running {
     async fn end(self) -> Option<RunReport<SlaveConfiguration>> {
-        self.stop.send_replace(true);
+        self.stop.send_replace(Wish::End);
         self.served().await
     }
 
@@ -192,17 +193,22 @@ async fn a_message_that_is_no_farewell_ends_the_session_as_failed() {
 }
 
 #[tokio::test]
-async fn a_host_that_is_stopped_says_farewell_and_reports() {
-    let host = run(options());
-    let (mut master, _) = patiently(Master::operate(&host.pairing)).await;
-    patiently(master.push(10)).await;
-    host.stop.send_replace(true);
-    let (ending, _) = patiently(master.hear_farewell()).await;
-    assert_eq!(ending, Ending::Interrupted);
-    master.say_farewell().await;
-    let report = host.served().await.unwrap();
-    assert_eq!(report.ending, Some("interrupted"));
-    assert_eq!(report.updates.received.applied, Some(7));
+async fn a_host_that_is_stopped_sends_a_farewell_with_its_cause_and_reports() {
+    for (wish, expected) in [
+        (Wish::End, Ending::Interrupted),
+        (Wish::Fail, Ending::Failed),
+    ] {
+        let host = run(options());
+        let (mut master, _) = patiently(Master::operate(&host.pairing)).await;
+        patiently(master.push(10)).await;
+        host.stop.send_replace(wish);
+        let (ending, _) = patiently(master.hear_farewell()).await;
+        assert_eq!(ending, expected);
+        master.say_farewell().await;
+        let report = host.served().await.unwrap();
+        assert_eq!(report.ending, Some(expected.name()));
+        assert_eq!(report.updates.received.applied, Some(7));
+    }
 }
 
 /// What becomes of a session whose loop is this, and what the master is told.
@@ -210,7 +216,7 @@ async fn served_by(
     body: impl FnOnce() -> Finished + Send + 'static,
 ) -> (Result<(), SlaveHostError>, Ending) {
     let host = SlaveHost::bind(options()).unwrap();
-    let (stop, mut stopped) = watch::channel(false);
+    let (stop, mut stopped) = watch::channel(Wish::GoOn);
     let context = &host.context;
     let (acceptor, mut masters) = Acceptor::new(
         host.tokens.clone(),

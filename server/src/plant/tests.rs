@@ -198,6 +198,25 @@ fn after_a_silence_the_tool_is_where_the_plant_says_and_waits_for_the_hand() {
 }
 
 #[test]
+fn an_image_that_no_tick_took_and_one_that_is_too_old_are_counted() {
+    let mut n = 0;
+    let slave = drive(600, |_| {
+        n += 1;
+        (n >= 500).then_some(PlantAnswer {
+            // 256 ms are remembered
+            image_age_s: if n == 550 { 0.3 } else { 0.02 },
+            ..answer()
+        })
+    });
+    assert_eq!((slave.images_dropped(), slave.images_too_old()), (0, 1));
+    let mut slave = Slave::try_new(&linked(), Coupling::for_stiffness(1000.0)).unwrap();
+    for _ in 0..3 {
+        slave.handle_plant(Time::ZERO + TICK, &answer());
+    }
+    assert_eq!(slave.images_dropped(), 2);
+}
+
+#[test]
 fn an_acceleration_that_no_tool_should_have_is_refused() {
     let mut config = linked();
     for bad in [f64::NAN, 0.0, 1e6] {

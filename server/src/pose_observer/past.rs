@@ -47,8 +47,8 @@ impl PastPoses {
         newest.map_or(Time::ZERO, |past| past.time)
     }
 
-    /// An object that nobody touches was found to be off by `off`, and to drift off at the rate `rate`, at `since`: so was all that was
-    /// taken for true from then on.
+    /// An object that nobody touches was found to be off by `off`, and to drift off at the rate `rate`, at `since`:
+    /// so was all that was taken for true from then on.
     pub(super) fn correct(&mut self, since: Time, off: Pose, rate: Twist) {
         for past in self.ring.iter_mut().filter(|past| past.time >= since) {
             let seconds = past.time.saturating_since(since).as_secs_f64();

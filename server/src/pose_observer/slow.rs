@@ -40,7 +40,7 @@ pub(super) struct Slow {
 }
 
 impl PoseObserver {
-    /// The master has not met the box that is pushed. Every other time it is told of one that the tool does not touch: on
+    /// The master has not met the box that is pushed. Every other time it is sent one that the tool does not touch: on
     /// its way the box may have come to stand beside the tool.
     pub(crate) fn approach(&mut self) {
         if self.config.quasi_static {
@@ -200,12 +200,12 @@ mod tests {
             let mut observer = observer(quasi_static);
             let (_, tool) = push(&mut observer, 0.0);
             let inward = observer.contact().unwrap().inward;
-            let mut told = || {
+            let mut depth = || {
                 observer.approach();
                 let middle = observer.pose_ahead(0.0, 0.1).position;
                 0.02 - inward.dot(&(middle - tool))
             };
-            (0..3).map(|_| told()).collect()
+            (0..3).map(|_| depth()).collect()
         };
         let slow = depths(true);
         assert!(

@@ -362,8 +362,8 @@ fn a_box_at_rest_whose_face_is_learned_does_not_seem_to_move() {
     assert!(fastest < 1e-6, "{fastest} m/s");
 }
 
-/// Lets go of a box that was pushed at 0.1 m/s and coasts against less friction than is believed; vision looks every 33 ms, 30 ms late,
-/// or not at all. How far off the pose is after 100, 200 and 400 ms, m.
+/// Lets go of a box that was pushed at 0.1 m/s and coasts against less friction than is believed; vision looks every
+/// 33 ms, 30 ms late, or not at all. How far off the pose is after 100, 200 and 400 ms, m.
 fn off_while_coasting(seen: bool) -> [f64; 3] {
     let mut observer = observer(true);
     let mut truth = push(&mut observer, 1000, 0.0);

@@ -10,6 +10,11 @@ use super::{CLEAR, PoseObserver};
 use crate::sensing::VisionSample;
 
 impl PoseObserver {
+    /// Whether an image that this mode uses was taken before all that is remembered: it shows nothing that can be compared.
+    pub(crate) fn is_too_old(&self, vision: &VisionSample) -> bool {
+        self.config.learn && self.past.at(vision.taken).is_none()
+    }
+
     /// Takes in an image that was taken some time ago, if this mode uses it.
     pub fn see(&mut self, vision: &VisionSample) {
         let then = self.past.at(vision.taken);

@@ -174,6 +174,9 @@ fn a_gap_in_time_yields_the_newest_image_and_counts_the_rest() {
     });
     assert_eq!(burst.count(), 0);
     assert!(sensing.on_their_way.len() <= 6);
+    // each image is given to a tick, dropped under its name or on its way
+    let accounted = 1 + sensing.images_dropped() + sensing.on_their_way.len() as u64;
+    assert_eq!(sensing.images_taken, accounted);
 }
 
 #[test]

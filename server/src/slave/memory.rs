@@ -68,7 +68,7 @@ impl Slave {
         slave.start = ModelState::nearest(params, footprint, pose, Twist::default(), &coupling)?;
         slave.shadow = Shadow::new(slave.settings, slave.start);
         slave.place_tool(memory.tool);
-        // what a plant's tool touches the plant will say
+        // what a plant's tool touches the plant will report
         if slave.contact.plant_mut().linked_mut().is_none() {
             let force = slave.environment_mut().force_at(memory.tool);
             slave.tool.begin_at(memory.tool, force);

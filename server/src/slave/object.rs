@@ -26,6 +26,8 @@ pub(super) struct ObjectEstimate {
     pub(super) params: ModelParams,
     /// Estimates whose numbers were not accepted as parameters.
     pub(super) refused: u64,
+    /// Images that are older than what the observer remembers.
+    pub(super) images_too_old: u64,
     /// Whether a mass too light for the coupling is brought to the least that is accepted.
     raises_mass: bool,
     coupling: Coupling,
@@ -93,6 +95,7 @@ impl ObjectEstimate {
             estimator: Estimator::new(&estimator, coupling),
             params,
             refused: 0,
+            images_too_old: 0,
             // the paper's block fit may give anything, and what is out of range is no estimate
             raises_mass: matches!(estimator, EstimatorConfig::Recommended(_)),
             coupling,
@@ -161,7 +164,7 @@ impl ObjectEstimate {
         self.observer = PoseObserver::new(self.observer_config, pose, found.footprint);
     }
 
-    /// One tick; what the estimator was given. `held_back` says whether the limit of the tool's force keeps the tool from
+    /// One tick; what the estimator was given. `held_back`: whether the limit of the tool's force keeps the tool from
     /// the HIP.
     pub(super) fn step(&mut self, now: Time, contact: &Contact, held_back: bool) -> Measured {
         let observer = &mut self.observer;
@@ -177,6 +180,7 @@ impl ObjectEstimate {
             &self.params,
         );
         if let Some(vision) = contact.vision {
+            self.images_too_old += u64::from(observer.is_too_old(&vision));
             observer.see(&vision);
         }
         // as wide as the learned faces; the paper's never change

@@ -51,7 +51,7 @@ impl ForceReference {
         }
     }
 
-    /// The trigger's input. `held_back` says whether the limit of the tool's force keeps the tool from the HIP, `hip_stands`
+    /// The trigger's input. `held_back`: whether the limit of the tool's force keeps the tool from the HIP, `hip_stands`
     /// whether the HIP is where it was a sample before.
     pub(super) fn input(
         &mut self,

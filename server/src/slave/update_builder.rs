@@ -42,7 +42,8 @@ impl UpdateBuilder {
     }
 
     /// The update that answers `stamp`; none where what was found is not of numbers. The master accepts no object beyond
-    /// the workspace, so one that has left it is at its edge. `model` is the copy of the master's model with every update that was sent.
+    /// the workspace, so one that has left it is at its edge. `model` is the copy of the master's model with every
+    /// update that was sent.
     pub(super) fn step(
         &mut self,
         cause: Cause,

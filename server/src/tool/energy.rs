@@ -25,7 +25,7 @@ const WAY_MAX_M: f64 = 0.01;
 const PLAY_M: f64 = 5e-4;
 /// In the budget from the beginning, J: as long as nobody knows the sensor's bias, that holds no free tool.
 const START_J: f64 = 0.02;
-/// Ticks for which the other side is told after the tool was held.
+/// Ticks for which the flags show it after the tool was held.
 const SHOWN_TICKS: u32 = 100;
 /// Accepted force of a hand, N.
 const HAND_FORCE_N: (f64, f64) = (0.1, 1000.0);

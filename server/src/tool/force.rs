@@ -59,8 +59,9 @@ impl ToolForce {
         max_n * (1.0 - MARGIN)
     }
 
-    /// The speed at which a touch that nobody foresaw costs the limit at most, m/s: f_max less the margin, over (k_d + 2 k_p T). The tool is
-    /// inside of the object for a tick before its force is measured, and for another before it stops.
+    /// The speed at which a touch that nobody foresaw costs the limit at most, m/s: f_max less the margin, over
+    /// (k_d + 2 k_p T). The tool is inside of the object for a tick before its force is measured, and for another
+    /// before it stops.
     ///
     /// # Errors
     /// When that is below 0.1 m/s: the coupling is too stiff or too damped for the limit.

@@ -15,7 +15,7 @@ const NOISE_DEVIATIONS: f64 = 4.0;
 pub struct ToolPort {
     energy: PortEnergy,
     other_in_j: f64,
-    /// Force on the object since the last tick as the port knows it, N.
+    /// Force on the object since the last tick as the port received it, N.
     held: Vec2,
     noise_n: f64,
     speed_max_m_per_s: f64,

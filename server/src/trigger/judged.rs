@@ -36,7 +36,7 @@ impl Judged {
         self.recent.push_back(forces);
     }
 
-    /// What went before an update says nothing of what it left.
+    /// What went before an update shows nothing of what it left.
     pub(super) fn begin(&mut self) {
         self.recent.clear();
     }

@@ -6,7 +6,7 @@
 //! wait in the network. A queue that stands is steered to a target: the window moves by what the queue holds too
 //! much or too little, read once a round (cf. LEDBAT, RFC 6817). ECN-CE (RFC 3168) and persistent congestion (RFC
 //! 9002, section 7.6) shrink it. Isolated loss is a matter of the radio, not of a queue, and does not; nor does the
-//! loss of what was sent into an outage. It must never stay below 8 kB: quinn wants a whole MTU of room for the
+//! loss of what was sent into an outage. It must never stay below 8 kB: quinn needs a whole MTU of room for the
 //! smallest packet.
 
 use std::any::Any;

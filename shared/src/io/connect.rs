@@ -15,7 +15,7 @@ use super::tls::{PinVerifier, TlsError};
 use crate::pairing::Pin;
 use crate::wire::ALPN;
 
-/// Name given to the TLS library, which wants one; it is not sent.
+/// Name given to the TLS library, which requires one; it is not sent.
 const SERVER_NAME: &str = "mmt";
 /// TLS alert `no_application_protocol` (RFC 7301, section 3.2).
 const ALERT_NO_PROTOCOL: u8 = 120;

@@ -199,7 +199,7 @@ impl<S: Send> LoopSide<S> {
         self.snapshots.publish();
     }
 
-    /// Whether the network task wants the loop to end.
+    /// Whether the network task has asked the loop to end.
     pub fn is_stopped(&self) -> bool {
         self.stop.load(Ordering::Acquire)
     }

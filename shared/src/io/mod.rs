@@ -1,7 +1,7 @@
 //! What both live shells need from the operating system and from QUIC: a clock, the 1 kHz deadline loop,
 //! real-time scheduling, a wake from that loop to tokio, an identity, endpoints, framed streams.
 //!
-//! Everything here may read a clock, start a wait or open a file or socket; nothing here knows a model, a
+//! Everything here may read a clock, start a wait or open a file or socket; nothing here depends on a model, a
 //! message or a session, but for the farewell. The haptic thread uses `clock`, `ticker`, `realtime` and `wake` only.
 
 #![allow(
@@ -35,6 +35,7 @@ pub mod transport;
 pub mod truth;
 pub mod wake;
 pub mod watchdog;
+pub mod wish;
 
 #[cfg(test)]
 mod tests;

@@ -13,6 +13,7 @@ use tokio::time::{Interval, MissedTickBehavior, interval, timeout};
 use super::clock::Clock;
 use super::loop_thread::LoopHandle;
 use super::transport::{Connection, ConnectionError, SendDatagramError};
+use super::wish::{Wish, asked_to_stop};
 use crate::report::SessionStats;
 
 /// Between two beats, at which a caller reads the loop's snapshot: 62 a second, a frame of most screens.
@@ -40,8 +41,8 @@ struct NetworkCounts {
 pub enum Event<T, F> {
     /// The read of the other side's farewell has ended.
     Farewell(F),
-    /// Somebody here wants the session to end.
-    Stopped,
+    /// The session is to end, for this reason.
+    Stopped(Wish),
     /// The connection is gone.
     Disconnected(ConnectionError),
     /// The loop has ended, by itself, or by a panic or a hang (none).
@@ -63,12 +64,6 @@ pub struct NetworkTask<S: Send, T> {
     awaits_farewell: bool,
     stopped: bool,
     wakes: bool,
-}
-
-/// Returns once `stop` becomes true or its sender is gone. Cancel-safe.
-pub async fn asked_to_stop(stop: &mut watch::Receiver<bool>) {
-    // an error means that nobody can ask any more
-    let _ = stop.wait_for(|stop| *stop).await;
 }
 
 impl<S: Send, T> NetworkTask<S, T> {
@@ -149,7 +144,7 @@ impl<S: Send, T> NetworkTask<S, T> {
     pub async fn next<F: Future>(
         &mut self,
         mut farewell: Pin<&mut F>,
-        stop: &mut watch::Receiver<bool>,
+        stop: &mut watch::Receiver<Wish>,
     ) -> Event<T, F::Output> {
         loop {
             // in this order, so that a flood of datagrams holds up nothing else
@@ -159,9 +154,9 @@ impl<S: Send, T> NetworkTask<S, T> {
                     self.awaits_farewell = false;
                     return Event::Farewell(read);
                 }
-                () = asked_to_stop(stop), if !self.stopped => {
+                wish = asked_to_stop(stop), if !self.stopped => {
                     self.stopped = true;
-                    return Event::Stopped;
+                    return Event::Stopped(wish);
                 }
                 ended = &mut self.handle.finished => {
                     self.send_departures();

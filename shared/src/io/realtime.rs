@@ -96,7 +96,7 @@ impl fmt::Display for RealTime {
     }
 }
 
-/// Lets the calling thread run only where nobody else wants to (`SCHED_IDLE`); every host permits it.
+/// Lets the calling thread run only where nobody else is ready to (`SCHED_IDLE`); every host permits it.
 ///
 /// # Errors
 /// A sandbox forbids the call.

@@ -16,7 +16,7 @@ use std::fs::File;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
-use std::sync::mpsc::{self, Receiver, Sender, TryRecvError};
+use std::sync::mpsc::{self, Receiver, RecvTimeoutError, Sender, TryRecvError};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
@@ -82,8 +82,22 @@ enum Order {
 pub struct RecordOutcome {
     /// Inputs and events that found no room on their way to the file.
     pub missed: u64,
-    /// Why the file could not be written.
-    pub error: Option<String>,
+    /// Why the file is not whole.
+    pub error: Option<RecordFailure>,
+}
+
+/// Why a record is not whole.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum RecordFailure {
+    /// The file could not be written.
+    #[error("{0}")]
+    File(String),
+    /// The disk was too slow for what was left at the end.
+    #[error("the disk took more than {FINISH:?} for the end")]
+    Slow,
+    /// The thread that writes it panicked.
+    #[error("the thread that writes it panicked")]
+    Panicked,
 }
 
 /// A record at work. Copies write into the same file.
@@ -103,6 +117,14 @@ impl Recorder {
     /// # Errors
     /// It cannot be created, or no thread is to be had.
     pub fn create(path: &Path) -> io::Result<Self> {
+        Self::written_by(write, path)
+    }
+
+    /// The same with a writer of the caller's making.
+    fn written_by(
+        write: impl FnOnce(File, &Receiver<Order>, &AtomicU64) -> Option<String> + Send + 'static,
+        path: &Path,
+    ) -> io::Result<Self> {
         let file = File::create(path)?;
         let (orders, inbox) = mpsc::channel();
         let (outcome, done) = mpsc::channel();
@@ -111,7 +133,7 @@ impl Recorder {
         std::thread::Builder::new()
             .name("mmt-record".to_owned())
             .spawn(move || {
-                let error = write(file, &inbox, &counted);
+                let error = write(file, &inbox, &counted).map(RecordFailure::File);
                 let missed = counted.load(Ordering::Relaxed);
                 // an error means that nobody waits for it any more
                 let _ = outcome.send(RecordOutcome { missed, error });
@@ -155,10 +177,14 @@ impl Recorder {
     pub fn finish(&self) -> RecordOutcome {
         let _ = self.orders.send(Order::Finish);
         let done = self.done.lock().unwrap_or_else(PoisonError::into_inner);
-        done.recv_timeout(FINISH).unwrap_or_else(|_| RecordOutcome {
-            missed: self.missed.load(Ordering::Relaxed),
-            error: Some(format!("the disk took more than {FINISH:?} for the end")),
-        })
+        done.recv_timeout(FINISH)
+            .unwrap_or_else(|gone| RecordOutcome {
+                missed: self.missed.load(Ordering::Relaxed),
+                error: Some(match gone {
+                    RecvTimeoutError::Timeout => RecordFailure::Slow,
+                    RecvTimeoutError::Disconnected => RecordFailure::Panicked,
+                }),
+            })
     }
 }
 

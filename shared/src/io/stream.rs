@@ -94,7 +94,7 @@ pub async fn write_message(
     write_frame(stream, out.get(..length).unwrap_or_default(), limit).await
 }
 
-/// Waits, at most `limit`, until the peer has all that was written, or wants no more of it.
+/// Waits, at most `limit`, until the peer has all that was written, or takes no more of it.
 pub async fn delivered(stream: &SendStream, limit: Duration) {
     // either way there is nothing more to wait for
     drop(timeout(limit, stream.stopped()).await);

@@ -1,9 +1,10 @@
 //! The hang watchdog of a 1 kHz loop: is a tick under way that does not end?
 //!
 //! The policy is a pure function of what a thread beside the loop sees every [`LOOK`]. A tick has hung once it has stood or
-//! computed for [`HUNG`] and the share of missed ticks that it makes up for. Time in which nobody could have told does not count:
-//! a look that came late (the process was stopped, the host suspended or short of CPU), a loop that is ready to run and gets no CPU,
-//! one that the kernel keeps from running, and the wait for the next deadline, which only a host can make long.
+//! computed for [`HUNG`] and the share of missed ticks that it makes up for. Time in which nobody could have noticed
+//! does not count: a look that came late (the process was stopped, the host suspended or short of CPU), a loop that
+//! is ready to run and gets no CPU, one that the kernel keeps from running, and the wait for the next deadline, which
+//! only a host can make long.
 
 mod thread;
 

@@ -109,7 +109,7 @@ pub struct ArchitectureReport {
 }
 
 impl ArchitectureReport {
-    /// Its name, and the round trip (s) of the tool's force at the end that knows it.
+    /// Its name, and the round trip (s) of the tool's force at the end that measures it.
     pub fn new(architecture: Architecture, round_trip_s: Option<f64>) -> Self {
         Self {
             name: Some(architecture.name().to_owned()),

@@ -84,20 +84,29 @@ pub struct UpdateDrops {
     pub rejected: u64,
     /// A newer one took its place before a tick could apply it.
     pub superseded: u64,
-    /// The session's state did not allow it.
-    pub frozen: u64,
+    /// It came while the link was stale.
+    pub link_stale: u64,
+    /// It answers a sample of too long ago.
+    pub answer_too_old: u64,
+    /// The hand had been released.
+    pub hand_released: u64,
+    /// The session ended before a tick could apply it.
+    pub unapplied: u64,
 }
 
 impl UpdateDrops {
     /// Each cause by its name in reports.
-    pub fn by_name(&self) -> [(&'static str, u64); 6] {
+    pub fn by_name(&self) -> [(&'static str, u64); 9] {
         [
             ("duplicate", self.duplicate),
             ("stale", self.stale),
             ("implausible", self.implausible),
             ("rejected", self.rejected),
             ("superseded", self.superseded),
-            ("frozen", self.frozen),
+            ("link_stale", self.link_stale),
+            ("answer_too_old", self.answer_too_old),
+            ("hand_released", self.hand_released),
+            ("unapplied", self.unapplied),
         ]
     }
 }

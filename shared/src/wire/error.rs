@@ -88,7 +88,7 @@ pub enum DecodeError {
         /// The number in the header.
         number: u8,
     },
-    /// Flags are set that this version does not know, or that the sender may not set.
+    /// Flags are set that this version does not have, or that the sender may not set.
     #[error("a {} has the flags {flags:#06x}, which its sender may not set", kind.name())]
     Flags {
         /// The message.

@@ -42,7 +42,7 @@ impl SampleBlock {
     /// Adds a sample.
     ///
     /// # Errors
-    /// Says why the sample cannot be in this block; the block stays as it was.
+    /// Why the sample cannot be in this block; the block stays as it was.
     pub fn push(&mut self, sample: HipSample) -> Result<(), PushError> {
         if let Some(last) = self.last() {
             ticks_between(last.stamp, sample.stamp).ok_or(PushError::OffGrid {

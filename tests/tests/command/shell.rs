@@ -1,7 +1,7 @@
 //! A program with all its traffic through emulated links: TCP there and back, in namespaces that the test makes.
 //!
-//! Needs namespaces and `python3`, and `tshark` for the capture: where the host forbids them the message is held to be right, the test
-//! prints that it did not run, and with `CI` set it fails.
+//! Needs namespaces and `python3`, and `tshark` for the capture: where the host forbids them the message is held to
+//! be right, the test prints that it did not run, and with `CI` set it fails.
 
 use std::path::Path;
 use std::process::{Command, Output};

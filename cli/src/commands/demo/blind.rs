@@ -1,6 +1,6 @@
 //! `mmt demo --blind A.toml B.toml`: two configurations are felt in random order, and a question is asked on each.
 //!
-//! Neither the page nor the terminal tells which is which.
+//! Neither the page nor the terminal shows which is which.
 
 use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime};
@@ -131,7 +131,7 @@ impl<'a> Comparison<'a> {
         })
     }
 
-    /// Does what the page wants, where it is the time for it.
+    /// Does what the page asks for, where it is the time for it.
     fn step(&mut self, wish: StudyWish) -> Result<(), Failure> {
         match (wish, self.stage.clone()) {
             (StudyWish::Agree, Stage::Consent) => {
@@ -189,7 +189,7 @@ impl<'a> Comparison<'a> {
         Ok(())
     }
 
-    /// The person feels the next configuration; what to tell them if it broke and has to be done again.
+    /// The person feels the next configuration; what they read if it broke and has to be done again.
     fn part(
         &mut self,
         desk: &mut Desk,
@@ -202,7 +202,7 @@ impl<'a> Comparison<'a> {
         };
         let path = self.study.record(who);
         let record = Record::start(Some(&path))?;
-        desk.tell([("study", self.stage_shown("part"))]);
+        desk.show_about([("study", self.stage_shown("part"))]);
         let [a, b] = &mut self.settings;
         let setting = match condition {
             Condition::A => a,
@@ -240,7 +240,7 @@ impl<'a> Comparison<'a> {
             Stage::Asked(_) => "question",
             Stage::Done => "done",
         };
-        desk.tell([
+        desk.show_about([
             ("state", json!("waiting")),
             ("note", json!(trouble)),
             ("study", self.stage_shown(stage)),

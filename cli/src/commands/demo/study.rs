@@ -193,7 +193,7 @@ impl Study {
         Ok(())
     }
 
-    /// A file for the record of the participant's next part that is not there yet. Its name says nothing of the condition.
+    /// A file for the record of the participant's next part that is not there yet. Its name does not show the condition.
     pub(super) fn record(&self, who: &Participant) -> PathBuf {
         let name = format!("{}-{}", who.code, who.answered + 1);
         let folder = self.folder.join("records");

@@ -28,7 +28,7 @@ struct Document {
 struct Service {
     service: SocketAddr,
     reachable: bool,
-    /// Its version; null if it does not say one.
+    /// Its version; null if it reports none.
     service_version: Option<String>,
     /// Why it is not reachable.
     why: Option<String>,

@@ -1,4 +1,4 @@
-//! `mmt device test`: reads a device for some seconds and says whether it does.
+//! `mmt device test`: reads a device for some seconds and judges whether it does.
 //!
 //! The hand is the session's: the same clutch, clock map, limits and ramp; only the model is missing.
 

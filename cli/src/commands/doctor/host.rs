@@ -118,7 +118,7 @@ fn cores(cores: usize) -> Finding {
     if cores >= 2 {
         return Finding::fit(subject, cores);
     }
-    let remedy = "a demo wants two: one for each side's loop";
+    let remedy = "a demo needs two: one for each side's loop";
     Finding::of(subject, Verdict::Advised, cores, remedy)
 }
 

@@ -29,7 +29,7 @@ pub(crate) struct Emulation {
 }
 
 impl Emulation {
-    /// Opens the record and begins to take commands: from stdin if the arguments say so, else, if it is `controlled`, from
+    /// Opens the record and begins to take commands: from stdin if the arguments ask for that, else, if it is `controlled`, from
     /// this process. `up` and `down`: the networks of this run; none where
     /// this process sends nothing.
     ///

@@ -233,7 +233,7 @@ impl<'a> Cycle<'a> {
         ]);
         words.extend(duration.into_iter().flat_map(|time| ["--duration", time]));
         let mut master = Process::start(&name, self.folder, self.state, &words)?;
-        master.tell(&self.rig.pairing());
+        master.send_line(&self.rig.pairing());
         self.records.push(Recorded {
             path,
             is_whole: false,

@@ -119,7 +119,7 @@ impl Process {
     }
 
     /// Writes a line to its stdin. One that has ended does not read it, which is seen elsewhere.
-    pub(super) fn tell(&mut self, line: &str) {
+    pub(super) fn send_line(&mut self, line: &str) {
         if let Some(stdin) = &mut self.stdin {
             let _ = writeln!(stdin, "{line}");
         }

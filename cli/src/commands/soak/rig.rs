@@ -125,7 +125,7 @@ impl Rig {
                 link.chain(faults).collect::<Vec<_>>().join("; then ")
             );
             if *settings != line {
-                self.relay.tell(&line);
+                self.relay.send_line(&line);
                 *settings = line;
             }
         }
@@ -133,7 +133,7 @@ impl Rig {
 
     /// Gives every master another port toward the slave, as a NAT that forgets.
     pub(super) fn rebind(&mut self) {
-        self.relay.tell("rebind");
+        self.relay.send_line("rebind");
     }
 }
 

@@ -3,7 +3,7 @@
 use mmt_lab::statistics::Slope;
 use serde::Serialize;
 
-/// Samples of the first minutes tell nothing of growth: a process that is new takes what it needs, h.
+/// Samples of the first minutes show no growth: a process that is new takes what it needs, h.
 const WARM_UP_H: f64 = 5.0 / 60.0;
 /// A slope is judged from so long a time on, h.
 const JUDGED_H: f64 = 0.5;
@@ -157,7 +157,7 @@ impl Row {
         format!("{:<24}{}", self.process, columns.join("  "))
     }
 
-    /// How memory grows, where there is enough to say so.
+    /// How memory grows, where there are enough samples.
     pub(super) fn slope_line(&self) -> Option<String> {
         let Slope { n, value, error } = self.slope?;
         Some(format!(
@@ -215,7 +215,7 @@ mod tests {
             (slope.value - 2048.0).abs() < 3.0 * slope.error,
             "{slope:?}"
         );
-        // too short a time tells nothing
+        // too short a time shows nothing
         let short = course((0..20).map(|k| (f64::from(k) / 60.0, 20_000 + 1000 * k as u64, 9)));
         assert_eq!(short.grows(), [""; 0]);
     }

@@ -27,7 +27,7 @@ pub(super) trait Rig {
     fn nonsense(&self) -> &'static [&'static str];
     /// It sends that.
     fn nonsensical(&mut self, kind: usize, now: Time, give: &mut dyn FnMut(HandEvent));
-    /// What it is told to press with at its tool, N, device.
+    /// What it is commanded to press with at its tool, N, device.
     fn acts(&mut self, now: Time, output: &HandOutput) -> [f64; 3];
 }
 

@@ -1,6 +1,7 @@
 //! What a device that is plugged in is like: its axes, its room and its limits.
 //!
-//! A kind of device has its own defaults ([`DeviceLinkConfig::of`]); a file ([`DeviceFile`](super::DeviceFile)) changes single numbers of them.
+//! A kind of device has its own defaults ([`DeviceLinkConfig::of`]); a file ([`DeviceFile`](super::DeviceFile))
+//! changes single numbers of them.
 
 use std::time::Duration;
 
@@ -251,7 +252,7 @@ pub enum DeviceLinkError {
         of: &'static str,
     },
     /// A 2DIY is to be held by a button.
-    #[error("device: a 2DIY has no button: leave hold out, or say hold = \"rest\"")]
+    #[error("device: a 2DIY has no button: leave hold out, or write hold = \"rest\"")]
     NoButton,
 }
 

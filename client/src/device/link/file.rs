@@ -4,7 +4,7 @@ use serde::Deserialize;
 
 use super::{Axis, DeviceKind, DeviceLinkConfig, DeviceLinkError, Dialect, Hold, Version};
 
-/// What a file says of a device; what it leaves out is as the kind has it.
+/// What a file has of a device; what it leaves out is as the kind has it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 #[allow(missing_docs, reason = "the keys are those of the configuration")]
@@ -31,7 +31,7 @@ impl DeviceFile {
     /// The device of this kind that the file describes.
     ///
     /// # Errors
-    /// It says what goes with another kind only.
+    /// It has a key that goes with another kind only.
     pub fn device(&self, kind: DeviceKind) -> Result<DeviceLinkConfig, DeviceLinkError> {
         let only = [
             ("dialect", self.dialect.is_some(), DeviceKind::Inverse3),
@@ -42,7 +42,9 @@ impl DeviceFile {
                 DeviceKind::TwoDiy,
             ),
         ];
-        let foreign = only.into_iter().find(|(_, said, of)| *said && *of != kind);
+        let foreign = only
+            .into_iter()
+            .find(|(_, given, of)| *given && *of != kind);
         if let Some((key, _, of)) = foreign {
             let of = of.name();
             return Err(DeviceLinkError::OfAnother { key, of });
@@ -53,7 +55,7 @@ impl DeviceFile {
             DeviceKind::TwoDiy => version.centre_m(),
             DeviceKind::Link | DeviceKind::Inverse3 => default.centre_m,
         };
-        let or = |said: Option<f64>, otherwise| said.unwrap_or(otherwise);
+        let or = |given: Option<f64>, otherwise| given.unwrap_or(otherwise);
         Ok(DeviceLinkConfig {
             kind,
             axes: self.axes.unwrap_or(default.axes),

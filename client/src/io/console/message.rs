@@ -21,7 +21,7 @@ pub enum FromPage {
     Drive(Driver),
     /// Whether the hand rests.
     Pause(bool),
-    /// It wants to operate, if nobody does.
+    /// It asks to operate, if nobody does.
     Take,
     /// It leaves the hand to others.
     Leave,

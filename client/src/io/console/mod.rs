@@ -24,10 +24,10 @@ use axum::routing::get;
 use axum::serve::ListenerExt;
 use mmt_shared::io::emergency::EmergencyStop;
 use mmt_shared::io::secret::NoRandomness;
-use rtrb::{Consumer, Producer, RingBuffer};
 use tokio::sync::{mpsc, watch};
 use tokio::time::{MissedTickBehavior, interval};
 
+use crate::io::hand_events::{HandEventSender, HandEvents, hand_events};
 use crate::operator::pointer::{Driver, HandEvent};
 use admission::{Admission, Refusal, Ticket};
 use assets::{Assets, PAGE};
@@ -77,7 +77,7 @@ pub type Source = Box<dyn FnMut() -> String + Send>;
 #[derive(Default)]
 struct Stage {
     source: Option<Source>,
-    events: Option<Producer<HandEvent>>,
+    events: Option<HandEventSender>,
     operator: Option<u64>,
     /// Whether the script never gets the hand.
     no_script: bool,
@@ -159,8 +159,8 @@ impl Console {
     }
 
     /// The way of a person's events to the loop of a session that begins; the one before gets none any more.
-    pub fn events(&self) -> Consumer<HandEvent> {
-        let (events, to_loop) = RingBuffer::new(EVENTS_MAX);
+    pub fn events(&self) -> HandEvents {
+        let (events, to_loop) = hand_events(EVENTS_MAX);
         self.shared.stage().events = Some(events);
         to_loop
     }
@@ -171,7 +171,7 @@ impl Console {
     }
 
     /// Shows what changes seldom, a JSON object.
-    pub fn tell(&self, about: String) {
+    pub fn show_about(&self, about: String) {
         self.shared.about.send_replace(about.into());
     }
 
@@ -190,7 +190,7 @@ impl Console {
         self.shared.stage().give(event);
     }
 
-    /// What a viewer wants done.
+    /// What a viewer asks for.
     pub fn next_order(&mut self) -> Option<Order> {
         self.orders.try_recv().ok()
     }
@@ -208,13 +208,12 @@ impl Shared {
 }
 
 impl Stage {
-    /// A full ring is a loop that stands: what is lost ends as silence, which releases the hand.
     fn give(&mut self, event: HandEvent) {
         if self.no_script && event == HandEvent::Drive(Driver::Scripted) {
             return;
         }
         if let Some(events) = &mut self.events {
-            let _ = events.push(event);
+            events.send(event);
         }
     }
 }
@@ -264,7 +263,7 @@ async fn page(State(shared): Served, headers: HeaderMap, uri: Uri) -> Response {
 
 async fn file(State(shared): Served, headers: HeaderMap, Path(name): Path<String>) -> Response {
     match shared.admission.file(&headers) {
-        // the page itself wants the token
+        // the page itself needs the token
         Ok(()) if name != PAGE => shared.assets.answer(&name),
         Ok(()) => refuse(Refusal::Token),
         Err(refusal) => refuse(refusal),
@@ -298,7 +297,7 @@ mod tests {
 
     #[test]
     fn where_the_script_is_refused_no_message_gives_it_the_hand() {
-        let (events, mut to_loop) = RingBuffer::new(4);
+        let (events, mut to_loop) = hand_events(4);
         let mut stage = Stage {
             events: Some(events),
             ..Stage::default()
@@ -308,7 +307,7 @@ mod tests {
         stage.give(HandEvent::Drive(Driver::Scripted));
         stage.give(HandEvent::Drive(Driver::Pointer));
         stage.give(HandEvent::Pause(true));
-        let given: Vec<_> = std::iter::from_fn(|| to_loop.pop().ok()).collect();
+        let given: Vec<_> = std::iter::from_fn(|| to_loop.next_event()).collect();
         assert_eq!(
             given,
             [

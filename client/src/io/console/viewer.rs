@@ -89,7 +89,7 @@ impl Viewer {
         format!(r#"{{"role":"{role}"}}"#)
     }
 
-    /// Does what the page wants, as far as this viewer may.
+    /// Does what the page asks for, as far as this viewer may.
     fn handle(&self, text: &Utf8Bytes) {
         let Ok(message) = FromPage::read(text) else {
             tracing::debug!("a page sent what no page of this version sends");

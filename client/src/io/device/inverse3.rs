@@ -14,11 +14,11 @@ use tungstenite::{Error, Message, WebSocket};
 use super::Shared;
 use crate::device::inverse3::Inverse3;
 
-/// How long the service may take to answer a connection and to say its version.
+/// How long the service may take to answer a connection and to send its version.
 const PATIENCE: Duration = Duration::from_secs(2);
 /// How long a frame is waited for before the next is asked for.
 const FRAME: Duration = Duration::from_millis(20);
-/// A service that has said nothing for so long is connected to anew.
+/// A service that has sent nothing for so long is connected to anew.
 const SILENCE: Duration = Duration::from_secs(1);
 /// Between two attempts to connect.
 const RETRY: Duration = Duration::from_millis(500);
@@ -27,7 +27,7 @@ const MESSAGE_MAX: usize = 1 << 20;
 /// Largest answer about the version that is read, bytes.
 const VERSION_MAX: u64 = 1 << 16;
 
-/// A connection, and the version of the service if it says one.
+/// A connection, and the version of the service if it sends one.
 pub(super) struct Connection {
     socket: WebSocket<TcpStream>,
     version: Option<String>,
@@ -52,7 +52,7 @@ pub(super) fn connect(at: SocketAddr) -> Result<Connection, String> {
     Ok(Connection { socket, version })
 }
 
-/// The version of the service that listens there, such as 3.5.0.0, by `GET /version`; none if it does not say.
+/// The version of the service that listens there, such as 3.5.0.0, by `GET /version`; none if it sends none.
 ///
 /// # Errors
 /// Nobody listens there.
@@ -64,11 +64,11 @@ pub fn version(at: SocketAddr) -> io::Result<Option<String>> {
     let mut stream = stream(at)?;
     let request = format!("GET /version HTTP/1.1\r\nHost: {at}\r\nConnection: close\r\n\r\n");
     let mut text = String::new();
-    // a service that does not say has no version
-    let said = stream
+    // a service that sends none has no version
+    let answered = stream
         .write_all(request.as_bytes())
         .and_then(|()| stream.take(VERSION_MAX).read_to_string(&mut text));
-    drop(said);
+    drop(answered);
     let body = text.find('{').zip(text.rfind('}'));
     let body = body.and_then(|(first, last)| text.get(first..=last));
     let version = body.and_then(|body| serde_json::from_str::<Version>(body).ok());
@@ -126,13 +126,13 @@ fn exchange(
     clock: Clock,
 ) -> Result<(), Error> {
     let mut ticker = Ticker::new(clock, TICK);
-    let mut heard = clock.now();
+    let mut last_message = clock.now();
     while !shared.has_ended() {
         let read = socket.read();
         let now = clock.now();
         match read {
             Ok(message) => {
-                heard = now;
+                last_message = now;
                 let asks = matches!(message, Message::Text(_) | Message::Binary(_));
                 shared.take(now, |give| {
                     match &message {
@@ -153,7 +153,7 @@ fn exchange(
                     device.miss(now, give);
                     (None, *device.counts())
                 });
-                if now.saturating_since(heard) > SILENCE {
+                if now.saturating_since(last_message) > SILENCE {
                     return Err(Error::Io(error));
                 }
             }
@@ -168,7 +168,7 @@ fn exchange(
 
 /// The last word: no force.
 fn part(socket: &mut WebSocket<TcpStream>, device: &mut Inverse3) {
-    // whoever does not hear it any more has forgotten the force as well
+    // whoever does not receive it any more has forgotten the force as well
     let _ = socket.send(Message::text(device.no_force()));
     let _ = socket.close(None);
     let _ = socket.flush();

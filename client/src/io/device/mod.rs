@@ -28,6 +28,7 @@ use rtrb::{Consumer, Producer, RingBuffer};
 use crate::device::inverse3::Inverse3;
 use crate::device::link::{DeviceLink, DeviceLinkConfig, DeviceLinkError, HandOutput, Reading};
 use crate::device::two_diy::TwoDiy;
+use crate::io::hand_events::{HandEventSender, HandEvents, hand_events};
 use crate::operator::pointer::HandEvent;
 pub use inverse3::version;
 
@@ -146,7 +147,7 @@ pub struct Seen {
 /// Who listens to the device.
 #[derive(Debug, Default)]
 struct Listeners {
-    events: Option<Producer<HandEvent>>,
+    events: Option<HandEventSender>,
     readings: Option<Producer<Seen>>,
     counts: PlugCounts,
 }
@@ -179,10 +180,9 @@ impl Shared {
             readings,
             counts,
         } = &mut *listeners;
-        // a full ring is a loop that stands: what is lost ends as silence, which releases the hand
         let (reading, counted) = take(&mut |event| {
             if let Some(events) = events {
-                let _ = events.push(event);
+                events.send(event);
             }
         });
         *counts = counted;
@@ -257,7 +257,7 @@ impl DeviceHost {
 
     /// The device for the loop of a session that begins; the one before gets nothing any more.
     pub fn port(&self) -> DevicePort {
-        let (events, to_loop) = RingBuffer::new(EVENTS_MAX);
+        let (events, to_loop) = hand_events(EVENTS_MAX);
         self.shared.listeners().events = Some(events);
         DevicePort {
             events: to_loop,
@@ -278,7 +278,7 @@ impl Drop for DeviceHost {
     fn drop(&mut self) {
         self.shared.ended.store(true, Ordering::Release);
         if let Some(thread) = self.speaks.take() {
-            // a thread that panicked has said so, and says no more
+            // a thread that panicked has reported it, and sends no more
             let _ = thread.join();
         }
     }
@@ -287,7 +287,7 @@ impl Drop for DeviceHost {
 /// The loop's end of the plug. When it is dropped no force is left on the device.
 #[derive(Debug)]
 pub struct DevicePort {
-    events: Consumer<HandEvent>,
+    events: HandEvents,
     shared: Arc<Shared>,
     tick: u64,
 }
@@ -295,7 +295,7 @@ pub struct DevicePort {
 impl DevicePort {
     /// What the hand did next.
     pub fn event(&mut self) -> Option<HandEvent> {
-        self.events.pop().ok()
+        self.events.next_event()
     }
 
     /// Gives the device what a tick came to; the number of the tick is counted here.
@@ -305,6 +305,11 @@ impl DevicePort {
             tick: self.tick,
             ..output
         });
+    }
+
+    /// What of the hand found no room on its way to the loop.
+    pub fn events_lost(&self) -> u64 {
+        self.events.lost()
     }
 
     /// What became of the device's packets, as the plug counted it last.

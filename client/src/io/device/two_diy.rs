@@ -16,7 +16,7 @@ use crate::device::two_diy::{ANSWER_BYTES, RESET, TwoDiy, no_torques};
 const ANSWER: Duration = Duration::from_millis(20);
 /// How long the port may take to take something.
 const PATIENCE: Duration = Duration::from_millis(500);
-/// A board that has said nothing for so long is set up anew: it may have been off.
+/// A board that has sent nothing for so long is set up anew: it may have been off.
 const SILENCE: Duration = Duration::from_secs(1);
 /// Answers that are read at once: those of a board that was late.
 const ANSWERS_MAX: usize = 16;
@@ -59,7 +59,7 @@ fn exchange(
 ) -> io::Result<()> {
     set_up(port, device)?;
     let mut ticker = Ticker::new(clock, TICK);
-    let mut heard = clock.now();
+    let mut last_answer = clock.now();
     let mut room = [0; ANSWERS_MAX * ANSWER_BYTES];
     while !shared.has_ended() {
         ticker.wait();
@@ -82,10 +82,10 @@ fn exchange(
             (device.seen(), *device.counts())
         });
         if came > 0 {
-            heard = now;
-        } else if now.saturating_since(heard) > SILENCE {
+            last_answer = now;
+        } else if now.saturating_since(last_answer) > SILENCE {
             set_up(port, device)?;
-            heard = now;
+            last_answer = now;
         }
     }
     Ok(())

@@ -30,7 +30,7 @@ async fn ended_by(
     let options = scripted(&fake);
     let opening = Opening::of_operator(&options, Vec2::new(-0.45, 0.0));
     let (opened, slave) = tokio::join!(open(&opening, &TIMEOUTS), Session::welcomed(&fake));
-    let (_stop, stop) = watch::channel(false);
+    let (_stop, stop) = watch::channel(Wish::GoOn);
     let (live, _shown) = watch::channel(MasterLive::default());
     let clock = Clock::start();
     let opened = opened.unwrap();

@@ -19,6 +19,7 @@ use super::fake::{state, welcome_for};
 use super::*;
 use crate::again::MasterSetting;
 use crate::end::MasterEnd;
+use crate::io::hand_events::hand_events;
 use crate::io::haptic::HapticLoop;
 use crate::io::record;
 use crate::limiter::{ForceLimiter, RAMP_TICKS};
@@ -311,7 +312,7 @@ async fn each_reading_of_a_hand_is_recorded_as_it_came() {
         commands: CommandConfig::default(),
     };
     let record = record::begin(&recorder, Clock::start(), &setting, &());
-    let (mut hand, events) = rtrb::RingBuffer::new(8);
+    let (mut hand, events) = hand_events(8);
     let mut ticked = pressing(None);
     ticked.haptic = ticked.haptic.recorded(record);
     ticked.haptic = ticked.haptic.operated_through(Some(events));
@@ -328,9 +329,9 @@ async fn each_reading_of_a_hand_is_recorded_as_it_came() {
         HandEvent::Move(moved[0]),
         HandEvent::Move(moved[1]),
     ];
-    all.into_iter().for_each(|event| hand.push(event).unwrap());
+    all.into_iter().for_each(|event| hand.send(event));
     assert!(ticked.tick(0).is_continue());
-    hand.push(HandEvent::Release).unwrap();
+    hand.send(HandEvent::Release);
     assert!(ticked.tick(1).is_continue());
     assert_eq!(recorder.finish().error, None);
     let mut found = Vec::new();

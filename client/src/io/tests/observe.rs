@@ -11,7 +11,7 @@ use crate::observer::{COUPLING, ObserverLive};
 type Observed = Result<(ObserverReport, SessionEnd), MasterHostError>;
 
 struct Looking {
-    stop: watch::Sender<bool>,
+    stop: watch::Sender<Wish>,
     live: watch::Receiver<ObserverLive>,
     task: JoinHandle<Observed>,
 }
@@ -26,7 +26,7 @@ fn look_on(fake: &Fake) -> Looking {
         netem_seed: 1,
         netem_extras: SocketExtras::default(),
     };
-    let (stop, stopped) = watch::channel(false);
+    let (stop, stopped) = watch::channel(Wish::GoOn);
     let (shown, live) = watch::channel(ObserverLive::default());
     Looking {
         stop,
@@ -69,7 +69,7 @@ async fn an_observer_asks_for_nothing_but_to_see_shows_it_and_reports_what_came(
     let live = *looking.live.borrow();
     assert_eq!((live.scene, live.params[0]), (Some(scene), 0.7));
     assert!(slave.stamps.is_empty(), "no command, no sample");
-    looking.stop.send_replace(true);
+    looking.stop.send_replace(Wish::End);
     let theirs = slave.serve().await;
     assert_eq!(theirs.ending, Ending::Interrupted);
     slave

@@ -127,7 +127,7 @@ async fn a_welcome_for_another_device_is_refused() {
 async fn a_stop_before_the_session_ends_the_attempt() {
     let fake = Fake::new();
     let mut master = start(scripted(&fake), TIMEOUTS);
-    master.stop.send_replace(true);
+    master.stop.send_replace(Wish::End);
     let error = master.error().await;
     assert!(matches!(error, MasterHostError::Interrupted), "{error}");
 }
@@ -154,7 +154,7 @@ async fn raw_udp_to_another_host_is_refused_before_a_packet_is_sent() {
     options.transport = Transport::RawUdp { insist: false };
     // TEST-NET-1 (RFC 5737)
     options.pairing.address = "192.0.2.1:4433".parse().unwrap();
-    let (_stop, stop) = watch::channel(false);
+    let (_stop, stop) = watch::channel(Wish::GoOn);
     let (live, _look) = watch::channel(MasterLive::default());
     let error = run(options, stop, live).await.unwrap_err();
     assert!(matches!(error, MasterHostError::Insecure(_)), "{error}");

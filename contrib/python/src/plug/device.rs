@@ -21,7 +21,7 @@ pub(crate) struct Device {
     force: Triple,
     hip: Pair,
     lost_up: f64,
-    heard: Option<Instant>,
+    last_answer: Option<Instant>,
 }
 
 #[pymethods]
@@ -34,7 +34,7 @@ impl Device {
             force: (0.0, 0.0, 0.0),
             hip: (0.0, 0.0),
             lost_up: 0.0,
-            heard: None,
+            last_answer: None,
         })
     }
 
@@ -65,7 +65,8 @@ impl Device {
         Ok(())
     }
 
-    /// Takes what has come; returns the force on the hand along the device's axes, (x, y, z), N, which is none after 20 ms of silence.
+    /// Takes what has come; returns the force on the hand along the device's axes, (x, y, z), N, which is none after
+    /// 20 ms of silence.
     fn receive(&mut self) -> Triple {
         let kind = PlugKind::Force;
         while let Some((ahead, flags, numbers)) =
@@ -77,10 +78,10 @@ impl Device {
                 self.force = (x, y, z);
                 self.hip = (hip_x, hip_y);
                 self.lost_up = lost_up;
-                self.heard = Some(Instant::now());
+                self.last_answer = Some(Instant::now());
             }
         }
-        if self.heard.is_none_or(|heard| heard.elapsed() > SILENCE) {
+        if self.last_answer.is_none_or(|last_answer| last_answer.elapsed() > SILENCE) {
             self.flags = 0;
             self.force = (0.0, 0.0, 0.0);
         }
@@ -99,8 +100,8 @@ impl Device {
         self.hip
     }
 
-    /// What mmt reports of itself, bits: 1 a session runs, 2 the hand is held, 4 in contact, 8 an emergency stop is set, 16 the slave is
-    /// late, 32 the newest reading was refused, or the button was never up.
+    /// What mmt reports of itself, bits: 1 a session runs, 2 the hand is held, 4 in contact, 8 an emergency stop is
+    /// set, 16 the slave is late, 32 the newest reading was refused, or the button was never up.
     #[getter]
     fn state(&self) -> u16 {
         self.flags

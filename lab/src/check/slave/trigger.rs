@@ -1,9 +1,10 @@
 //! When an update leaves: by (12) and by the timer, as far as the numbers of a tick show it.
 //!
-//! Each direction is judged where it follows from the contract alone. An update of cause `deadband` needs (12), one of cause `timer`
-//! needs T_update. Under the schemes that ask for nothing more, (12) and T_update need an update. Not judged: where the force is
-//! averaged because its sensor is noisy or by `judged_over`; other metrics and references than the paper's; what `useful` and `adaptive` leave out as
-//! not felt; and (12) in a tick in which the model pushes harder than the tool, whose limit may hold it back then.
+//! Each direction is judged where it follows from the contract alone. An update of cause `deadband` needs (12), one
+//! of cause `timer` needs T_update. Under the schemes that ask for nothing more, (12) and T_update need an update.
+//! Not judged: where the force is averaged because its sensor is noisy or by `judged_over`; other metrics and
+//! references than the paper's; what `useful` and `adaptive` leave out as not felt; and (12) in a tick in which the
+//! model pushes harder than the tool, whose limit may hold it back then.
 
 use std::mem::replace;
 use std::time::Duration;

@@ -116,7 +116,7 @@ impl Bounded {
     }
 }
 
-/// What an update of the oracle's may say: the truth, with e by each of the choices.
+/// What an update of the oracle's may carry: the truth, with e by each of the choices.
 fn choices(truth: &ModelParams, settings: &ModelSettings) -> Vec<ModelParams> {
     let [m, b, c, inertia, e] = truth.to_array();
     let scaled = |by: f64| ModelParams::try_new(m, b, c, inertia, e * by, &settings.coupling);

@@ -1,6 +1,7 @@
 //! The one number of each architecture that is tuned, and the six values that are tried.
 //!
-//! As many for each: no architecture is looked at more closely than another. What it is run with where nobody tunes it is one of them.
+//! As many for each: no architecture is looked at more closely than another. What it is run with where nobody tunes
+//! it is one of them.
 
 use std::time::Duration;
 

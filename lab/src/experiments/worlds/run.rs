@@ -138,7 +138,7 @@ struct TouchedBody {
 }
 
 impl TouchedBody {
-    /// The body that the master was told of at the beginning, at `place` (m).
+    /// The body of which the master received the place at the beginning, at `place` (m).
     fn new(place: Vec2, round_trip_s: f64) -> Self {
         Self {
             place,

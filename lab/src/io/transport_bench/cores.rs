@@ -110,7 +110,7 @@ fn stay(core: &CpuSet) -> io::Result<()> {
     Ok(sched_setaffinity(None, core)?)
 }
 
-/// Spins on `core` while nobody else wants it, once it has reported that it can give way to all others.
+/// Spins on `core` while nobody else uses it, once it has reported that it can give way to all others.
 fn keep_awake(core: &CpuSet, over: &AtomicBool, report: &mpsc::SyncSender<io::Result<()>>) {
     let able = stay(core).and_then(|()| yield_to_all());
     let spins = able.is_ok();

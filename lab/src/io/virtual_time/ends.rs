@@ -146,7 +146,7 @@ pub(super) struct Ends {
     pub(super) client: ClientConfig,
 }
 
-/// Both endpoints as `case` wants them, on their sockets.
+/// Both endpoints as `case` sets them, on their sockets.
 pub(super) fn ends(
     case: &Case,
     executor: &Executor,

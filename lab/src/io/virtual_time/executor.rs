@@ -44,7 +44,7 @@ struct State {
     next_timer: u64,
 }
 
-/// Tasks that want to run, each once, in the order of their wakes.
+/// Tasks that are ready to run, each once, in the order of their wakes.
 #[derive(Default)]
 struct Woken {
     queue: VecDeque<u64>,

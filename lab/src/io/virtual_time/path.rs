@@ -1,7 +1,7 @@
 //! The emulated path between two ends, one direction: outage and bottleneck with a queue, then the rest of the path.
 //!
 //! Both are links of the emulator, one behind the other: what the queue or an outage drops never meets the second,
-//! and takes no draw of it. Nothing here knows what packets carry, and nothing here may wait or read a clock.
+//! and takes no draw of it. Nothing here reads what packets carry, and nothing here may wait or read a clock.
 
 use std::ops::Range;
 use std::time::Duration;

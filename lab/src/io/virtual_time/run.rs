@@ -24,7 +24,7 @@ use crate::transport::{Case, FlowOutcome, HEARTBEAT, HEARTBEAT_BYTES, Log, Sent}
 /// Is called for each packet that came: when, and what the path itself took for it.
 type Arrived<'a> = &'a mut dyn FnMut(Time, Duration) -> Result<(), Failure>;
 
-/// Name given to the TLS library, which wants one; it is not sent.
+/// Name given to the TLS library, which requires one; it is not sent.
 const SERVER_NAME: &str = "mmt";
 /// A handshake that takes longer than this has failed.
 const HANDSHAKE_MAX: Time = Time::from_millis(30_000);

@@ -63,7 +63,7 @@ impl Course {
         }
         now_s += STANDS_S;
         self.go(now_s, first);
-        // no sample of the push before says so
+        // no sample of the push before shows it
         self.feel(from_s + SOON_S, Vec2::zeros());
         let count = ((now_s - from_s) * IMAGES_HZ) as u32;
         let seen = (0..count).map(|k| (from_s + f64::from(k) / IMAGES_HZ, push.before));

@@ -1,6 +1,6 @@
 //! Which client gives its place to a newer one when all are taken.
 //!
-//! Whoever comes gets a place, so that strangers who take all of them keep nobody out: who has said nothing for the longest,
+//! Whoever comes gets a place, so that strangers who take all of them keep nobody out: who has sent nothing for the longest,
 //! or was never answered, makes room. Who talks with the target stays, whoever else comes.
 
 use std::net::IpAddr;
@@ -143,7 +143,7 @@ mod tests {
         assert!(rests(3000, 2990) && !rests(3000, 3010));
         assert!(rests(100_000, 14_990) && !rests(100_000, 15_010));
         assert!(rests(0, 490) && !rests(0, 510));
-        // what the target goes on to send keeps nobody who says nothing
+        // what the target goes on to send keeps nobody who sends nothing
         let mut client = session(0, 0);
         (0..20_000).for_each(|ms| client.is_answered(at(ms)));
         assert_eq!(leaves(&[client], 100, 20_000), Some(0));

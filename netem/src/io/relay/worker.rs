@@ -39,7 +39,7 @@ pub(super) struct Worker {
     /// What the target sent to several clients, to be put in order.
     answers: Vec<(Time, Datagram<Origin>)>,
     pace: Pace,
-    /// The links, whose datagrams know their client.
+    /// The links, whose datagrams carry their client.
     up: Driver<Origin>,
     down: Driver<Origin>,
     /// The latest arrival that was offered to either: times of offers never go back.
@@ -282,7 +282,7 @@ impl Worker {
         moment
     }
 
-    /// Sends to the target from the client's own port, or to the client from the address that it knows.
+    /// Sends to the target from the client's own port, or to the client from the address that it has.
     fn send(&mut self, direction: Direction, packet: &mut Departure<Datagram<Origin>>) -> Outcome {
         let Some(client) = self.clients.get(packet.payload.address.number) else {
             return Outcome::Abandoned;

@@ -17,6 +17,8 @@ pub(in crate::io) const SILENCE_MAX: Duration = Duration::from_secs(10);
 pub(in crate::io) enum End {
     #[error("this side was asked to end")]
     Asked,
+    #[error("a thread of this side panicked")]
+    ThreadPanicked,
     #[error("the master ended ({:?})", .0.ending)]
     Farewell(Box<ReceivedFarewell<MasterHalf>>),
     #[error("no command came for {DISENGAGE:?}: the tool stands until somebody engages it anew")]

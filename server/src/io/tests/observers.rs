@@ -135,7 +135,7 @@ async fn an_observer_comes_before_any_operator_and_sees_one_after_the_other() {
     let heard: Vec<u32> = observer.updates.iter().map(|of| of.sequence).collect();
     assert!(heard.is_sorted(), "one count for both sessions: {heard:?}");
     // the host ends: a farewell, and no more
-    host.stop.send_replace(true);
+    host.stop.send_replace(Wish::End);
     let (ending, half) = patiently(observer.hear_farewell()).await;
     assert_eq!(ending, Ending::Interrupted);
     assert!(half.session.sent.updates > Some(0));

@@ -118,7 +118,7 @@ async fn raw_udp_beyond_this_host_is_refused_unless_somebody_insists() {
 async fn a_panic_of_ours_that_a_stranger_brings_about_is_counted_and_ends_nobodys_session() {
     const STRANGERS: u64 = 3;
     let host = SlaveHost::bind(options()).unwrap();
-    let (stop, mut stopped) = watch::channel(false);
+    let (stop, mut stopped) = watch::channel(Wish::GoOn);
     let context = &host.context;
     let (acceptor, mut masters) = Acceptor::new(
         host.tokens.clone(),

@@ -24,7 +24,7 @@ pub(super) enum Place {
 /// The newest number and one bit for each of the [`WINDOW`] last ones, at the number's remainder.
 ///
 /// One number never takes the newest further ahead than the window reaches back: whatever it was, those that follow
-/// are still told apart. Where the numbers have really gone on (an outage, a host that stood still) the second that arrives
+/// are still distinguished. Where the numbers have really gone on (an outage, a host that stood still) the second that arrives
 /// shows it, however many were lost.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Window {

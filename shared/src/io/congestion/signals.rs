@@ -1,6 +1,6 @@
 //! What shows the state of a path: its shortest round trip, its queue, its silence.
 //!
-//! Pure: time comes as an argument. Nothing here knows the window.
+//! Pure: time comes as an argument. Nothing here depends on the window.
 
 use std::time::{Duration, Instant};
 

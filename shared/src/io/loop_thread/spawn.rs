@@ -35,14 +35,14 @@ where
     let run = move || {
         announce(name, &realtime::request());
         let pulse = Pulse::default();
-        let (watched, told) = (done.clone(), done.clone());
+        let (watched, ended) = (done.clone(), done.clone());
         let bark = move || {
             tracing::error!("{name}: a tick does not end: the loop has hung");
             hung.store(true, Ordering::Release);
             watched.take();
         };
         let own = rustix::thread::gettid();
-        let watches = watchdog::watch(pulse.clone(), own, move || told.is_told(), bark);
+        let watches = watchdog::watch(pulse.clone(), own, move || ended.is_reported(), bark);
         if let Err(error) = watches {
             tracing::warn!("{name}: nobody watches for a tick that hangs: {error}");
         }
@@ -57,7 +57,7 @@ where
     Ok(handle)
 }
 
-/// How the loop's end is told: once, by the loop or by its watchdog.
+/// How the loop's end is reported: once, by the loop or by its watchdog.
 struct Ending<T>(Arc<Mutex<Option<oneshot::Sender<T>>>>);
 
 impl<T> Clone for Ending<T> {
@@ -67,15 +67,15 @@ impl<T> Clone for Ending<T> {
 }
 
 impl<T> Ending<T> {
-    /// For whoever tells it. The loop takes it after its last tick.
+    /// For whoever reports it. The loop takes it after its last tick.
     fn take(&self) -> Option<oneshot::Sender<T>> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).take()
     }
 
-    /// Whether it is told.
-    fn is_told(&self) -> bool {
-        let told = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        told.is_none()
+    /// Whether it is reported.
+    fn is_reported(&self) -> bool {
+        let sender = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        sender.is_none()
     }
 }
 

@@ -134,7 +134,7 @@ fn open(
     (name, schema): (&str, String),
 ) -> McapResult<u16> {
     let schema = inner.add_schema(name, "ros2msg", schema.as_bytes())?;
-    // rosbag2 wants this key, empty for the default
+    // rosbag2 requires this key, empty for the default
     let metadata = BTreeMap::from([("offered_qos_profiles".to_owned(), String::new())]);
     inner.add_channel(schema, topic, "cdr", &metadata)
 }

@@ -1,6 +1,6 @@
 //! Reads a record message by message; one that was cut off reads up to there.
 //!
-//! Of MCAP it knows what a record has: chunks without compression, channels, messages (mcap.dev/spec). No length in the file is
+//! Of MCAP it reads what a record has: chunks without compression, channels, messages (mcap.dev/spec). No length in the file is
 //! believed before the bytes are there, and none leads out of what it stands in. The reader of the MCAP crate does not bear a
 //! hostile file: for a text it makes room for as many bytes as the file announces, up to 4 GiB, and a record that is longer than
 //! its chunk overflows.

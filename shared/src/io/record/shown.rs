@@ -26,7 +26,7 @@ pub struct Shown {
     pub covariance: [f64; 9],
     /// Median round trip, ms; none before the first.
     pub rtt_ms: Option<f64>,
-    /// The master's datagrams, as far as this end knows.
+    /// The master's datagrams, as far as this end counts them.
     pub up: Loss,
     /// The slave's datagrams, likewise.
     pub down: Loss,

@@ -1,4 +1,4 @@
-//! The watchdog's own thread, and what the kernel tells of another one.
+//! The watchdog's own thread, and what the kernel reports of another one.
 
 use std::io;
 use std::time::Duration;
@@ -20,7 +20,7 @@ pub fn watch(
     hung: impl FnOnce() + Send + 'static,
 ) -> io::Result<()> {
     let run = move || {
-        // as sharp as the loop, where the host permits that; the loop has told what was not granted
+        // as sharp as the loop, where the host permits that; the loop has reported what was not granted
         realtime::request();
         let clock = Clock::since_boot();
         let mut watchdog = Watchdog::new(clock.now());

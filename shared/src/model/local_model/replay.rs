@@ -75,7 +75,7 @@ impl Replay {
         self.waiting.take()
     }
 
-    /// Restarts at the sample that an update answers. One that is older than the history says nothing of
+    /// Restarts at the sample that an update answers. One that is older than the history shows nothing of
     /// where the box is now.
     pub(super) fn begin(&mut self, update: &Update, history: &History) {
         let Some(then) = history.nearest(update.answers) else {
@@ -88,7 +88,7 @@ impl Replay {
             .nearest(state.pose.point_to_object(then.hip))
             .1;
         if jump > JUMP_M && depth < FLAT_M && god.touched().is_none() {
-            // where the HIP was seen from another place says nothing of the face that it is at
+            // where the HIP was seen from another place shows nothing of the face that it is at
             god = GodObject::default();
         }
         god.after_jump(&state.footprint, &state.pose, then.hip);

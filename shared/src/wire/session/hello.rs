@@ -10,7 +10,7 @@ use crate::pairing::Token;
 use crate::wire::label::Label;
 use crate::wire::samples::SAMPLES_MAX;
 
-/// What a master wants to be, and what its token lets it be.
+/// What a master asks to be, and what its token permits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Role {
@@ -92,7 +92,7 @@ pub const SCENE_HZ_MAX: u8 = 60;
 pub struct Hello {
     /// The secret of the pairing string, to be judged before anything else.
     pub token: Token,
-    /// What the master wants to be.
+    /// What the master asks to be.
     pub role: Role,
     /// What becomes of another operator.
     pub claim: Claim,
@@ -102,7 +102,7 @@ pub struct Hello {
     pub samples_per_command: u8,
     /// What the hand feels.
     pub architecture: Architecture,
-    /// Scenes that the master wants, 1/s: 0, none, to [`SCENE_HZ_MAX`].
+    /// Scenes that the master asks for, 1/s: 0, none, to [`SCENE_HZ_MAX`].
     pub scene_hz: u8,
     /// Where the HIP would like to start, m: a simulated tool that is nowhere yet is put there.
     pub hip: Vec2,

@@ -246,7 +246,7 @@ impl Nat {
 impl Drop for Nat {
     fn drop(&mut self) {
         let mut nft = Command::new("nft");
-        // best effort: nobody is left to tell
+        // best effort: nobody is left to read an error
         let _ = done("nft", nft.args(["delete", "table", "ip", &self.table]));
         if self.forwarding_before.trim() != "1" {
             let _ = std::fs::write(FORWARDING, &self.forwarding_before);

@@ -1,4 +1,4 @@
-// The controls: they send words and show what the master says is so.
+// The controls: they send words and show what the master reports.
 
 const $ = (id) => document.getElementById(id);
 const UNITS = { delay: "ms", jitter: "ms", loss: "%", delta: "%", period: "ms", mass: "kg", friction: "" };
@@ -35,7 +35,7 @@ export class Controls {
     this.#allow();
   }
 
-  /** A new session as the form says. */
+  /** A new session as the form has it. */
   restart() {
     const wish = { mode: $("mode").value, architecture: $("architecture").value, scheme: this.#words() };
     if (!$("mass").disabled) wish.mass_kg = Number($("mass").value);

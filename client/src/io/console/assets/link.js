@@ -35,32 +35,32 @@ export class Link extends EventTarget {
     this.socket = socket;
     socket.onopen = () => {
       this.open = true;
-      this.#tell("open");
+      this.#notify("open");
     };
     socket.onclose = () => {
       const was = this.open;
       this.open = false;
       this.role = "observer";
-      if (was) this.#tell("closed");
-      else this.#tell("unreachable");
+      if (was) this.#notify("closed");
+      else this.#notify("unreachable");
       setTimeout(() => this.#connect(), RETRY_MS);
     };
     socket.onmessage = ({ data }) => {
       const message = JSON.parse(data);
       if (message.role) {
         this.role = message.role;
-        this.#tell("role");
+        this.#notify("role");
       } else if (message.about) {
         this.about = message.about;
-        this.#tell("about");
+        this.#notify("about");
       } else if (message.master || message.observer) {
         this.frame = message.observer ? handless(message) : message;
-        this.#tell("frame");
+        this.#notify("frame");
       }
     };
   }
 
-  #tell(name) {
+  #notify(name) {
     this.dispatchEvent(new Event(name));
   }
 }

@@ -2,7 +2,7 @@
 
 import { fit } from "./scene.js";
 
-/** A dot needs at least this long across, s: faster paths are shown slower, and the picture says so. */
+/** A dot needs at least this long across, s: faster paths are shown slower, and the picture notes it. */
 const ACROSS_S = 0.7;
 const DOTS_MAX = 600;
 const calm = matchMedia("(prefers-reduced-motion: reduce)");

@@ -2,7 +2,7 @@
 
 /** Speed of the arrow keys, m/s; with Shift a third of it. */
 const KEY_M_PER_S = 0.15;
-/** A pressed pointer at rest is told of again after this, with a stamp that no later event can have, ms. */
+/** A pressed pointer at rest is sent again after this, with a stamp that no later event can have, ms. */
 const STILL_MS = 20;
 /** After this a hand that the master does not hold has been let go, ms. */
 const GONE_MS = 600;
@@ -37,11 +37,11 @@ export class Pointer {
     this.canvas.classList.remove("held");
   }
 
-  /** Often: keys move, a pointer at rest is told of, and the clocks are compared. */
+  /** Often: keys move, a pointer at rest is sent, and the clocks are compared. */
   tick(now) {
     const seconds = (now - this.last) / 1000;
     this.last = now;
-    // the master lets a hand go of which it hears nothing
+    // the master lets a hand go from which it receives nothing
     if (this.held && now - this.pressed > GONE_MS && this.link.frame?.master.engaged === false) this.release();
     if (this.id === "keys") this.#glide(now, seconds);
     else if (this.held && now - STILL_MS > this.stamp) this.#send([[now - STILL_MS, ...this.at]]);
