@@ -19,7 +19,7 @@ use mmt_shared::stats::histogram::Histogram;
 use mmt_shared::time::{TICK, Time};
 use serde::Serialize;
 
-use super::Device;
+use super::hand::Device;
 use crate::args::DeviceTestArguments;
 use crate::failure::{Exit, Failure};
 use crate::output::{note, print, print_json};
