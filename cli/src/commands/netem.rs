@@ -29,7 +29,6 @@ mod trace;
 pub(super) mod wrap;
 
 use control::Command;
-use document::NetemConfiguration;
 pub(crate) use document::NetemReport;
 use files::{Files, record_file};
 use gauge::{Caption, Gauge};
@@ -98,26 +97,14 @@ pub(crate) fn run(arguments: &NetemArguments, messages: &Messages) -> Result<(),
     let effects = effects.join();
     let effects =
         effects.map_err(|_| Failure::failed("the effect of the networks is not known"))?;
-    let (effect_up, effect_down) = effects.map_err(Failure::usage)?;
-    let report = NetemReport {
-        version: env!("CARGO_PKG_VERSION"),
-        command: "netem",
-        seed: arguments.seed,
+    let report = NetemReport::of(
+        arguments,
+        [local, to],
         duration_s,
         ending,
-        degraded: counters.lateness.degraded(),
-        refused_clients: counters.refused.packets > 0,
-        displaced_clients: counters.clients_displaced > 0,
         counters,
-        configuration: NetemConfiguration {
-            listen: local.to_string(),
-            to: to.to_string(),
-            up: arguments.up.to_string(),
-            down: arguments.down.to_string(),
-            effect_up,
-            effect_down,
-        },
-    };
+        effects.map_err(Failure::usage)?,
+    );
     let printed = if arguments.json {
         print_json(&report)
     } else {

@@ -1,8 +1,12 @@
 //! The document of a relay.
 
+use std::net::SocketAddr;
+
 use mmt_netem::Effect;
 use mmt_netem::io::relay::RelaySnapshot;
 use serde::Serialize;
+
+use crate::args::NetemArguments;
 
 #[derive(Debug, Serialize)]
 pub(crate) struct NetemReport {
@@ -18,15 +22,47 @@ pub(crate) struct NetemReport {
     /// Whether a master that did not talk with the slave made room for a newer one.
     pub(super) displaced_clients: bool,
     pub(super) counters: RelaySnapshot,
-    pub(super) configuration: NetemConfiguration,
+    configuration: NetemConfiguration,
+}
+
+impl NetemReport {
+    /// Of a relay between these addresses, which ran for so long (s) and ended so.
+    pub(super) fn of(
+        arguments: &NetemArguments,
+        [local, to]: [SocketAddr; 2],
+        duration_s: f64,
+        ending: &'static str,
+        counters: RelaySnapshot,
+        (effect_up, effect_down): (Effect, Effect),
+    ) -> Self {
+        Self {
+            version: env!("CARGO_PKG_VERSION"),
+            command: "netem",
+            seed: arguments.seed,
+            duration_s,
+            ending,
+            degraded: counters.lateness.degraded(),
+            refused_clients: counters.refused.packets > 0,
+            displaced_clients: counters.clients_displaced > 0,
+            counters,
+            configuration: NetemConfiguration {
+                listen: local.to_string(),
+                to: to.to_string(),
+                up: arguments.up.to_string(),
+                down: arguments.down.to_string(),
+                effect_up,
+                effect_down,
+            },
+        }
+    }
 }
 
 #[derive(Debug, Serialize)]
-pub(super) struct NetemConfiguration {
-    pub(super) listen: String,
-    pub(super) to: String,
-    pub(super) up: String,
-    pub(super) down: String,
-    pub(super) effect_up: Effect,
-    pub(super) effect_down: Effect,
+struct NetemConfiguration {
+    listen: String,
+    to: String,
+    up: String,
+    down: String,
+    effect_up: Effect,
+    effect_down: Effect,
 }
