@@ -8,6 +8,7 @@ use serde::Serialize;
 
 use crate::args::NetemArguments;
 
+/// The document of a relay.
 #[derive(Debug, Serialize)]
 pub(crate) struct NetemReport {
     pub(super) version: &'static str,

@@ -17,8 +17,6 @@ pub(super) const CHECK_EVERY: Duration = Duration::from_millis(50);
 pub(super) const DEGRADED: &str =
     "degraded: this host was too slow for the emulation, do not trust its delays";
 
-/// The document of a relay.
-
 /// What the networks up and down will do, worked out and printed while they are at work already.
 pub(super) fn announce(
     links: [&LinkConfig; 2],
