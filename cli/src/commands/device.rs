@@ -1,5 +1,6 @@
 //! The hand's device as a command uses it: a known one, or one that is plugged in. And `mmt device`.
 
+mod gauge;
 mod hand;
 mod list;
 mod test;

@@ -5,8 +5,8 @@
 use std::fmt;
 use std::time::Duration;
 
-use mmt_client::device::link::{HandOutput, Reading};
-use mmt_client::io::device::{DeviceHost, Seen};
+use mmt_client::device::link::HandOutput;
+use mmt_client::io::device::DeviceHost;
 use mmt_client::limiter::ForceLimiter;
 use mmt_client::operator::pointer::{Driver, HandTuning, Person};
 use mmt_client::operator::scripted::{Scripted, ScriptedConfig, View};
@@ -19,6 +19,7 @@ use mmt_shared::stats::histogram::Histogram;
 use mmt_shared::time::{TICK, Time};
 use serde::Serialize;
 
+use super::gauge::Gauge;
 use super::hand::Device;
 use crate::args::DeviceTestArguments;
 use crate::failure::{Exit, Failure};
@@ -80,66 +81,6 @@ impl From<&Histogram> for Spread {
         let of = of.quantiles();
         let [p50, p99, max] = [of.p50, of.p99, of.max].map(|one| one.as_secs_f64() * 1e3);
         Self { p50, p99, max }
-    }
-}
-
-/// What has come so far.
-#[derive(Debug)]
-struct Gauge {
-    first: Option<Time>,
-    last: Option<Time>,
-    readings: u64,
-    interval: Histogram,
-    /// How much later than the fastest before it each came by its stamp.
-    late: Histogram,
-    /// Least arrival less stamp, ns.
-    fastest: Option<i128>,
-    range: [(f64, f64); 3],
-    speed_max: f64,
-    buttons: u16,
-}
-
-impl Default for Gauge {
-    fn default() -> Self {
-        Self {
-            first: None,
-            last: None,
-            readings: 0,
-            interval: Histogram::default(),
-            late: Histogram::default(),
-            fastest: None,
-            range: [(f64::INFINITY, f64::NEG_INFINITY); 3],
-            speed_max: 0.0,
-            buttons: 0,
-        }
-    }
-}
-
-impl Gauge {
-    fn take(&mut self, Seen { at, reading }: &Seen) {
-        let Reading {
-            stamp_ns,
-            place,
-            velocity,
-            buttons,
-        } = reading;
-        if let Some(last) = self.last {
-            self.interval.record(at.saturating_since(last));
-        }
-        self.first = self.first.or(Some(*at));
-        self.last = Some(*at);
-        self.readings += 1;
-        let delay = i128::from(at.as_nanos()) - i128::from(*stamp_ns);
-        let fastest = self.fastest.map_or(delay, |fastest| fastest.min(delay));
-        self.fastest = Some(fastest);
-        let late = u64::try_from(delay - fastest).unwrap_or(u64::MAX);
-        self.late.record(Duration::from_nanos(late));
-        for ((least, most), metres) in self.range.iter_mut().zip(place) {
-            (*least, *most) = (least.min(*metres), most.max(*metres));
-        }
-        let speed = velocity.iter().map(|v| v * v).sum::<f64>().sqrt();
-        self.speed_max = self.speed_max.max(speed);
-        self.buttons |= buttons;
     }
 }
 
