@@ -3,6 +3,7 @@
 //! Pure. What the end is made of is written into the record and read back from it here, in one place; numbers from a file
 //! pass the same doors as numbers off the wire.
 
+use mmt_shared::model::architecture::Architecture;
 use mmt_shared::model::geometry::Vec2;
 use mmt_shared::pairing::{SECRET_BYTES, Token};
 use mmt_shared::range::OutOfRange;
@@ -10,7 +11,7 @@ use mmt_shared::record::again::{EndAgain, TickInput};
 use mmt_shared::record::digest::RunDigest;
 use mmt_shared::record::messages::{Arrival, MasterTick, Session};
 use mmt_shared::time::Time;
-use mmt_shared::wire::{Architecture, DecodeError, Side, StreamMessage, Welcome, WelcomeError};
+use mmt_shared::wire::{DecodeError, Side, StreamMessage, Welcome, WelcomeError};
 use serde::{Deserialize, Serialize};
 
 use crate::commands::CommandConfig;

@@ -3,9 +3,10 @@
 //! Pure and of fixed size. A sample is never sent in another form than it was first.
 
 use mmt_shared::channel::rate_control::StretchMax;
+use mmt_shared::model::architecture::Architecture;
 use mmt_shared::model::sample::HipSample;
 use mmt_shared::range::{OutOfRange, all_in_range};
-use mmt_shared::wire::{Architecture, SAMPLES_MAX, SampleBlock};
+use mmt_shared::wire::{SAMPLES_MAX, SampleBlock};
 use serde::{Deserialize, Serialize};
 
 /// Most ticks from one packed sample to the next: play-out takes its velocity from samples of 5 ms.

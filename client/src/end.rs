@@ -6,6 +6,7 @@
 use mmt_shared::channel::datagram_channel::DatagramChannel;
 use mmt_shared::channel::peer::{Freshness, NumbersSpent, SequenceWindow};
 use mmt_shared::metrics::{AgeOfInformation, ContactBreaks, ForcePeak};
+use mmt_shared::model::architecture::Architecture;
 use mmt_shared::model::geometry::Vec2;
 use mmt_shared::model::tool::{HandPort, Scene};
 use mmt_shared::model::update::{Cause, Update};
@@ -14,7 +15,7 @@ use mmt_shared::report::{
 };
 use mmt_shared::stats::session::UpdateDrops;
 use mmt_shared::time::{TICK, Time};
-use mmt_shared::wire::{Architecture, Command, Message, RawState, Side, ToolState};
+use mmt_shared::wire::{Command, Message, RawState, Side, ToolState};
 use serde::Serialize;
 
 use crate::commands::{CommandConfig, CommandPacker};

@@ -7,13 +7,14 @@ mod port;
 
 use std::time::Duration;
 
+use mmt_shared::model::architecture::Architecture;
 use mmt_shared::model::geometry::{Pose, Vec2};
 use mmt_shared::model::local_model::{LocalModel, Rendered};
 use mmt_shared::model::sample::{ForceCounts, HipCounts, HipSample};
 use mmt_shared::model::tool::{HandPort, Tool};
 use mmt_shared::model::update::{Cause, Update};
 use mmt_shared::time::{TICK_S, Time};
-use mmt_shared::wire::{Architecture, Welcome};
+use mmt_shared::wire::Welcome;
 
 use crate::failsafe::LinkState;
 use crate::limiter::ForceLimiter;

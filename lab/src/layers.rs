@@ -4,7 +4,9 @@
 //! with its place in the file.
 
 mod idle;
+mod keys;
 mod known;
+mod program;
 mod template;
 #[cfg(test)]
 mod tests;
@@ -13,72 +15,25 @@ use std::ops::Range;
 
 use mmt_netem::config::LinkConfig;
 use mmt_server::playout::PlayoutConfig;
-use mmt_server::slave::SlaveConfig;
 use serde::Serialize;
-use serde::de::DeserializeOwned;
 use toml::Spanned;
-use toml::de::{DeTable, DeValue, Deserializer};
+use toml::de::{DeTable, DeValue};
 
 pub(crate) use idle::{DEVICE_STIFFNESS, MODEL_STIFFNESS, idle_in_sweep};
 pub use known::{Known, Origin};
 pub use template::template;
 
 use crate::overlay::{lay, lay_at};
-use crate::sweep::{SEED_KEYS, Start, beginning};
+use crate::sweep::{Start, beginning};
 use crate::text_error::TextError;
 use crate::world::{World, WorldConfig};
+use keys::leaves_of;
+pub(crate) use keys::{at, configuration};
+pub use program::Program;
+pub(crate) use program::SEED_KEYS;
 
 /// The emulated network of a demo, each way, where nobody wants another one.
 const DEMO_NETWORK: &str = "delay 50ms 5ms loss 1%";
-
-/// Keys at the top of a file that hold for these as well, where the file does not give these.
-const SHARED: [(&str, &[&str]); 2] = [
-    ("seed", &["slave.seed", "operator.seed"]),
-    ("stretch_max", &["slave.stretch_max"]),
-];
-
-/// Who reads the configuration.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Program {
-    /// Both sides on one machine.
-    Demo,
-    /// The host with the object.
-    Slave,
-    /// The host with the hand.
-    Master,
-    /// Experiments in virtual time.
-    Sweep,
-}
-
-impl Program {
-    /// All of them.
-    pub const ALL: [Self; 4] = [Self::Demo, Self::Slave, Self::Master, Self::Sweep];
-
-    /// Its name on the command line.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Demo => "demo",
-            Self::Slave => "slave",
-            Self::Master => "master",
-            Self::Sweep => "sweep",
-        }
-    }
-
-    /// Whether a key has an effect in it; the keys of the other side have none.
-    #[must_use]
-    pub fn uses(self, key: &str) -> bool {
-        let any = |tables: &[&str]| tables.iter().any(|table| within(key, table));
-        // a session has the coupling of its device, and its estimator starts from `slave.start`
-        let used = !any(&["slave.environment.coupling"]) && !key.ends_with(".prior");
-        used && match self {
-            Self::Demo => !any(&["settings", "slave.plant"]),
-            Self::Slave => any(&["seed", "slave", "down"]),
-            Self::Master => !any(&["settings", "slave", "down"]),
-            Self::Sweep => !any(&SEED_KEYS) && !any(&["slave.plant"]),
-        }
-    }
-}
 
 /// A key that the command line sets.
 #[derive(Clone, Debug)]
@@ -251,90 +206,4 @@ impl<'a> Layers<'a> {
         self.flags
             .get(place.start.checked_sub(self.file.len() + 1)?)
     }
-}
-
-/// The keys of a file, each at its home.
-pub(crate) fn configuration(text: &str) -> Result<Spanned<DeTable<'_>>, toml::de::Error> {
-    let mut given = DeTable::parse(text)?;
-    bring_home(given.get_mut());
-    Ok(given)
-}
-
-/// Whether a key is `table` or stands in it.
-fn within(key: &str, table: &str) -> bool {
-    key.strip_prefix(table)
-        .is_some_and(|rest| rest.is_empty() || rest.starts_with('.'))
-}
-
-/// The value at a key written with dots.
-pub(crate) fn at<'t, 'i>(table: &'t DeTable<'i>, key: &str) -> Option<&'t Spanned<DeValue<'i>>> {
-    match key.split_once('.') {
-        None => table.get(key),
-        Some((first, rest)) => at(table.get(first)?.get_ref().as_table()?, rest),
-    }
-}
-
-/// Every value that is no table, with its key; an empty table is a value.
-fn leaves_of<'t, 'i>(
-    table: &'t DeTable<'i>,
-    path: &str,
-    leaves: &mut Vec<(String, &'t Spanned<DeValue<'i>>)>,
-) {
-    for (key, value) in table {
-        let key = format!("{path}{}", key.get_ref());
-        match value.get_ref() {
-            DeValue::Table(inner) if !inner.is_empty() => {
-                leaves_of(inner, &format!("{key}."), leaves);
-            }
-            _ => leaves.push((key, value)),
-        }
-    }
-}
-
-/// What stands at the top of a file and is the slave's alone belongs into `slave`, so that a file of a slave needs no
-/// other word before its keys; and what both sides share is given to each that has none of its own.
-fn bring_home(given: &mut DeTable) {
-    let (all, of_slave) = (fields::<WorldConfig>(), fields::<SlaveConfig>());
-    let top: Vec<String> = given.keys().map(|key| key.get_ref().to_string()).collect();
-    for name in top {
-        let Some((key, value)) = given.get_key_value(name.as_str()) else {
-            continue;
-        };
-        let (place, value) = (key.span(), value.clone());
-        let shared = SHARED.iter().find(|(shared, _)| *shared == name);
-        let own = format!("slave.{name}");
-        let moved = shared.is_none() && !all.contains(&name) && of_slave.contains(&name);
-        let mut homes = shared.map_or_else(Vec::new, |(_, homes)| homes.to_vec());
-        if moved {
-            homes.push(&own);
-        }
-        for home in homes {
-            // of a key that is there twice the one at the top is refused as unknown
-            if at(given, home).is_none() {
-                lay_at(given, home, &place, value.clone());
-                if moved {
-                    given.remove(name.as_str());
-                }
-            }
-        }
-    }
-}
-
-/// The names of a configuration's fields, as its reader lists them to who gives it another one.
-fn fields<T: DeserializeOwned>() -> Vec<String> {
-    let unknown = DeTable::parse("\"?\" = 0").map(|text| T::deserialize(Deserializer::from(text)));
-    let refused = unknown.map(|read| read.err());
-    refused.map_or_else(
-        |_| Vec::new(),
-        |error| error.map_or_else(Vec::new, |error| named(error.message())),
-    )
-}
-
-/// The fields that a message on an unknown one names.
-fn named(message: &str) -> Vec<String> {
-    let Some(message) = message.strip_prefix("unknown field ") else {
-        return Vec::new();
-    };
-    let words = message.split('`').skip(1).step_by(2);
-    words.skip(1).map(str::to_owned).collect()
 }

@@ -11,14 +11,6 @@ use serde::de::DeserializeOwned;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue, Deserializer, Error};
 
-/// The configuration `base` with the keys of a text laid over it.
-///
-/// # Errors
-/// The text is no TOML, a key is unknown or its value is none.
-pub fn laid_over<T: Serialize + DeserializeOwned>(base: &T, text: &str) -> Result<T, Error> {
-    lay(base, DeTable::parse(text)?, text.len())
-}
-
 /// The configuration `base` with the given keys laid over it; `text_len` is the length of the text that they stand in.
 ///
 /// # Errors

@@ -12,48 +12,11 @@ mod way;
 
 use std::time::Duration;
 
-use mmt_client::device::DeviceError;
-use mmt_client::operator::scripted::ScriptedConfig;
-use mmt_netem::config::ConfigError;
-use mmt_server::slave::SlaveError;
-use mmt_shared::range::OutOfRange;
-
-use crate::check::Verdict;
 use crate::worlds::RandomWorld;
 
 pub use faults::{Fault, Scheduled, draw};
-
-/// What a run of the swarm came to.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Swarmed {
-    /// Its seed.
-    pub seed: u64,
-    /// How many sessions there were.
-    pub sessions: u64,
-    /// The faults, in the order of their beginnings.
-    pub faults: Vec<Scheduled>,
-    /// What was found of all sessions.
-    pub verdict: Verdict,
-    /// Digest of what both ends gave: equal for equal seeds.
-    pub digest: u64,
-}
-
-/// Why a run could not be made: the generator is wrong.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum SwarmError {
-    /// The slave's numbers are not accepted.
-    #[error("slave: {0}")]
-    Slave(#[from] SlaveError),
-    /// The device's numbers are not accepted.
-    #[error("device: {0}")]
-    Device(#[from] DeviceError),
-    /// A number is out of its range.
-    #[error(transparent)]
-    Number(#[from] OutOfRange),
-    /// The network is none.
-    #[error("network: {0}")]
-    Network(#[from] ConfigError),
-}
+pub use run::Swarmed;
+pub use session::SwarmError;
 
 /// Runs the swarm's `seed` for as long as that.
 ///
@@ -70,14 +33,6 @@ pub fn swarm(seed: u64, duration: Duration) -> Result<Swarmed, SwarmError> {
     }
     let faults = draw(seed, duration, &Fault::ALL);
     run::Run::try_new(seed, &world, faults)?.finish(duration)
-}
-
-/// The hand of session `session`: another one each time.
-fn hand(world: &RandomWorld, session: u64) -> ScriptedConfig {
-    ScriptedConfig {
-        seed: world.number.wrapping_mul(1000).wrapping_add(session),
-        ..world.config.operator
-    }
 }
 
 #[cfg(test)]

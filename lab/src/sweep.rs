@@ -14,7 +14,6 @@ mod start;
 
 pub use measures::columns;
 pub use plan::{Axis, Plan, ROWS_MAX, Row, Seeds, Start};
-pub(crate) use reader::SEED_KEYS;
 pub use results::{PartError, Results, RowResult, part_header};
 pub use shard::{Shard, ShardError};
 pub(crate) use start::beginning;

@@ -11,7 +11,6 @@ pub use running::Running;
 
 use std::time::Duration;
 
-use mmt_client::operator::trace::Trace;
 use mmt_server::environment::{Environment, EnvironmentError};
 use mmt_server::slave::SlaveTick;
 use mmt_shared::metrics::{ForceSummary, UpdateCounts};
@@ -21,7 +20,7 @@ use mmt_shared::report::TrueForce;
 use mmt_shared::time::TICK_S;
 use serde::{Deserialize, Serialize};
 
-use crate::world::{Given, Traffic, World, WorldConfig, WorldError, WorldTick};
+use crate::world::{Traffic, World, WorldConfig, WorldError, WorldTick};
 use recovery::Watch;
 
 /// The first second of contact is the opening: the model starts wrong there.
@@ -162,30 +161,6 @@ impl Trial {
             config: self.config.seeded(seed),
             ..self
         }
-    }
-
-    /// Runs it.
-    ///
-    /// # Errors
-    /// When a number of the configuration or of the change is not accepted.
-    pub fn run(&self) -> Result<Measured, TrialError> {
-        self.run_in(World::try_new(&self.config)?)
-    }
-
-    /// Runs it with a hand that goes this way, whatever it feels.
-    ///
-    /// # Errors
-    /// As [`Trial::run`].
-    pub fn run_along(&self, hand: &Trace) -> Result<Measured, TrialError> {
-        self.run_in(World::along(&self.config, hand.clone())?)
-    }
-
-    fn run_in(&self, world: World) -> Result<Measured, TrialError> {
-        let mut running = Running::of(self, world);
-        while !running.is_over() {
-            running.step(Given::default())?;
-        }
-        Ok(running.into_measured())
     }
 }
 

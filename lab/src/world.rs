@@ -28,6 +28,7 @@ use crate::check::SessionChecks;
 
 mod config;
 mod datagram;
+mod delivery;
 mod given;
 mod measures;
 mod outcome;

@@ -16,12 +16,14 @@ mod print;
 mod sentence;
 #[cfg(test)]
 mod tests;
+mod word;
 
 pub use error::{ParseError, Reason};
 
 use crate::config::{LINKS_MAX, LinkConfig, Profile, STEPS_MAX, Shape, Step};
 use draft::Draft;
 use number::time;
+use word::Word;
 
 const A_WORD: &str = "delay, loss, outage, order, reorder, duplicate, corrupt, mtu, rate, queue, codel, \
                       cross, slot, ecn, limit, trace, seed, preset or none";
@@ -62,35 +64,6 @@ impl TryFrom<String> for LinkConfig {
 
     fn try_from(text: String) -> Result<Self, ParseError> {
         text.parse()
-    }
-}
-
-#[derive(Clone, Copy, Debug)]
-struct Word<'a> {
-    text: &'a str,
-    column: usize,
-}
-
-impl Word<'_> {
-    fn wrong(self, reason: Reason) -> ParseError {
-        ParseError {
-            word: self.text.to_owned(),
-            column: self.column,
-            reason,
-        }
-    }
-
-    fn expected(self, expected: &'static str) -> ParseError {
-        self.wrong(Reason::Expected { expected })
-    }
-
-    fn not_yet(self, feature: &'static str) -> ParseError {
-        self.wrong(Reason::NotSupportedYet { feature })
-    }
-
-    fn starts_a_number(self) -> bool {
-        self.text
-            .starts_with(|c: char| c.is_ascii_digit() || "+-.".contains(c))
     }
 }
 

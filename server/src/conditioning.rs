@@ -17,12 +17,11 @@ use crate::trigger::{ContactConfig, ContactDetector};
 use noise::{CONTACT_MAX, Noise};
 use withdrawal::Withdrawal;
 
+use noise::FIRST_SAMPLES;
 pub use noise::JUDGED_MAX;
 
 /// An averaged force of so many of its standard deviations is no noise.
 const DEVIATIONS: f64 = 5.0;
-/// Samples that the first bias and the first noise are measured by.
-const FIRST_SAMPLES: u32 = 100;
 /// A bias below this is left, N: half of F_min.
 const BIAS_LEFT_N: f64 = 0.02;
 /// No bias of an untouched tool is more, N: more is contact.

@@ -8,10 +8,11 @@ use std::time::Duration;
 use mmt_shared::channel::datagram_channel::DatagramChannel;
 use mmt_shared::channel::rate_control::StretchMax;
 use mmt_shared::metrics::UpdateCounts;
+use mmt_shared::model::architecture::Architecture;
 use mmt_shared::model::tool::{Scene, Tool};
 use mmt_shared::model::update::Update;
 use mmt_shared::time::Time;
-use mmt_shared::wire::{Architecture, Command, Hello, Message, Side, ToolState};
+use mmt_shared::wire::{Command, Hello, Message, Side, ToolState};
 
 use crate::plant::{PlantAnswer, PlantCommand};
 use crate::repeats::{Repeating, Repeats};

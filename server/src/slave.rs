@@ -33,6 +33,7 @@ use crate::trigger::{Scheme, Trigger};
 
 mod config;
 mod force_errors;
+mod linked;
 mod memory;
 mod object;
 mod plant;

@@ -1,5 +1,6 @@
 //! The domain's nouns and the local model: what both sides mean by a HIP sample, an update and a box, and how they compute it.
 
+pub mod architecture;
 pub mod contact;
 pub mod correction;
 pub mod dynamics;

@@ -10,8 +10,6 @@
     reason = "a target fails by panicking"
 )]
 
-use std::fmt::{self, Display, Write as _};
-
 mod config;
 mod device;
 mod drive;
@@ -19,163 +17,26 @@ mod inputs;
 mod link;
 mod mutate;
 mod numbers;
+mod outcome;
 mod page;
 mod plug;
 mod record;
 mod session;
+mod target;
 mod text;
 mod wire;
 
 pub use drive::{Failure, Plan, Ran, Watch, drive, shown};
 pub use mutate::Mutator;
-
-/// What a target made of an input.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Outcome {
-    /// Whether the decoder took it.
-    pub accepted: bool,
-    /// What sort of thing it was, or why it was refused: an input with a mark that no other had is mutated further.
-    pub mark: u64,
-}
-
-impl Outcome {
-    /// It was taken; `sort` tells sorts of inputs apart.
-    #[must_use]
-    pub fn taken(sort: u64) -> Self {
-        Self {
-            accepted: true,
-            mark: sort.wrapping_mul(2),
-        }
-    }
-
-    /// It was refused for this reason; what stands between quotes in it does not count.
-    #[must_use]
-    pub fn refused(why: &dyn Display) -> Self {
-        Self {
-            accepted: false,
-            mark: mark(why) | 1,
-        }
-    }
-
-    /// What becomes of a result whose value was judged already.
-    fn of<T>(result: Result<T, impl Display>) -> Self {
-        match result {
-            Ok(_) => Self::taken(0),
-            Err(why) => Self::refused(&why),
-        }
-    }
-}
-
-/// Hashes the letters of a text outside of quotes, the first 64 of them, without memory.
-struct Letters {
-    hash: u64,
-    left: u32,
-    quoted: bool,
-}
-
-impl fmt::Write for Letters {
-    fn write_str(&mut self, text: &str) -> fmt::Result {
-        for byte in text.bytes() {
-            if matches!(byte, b'"' | b'`' | b'\'') {
-                self.quoted = !self.quoted;
-            }
-            if !self.quoted && byte.is_ascii_alphabetic() {
-                if self.left == 0 {
-                    return Ok(());
-                }
-                self.left -= 1;
-                // FNV-1a
-                self.hash = (self.hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3);
-            }
-        }
-        Ok(())
-    }
-}
-
-fn mark(why: &dyn Display) -> u64 {
-    let mut letters = Letters {
-        hash: 0xcbf2_9ce4_8422_2325,
-        left: 64,
-        quoted: false,
-    };
-    // hashing cannot fail, and what fails to show itself has no letters
-    let _ = write!(letters, "{why}");
-    letters.hash
-}
-
-/// A fuzz target.
-#[derive(Clone, Copy)]
-pub struct Target {
-    /// Its name, also that of its folder in `tests/fuzz/corpus`.
-    pub name: &'static str,
-    /// What it decodes.
-    pub about: &'static str,
-    /// Decodes and judges an input.
-    ///
-    /// It panics where a promise does not hold.
-    pub run: fn(&[u8]) -> Outcome,
-    /// Inputs to begin with.
-    pub seeds: fn() -> Vec<Vec<u8>>,
-    /// Words that its inputs are made of.
-    pub words: &'static [&'static str],
-    /// The longest input, bytes.
-    pub longest: usize,
-    /// Its share of the inputs of all decoders, in thousandths; 0 of the session, which is counted by itself.
-    pub share: u32,
-    /// Memory that it may take at once beyond 64 times the length of its input, kB.
-    pub room_kb: u64,
-}
-
-/// A target with the usual bounds.
-const fn target(
-    name: &'static str,
-    about: &'static str,
-    run: fn(&[u8]) -> Outcome,
-    seeds: fn() -> Vec<Vec<u8>>,
-) -> Target {
-    Target {
-        name,
-        about,
-        run,
-        seeds,
-        words: &[],
-        longest: 1100,
-        share: 40,
-        room_kb: 1024,
-    }
-}
+pub use outcome::Outcome;
+pub use target::Target;
+use target::target;
 
 impl Target {
-    const fn words(mut self, words: &'static [&'static str]) -> Self {
-        self.words = words;
-        self
-    }
-
-    const fn longest(mut self, longest: usize) -> Self {
-        self.longest = longest;
-        self
-    }
-
-    const fn share(mut self, share: u32) -> Self {
-        self.share = share;
-        self
-    }
-
-    const fn room_kb(mut self, room_kb: u64) -> Self {
-        self.room_kb = room_kb;
-        self
-    }
-
     /// The target of this name.
     #[must_use]
     pub fn named(name: &str) -> Option<Self> {
         TARGETS.iter().find(|target| target.name == name).copied()
-    }
-
-    /// Whether its inputs are sequences of operations on a session, not bytes of a decoder.
-    #[must_use]
-    pub fn is_session(&self) -> bool {
-        self.share == 0
     }
 }
 

@@ -18,10 +18,9 @@ use std::time::Duration;
 use mmt_client::again::MasterSetting;
 use mmt_client::commands::CommandConfig;
 use mmt_client::device::DeviceProfile;
-use mmt_client::io::MasterLive;
 use mmt_client::io::hand_events::{HandEventSender, HandEvents, hand_events};
 use mmt_client::io::haptic::HapticLoop;
-use mmt_client::io::record;
+use mmt_client::io::{MasterLive, record};
 use mmt_client::operator::Operator;
 use mmt_client::operator::pointer::{Driver, HandEvent, HandTuning, Person, PointerSample};
 use mmt_client::operator::scripted::{Scripted, ScriptedConfig};
@@ -39,12 +38,13 @@ use mmt_shared::io::clock::Clock;
 use mmt_shared::io::loop_thread::{self, Frame, LoopHandle, LoopSide};
 use mmt_shared::io::record::Recorder;
 use mmt_shared::io::schedule::Tick;
+use mmt_shared::model::architecture::Architecture;
 use mmt_shared::model::geometry::Vec2;
 use mmt_shared::model::sample::HipSample;
 use mmt_shared::model::settings::Mode;
 use mmt_shared::pairing::Token;
 use mmt_shared::time::{TICK, Time};
-use mmt_shared::wire::{Architecture, DATAGRAM_MAX, Label, Message, Side, Welcome};
+use mmt_shared::wire::{DATAGRAM_MAX, Label, Message, Side, Welcome};
 
 use counting_allocator::counted;
 

@@ -33,9 +33,9 @@ use mmt_shared::io::identity::Identity;
 use mmt_shared::io::record::{Ended, RecordError, RecordOutcome, Recorder, read};
 use mmt_shared::io::transport::Transport;
 use mmt_shared::io::wish::Wish;
+use mmt_shared::model::architecture::Architecture;
 use mmt_shared::record::cdr::CdrWriter;
 use mmt_shared::record::messages::{Arrival, Message, Session, SlaveTick};
-use mmt_shared::wire::Architecture;
 use tokio::sync::watch;
 
 use crate::harness::in_real_time;

@@ -9,10 +9,11 @@ use mmt_netem::LinkConfig;
 use mmt_server::repeats::Repeats;
 use mmt_server::trigger::Scheme;
 use mmt_shared::channel::rate_control::StretchMax;
+use mmt_shared::model::architecture::Architecture;
 use mmt_shared::model::settings::Mode;
-use mmt_shared::wire::Architecture;
 
-use super::{DemoArguments, MasterArguments, SlaveArguments, values};
+use super::master::MasterArguments;
+use super::{DemoArguments, SlaveArguments, values};
 use crate::config::Flags;
 use crate::failure::Failure;
 

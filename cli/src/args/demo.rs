@@ -8,8 +8,8 @@ use mmt_netem::LinkConfig;
 use mmt_server::repeats::Repeats;
 use mmt_server::trigger::Scheme;
 use mmt_shared::channel::rate_control::StretchMax;
+use mmt_shared::model::architecture::Architecture;
 use mmt_shared::model::settings::Mode;
-use mmt_shared::wire::Architecture;
 
 use super::console::ConsoleArguments;
 use super::device::DeviceArguments;

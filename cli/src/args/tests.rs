@@ -1,5 +1,7 @@
 //! What the command line takes, and how it answers what it does not take.
 
+use std::time::Duration;
+
 use clap::CommandFactory;
 use mmt_lab::experiments::ALL;
 

@@ -10,9 +10,10 @@ use std::time::Duration;
 use clap::builder::{PossibleValue, PossibleValuesParser, RangedI64ValueParser, TypedValueParser};
 use mmt_netem::LinkConfig;
 use mmt_server::trigger::Scheme;
+use mmt_shared::model::architecture::Architecture;
 use mmt_shared::model::settings::Mode;
 use mmt_shared::pairing::{Address, AddressError, Host, TOKENS_MAX};
-use mmt_shared::wire::{Architecture, SAMPLES_MAX};
+use mmt_shared::wire::SAMPLES_MAX;
 
 /// The longest duration accepted: a week.
 const DURATION_MAX: Duration = Duration::from_secs(7 * 24 * 3600);

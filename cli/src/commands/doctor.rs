@@ -1,9 +1,8 @@
 //! `mmt doctor`: is this host fit for a 1 kHz loop, and does a slave answer.
 
+mod finding;
 mod host;
 mod peer;
-
-use std::fmt;
 
 use serde::Serialize;
 
@@ -11,75 +10,7 @@ use super::master::pairing;
 use crate::args::DoctorArguments;
 use crate::failure::{Exit, Failure};
 use crate::output::{note, print, print_json};
-
-/// How a finding is judged.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
-#[serde(rename_all = "snake_case")]
-enum Verdict {
-    /// As it should be.
-    Fit,
-    /// Sessions run; their figures are better with the remedy.
-    Advised,
-    /// Sessions suffer or do not begin.
-    Unfit,
-}
-
-impl Verdict {
-    fn word(self) -> &'static str {
-        match self {
-            Self::Fit => "fit",
-            Self::Advised => "advised",
-            Self::Unfit => "UNFIT",
-        }
-    }
-}
-
-/// One thing that was looked at.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-struct Finding {
-    /// What.
-    subject: &'static str,
-    verdict: Verdict,
-    /// What was found.
-    found: String,
-    /// What to do; none where nothing is to be done.
-    remedy: Option<String>,
-}
-
-impl Finding {
-    fn fit(subject: &'static str, found: impl fmt::Display) -> Self {
-        Self {
-            subject,
-            verdict: Verdict::Fit,
-            found: found.to_string(),
-            remedy: None,
-        }
-    }
-
-    fn of(
-        subject: &'static str,
-        verdict: Verdict,
-        found: impl fmt::Display,
-        remedy: impl fmt::Display,
-    ) -> Self {
-        Self {
-            verdict,
-            remedy: Some(remedy.to_string()),
-            ..Self::fit(subject, found)
-        }
-    }
-}
-
-impl fmt::Display for Finding {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (word, subject) = (self.verdict.word(), self.subject);
-        write!(f, "{word:9}{subject:18}{}", self.found)?;
-        match &self.remedy {
-            Some(remedy) => write!(f, "\n{:27}what to do: {remedy}", ""),
-            None => Ok(()),
-        }
-    }
-}
+use finding::{Finding, Verdict};
 
 /// All that was looked at.
 #[derive(Debug, Serialize)]
@@ -115,23 +46,4 @@ pub(crate) fn run(arguments: &DoctorArguments) -> Result<(), Failure> {
     }
     let what = format!("unfit: {}", subjects.join(", "));
     Err(Failure::new(Exit::Failed, what).remedy("what stands behind each finding"))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_finding_is_a_line_and_its_remedy_the_next() {
-        assert_eq!(
-            Finding::fit("clock", "tsc").to_string(),
-            "fit      clock             tsc"
-        );
-        let advised = Finding::of("clock", Verdict::Advised, "hpet", "use tsc").to_string();
-        let lines: Vec<&str> = advised.lines().collect();
-        assert_eq!(lines.len(), 2);
-        assert!(
-            lines[0].starts_with("advised  clock") && lines[1].ends_with("what to do: use tsc")
-        );
-    }
 }

@@ -2,72 +2,38 @@
 
 use std::net::{SocketAddr, ToSocketAddrs};
 use std::sync::mpsc::{Receiver, channel};
-use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use mmt_netem::config::ConfigError;
-use mmt_netem::io::relay::{Extras, Relay, RelayError, RelayHandle, RelaySnapshot};
+use mmt_netem::io::relay::{Extras, Relay, RelayHandle};
 use mmt_netem::record::Heading;
-use mmt_netem::{Direction, Effect, LinkConfig};
+use mmt_netem::{Direction, LinkConfig};
 use mmt_shared::pairing::Address;
-use serde::Serialize;
 
 use super::conclusion::conclude;
 use crate::args::{NetemArguments, NetemCommand};
-use crate::failure::{Exit, Failure};
+use crate::failure::Failure;
 use crate::log::Messages;
 use crate::output::{note, print, print_json};
 use crate::stop::Stop;
 
 pub(super) mod control;
+mod document;
 mod files;
 mod gauge;
 mod places;
 mod report;
 mod shell;
+mod start;
 mod table;
 mod trace;
 pub(super) mod wrap;
 
 use control::Command;
+pub(crate) use document::NetemReport;
 use files::{Files, record_file};
 use gauge::{Caption, Gauge};
 use places::Places;
-
-/// How often the state of the relay is checked.
-const CHECK_EVERY: Duration = Duration::from_millis(50);
-
-/// The last line of a run that the host was too slow for.
-const DEGRADED: &str =
-    "degraded: this host was too slow for the emulation, do not trust its delays";
-
-/// The document of a relay.
-#[derive(Debug, Serialize)]
-pub(crate) struct NetemReport {
-    version: &'static str,
-    command: &'static str,
-    seed: u64,
-    duration_s: f64,
-    ending: &'static str,
-    /// Whether this host was too slow for the run to be about these networks.
-    degraded: bool,
-    /// Whether a master was turned away because there were as many as --clients allows.
-    refused_clients: bool,
-    /// Whether a master that did not talk with the slave made room for a newer one.
-    displaced_clients: bool,
-    counters: RelaySnapshot,
-    configuration: NetemConfiguration,
-}
-
-#[derive(Debug, Serialize)]
-struct NetemConfiguration {
-    listen: String,
-    to: String,
-    up: String,
-    down: String,
-    effect_up: Effect,
-    effect_down: Effect,
-}
+use start::{CHECK_EVERY, announce, start_error};
 
 /// Runs `mmt netem`.
 ///
@@ -127,51 +93,20 @@ pub(crate) fn run(arguments: &NetemArguments, messages: &Messages) -> Result<(),
     let effects = effects.join();
     let effects =
         effects.map_err(|_| Failure::failed("the effect of the networks is not known"))?;
-    let (effect_up, effect_down) = effects.map_err(Failure::usage)?;
-    let report = NetemReport {
-        version: env!("CARGO_PKG_VERSION"),
-        command: "netem",
-        seed: arguments.seed,
+    let report = NetemReport::of(
+        arguments,
+        [local, to],
         duration_s,
         ending,
-        degraded: counters.lateness.degraded(),
-        refused_clients: counters.refused.packets > 0,
-        displaced_clients: counters.clients_displaced > 0,
         counters,
-        configuration: NetemConfiguration {
-            listen: local.to_string(),
-            to: to.to_string(),
-            up: arguments.up.to_string(),
-            down: arguments.down.to_string(),
-            effect_up,
-            effect_down,
-        },
-    };
+        effects.map_err(Failure::usage)?,
+    );
     let printed = if arguments.json {
         print_json(&report)
     } else {
         print(format_args!("\n{report}"))
     };
     conclude([printed, files.finish()])
-}
-
-/// What the networks up and down will do, worked out and printed while they are at work already.
-fn announce(
-    links: [&LinkConfig; 2],
-    rate: f64,
-    bytes: usize,
-    names: [String; 2],
-    messages: &Messages,
-) -> JoinHandle<Result<(Effect, Effect), ConfigError>> {
-    let ([up, down], [of_up, of_down]) = (links.map(LinkConfig::clone), names);
-    let messages = messages.clone();
-    std::thread::spawn(move || {
-        let effect_up = up.expected(rate, bytes)?;
-        messages.show(&format!("{of_up}: {effect_up}"));
-        let effect_down = down.expected(rate, bytes)?;
-        messages.show(&format!("{of_down}: {effect_down}"));
-        Ok((effect_up, effect_down))
-    })
 }
 
 fn heading(arguments: &NetemArguments) -> Heading {
@@ -285,21 +220,10 @@ fn resolve(address: &Address) -> Result<SocketAddr, Failure> {
         .ok_or_else(|| unknown("the name has no address".to_owned()))
 }
 
-fn start_error(error: RelayError) -> Failure {
-    match &error {
-        RelayError::Listen { .. } => Failure::new(Exit::Address, &error)
-            .remedy("give another --listen address, or port 0 for any free port"),
-        RelayError::Target { .. } | RelayError::Loop { .. } => {
-            Failure::usage(&error).remedy("give --to the address that the slave listens on")
-        }
-        RelayError::Config(_) => Failure::usage(&error).remedy("change --up or --down"),
-        RelayError::Thread(_) | RelayError::Broken(_) => Failure::failed(&error),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::failure::Exit;
 
     #[test]
     fn an_unknown_host_is_named_with_the_remedy() {
@@ -311,14 +235,5 @@ mod tests {
             text.contains("no-such-host.invalid:1") && text.contains("what to do"),
             "{text}"
         );
-    }
-
-    #[test]
-    fn a_relay_to_itself_is_wrong_input_and_an_address_in_use_has_its_own_code() {
-        let to = SocketAddr::from(([127, 0, 0, 1], 1));
-        assert_eq!(start_error(RelayError::Loop { to }).exit(), Exit::Usage);
-        let source = std::io::ErrorKind::AddrInUse.into();
-        let listen = RelayError::Listen { listen: to, source };
-        assert_eq!(start_error(listen).exit(), Exit::Address);
     }
 }

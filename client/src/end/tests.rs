@@ -4,6 +4,7 @@ mod silence;
 
 use super::*;
 use crate::limiter::{ForceLimiter, Limits};
+use mmt_shared::model::architecture::Architecture;
 use mmt_shared::model::contact::Coupling;
 use mmt_shared::model::geometry::{BoxFootprint, Pose, Twist};
 use mmt_shared::model::params::{ModelParams, ModelState};
@@ -13,7 +14,7 @@ use mmt_shared::model::tool::Tool;
 use mmt_shared::model::update::Cause;
 use mmt_shared::pairing::Token;
 use mmt_shared::time::TICK;
-use mmt_shared::wire::{Architecture, DATAGRAM_MAX, Label, Welcome};
+use mmt_shared::wire::{DATAGRAM_MAX, Label, Welcome};
 
 const AT: fn(u64) -> Time = Time::from_millis;
 

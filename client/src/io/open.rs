@@ -15,15 +15,17 @@ use mmt_shared::io::stream::{read_frame, write_message};
 use mmt_shared::io::transport::{
     CLOSE_FINISHED, Connection, Endpoint, RecvStream, SendStream, Transport, WriteError,
 };
+use mmt_shared::model::architecture::Architecture;
 use mmt_shared::model::geometry::Vec2;
 use mmt_shared::pairing::Pairing;
 use mmt_shared::wire::{
-    Architecture, Claim, DATAGRAM_MAX, Hello, Label, Refusal, Role, STREAM_MESSAGE_MAX, Side,
-    StreamMessage, Welcome,
+    Claim, DATAGRAM_MAX, Hello, Label, Refusal, Role, STREAM_MESSAGE_MAX, Side, StreamMessage,
+    Welcome,
 };
 use tokio::time::timeout;
 
-use super::{MasterHostError, MasterOptions, ResumeFile};
+use super::options::MasterOptions;
+use super::{MasterHostError, ResumeFile};
 use crate::commands::CommandConfig;
 
 /// How the program names itself to the slave.

@@ -8,7 +8,8 @@ use mmt_shared::report::{MasterHalf, PushesReport};
 
 use super::haptic::HapticLoop;
 use super::open::Connected;
-use super::{MasterConfiguration, MasterLive, MasterOptions, OperatorChoice};
+use super::options::{MasterOptions, OperatorChoice};
+use super::{MasterConfiguration, MasterLive};
 
 /// What the master counted and measured in the `duration` from the welcome to the farewell.
 pub(super) fn half(

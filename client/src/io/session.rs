@@ -19,11 +19,9 @@ use tokio::time::{Instant, error::Elapsed, timeout_at};
 
 use super::haptic::HapticLoop;
 use super::open::{Opened, Opening, TIMEOUTS, Timeouts, open};
+use super::options::MasterOptions;
 use super::report::half;
-use super::{
-    MasterConfiguration, MasterHostError, MasterLive, MasterOptions, MasterReport, SessionEnd,
-    record,
-};
+use super::{MasterConfiguration, MasterHostError, MasterLive, MasterReport, SessionEnd, record};
 use crate::again::MasterSetting;
 use crate::failsafe::LinkState;
 use crate::limiter::ForceLimiter;

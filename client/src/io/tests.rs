@@ -1,5 +1,8 @@
 //! What a master host promises, against a slave that the test plays.
 
+use crate::operator::trace::Trace;
+use mmt_netem::io::socket::SocketExtras;
+use mmt_shared::io::emergency::EmergencyStop;
 use std::time::Duration;
 
 use mmt_netem::LinkConfig;
@@ -8,6 +11,7 @@ use mmt_shared::io::connect::ConnectError;
 use mmt_shared::io::transport::Transport;
 use mmt_shared::io::wish::Wish;
 use mmt_shared::metrics::ForceSummary;
+use mmt_shared::model::architecture::Architecture;
 use mmt_shared::model::contact::Coupling;
 use mmt_shared::model::geometry::{Pose, Twist, Vec2};
 use mmt_shared::model::params::{ModelParams, ModelState};
@@ -15,7 +19,7 @@ use mmt_shared::model::update::Cause;
 use mmt_shared::pairing::{Pin, Token};
 use mmt_shared::report::{EstimateReport, ModelReport, RunReport, SentUpdates, SlaveHalf, named};
 use mmt_shared::time::{TICK, Time};
-use mmt_shared::wire::{Architecture, Ending, Message, Refusal};
+use mmt_shared::wire::{Ending, Message, Refusal};
 use tokio::sync::watch;
 use tokio::time::{Instant, sleep, timeout};
 

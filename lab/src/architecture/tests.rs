@@ -6,7 +6,6 @@ use mmt_netem::config::LinkConfig;
 use mmt_shared::model::geometry::Vec2;
 use mmt_shared::rng::Substream;
 use mmt_shared::time::TICK_S;
-use mmt_shared::wire;
 
 const RUN: Duration = Duration::from_secs(20);
 
@@ -289,7 +288,7 @@ fn tdpa_and_the_model_cross_at_a_short_delay_and_a_stiff_device_breaks_contact_w
 fn the_live_master_feels_the_tool_from_the_first_sample_and_makes_no_energy() {
     for words in ["delay 0ms", "delay 5ms", "delay 50ms 10ms loss 20%"] {
         let config = WorldConfig {
-            architecture: wire::Architecture::Tdpa,
+            architecture: mmt_shared::model::architecture::Architecture::Tdpa,
             ..over(words, 1000.0, 1)
         };
         let mut world = World::try_new(&config).unwrap();

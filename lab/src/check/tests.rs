@@ -10,12 +10,13 @@ use mmt_client::limiter::ForceLimiter;
 use mmt_client::master::{Master, MasterTick};
 use mmt_server::end::{SlaveEnd, SlaveGiven};
 use mmt_server::slave::{SlaveConfig, SlaveTick};
+use mmt_shared::model::architecture::Architecture;
 use mmt_shared::model::geometry::Vec2;
 use mmt_shared::model::update::Cause;
 use mmt_shared::pairing::Token;
 use mmt_shared::time::{TICK, Time};
 use mmt_shared::wire::{
-    Architecture, Claim, DATAGRAM_MAX, Datagram, Hello, Label, Message, Role, SampleBlock, Side,
+    Claim, DATAGRAM_MAX, Datagram, Hello, Label, Message, Role, SampleBlock, Side,
 };
 
 use super::*;

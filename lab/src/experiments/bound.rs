@@ -3,15 +3,13 @@
 //! The oracle ([`crate::oracle`]) has the run's own pushes, is allowed the force error that the scheme itself reached, and
 //! chooses with hindsight from the truth.
 
+mod case;
 mod figure;
 mod trace;
 
-use std::time::Duration;
-
-use mmt_server::trigger::Scheme;
-
 use crate::experiment::grid::Run;
 use crate::experiment::prelude::*;
+use case::{Case, Group, Rule, TARGET, ratio};
 use trace::Bounded;
 
 /// The bound, with as many seeds as fig. 5.
@@ -21,60 +19,6 @@ pub(super) const EXPERIMENT: Experiment = Experiment::new(
     10,
     run,
 );
-
-/// Deadbands, as shares.
-const DEADBANDS: [f64; 3] = [0.05, 0.10, 0.20];
-/// Demanded: updates over the fewest.
-const TARGET: f64 = 2.0;
-
-/// A scheme that is held to the bound.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Rule {
-    Useful,
-    Adaptive,
-}
-
-impl Rule {
-    const ALL: [Self; 2] = [Self::Useful, Self::Adaptive];
-
-    const fn name(self) -> &'static str {
-        match self {
-            Self::Useful => "useful",
-            Self::Adaptive => "adaptive",
-        }
-    }
-
-    /// Each with its default time.
-    fn at(self, delta: f64) -> Scheme {
-        match self {
-            Self::Useful => Curve::Useful(150).at(delta),
-            Self::Adaptive => Scheme::Adaptive {
-                delta,
-                horizon: Duration::from_millis(50),
-            },
-        }
-    }
-}
-
-/// A point of the experiment.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Case {
-    rule: Rule,
-    deadband: f64,
-}
-
-impl Case {
-    fn all() -> Vec<Self> {
-        let of = |rule| DEADBANDS.map(|deadband| Self { rule, deadband });
-        Rule::ALL.into_iter().flat_map(of).collect()
-    }
-
-    fn world(self) -> WorldConfig {
-        paper_world(Mode::Recommended, self.rule.at(self.deadband))
-    }
-}
-
-type Group = grid::Group<Case, Bounded>;
 
 /// Keeps `bound.csv` and `bound.svg`.
 fn run(runner: &Runner, request: &Request) -> Result<Findings, ExperimentError> {
@@ -132,9 +76,4 @@ fn summary(groups: &[Group]) -> Table {
         if ratio.mean <= TARGET { "met" } else { "not met" }
     })));
     Table::of("Updates over the fewest of an oracle with hindsight: mean over the seeds", groups, &columns)
-}
-
-/// Geometric mean of updates over the fewest.
-fn ratio(group: &Group) -> Option<Interval> {
-    Interval::of_ratios(group.values(Bounded::ratio))
 }

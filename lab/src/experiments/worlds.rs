@@ -2,12 +2,14 @@
 //!
 //! What the hand can move is judged by force, the rest by pose, sign and energy.
 
+mod row;
 mod run;
 mod tables;
 
 use crate::experiment::prelude::*;
 use crate::worlds::RandomWorld;
-use run::{Measured as Reached, reach};
+use row::Row;
+use run::reach;
 
 /// The worlds.
 pub(super) const EXPERIMENT: Experiment = Experiment {
@@ -32,12 +34,6 @@ pub(super) const EXPERIMENT: Experiment = Experiment {
         run,
     )
 };
-
-/// A world and what came of it.
-struct Row {
-    world: RandomWorld,
-    reached: Reached,
-}
 
 /// Keeps `worlds.csv` and `worlds.svg`.
 fn run(runner: &Runner, request: &Request) -> Result<Findings, ExperimentError> {

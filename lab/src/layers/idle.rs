@@ -12,7 +12,8 @@ use mmt_server::trigger::{MismatchMetric, Scheme};
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-use super::{Program, at, within};
+use super::keys::{at, within};
+use super::program::Program;
 use crate::text_error::TextError;
 use crate::world::WorldConfig;
 

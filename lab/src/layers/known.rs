@@ -8,8 +8,10 @@ use serde::Serialize;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
+use super::Layers;
 use super::idle::idle;
-use super::{Layers, SEED_KEYS, at, named, within};
+use super::keys::{at, named, within};
+use super::program::SEED_KEYS;
 use crate::overlay::{lay, lay_at};
 use crate::text_error::TextError;
 use crate::world::{World, WorldConfig};

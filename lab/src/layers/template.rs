@@ -6,7 +6,8 @@ use std::fmt::Write;
 
 use mmt_shared::model::settings::Mode;
 
-use super::{Flag, Known, Layers, Program};
+use super::program::Program;
+use super::{Flag, Known, Layers};
 use crate::text_error::TextError;
 
 /// What the file begins with.

@@ -7,8 +7,8 @@ use mmt_shared::model::geometry::{Twist, Vec2};
 use mmt_shared::model::params::{SPEED_M_PER_S, TURN_RATE_RAD_PER_S};
 use mmt_shared::time::TICK_S;
 
+use super::body::{Dynamics, PhysicsError};
 use super::reference::{FinePatch, Line, STEPS, State};
-use super::{Dynamics, PhysicsError, Source, TracePoint};
 
 /// Force of the push, force (N) and torque (N m) of the wrench.
 const PUSH_N: f64 = 4.0;
@@ -325,4 +325,24 @@ impl Place {
     fn part(&self, turns: bool) -> f64 {
         if turns { self.angle } else { self.shift }
     }
+}
+
+/// Where a reference comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Source {
+    /// A closed form of (1), (7) with the friction of (9).
+    ClosedForm,
+    /// The fine patch.
+    FinePatch,
+}
+
+/// One instant of a trace.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TracePoint {
+    /// Time since the start of the motion, s.
+    pub t_s: f64,
+    /// What the environment did.
+    pub measured: f64,
+    /// What it should have done.
+    pub reference: f64,
 }

@@ -4,7 +4,7 @@
 //! is not smoothed, and time is stepped explicitly by the midpoint rule. It must never look at a measured
 //! motion.
 
-use super::Dynamics;
+use super::body::Dynamics;
 
 /// Points of the fine patch along one side.
 const POINTS_PER_SIDE: usize = 48;

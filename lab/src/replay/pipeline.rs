@@ -13,7 +13,6 @@ use std::time::Duration;
 
 use mmt_server::trigger::Scheme;
 use mmt_shared::recording::Recording;
-use serde::Serialize;
 
 use super::report::percent;
 use crate::table::{Table, column};
@@ -21,7 +20,7 @@ use crate::world::WorldError;
 use course::Course;
 use hold::Hold;
 
-pub use measures::Errors;
+pub use measures::{Errors, PipelineReport};
 
 /// Update scheme of mmt. Chosen on `black-patch` alone.
 const MMT: Scheme = Scheme::Deadband { delta: 0.08 };
@@ -29,26 +28,6 @@ const MMT: Scheme = Scheme::Deadband { delta: 0.08 };
 const HELD: [f64; 3] = [0.10, 0.15, 0.20];
 /// One-way delays, ms.
 const DELAYS_MS: [u64; 2] = [0, 250];
-
-/// One scheme over one delay, over all pushes of a recording in their order.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct PipelineReport {
-    /// `mmt`, or `hold`: the last measured force.
-    pub system: &'static str,
-    /// When it sends.
-    pub scheme: String,
-    /// One-way delay, ms.
-    pub delay_ms: u64,
-    /// Updates that left the slave, of every cause.
-    pub sent: u64,
-    /// Time in contact by the recorded force, s.
-    pub contact_s: f64,
-    /// Updates per second of contact; none without contact.
-    pub contact_rate_hz: Option<f64>,
-    /// Errors of the rendered force.
-    #[serde(flatten)]
-    pub errors: Errors,
-}
 
 /// Runs every scheme over every delay.
 ///

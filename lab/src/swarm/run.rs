@@ -9,8 +9,7 @@ use mmt_shared::rng::Substream;
 use mmt_shared::time::{TICK, Time};
 
 use super::faults::{Fault, Now, Scheduled};
-use super::session::{BETWEEN, Moment, Session};
-use super::{SwarmError, Swarmed};
+use super::session::{BETWEEN, Moment, Session, SwarmError};
 use crate::check::Verdict;
 use crate::worlds::RandomWorld;
 
@@ -186,4 +185,19 @@ fn note(digest: &mut RunDigest, numbers: [f64; 2]) {
     for number in numbers {
         digest.datagram(&number.to_bits().to_le_bytes());
     }
+}
+
+/// What a run of the swarm came to.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Swarmed {
+    /// Its seed.
+    pub seed: u64,
+    /// How many sessions there were.
+    pub sessions: u64,
+    /// The faults, in the order of their beginnings.
+    pub faults: Vec<Scheduled>,
+    /// What was found of all sessions.
+    pub verdict: Verdict,
+    /// Digest of what both ends gave: equal for equal seeds.
+    pub digest: u64,
 }

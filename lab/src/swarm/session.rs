@@ -12,17 +12,22 @@ use mmt_client::operator::Operator;
 use mmt_client::operator::scripted::Scripted;
 use mmt_server::end::{SlaveEnd, SlaveGiven, session_config};
 use mmt_server::slave::{Memory, SlaveTick};
+use mmt_shared::model::architecture::Architecture;
 use mmt_shared::model::geometry::Vec2;
 use mmt_shared::pairing::Token;
 use mmt_shared::rng::Substream;
 use mmt_shared::time::{TICK, Time};
-use mmt_shared::wire::{Architecture, Claim, DATAGRAM_MAX, Hello, Label, Role, Side};
+use mmt_shared::wire::{Claim, DATAGRAM_MAX, Hello, Label, Role, Side};
 
 use super::faults::{Fault, Now};
 use super::way::Way;
-use super::{SwarmError, hand};
 use crate::check::{SessionChecks, Verdict};
 use crate::worlds::RandomWorld;
+use mmt_client::device::DeviceError;
+use mmt_client::operator::scripted::ScriptedConfig;
+use mmt_netem::config::ConfigError;
+use mmt_server::slave::SlaveError;
+use mmt_shared::range::OutOfRange;
 
 /// How the world's time, the slave's clock and the faults stand in a millisecond.
 pub(super) struct Moment<'a> {
@@ -265,3 +270,28 @@ fn disturbed(reading: Vec2, faults: &Now) -> Vec2 {
 const FAREWELL_TICKS: u32 = 50;
 /// From the end of a session to the beginning of the next.
 pub(super) const BETWEEN: Duration = Duration::from_millis(300);
+
+/// Why a run could not be made: the generator is wrong.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum SwarmError {
+    /// The slave's numbers are not accepted.
+    #[error("slave: {0}")]
+    Slave(#[from] SlaveError),
+    /// The device's numbers are not accepted.
+    #[error("device: {0}")]
+    Device(#[from] DeviceError),
+    /// A number is out of its range.
+    #[error(transparent)]
+    Number(#[from] OutOfRange),
+    /// The network is none.
+    #[error("network: {0}")]
+    Network(#[from] ConfigError),
+}
+
+/// The hand of session `session`: another one each time.
+pub(super) fn hand(world: &RandomWorld, session: u64) -> ScriptedConfig {
+    ScriptedConfig {
+        seed: world.number.wrapping_mul(1000).wrapping_add(session),
+        ..world.config.operator
+    }
+}

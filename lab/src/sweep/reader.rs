@@ -14,7 +14,7 @@ use super::given::{Given, outdone};
 use super::placed::{AxisHead, PlacedAxis, placed_axis};
 use super::plan::{Plan, ROWS_MAX, Seeds, Start, steps};
 use super::start::beginning;
-use crate::layers::configuration;
+use crate::layers::{SEED_KEYS, configuration};
 use crate::overlay::{lay, lay_at, lay_over};
 use crate::text_error::TextError;
 use crate::trial::{Change, TrialError};
@@ -24,8 +24,6 @@ use crate::world::{World, WorldConfig};
 const DURATION_S: (f64, f64) = (0.001, 604_800.0);
 /// The most parts of a key: no configuration is as deep, and each part is a table in a table.
 const KEY_PARTS_MAX: usize = 16;
-/// What the seeds of a plan set.
-pub(crate) const SEED_KEYS: [&str; 3] = ["seed", "slave.seed", "operator.seed"];
 
 impl Plan {
     /// The plan of a text in TOML (`docs/sweep.md` has its keys).

@@ -5,6 +5,32 @@ use mmt_client::operator::trace::Trace;
 use super::{Change, Counters, Measured, Trial, TrialError, Watch};
 use crate::world::{Given, World, WorldPackets, WorldTick};
 
+impl Trial {
+    /// Runs it.
+    ///
+    /// # Errors
+    /// When a number of the configuration or of the change is not accepted.
+    pub fn run(&self) -> Result<Measured, TrialError> {
+        self.run_in(World::try_new(&self.config)?)
+    }
+
+    /// Runs it with a hand that goes this way, whatever it feels.
+    ///
+    /// # Errors
+    /// As [`Trial::run`].
+    pub fn run_along(&self, hand: &Trace) -> Result<Measured, TrialError> {
+        self.run_in(World::along(&self.config, hand.clone())?)
+    }
+
+    fn run_in(&self, world: World) -> Result<Measured, TrialError> {
+        let mut running = Running::of(self, world);
+        while !running.is_over() {
+            running.step(Given::default())?;
+        }
+        Ok(running.into_measured())
+    }
+}
+
 /// A trial on its way.
 pub struct Running {
     world: World,

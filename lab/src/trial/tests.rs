@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::setting::{Curve, paper_world};
+use crate::world::Given;
 use mmt_shared::model::settings::Mode;
 
 fn trial(seconds: u64) -> Trial {

@@ -9,10 +9,10 @@ use mmt_netem::config::{ConfigError, LinkConfig};
 use mmt_server::end::SlaveEndConfig;
 use mmt_server::slave::{SlaveConfig, SlaveError};
 use mmt_shared::channel::rate_control::StretchMax;
+use mmt_shared::model::architecture::Architecture;
 use mmt_shared::model::contact::Coupling;
 use mmt_shared::model::settings::ModelSettings;
 use mmt_shared::range::OutOfRange;
-use mmt_shared::wire::Architecture;
 use serde::{Deserialize, Serialize};
 
 /// Everything that a run depends on.

@@ -7,7 +7,6 @@ use mmt_shared::record::packet::PacketWatch;
 use mmt_shared::time::Time;
 use mmt_shared::wire::Side;
 
-use super::World;
 use super::datagram::Datagram;
 
 /// A datagram that an end handed to the network.
@@ -80,7 +79,7 @@ impl WorldPackets {
     }
 
     /// The network is done with it.
-    fn ended(&mut self, direction: Direction, departure: &Departure<Datagram>) {
+    pub(super) fn ended(&mut self, direction: Direction, departure: &Departure<Datagram>) {
         let [ups, downs] = &self.places;
         let places = match direction {
             Direction::Up => ups,
@@ -94,44 +93,5 @@ impl WorldPackets {
                 packet.end = Some(Entry::of(direction, departure).end);
             }
         }
-    }
-}
-
-impl World {
-    /// What comes through next in a direction by now; what is dropped before it is noted.
-    pub(super) fn next(&mut self, direction: Direction) -> Option<Departure<Datagram>> {
-        let link = match direction {
-            Direction::Up => &mut self.up,
-            Direction::Down => &mut self.down,
-        };
-        while let Some(departure) = link.poll(self.now) {
-            if let Some(packets) = &mut self.packets {
-                packets.ended(direction, &departure);
-            }
-            if departure.is_delivered() {
-                return Some(departure);
-            }
-        }
-        None
-    }
-
-    /// The same, keeping every datagram from now on.
-    #[must_use]
-    pub fn with_packets(mut self) -> Self {
-        self.packets = Some(Box::default());
-        self
-    }
-
-    /// The datagrams in the order of sending; none where they are not kept.
-    #[must_use]
-    pub fn packets(&self) -> Vec<WorldPacket> {
-        let packets = self.packets.as_ref();
-        packets.map_or_else(Vec::new, |packets| packets.read())
-    }
-
-    /// The same, handed out; from now on none is kept.
-    pub fn take_packets(&mut self) -> WorldPackets {
-        let packets = self.packets.take();
-        packets.map_or_else(WorldPackets::default, |packets| *packets)
     }
 }

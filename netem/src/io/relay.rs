@@ -6,113 +6,46 @@
 
 use std::io;
 use std::net::{SocketAddr, UdpSocket};
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex};
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-use mmt_shared::io::alarm::Alarm;
 use mmt_shared::stats::histogram::Quantiles;
 use mmt_shared::time::Time;
-use serde::Serialize;
 
 use super::capture_file::CaptureWriter;
-use super::driver::{DirectionCounters, Driver, SidesOf};
-use super::lateness::{Lateness, Recorder};
+use super::driver::{Driver, SidesOf};
+use super::lateness::Recorder;
 use super::record_file::RecordWriter;
 use super::{lock, now};
 use crate::config::{ConfigError, LinkConfig};
-use crate::counters::Tally;
 use crate::direction::LinkId;
 
 mod clients;
+mod error;
 mod origin;
 mod pace;
 mod port;
+mod shared;
 mod sockets;
 mod standing;
 #[cfg(test)]
 mod tests;
 mod worker;
 
+pub use clients::CLIENT_IDLE;
 use clients::Clients;
+pub use error::RelayError;
 use origin::Origin;
 use port::Port;
+pub use shared::RelaySnapshot;
+pub(super) use shared::Shared;
 use worker::Worker;
 
 /// Clients at one time unless [`Extras::clients`] sets another number. One more takes the place of one that does not talk with
 /// the target; where all do, its datagrams are dropped and counted. Each holds one descriptor.
 pub const CLIENTS: usize = 64;
-/// A client without a datagram in either direction for this long is forgotten: four times QUIC's own
-/// idle timeout in this project.
-pub const CLIENT_IDLE: Duration = Duration::from_secs(60);
-
-/// A relay could not be started, or broke.
-#[derive(Debug, thiserror::Error)]
-pub enum RelayError {
-    /// The settings of a link are out of range.
-    #[error(transparent)]
-    Config(#[from] ConfigError),
-    /// The target is no address to send to.
-    #[error("relay target {to}: give the address and the port of a host")]
-    Target {
-        /// The target given.
-        to: SocketAddr,
-    },
-    /// The relay would send to itself.
-    #[error("relay target {to} is the relay's own address: its packets would go round for ever")]
-    Loop {
-        /// The target given.
-        to: SocketAddr,
-    },
-    /// The address to listen on cannot be had.
-    #[error("relay cannot listen on {listen}: {source}")]
-    Listen {
-        /// The address given.
-        listen: SocketAddr,
-        /// The system's answer.
-        source: io::Error,
-    },
-    /// The system gave no event descriptor or no thread.
-    #[error("no thread for the relay: {0}")]
-    Thread(io::Error),
-    /// The relay's thread ended by itself.
-    #[error("the relay broke off: {0}")]
-    Broken(io::Error),
-}
-
-/// What the relay did so far. The counts of one snapshot are those of one moment.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
-pub struct RelaySnapshot {
-    /// From the clients (masters) to the target (slave).
-    pub up: DirectionCounters,
-    /// From the target (slave) to the clients (masters).
-    pub down: DirectionCounters,
-    /// Clients that have a place at the relay now.
-    pub clients: u64,
-    /// Clients that the relay met since its start.
-    pub clients_met: u64,
-    /// Clients that had to make room for newer ones: there were as many as there can be, and they did not talk with the target.
-    pub clients_displaced: u64,
-    /// Datagrams from clients for which nobody had to make room, or without a socket to be had: never offered.
-    pub refused: Tally,
-    /// Datagrams from clients that the kernel dropped because the relay did not read in time: never offered.
-    pub overflows_up: u64,
-    /// The same of datagrams from the target.
-    pub overflows_down: u64,
-    /// Times that the target's host answered that nobody listens there (ICMP port unreachable).
-    pub unreachable: u64,
-    /// Other errors of receiving.
-    pub receive_errors: u64,
-    /// Times that a client got a new port toward the target.
-    pub rebinds: u64,
-    /// Packets that the record misses, because the disk was too slow.
-    pub unrecorded: u64,
-    /// Packets that the capture misses, because the disk was too slow.
-    pub uncaptured: u64,
-    /// How late packets left, both directions.
-    pub lateness: Lateness,
-}
 
 /// What a relay can do besides.
 #[derive(Debug, Default)]
@@ -126,13 +59,6 @@ pub struct Extras {
     pub rebind_every: Option<Duration>,
     /// Clients at one time; none: [`CLIENTS`].
     pub clients: Option<usize>,
-}
-
-/// What the handle asks of the thread.
-#[derive(Debug, Default)]
-pub(super) struct Commands {
-    pub(super) links: Option<(LinkConfig, LinkConfig)>,
-    rebind: bool,
 }
 
 /// The relay as such: [`Relay::bind`] starts one.
@@ -212,32 +138,6 @@ pub struct RelayHandle {
     local: Option<SocketAddr>,
     shared: Arc<Shared>,
     thread: Option<JoinHandle<io::Result<()>>>,
-}
-
-/// What the relay's thread and its handle share.
-#[derive(Debug)]
-pub(super) struct Shared {
-    pub(super) alarm: Alarm,
-    pub(super) stopping: AtomicBool,
-    pub(super) commands: Mutex<Commands>,
-    /// The counts as of the thread's last round, without the lateness.
-    pub(super) board: Mutex<RelaySnapshot>,
-    lateness: Arc<Recorder>,
-    /// Delays up and down since somebody last asked.
-    delays: [Arc<Recorder>; 2],
-}
-
-impl Shared {
-    pub(super) fn try_new() -> Result<Arc<Self>, RelayError> {
-        Ok(Arc::new(Self {
-            alarm: Alarm::try_new().map_err(RelayError::Thread)?,
-            stopping: AtomicBool::new(false),
-            commands: Mutex::default(),
-            board: Mutex::default(),
-            lateness: Arc::default(),
-            delays: Default::default(),
-        }))
-    }
 }
 
 impl RelayHandle {

@@ -7,7 +7,7 @@
 
 use std::fmt;
 use std::io::{self, IoSliceMut};
-use std::net::{IpAddr, SocketAddr};
+use std::net::SocketAddr;
 use std::pin::Pin;
 use std::sync::Arc;
 use std::task::{Context, Poll};
@@ -15,7 +15,7 @@ use std::task::{Context, Poll};
 use quinn::udp::{RecvMeta, Transmit};
 use quinn::{AsyncUdpSocket, UdpPoller};
 
-use crate::config::{ConfigError, LinkConfig};
+use crate::config::LinkConfig;
 use crate::direction::LinkId;
 use crate::io::driver::Datagram;
 use crate::io::record_file::RecordWriter;
@@ -23,23 +23,15 @@ use crate::io::record_file::RecordWriter;
 mod control;
 mod meter;
 mod release;
+mod segments;
 #[cfg(test)]
 mod tests;
 
 pub use control::SocketControl;
 pub use meter::{SocketCounters, SocketMeter};
-use release::Release;
-
-/// A socket could not be wrapped.
-#[derive(Debug, thiserror::Error)]
-pub enum WrapError {
-    /// The settings of the link are out of range.
-    #[error(transparent)]
-    Config(#[from] ConfigError),
-    /// The system gave no event descriptor or no thread.
-    #[error("no thread for the emulated link: {0}")]
-    Thread(#[from] io::Error),
-}
+pub use release::WrapError;
+use release::{Address, Release};
+use segments::segments;
 
 /// What a wrapped socket can do besides. With any of it there is a thread even while there is nothing to
 /// emulate.
@@ -84,7 +76,11 @@ impl EmulatedSocket {
         let release = if config.is_transparent() && extras.is_empty() {
             None
         } else {
-            Some(Release::start(&inner, config, seed, id, &meter, extras)?)
+            let release = Release::start(&inner, config, seed, id, &meter, extras.record)?;
+            if let Some(control) = extras.control {
+                control.attach(release.shared())?;
+            }
+            Some(release)
         };
         Ok(Self {
             inner,
@@ -178,21 +174,4 @@ impl UdpPoller for AlwaysWritable {
     fn poll_writable(self: Pin<&mut Self>, _: &mut Context<'_>) -> Poll<io::Result<()>> {
         Poll::Ready(Ok(()))
     }
-}
-
-/// Where an outgoing datagram goes, and from which address.
-#[derive(Clone, Copy, Debug)]
-struct Address {
-    destination: SocketAddr,
-    src_ip: Option<IpAddr>,
-}
-
-/// The datagrams in a transmit: one, or as many as the segment size makes of it.
-fn segments<'a>(transmit: &Transmit<'a>) -> impl Iterator<Item = &'a [u8]> {
-    let contents = transmit.contents;
-    let whole = contents.len().max(1);
-    let size = transmit.segment_size.unwrap_or(whole).clamp(1, whole);
-    // an empty datagram is one datagram too
-    let empty = contents.is_empty().then_some(contents);
-    contents.chunks(size).chain(empty)
 }

@@ -1,6 +1,7 @@
 //! Settings as far as they are read, and which words were seen.
 
-use super::{ParseError, Reason, Word};
+use super::word::Word;
+use super::{ParseError, Reason};
 use crate::config::{Chance, Delay, LinkConfig, Loss, Probability, Reorder, Shape};
 
 /// Settings as far as they are read.

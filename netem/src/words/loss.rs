@@ -4,7 +4,8 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use super::number::{percentage, time, time_from, whole};
-use super::{ParseError, Parser, Word};
+use super::word::Word;
+use super::{ParseError, Parser};
 use crate::config::{
     BURST_MIN, FourState, GilbertElliott, Loss, Outage, PacketList, Probability, TimedBursts,
 };

@@ -2,7 +2,8 @@
 
 use std::time::Duration;
 
-use super::{ParseError, Reason, Word};
+use super::word::Word;
+use super::{ParseError, Reason};
 use crate::config::{DELAY_MAX, Probability, RATE_MAX_BIT_S};
 
 const A_TIME: &str = "a time with its unit, such as 50ms (s, ms, us, ns)";

@@ -6,7 +6,8 @@ use super::draft::Draft;
 use super::number::{
     QueueLimit, bits_per_second, percentage, queue_limit, signed_bytes, time, time_from, whole,
 };
-use super::{A_WORD, ParseError, Parser, Reason, SHAPES, Word};
+use super::word::Word;
+use super::{A_WORD, ParseError, Parser, Reason, SHAPES};
 use crate::config::{
     Chance, Codel, Correlation, Cross, Delay, Framing, LIMIT_MAX, Limit, Order, Probability, Queue,
     Rate, STEPS_MAX, Service, Shape, Slot, SlotGap, TAU_MIN,

@@ -2,8 +2,8 @@
 
 use mmt_shared::model::geometry::Vec2;
 
-use super::FIRST_SAMPLES;
-
+/// Samples that the first bias and the first noise are measured by.
+pub(super) const FIRST_SAMPLES: u32 = 100;
 /// Noise per axis that thresholds are made for, N: twice the default sensor's. Contact begins at 0.10 N: five of it.
 const NOISE_N: f64 = 0.02;
 /// The same of the default sensor: what is taken for true before it has been measured, N.

@@ -9,10 +9,11 @@ use mmt_shared::time::TICK_S;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
+use super::estimate::{Estimate, STICK_SPEED};
 use super::kalman::{KalmanConfig, MotionFilter};
+use super::measured::Measured;
 use super::surface::Surface;
 use super::windowed::{Rows, WindowedLeastSquares};
-use super::{Estimate, Measured, STICK_SPEED};
 
 /// Which motion is taken for the object's.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]

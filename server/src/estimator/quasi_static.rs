@@ -9,7 +9,8 @@ use mmt_shared::time::TICK_S;
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 
-use super::{Estimate, Measured};
+use super::estimate::Estimate;
+use super::measured::Measured;
 
 /// Settings of the quasi-static estimator.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]

@@ -11,13 +11,14 @@ use serde::{Deserialize, Serialize};
 
 use super::creep::Creep;
 use super::direction::{DirectionConfig, ForceDirection};
+use super::estimate::{Estimate, STICK_SPEED};
 use super::filter::{Row, StateVariableFilter, stage_weight};
 use super::gate::{Gate, GateConfig, GateState};
+use super::measured::{Measured, Seen};
 use super::obstacle::{Friction, MotionState, Obstacle};
 use super::recursive::{RecursiveConfig, RecursiveLeastSquares, Verdict};
 use super::surface::{Surface, SurfaceMotion};
-use super::turning::{self, Seen};
-use super::{Estimate, Measured, STICK_SPEED};
+use super::turning;
 
 /// Rows between two copies of the regression. On an obstacle the older copy returns: what was learned while
 /// the object ran up against it is no friction.

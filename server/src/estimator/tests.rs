@@ -4,6 +4,7 @@ mod first_press;
 mod paper;
 mod plant;
 
+use mmt_shared::model::geometry::Vec2;
 use proptest::prelude::*;
 
 use super::filter::StateVariableFilter;

@@ -6,40 +6,15 @@
 //! It must never change the row of a push through the centre of an object that does not turn.
 
 use mmt_shared::model::geometry::{Vec2, cross};
-use mmt_shared::model::params::{FACE_OFFSET_M, TURN_RATE_RAD_PER_S};
 use nalgebra::Vector3;
 
-use super::POSITION_LIMIT;
 use super::filter::Row;
+use super::measured::Seen;
 use super::surface::SurfaceMotion;
 use crate::square_friction::friction;
 
 /// e/(c l) of the ellipse through the wrenches with which a slow tool pushes a square.
 const CREEP_RADIUS: f64 = 0.30;
-
-/// The object as the slave sees it: of its own observer, never the truth.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Seen {
-    /// Centre of the object, world frame, m.
-    pub centre: Vec2,
-    /// Turning rate omega of the touched face or tangent, rad/s, counter-clockwise.
-    pub turning: f64,
-    /// Turning rate of the object itself, rad/s: another one only where the tangent turns on a curved side.
-    pub body_turning: f64,
-    /// Side l of the square that (8) and (9) are written for, m.
-    pub side: f64,
-}
-
-impl Seen {
-    /// Whether every number is one that an object of this system can have.
-    pub(super) fn is_usable(&self) -> bool {
-        // written so that NaN fails
-        self.centre.norm() <= POSITION_LIMIT
-            && self.turning.abs() <= TURN_RATE_RAD_PER_S
-            && self.body_turning.abs() <= TURN_RATE_RAD_PER_S
-            && self.side >= 2.0 * FACE_OFFSET_M.0
-    }
-}
 
 /// The row of a raw surface motion of an object that is where it is `seen` to be.
 ///

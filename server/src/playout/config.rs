@@ -2,9 +2,9 @@
 
 use std::time::Duration;
 
+use mmt_shared::model::architecture::Architecture;
 use mmt_shared::model::params::WORKSPACE_M;
 use mmt_shared::range::{OutOfRange, all_in_range};
-use mmt_shared::wire::Architecture;
 use serde::{Deserialize, Serialize};
 
 use crate::motion_limits::MotionLimits;

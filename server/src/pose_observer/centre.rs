@@ -7,6 +7,9 @@ use mmt_shared::time::TICK_S;
 
 use super::PoseObserver;
 
+/// Drift of the coordinate along the face while pushed, m per square root of a second.
+const SLIDE_DRIFT_M: f64 = 5e-3;
+
 impl PoseObserver {
     /// Moves the centre so that the face lies where the tool touches it.
     pub(super) fn follow_plane(&mut self, face: Face, inward: Vec2, surface: Vec2) {
@@ -45,5 +48,10 @@ impl PoseObserver {
         };
         twist.linear += braked - along;
         pose.position += braked * TICK_S;
+    }
+
+    /// One tick in which the centre drifts along the face.
+    pub(super) fn hold_centre(&mut self) {
+        self.centre.hold(SLIDE_DRIFT_M * SLIDE_DRIFT_M * TICK_S);
     }
 }

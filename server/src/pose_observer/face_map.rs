@@ -68,6 +68,8 @@ impl FaceMap {
         let known = self.footprint.offset(face);
         match tracker {
             Tracker::Box(_) => self.learn_box(face, known, offset, variance),
+            // no face is known of a body that is pushed slowly
+            Tracker::Slow(_) => {}
             Tracker::Tangent(tangent) if tangent.is_settling() => {}
             Tracker::Tangent(tangent) => {
                 let mean = known + (offset - known) * tangent.offset_weight();

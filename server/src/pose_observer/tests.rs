@@ -3,6 +3,7 @@
 use super::*;
 use crate::sensing::VisionSample;
 use mmt_shared::fixtures::COUPLING;
+use mmt_shared::model::geometry::{cross, wrap_angle};
 use mmt_shared::model::params::friction_torque_of_square;
 use mmt_shared::time::TICK;
 

@@ -5,6 +5,9 @@
 
 use mmt_shared::time::TICK_S;
 
+/// Spread of the normal of a new contact with a body that is no box, rad.
+const ANY_NORMAL_RAD: f64 = 0.5;
+
 /// Covariance of a coordinate (m or rad) and its rate.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Track {
@@ -18,6 +21,11 @@ impl Track {
         Self {
             covariance: [variance, 0.0, 0.0],
         }
+    }
+
+    /// The angle of a new contact with a body that is no box.
+    pub(super) fn of_any_normal() -> Self {
+        Self::at_rest(ANY_NORMAL_RAD * ANY_NORMAL_RAD)
     }
 
     /// Variance of the place.

@@ -1,5 +1,7 @@
-//! How the object is followed: as a box with faces, or, once vision has shown that it is none, by its tangent.
+//! How the object is followed: as a box with faces; once vision has shown that it is none, by its tangent; pushed slowly,
+//! by the force alone.
 
+use super::slow::{DIRECTION_RAD, SlowTracker};
 use super::tangent_tracker::TangentTracker;
 use super::turning::Turning;
 
@@ -8,6 +10,9 @@ const DISAGREEMENT_RAD: f64 = 0.05;
 /// Images in a row that must disagree.
 const IMAGES: u32 = 3;
 
+/// Direction error of the force besides its noise (the face is not perfectly smooth), rad.
+const DIRECTION_FLOOR_RAD: f64 = 2e-3;
+
 /// What the object is taken for.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Tracker {
@@ -15,6 +20,8 @@ pub(super) enum Tracker {
     Box(BoxTracker),
     /// Any other body: theta is that of the tangent at the contact.
     Tangent(TangentTracker),
+    /// Any body that is pushed slowly: theta is that of the force.
+    Slow(SlowTracker),
 }
 
 impl Tracker {
@@ -26,7 +33,7 @@ impl Tracker {
     /// By how much the tracked face is turned against the body that vision sees, rad.
     pub(super) fn turned(&self) -> f64 {
         match self {
-            Self::Box(_) => 0.0,
+            Self::Box(_) | Self::Slow(_) => 0.0,
             Self::Tangent(tangent) => tangent.turned,
         }
     }
@@ -34,8 +41,24 @@ impl Tracker {
     /// Rate of that, rad/s.
     pub(super) fn slip(&self) -> f64 {
         match self {
-            Self::Box(_) => 0.0,
+            Self::Box(_) | Self::Slow(_) => 0.0,
             Self::Tangent(tangent) => tangent.slip,
+        }
+    }
+
+    /// How far the next update leaves the box from the tool, m.
+    pub(super) fn aside_m(&self) -> f64 {
+        match self {
+            Self::Box(_) | Self::Tangent(_) => 0.0,
+            Self::Slow(slow) => slow.aside_m,
+        }
+    }
+
+    /// Error of the force's direction besides its noise, rad.
+    pub(super) fn direction_floor_rad(&self) -> f64 {
+        match self {
+            Self::Box(_) | Self::Tangent(_) => DIRECTION_FLOOR_RAD,
+            Self::Slow(_) => DIRECTION_RAD,
         }
     }
 }

@@ -2,12 +2,15 @@
 
 use mmt_shared::model::geometry::{Pose, Twist, Vec2, wrap_angle};
 
+use super::PoseObserver;
 use super::past::{Past, corrected};
 use super::tangent_tracker::TangentTracker;
 use super::track::Track;
 use super::tracker::Tracker;
-use super::{CLEAR, PoseObserver};
 use crate::sensing::VisionSample;
+
+/// A tool is seen clear of the object at this distance, m, and so many standard deviations of what is known of it.
+const CLEAR: (f64, f64) = (5e-3, 5.0);
 
 impl PoseObserver {
     /// Whether an image that this mode uses was taken before all that is remembered: it shows nothing that can be compared.
@@ -28,8 +31,10 @@ impl PoseObserver {
             return;
         }
         self.clear_images = 0;
-        if self.config.quasi_static && (then.contact.is_some() || self.contact.is_some()) {
-            self.slow.seen = Some(vision.pose);
+        if let Tracker::Slow(slow) = &mut self.tracker
+            && (then.contact.is_some() || self.contact.is_some())
+        {
+            slow.see(vision.pose);
             return;
         }
         if self.refutes(turn, &then) {
@@ -93,12 +98,12 @@ impl PoseObserver {
         self.motion.pose.position += is.inward * shift;
     }
 
-    /// Whether an image shows a tool in contact clear of a box.
+    /// Whether an image shows a tool in contact clear of a body with faces.
     fn shows_clear(&self, vision: &VisionSample, then: &Past) -> bool {
         let in_contact = then.contact.is_some() && self.contact.is_some();
-        let is_box = matches!(self.tracker, Tracker::Box(_));
+        let is_tangent = matches!(self.tracker, Tracker::Tangent(_));
         let outside = self.faces.outside(vision.pose.point_to_object(then.tool));
-        let Some((distance, variance)) = outside.filter(|_| in_contact && is_box) else {
+        let Some((distance, variance)) = outside.filter(|_| in_contact && !is_tangent) else {
             return false;
         };
         let turned = self.config.vision_noise_rad * self.faces.footprint.mean_side();

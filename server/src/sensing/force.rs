@@ -7,7 +7,7 @@ use mmt_shared::model::geometry::{Vec2, rotate};
 use mmt_shared::rng::Substream;
 use mmt_shared::time::TICK_S;
 
-use super::{SensingConfig, pair};
+use super::config::SensingConfig;
 
 /// The sensor between tool and object.
 #[derive(Clone, Debug)]
@@ -54,4 +54,9 @@ impl ForceSensor {
 fn direction(seed: u64, name: &str) -> Vec2 {
     let angle = std::f64::consts::TAU * Substream::new(seed, name, 0).uniform();
     rotate(angle, Vec2::new(1.0, 0.0))
+}
+
+pub(super) fn pair(stream: &mut Substream) -> Vec2 {
+    let (x, y) = stream.normal_pair();
+    Vec2::new(x, y)
 }

@@ -11,6 +11,7 @@ mod sink;
 mod source;
 #[cfg(test)]
 mod tests;
+mod wall;
 
 use std::fs::File;
 use std::io;
@@ -18,10 +19,9 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 use std::sync::mpsc::{self, Receiver, RecvTimeoutError, Sender, TryRecvError};
 use std::sync::{Arc, Mutex, PoisonError};
-use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+use std::time::{Duration, Instant};
 
-use super::clock::Clock;
-use crate::record::messages::{Session, Stamp};
+use crate::record::messages::Session;
 use crate::time::Time;
 use crate::wire::Side;
 
@@ -33,6 +33,7 @@ pub use source::{TickAbout, Topics};
 
 use sink::ROOM;
 use source::{Drain, Source};
+pub use wall::Wall;
 
 /// How long the thread rests when the rings are empty.
 const REST: Duration = Duration::from_millis(5);
@@ -40,36 +41,6 @@ const REST: Duration = Duration::from_millis(5);
 const FLUSH: Duration = Duration::from_millis(200);
 /// How long the last messages may take to be written.
 const FINISH: Duration = Duration::from_secs(5);
-
-/// The wall clock at a moment of an end's clock: both ends of a record lie on one axis.
-#[derive(Clone, Copy, Debug)]
-pub struct Wall {
-    stamp: Stamp,
-    at: Time,
-}
-
-impl Wall {
-    /// Now.
-    pub fn now(clock: Clock) -> Self {
-        let since = SystemTime::now().duration_since(UNIX_EPOCH);
-        let nanos = since.map_or(0, |since| since.as_nanos());
-        Self {
-            stamp: Stamp(u64::try_from(nanos).unwrap_or(0)),
-            at: clock.now(),
-        }
-    }
-
-    /// This moment of the wall clock and of the end's.
-    pub fn of(stamp: Stamp, at: Time) -> Self {
-        Self { stamp, at }
-    }
-
-    /// A moment of the end's clock on the wall clock.
-    pub fn stamp(&self, at: Time) -> Stamp {
-        let since = at.signed_since(self.at);
-        Stamp(self.stamp.0.saturating_add_signed(since))
-    }
-}
 
 /// What the thread is asked for.
 enum Order {

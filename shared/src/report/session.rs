@@ -7,9 +7,10 @@ use serde::{Deserialize, Serialize};
 use super::number::{Counts, Number, named};
 use crate::channel::datagram_channel::DatagramChannel;
 use crate::channel::peer::Loss;
+use crate::model::architecture::Architecture;
 use crate::stats::histogram::{Histogram, Quantiles};
 use crate::stats::session::KindCounts;
-use crate::wire::{Architecture, Side};
+use crate::wire::Side;
 
 /// What one end counted and measured of a session. Its farewell carries it, its report prints it.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]

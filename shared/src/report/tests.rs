@@ -8,12 +8,13 @@ use crate::channel::peer::Loss;
 use crate::metrics::{
     AgeOfInformation, ContactBreaks, ForceMetrics, ForcePeak, PoseError, UpdateCounts,
 };
+use crate::model::architecture::Architecture;
 use crate::model::geometry::{Pose, Vec2};
 use crate::model::update::Cause;
 use crate::stats::histogram::Histogram;
 use crate::stats::session::KindCounts;
 use crate::time::Time;
-use crate::wire::{Architecture, DATAGRAM_MAX, Message, Side};
+use crate::wire::{DATAGRAM_MAX, Message, Side};
 use serde_json::{Value, json};
 
 fn empty() -> RunReport<Value> {

@@ -27,7 +27,7 @@ pub use kind::{
 pub use label::{LABEL_MAX, Label};
 pub use samples::{PushError, SAMPLES_MAX, SampleBlock};
 pub use session::{
-    Architecture, Claim, Ending, Farewell, Hello, HelloError, Refusal, Role, SCENE_HZ_MAX,
-    StreamMessage, Welcome, WelcomeError,
+    Claim, Ending, Farewell, Hello, HelloError, Refusal, Role, SCENE_HZ_MAX, StreamMessage,
+    Welcome, WelcomeError,
 };
 pub use state::RawState;

@@ -7,7 +7,7 @@
 mod hello;
 mod welcome;
 
-pub use hello::{Architecture, Claim, Hello, HelloError, Role, SCENE_HZ_MAX};
+pub use hello::{Claim, Hello, HelloError, Role, SCENE_HZ_MAX};
 pub use welcome::{Welcome, WelcomeError};
 
 use serde::{Deserialize, Serialize};

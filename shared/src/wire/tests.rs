@@ -5,6 +5,7 @@ mod generated;
 mod sizes;
 
 use crate::fixtures::COUPLING;
+use crate::model::architecture::Architecture;
 use proptest::prelude::*;
 
 use super::*;

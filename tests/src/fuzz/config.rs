@@ -12,8 +12,9 @@ use mmt_server::environment::{Environment, EnvironmentConfig, SceneConfig};
 use mmt_shared::model::geometry::Vec2;
 use mmt_shared::time::TICK;
 
+use super::inputs;
+use super::outcome::Outcome;
 use super::plug::TOKEN;
-use super::{Outcome, inputs};
 
 /// The first byte asks for a program.
 pub(super) fn layers(input: &[u8]) -> Outcome {

@@ -7,7 +7,7 @@ use mmt_client::device::link::{DeviceKind, DeviceLinkConfig};
 use mmt_client::device::two_diy::{ANSWER_BYTES, TwoDiy};
 use mmt_shared::time::Time;
 
-use super::Outcome;
+use super::outcome::Outcome;
 use super::plug::{Held, output};
 
 /// Lines, each a frame that comes a millisecond after the one before; one that is no text is handed over as such.

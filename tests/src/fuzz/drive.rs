@@ -4,7 +4,9 @@ use std::collections::BTreeSet;
 use std::fmt;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-use super::{Mutator, Outcome, Target};
+use super::mutate::Mutator;
+use super::outcome::Outcome;
+use super::target::Target;
 
 /// Inputs that are kept to be mutated further, besides the seeds.
 const KEPT_MAX: usize = 500;

@@ -6,22 +6,22 @@
 use std::time::Duration;
 
 use mmt_client::device::two_diy::ANSWER_BYTES;
-use mmt_netem::Direction;
 use mmt_netem::capture::{Event, Sides, Writer};
-use mmt_netem::record::{End, Entry, Heading, binary, csv};
 use mmt_server::plant::PlantAnswer;
 use mmt_shared::model::geometry::{Pose, Vec2};
 use mmt_shared::plug::{DEVICE_BYTES, PlugHead, PlugKind, encode};
-use mmt_shared::time::Time;
 use serde_json::Value;
 
 use super::plug::TOKEN;
 
+mod packets;
 mod recorded;
 mod texts;
 mod words;
 
-pub(super) use recorded::{messages, messages_of, recorded_sessions, records};
+pub(super) use packets::packet_records;
+use packets::{entries, heading};
+pub(super) use recorded::{TOPICS, messages, messages_of, recorded_sessions, records};
 pub(super) use texts::*;
 pub(super) use words::*;
 
@@ -190,55 +190,6 @@ pub(super) fn two_diy() -> Vec<Vec<u8>> {
         run(&rest[..3]),
         run(&[(1, &[[83.18, 96.82]]), (1, &[[1e9, 0.0]])]),
     ]
-}
-
-fn entries() -> Vec<Entry> {
-    let entry = |number: u64, end| Entry {
-        direction: if number.is_multiple_of(3) {
-            Direction::Down
-        } else {
-            Direction::Up
-        },
-        number,
-        offered: Time::from_millis(number * 10),
-        bytes: 100,
-        backlog: 2,
-        end,
-    };
-    let sent = |number: u64, copy| End::Sent {
-        due: Time::from_millis(number * 10 + 50),
-        sent: Time::from_millis(number * 10 + 51),
-        copy,
-        corrupted: false,
-    };
-    let mut entries: Vec<Entry> = (0..6)
-        .map(|number| entry(number, sent(number, false)))
-        .collect();
-    entries.push(entry(6, sent(6, true)));
-    entries.push(entry(7, End::Unsent));
-    entries.extend(mmt_netem::DropCause::ALL.map(|cause| entry(8, End::Dropped(cause))));
-    entries
-}
-
-fn heading() -> Heading {
-    Heading {
-        seed: 7,
-        up: "delay 50ms 5ms loss 1%".to_owned(),
-        down: "none".to_owned(),
-    }
-}
-
-pub(super) fn packet_records() -> Vec<Vec<u8>> {
-    let mut text = csv::heading(&heading());
-    entries()
-        .iter()
-        .for_each(|entry| csv::push(&mut text, entry));
-    let (mut writer, mut bytes) = (binary::Writer::default(), Vec::new());
-    writer.heading(&mut bytes, &heading());
-    entries()
-        .iter()
-        .for_each(|entry| writer.push(&mut bytes, entry));
-    vec![text.into_bytes(), bytes]
 }
 
 /// A pcapng of our own writer, a pcap of two packets, and two of either behind each other.

@@ -14,7 +14,8 @@ use mmt_netem::words::parse;
 use mmt_netem::{Direction, Link, LinkConfig, Packet};
 use mmt_shared::time::Time;
 
-use super::{Outcome, inputs};
+use super::inputs;
+use super::outcome::Outcome;
 
 const HOUR: Duration = Duration::from_secs(3600);
 /// A path has no more samples.

@@ -9,7 +9,7 @@ use mmt_client::operator::pointer::{
 use mmt_client::operator::scripted::{Scripted, ScriptedConfig, View};
 use mmt_shared::model::geometry::{BoxFootprint, Pose, Vec2};
 
-use super::Outcome;
+use super::outcome::Outcome;
 
 /// A box a metre away, which nobody touches.
 fn view() -> View {
@@ -32,7 +32,7 @@ pub(super) fn page(input: &[u8]) -> Outcome {
                 read += 1;
                 let name = format!("{message:?}");
                 let name = name.split(['(', '{']).next().unwrap_or_default();
-                sorts |= 1 << (super::mark(&name) % 60);
+                sorts |= 1 << (super::outcome::mark(&name) % 60);
                 for event in message.hand_events() {
                     person.handle(now, event);
                 }

@@ -10,7 +10,7 @@ use mmt_shared::model::geometry::Vec2;
 use mmt_shared::plug::{DEVICE_BYTES, PLANT_BYTES, PlugKind, PlugToken, decode, singles};
 use mmt_shared::time::Time;
 
-use super::Outcome;
+use super::outcome::Outcome;
 
 /// The token that the seeds show.
 pub(super) const TOKEN: PlugToken = PlugToken::new([7; 16]);

@@ -13,22 +13,8 @@ use mmt_shared::record::messages::{
 };
 use mmt_shared::record::table;
 
-use super::{Outcome, inputs};
-
-/// Names of topics, in the order in which the first byte of a message means them.
-pub(super) const TOPICS: [&str; 11] = [
-    "/master/ticks",
-    "/slave/ticks",
-    "/master/session",
-    "/slave/session",
-    "/master/arrivals",
-    "/slave/arrivals",
-    "/master/packets",
-    "/slave/parameters",
-    "/master/link",
-    "/slave/loop",
-    "/master/readings",
-];
+use super::inputs::{self, TOPICS};
+use super::outcome::Outcome;
 
 /// The first byte asks for a topic.
 pub(super) fn message(input: &[u8]) -> Outcome {

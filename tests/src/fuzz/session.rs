@@ -5,6 +5,7 @@
 //! break what `judge` asserts, and after the last operation a session works, the same one or a new one.
 
 mod bench;
+mod bytes;
 mod enemy;
 mod judge;
 
@@ -14,11 +15,11 @@ use mmt_shared::model::geometry::Vec2;
 use mmt_shared::rng::Substream;
 use mmt_shared::wire::Side;
 
-use super::Outcome;
+use super::outcome::Outcome;
 use bench::{Bench, Network};
+pub(super) use bytes::HEAD;
+use bytes::place;
 
-/// Bytes of the head, and of an operation.
-pub(super) const HEAD: usize = 8;
 const OPERATION: usize = 4;
 
 /// What is done to a session.
@@ -58,14 +59,6 @@ enum Op {
     Farewell(u8),
     /// A new session: whether the slave's process remembers, and where the hello would like to be.
     Again(bool, Vec2),
-}
-
-/// A place on a table, m.
-fn place(x: u8, y: u8) -> Vec2 {
-    Vec2::new(
-        f64::from(x.cast_signed()) * 0.008,
-        f64::from(y.cast_signed()) * 0.008,
-    )
 }
 
 fn side(byte: u8) -> Side {

@@ -11,7 +11,7 @@ use mmt_shared::pairing::{Address, Pairing, Pin, Token, Tokens};
 use mmt_shared::plug::PlugToken;
 use mmt_shared::recording::Recording;
 
-use super::Outcome;
+use super::outcome::Outcome;
 
 fn text(input: &[u8]) -> Result<&str, Outcome> {
     std::str::from_utf8(input).map_err(|_| Outcome::refused(&"no text"))
@@ -99,7 +99,7 @@ pub(super) fn words(input: &[u8]) -> Outcome {
         text.parse::<Repeats>().is_ok(),
     ];
     match scheme {
-        Ok(scheme) => Outcome::taken(super::mark(&scheme.name())),
+        Ok(scheme) => Outcome::taken(super::outcome::mark(&scheme.name())),
         Err(_) if others.contains(&true) => {
             Outcome::taken(u64::from(others[0]) + 2 * u64::from(others[1]))
         }

@@ -12,7 +12,7 @@ use mmt_shared::wire::{
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
-use super::Outcome;
+use super::outcome::Outcome;
 
 /// Couplings of sessions: the default one, the softest, the stiffest.
 const COUPLINGS: [(f64, f64); 3] = [(1000.0, 10.0), (50.0, 0.0), (10_000.0, 40.0)];

@@ -10,8 +10,9 @@ use mmt_client::io::console::{Order, StudyWish};
 use mmt_shared::wire::Ending;
 use serde_json::{Value, json};
 
+use super::round::{LOOK, Round};
+use super::setting::Setting;
 use super::study::{Answer, Condition, Participant, Study};
-use super::{LOOK, Round, Setting};
 use crate::args::DemoArguments;
 use crate::commands::console::Desk;
 use crate::commands::device::Device;

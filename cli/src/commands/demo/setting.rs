@@ -5,10 +5,10 @@ use mmt_lab::layers::Program;
 use mmt_lab::world::WorldConfig;
 use mmt_netem::LinkConfig;
 use mmt_server::plant::PlantConfig;
+use mmt_shared::model::architecture::Architecture;
 use mmt_shared::model::settings::Mode;
 use mmt_shared::pairing::Pairing;
 use mmt_shared::range::in_range;
-use mmt_shared::wire::Architecture;
 use serde_json::{Value, json};
 
 use crate::args::DemoArguments;

@@ -5,10 +5,10 @@
 use std::fmt;
 use std::time::Duration;
 
-use mmt_client::device::link::{HandOutput, Reading};
-use mmt_client::io::device::Seen;
+use mmt_client::device::link::HandOutput;
+use mmt_client::io::device::DeviceHost;
 use mmt_client::limiter::ForceLimiter;
-use mmt_client::operator::pointer::{Driver, Person};
+use mmt_client::operator::pointer::{Driver, HandTuning, Person};
 use mmt_client::operator::scripted::{Scripted, ScriptedConfig, View};
 use mmt_shared::clean::clean;
 use mmt_shared::io::clock::Clock;
@@ -19,7 +19,8 @@ use mmt_shared::stats::histogram::Histogram;
 use mmt_shared::time::{TICK, Time};
 use serde::Serialize;
 
-use super::Device;
+use super::gauge::Gauge;
+use super::hand::Device;
 use crate::args::DeviceTestArguments;
 use crate::failure::{Exit, Failure};
 use crate::output::{note, print, print_json};
@@ -83,64 +84,6 @@ impl From<&Histogram> for Spread {
     }
 }
 
-/// What has come so far.
-#[derive(Debug)]
-struct Gauge {
-    first: Option<Time>,
-    last: Option<Time>,
-    readings: u64,
-    interval: Histogram,
-    /// How much later than the fastest before it each came by its stamp.
-    late: Histogram,
-    /// Least arrival less stamp, ns.
-    fastest: Option<i128>,
-    range: [(f64, f64); 3],
-    speed_max: f64,
-    buttons: u16,
-}
-
-impl Gauge {
-    fn new() -> Self {
-        Self {
-            first: None,
-            last: None,
-            readings: 0,
-            interval: Histogram::default(),
-            late: Histogram::default(),
-            fastest: None,
-            range: [(f64::INFINITY, f64::NEG_INFINITY); 3],
-            speed_max: 0.0,
-            buttons: 0,
-        }
-    }
-
-    fn take(&mut self, Seen { at, reading }: &Seen) {
-        let Reading {
-            stamp_ns,
-            place,
-            velocity,
-            buttons,
-        } = reading;
-        if let Some(last) = self.last {
-            self.interval.record(at.saturating_since(last));
-        }
-        self.first = self.first.or(Some(*at));
-        self.last = Some(*at);
-        self.readings += 1;
-        let delay = i128::from(at.as_nanos()) - i128::from(*stamp_ns);
-        let fastest = self.fastest.map_or(delay, |fastest| fastest.min(delay));
-        self.fastest = Some(fastest);
-        let late = u64::try_from(delay - fastest).unwrap_or(u64::MAX);
-        self.late.record(Duration::from_nanos(late));
-        for ((least, most), metres) in self.range.iter_mut().zip(place) {
-            (*least, *most) = (least.min(*metres), most.max(*metres));
-        }
-        let speed = velocity.iter().map(|v| v * v).sum::<f64>().sqrt();
-        self.speed_max = self.speed_max.max(speed);
-        self.buttons |= buttons;
-    }
-}
-
 /// Runs `mmt device test`.
 ///
 /// # Errors
@@ -154,6 +97,46 @@ pub(super) fn run(arguments: &DeviceTestArguments) -> Result<(), Failure> {
                 .remedy("add --device link, inverse3 or 2diy"),
         );
     };
+    let felt = feel(arguments, &device, host, *tuning, &stop)?;
+    if felt.gauge.readings == 0 {
+        let what = format!("nothing came from the device at {}", host.address());
+        return Err(Failure::new(Exit::NoAnswer, what)
+            .remedy("is it switched on and calibrated? mmt device list shows what is there"));
+    }
+    let document = Document::of(&device, host, &felt);
+    let unfit = document.verdict == "unfit";
+    let advice = document.advice.join("; ");
+    if arguments.json {
+        print_json(&document)?;
+    } else {
+        print(&document)?;
+    }
+    if unfit {
+        return Err(Failure::new(Exit::Failed, "the device is unfit").remedy(advice));
+    }
+    note("no force is left on the device");
+    Ok(())
+}
+
+/// What a test came to.
+#[derive(Debug, Default)]
+struct Felt {
+    gauge: Gauge,
+    /// Ticks in which the hand was held.
+    held_ticks: u32,
+    /// Greatest force that was asked for, N.
+    force_peak_n: f64,
+    counts: PlugCounts,
+}
+
+/// Reads the device for as long as the test lasts, and lets a hand feel the force that was asked for.
+fn feel(
+    arguments: &DeviceTestArguments,
+    device: &Device,
+    host: &DeviceHost,
+    tuning: HandTuning,
+    stop: &Stop,
+) -> Result<Felt, Failure> {
     let (mut port, mut readings) = (host.port(), host.readings());
     let view = View {
         pose: Pose::default(),
@@ -161,12 +144,12 @@ pub(super) fn run(arguments: &DeviceTestArguments) -> Result<(), Failure> {
         in_contact: false,
     };
     let scripted = Scripted::try_new(ScriptedConfig::default(), view).map_err(Failure::usage)?;
-    let mut person = Person::new(scripted, Driver::Pointer, *tuning);
+    let mut person = Person::new(scripted, Driver::Pointer, tuning);
     let limits = device.profile.limits();
     let mut limiter = ForceLimiter::try_new(limits).map_err(Failure::usage)?;
     let clock = Clock::start();
     let mut ticker = Ticker::new(clock, TICK);
-    let (mut gauge, mut held, mut peak) = (Gauge::new(), 0_u32, 0.0_f64);
+    let mut felt = Felt::default();
     let mut begun = None;
     let own = device.profile.name() != "link";
     loop {
@@ -174,7 +157,7 @@ pub(super) fn run(arguments: &DeviceTestArguments) -> Result<(), Failure> {
         let now = clock.now();
         while let Ok(seen) = readings.pop() {
             begun = begun.or(Some(now));
-            gauge.take(&seen);
+            felt.gauge.take(&seen);
         }
         let over = match begun {
             Some(begun) => now.saturating_since(begun) >= arguments.duration,
@@ -190,9 +173,9 @@ pub(super) fn run(arguments: &DeviceTestArguments) -> Result<(), Failure> {
         } else {
             limiter.release();
         }
-        held += u32::from(person.engaged());
+        felt.held_ticks += u32::from(person.engaged());
         let force = limiter.limit(Vec2::new(arguments.force, 0.0));
-        peak = peak.max(force.norm());
+        felt.force_peak_n = felt.force_peak_n.max(force.norm());
         port.give(HandOutput {
             force,
             hip,
@@ -201,60 +184,48 @@ pub(super) fn run(arguments: &DeviceTestArguments) -> Result<(), Failure> {
         });
         // the ramp ends before the test does
         if (over || stop.asked()) && limiter.at_rest() {
-            break;
+            felt.counts = port.counts();
+            return Ok(felt);
         }
     }
-    if gauge.readings == 0 {
-        let what = format!("nothing came from the device at {}", host.address());
-        return Err(Failure::new(Exit::NoAnswer, what)
-            .remedy("is it switched on and calibrated? mmt device list shows what is there"));
-    }
-    let counts = port.counts();
-    let mut document = Document {
-        version: env!("CARGO_PKG_VERSION"),
-        command: "device test",
-        device: device.profile.name(),
-        address: clean(host.address().split('?').next().unwrap_or_default()).to_string(),
-        verdict: "fit",
-        advice: Vec::new(),
-        readings: gauge.readings,
-        duration_s: 0.0,
-        rate_hz: 0.0,
-        interval_ms: (&gauge.interval).into(),
-        late_ms: (&gauge.late).into(),
-        place_min_m: gauge.range.map(|(least, _)| least),
-        place_max_m: gauge.range.map(|(_, most)| most),
-        speed_max_m_per_s: gauge.speed_max,
-        buttons: gauge.buttons,
-        held_s: f64::from(held) * TICK.as_secs_f64(),
-        force_peak_n: peak,
-        drops: Drops {
-            lost: counts.lost,
-            late: counts.late,
-            malformed: counts.malformed,
-            nonsense: counts.nonsense,
-        },
-    };
-    if let (Some(first), Some(last)) = (gauge.first, gauge.last) {
-        document.duration_s = last.saturating_since(first).as_secs_f64();
-        document.rate_hz = (gauge.readings - 1) as f64 / document.duration_s.max(1e-9);
-    }
-    document.judge(&counts);
-    let unfit = document.verdict == "unfit";
-    let advice = document.advice.join("; ");
-    if arguments.json {
-        print_json(&document)?;
-    } else {
-        print(&document)?;
-    }
-    if unfit {
-        return Err(Failure::new(Exit::Failed, "the device is unfit").remedy(advice));
-    }
-    note("no force is left on the device");
-    Ok(())
 }
 
 impl Document {
+    fn of(device: &Device, host: &DeviceHost, felt: &Felt) -> Self {
+        let Felt { gauge, counts, .. } = felt;
+        let mut document = Document {
+            version: env!("CARGO_PKG_VERSION"),
+            command: "device test",
+            device: device.profile.name(),
+            address: clean(host.address().split('?').next().unwrap_or_default()).to_string(),
+            verdict: "fit",
+            advice: Vec::new(),
+            readings: gauge.readings,
+            duration_s: 0.0,
+            rate_hz: 0.0,
+            interval_ms: (&gauge.interval).into(),
+            late_ms: (&gauge.late).into(),
+            place_min_m: gauge.range.map(|(least, _)| least),
+            place_max_m: gauge.range.map(|(_, most)| most),
+            speed_max_m_per_s: gauge.speed_max,
+            buttons: gauge.buttons,
+            held_s: f64::from(felt.held_ticks) * TICK.as_secs_f64(),
+            force_peak_n: felt.force_peak_n,
+            drops: Drops {
+                lost: counts.lost,
+                late: counts.late,
+                malformed: counts.malformed,
+                nonsense: counts.nonsense,
+            },
+        };
+        if let (Some(first), Some(last)) = (gauge.first, gauge.last) {
+            document.duration_s = last.saturating_since(first).as_secs_f64();
+            document.rate_hz = (gauge.readings - 1) as f64 / document.duration_s.max(1e-9);
+        }
+        document.judge(counts);
+        document
+    }
+
     fn judge(&mut self, counts: &PlugCounts) {
         let (least, good) = RATES_HZ;
         let mut advise = |verdict, advice: String| {

@@ -5,13 +5,12 @@ use std::path::Path;
 use std::thread;
 use std::time::Duration;
 
+use super::finding::{Finding, Verdict};
 use mmt_server::io::address_for_others;
 use mmt_shared::io::clock::Clock;
 use mmt_shared::io::realtime::{self, Obtained, RealTime};
 use mmt_shared::io::ticker::{Ticker, TickerReport};
 use mmt_shared::time::TICK;
-
-use super::{Finding, Verdict};
 
 /// How long the loop is measured.
 pub(super) const LOOP: Duration = Duration::from_secs(3);

@@ -11,7 +11,7 @@ use mmt_shared::io::transport::{CLOSE_FINISHED, Connection, Endpoint, Transport}
 use mmt_shared::pairing::Pairing;
 use tokio::time::timeout;
 
-use super::{Finding, Verdict};
+use super::finding::{Finding, Verdict};
 use crate::failure::Failure;
 
 /// How long a name may take to be looked up, and a slave to answer.

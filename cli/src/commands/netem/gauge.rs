@@ -14,7 +14,7 @@ use ratatui::style::{Modifier, Style};
 use ratatui::text::Line;
 use ratatui::widgets::Paragraph;
 
-use super::DEGRADED;
+use super::start::DEGRADED;
 use super::table::{ALWAYS, ROWS};
 use crate::log::Messages;
 use crate::view::{Screen, Wish};

@@ -9,7 +9,7 @@ use mmt_netem::{Direction, Effect};
 use mmt_shared::time::Time;
 use serde::Serialize;
 
-use super::DEGRADED;
+use super::start::DEGRADED;
 use crate::args::{NetemReportArguments, network};
 use crate::failure::Failure;
 use crate::input::read_bytes;

@@ -2,8 +2,7 @@
 
 use std::io;
 use std::net::Ipv4Addr;
-use std::os::unix::process::CommandExt;
-use std::os::unix::process::ExitStatusExt;
+use std::os::unix::process::{CommandExt, ExitStatusExt};
 use std::process::{Child, Command, ExitStatus};
 use std::time::{Duration, Instant};
 
@@ -16,7 +15,7 @@ use serde::Serialize;
 use tokio::runtime::{Builder, Runtime};
 use tokio::signal::unix::{Signal, SignalKind, signal};
 
-use super::{CHECK_EVERY, DEGRADED, Files, announce, start_error};
+use super::files::Files;
 use crate::args::NetemShellArguments;
 use crate::failure::Failure;
 use crate::log::Messages;
@@ -27,6 +26,7 @@ mod ends;
 mod names;
 mod tun;
 
+use super::start::{CHECK_EVERY, DEGRADED, announce, start_error};
 use ends::Ends;
 
 /// Packets per second for which the effect of the networks is printed.

@@ -5,7 +5,8 @@ use std::fmt;
 use mmt_netem::counters::Tally;
 use mmt_netem::io::driver::DirectionCounters;
 
-use super::{DEGRADED, NetemReport};
+use super::document::NetemReport;
+use super::start::DEGRADED;
 
 /// What a row counts in a direction.
 pub(super) type Count = fn(&DirectionCounters) -> Tally;

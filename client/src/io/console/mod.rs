@@ -7,12 +7,13 @@
 mod admission;
 mod assets;
 mod message;
+mod shared;
 mod viewer;
 
 use std::io;
 use std::net::SocketAddr;
 use std::path::PathBuf;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use axum::Router;
@@ -27,11 +28,13 @@ use mmt_shared::io::secret::NoRandomness;
 use tokio::sync::{mpsc, watch};
 use tokio::time::{MissedTickBehavior, interval};
 
-use crate::io::hand_events::{HandEventSender, HandEvents, hand_events};
-use crate::operator::pointer::{Driver, HandEvent};
+use crate::io::hand_events::{HandEvents, hand_events};
+use crate::operator::pointer::HandEvent;
 use admission::{Admission, Refusal, Ticket};
 use assets::{Assets, PAGE};
 pub use message::{FromPage, NetworkWish, Order, SessionWish, StudyWish};
+use shared::Shared;
+pub use shared::Source;
 
 /// Between two frames of the page: 62 a second.
 const FRAME: Duration = Duration::from_millis(16);
@@ -68,39 +71,6 @@ pub enum ConsoleError {
     /// No thread or no runtime.
     #[error("no thread for the console: {0}")]
     Thread(#[source] io::Error),
-}
-
-/// What a frame of the page is made of.
-pub type Source = Box<dyn FnMut() -> String + Send>;
-
-/// What is shown and who operates, under one lock that no tick ever takes.
-#[derive(Default)]
-struct Stage {
-    source: Option<Source>,
-    events: Option<HandEventSender>,
-    operator: Option<u64>,
-    /// Whether the script never gets the hand.
-    no_script: bool,
-    /// Whether no page may do anything: there is no hand.
-    looks_on: bool,
-    viewers: usize,
-    viewers_ever: u64,
-}
-
-/// What the console's tasks share.
-struct Shared {
-    admission: Admission,
-    assets: Assets,
-    stage: Mutex<Stage>,
-    /// The newest frame.
-    frame: watch::Sender<Utf8Bytes>,
-    /// What changes seldom: settings, state, notes.
-    about: watch::Sender<Utf8Bytes>,
-    /// Who operates.
-    operator: watch::Sender<Option<u64>>,
-    orders: mpsc::UnboundedSender<Order>,
-    /// That of the sessions which are shown.
-    emergency: EmergencyStop,
 }
 
 /// A console at work; it ends with the process.
@@ -201,23 +171,6 @@ impl Console {
     }
 }
 
-impl Shared {
-    fn stage(&self) -> MutexGuard<'_, Stage> {
-        self.stage.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-}
-
-impl Stage {
-    fn give(&mut self, event: HandEvent) {
-        if self.no_script && event == HandEvent::Drive(Driver::Scripted) {
-            return;
-        }
-        if let Some(events) = &mut self.events {
-            events.send(event);
-        }
-    }
-}
-
 async fn serve(listener: tokio::net::TcpListener, shared: Arc<Shared>) {
     tokio::spawn(frames(Arc::clone(&shared)));
     let routes = Router::new()
@@ -289,32 +242,4 @@ async fn socket(
 
 fn refuse(refusal: Refusal) -> Response {
     (StatusCode::FORBIDDEN, refusal.to_string()).into_response()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn where_the_script_is_refused_no_message_gives_it_the_hand() {
-        let (events, mut to_loop) = hand_events(4);
-        let mut stage = Stage {
-            events: Some(events),
-            ..Stage::default()
-        };
-        stage.give(HandEvent::Drive(Driver::Scripted));
-        stage.no_script = true;
-        stage.give(HandEvent::Drive(Driver::Scripted));
-        stage.give(HandEvent::Drive(Driver::Pointer));
-        stage.give(HandEvent::Pause(true));
-        let given: Vec<_> = std::iter::from_fn(|| to_loop.next_event()).collect();
-        assert_eq!(
-            given,
-            [
-                HandEvent::Drive(Driver::Scripted),
-                HandEvent::Drive(Driver::Pointer),
-                HandEvent::Pause(true)
-            ]
-        );
-    }
 }

@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use axum::extract::ws::{Message, Utf8Bytes, WebSocket};
 
-use super::Shared;
 use super::message::FromPage;
+use super::shared::Shared;
 use crate::operator::pointer::HandEvent;
 
 /// Serves a viewer until it leaves.

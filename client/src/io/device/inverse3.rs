@@ -11,7 +11,7 @@ use serde::Deserialize;
 use tungstenite::protocol::WebSocketConfig;
 use tungstenite::{Error, Message, WebSocket};
 
-use super::Shared;
+use super::shared::Shared;
 use crate::device::inverse3::Inverse3;
 
 /// How long the service may take to answer a connection and to send its version.

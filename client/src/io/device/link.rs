@@ -3,7 +3,7 @@
 use mmt_shared::io::clock::Clock;
 use mmt_shared::io::plug_socket::{PACKET_MAX, PlugSocket};
 
-use super::Shared;
+use super::shared::Shared;
 use crate::device::link::DeviceLink;
 
 /// Serves whoever shows the token until the process ends.

@@ -8,6 +8,7 @@ mod inverse3;
 mod link;
 pub mod ports;
 mod serial;
+mod shared;
 #[cfg(test)]
 mod tests;
 mod two_diy;
@@ -15,22 +16,22 @@ mod two_diy;
 use std::io;
 use std::net::SocketAddr;
 use std::path::PathBuf;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
 use std::thread::JoinHandle;
 
 use mmt_shared::io::plug_socket::{PlugSocket, PlugSocketError};
-use mmt_shared::model::geometry::Vec2;
 use mmt_shared::plug::PlugCounts;
-use mmt_shared::time::Time;
-use rtrb::{Consumer, Producer, RingBuffer};
+use rtrb::{Consumer, RingBuffer};
 
 use crate::device::inverse3::Inverse3;
-use crate::device::link::{DeviceLink, DeviceLinkConfig, DeviceLinkError, HandOutput, Reading};
+use crate::device::link::{DeviceLink, DeviceLinkConfig, DeviceLinkError, HandOutput};
 use crate::device::two_diy::TwoDiy;
-use crate::io::hand_events::{HandEventSender, HandEvents, hand_events};
+use crate::io::hand_events::{HandEvents, hand_events};
 use crate::operator::pointer::HandEvent;
 pub use inverse3::version;
+pub use shared::Seen;
+use shared::Shared;
 
 /// Events that may wait for the loop: a second at 1 kHz, in which it stands.
 const EVENTS_MAX: usize = 1024;
@@ -74,126 +75,6 @@ pub enum DeviceHostError {
     /// No thread.
     #[error("no thread for the device: {0}")]
     Thread(#[source] io::Error),
-}
-
-/// What the newest tick gave, for another thread.
-#[derive(Debug, Default)]
-struct Cell {
-    /// The number of the tick, and the bits of its state below.
-    tick: AtomicU64,
-    force: AtomicU64,
-    hip: AtomicU64,
-}
-
-/// Bits below the number of the tick.
-const STATE_BITS: u32 = 8;
-
-impl Cell {
-    fn store(&self, output: &HandOutput) {
-        let HandOutput {
-            engaged,
-            in_contact,
-            stopped,
-            link_late,
-            ..
-        } = *output;
-        let state = [engaged, in_contact, stopped, link_late];
-        let bits = state
-            .iter()
-            .rev()
-            .fold(0, |bits, bit| bits << 1 | u64::from(*bit));
-        self.force.store(packed(output.force), Ordering::Relaxed);
-        self.hip.store(packed(output.hip), Ordering::Relaxed);
-        // whoever sees this tick sees its force
-        self.tick
-            .store(output.tick << STATE_BITS | bits, Ordering::Release);
-    }
-
-    fn load(&self) -> HandOutput {
-        let tick = self.tick.load(Ordering::Acquire);
-        let bit = |number: u32| tick >> number & 1 == 1;
-        HandOutput {
-            tick: tick >> STATE_BITS,
-            force: unpacked(self.force.load(Ordering::Relaxed)),
-            hip: unpacked(self.hip.load(Ordering::Relaxed)),
-            engaged: bit(0),
-            in_contact: bit(1),
-            stopped: bit(2),
-            link_late: bit(3),
-        }
-    }
-}
-
-/// Two numbers as the device gets them, in one.
-fn packed(v: Vec2) -> u64 {
-    let [x, y] = [v.x, v.y].map(|n| u64::from((n as f32).to_bits()));
-    x << 32 | y
-}
-
-fn unpacked(bits: u64) -> Vec2 {
-    let [x, y] = [bits >> 32, bits & u64::from(u32::MAX)].map(|n| f32::from_bits(n as u32).into());
-    Vec2::new(x, y)
-}
-
-/// A reading as it came, and when.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Seen {
-    /// By the thread's own clock.
-    pub at: Time,
-    /// The reading.
-    pub reading: Reading,
-}
-
-/// Who listens to the device.
-#[derive(Debug, Default)]
-struct Listeners {
-    events: Option<HandEventSender>,
-    readings: Option<Producer<Seen>>,
-    counts: PlugCounts,
-}
-
-/// What the thread and the process share.
-#[derive(Debug, Default)]
-struct Shared {
-    cell: Cell,
-    /// No tick ever takes it.
-    listeners: Mutex<Listeners>,
-    ended: AtomicBool,
-}
-
-impl Shared {
-    fn listeners(&self) -> MutexGuard<'_, Listeners> {
-        self.listeners
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner)
-    }
-
-    /// Hands over the events of what `take` takes in, with the newest reading and the counts that it returns.
-    fn take(
-        &self,
-        at: Time,
-        take: impl FnOnce(&mut dyn FnMut(HandEvent)) -> (Option<Reading>, PlugCounts),
-    ) {
-        let mut listeners = self.listeners();
-        let Listeners {
-            events,
-            readings,
-            counts,
-        } = &mut *listeners;
-        let (reading, counted) = take(&mut |event| {
-            if let Some(events) = events {
-                events.send(event);
-            }
-        });
-        *counts = counted;
-        if let (Some(readings), Some(reading)) = (readings, reading) {
-            let _ = readings.push(Seen { at, reading });
-        }
-    }
-
-    fn has_ended(&self) -> bool {
-        self.ended.load(Ordering::Acquire)
-    }
 }
 
 /// A plug for a device; it ends with the process, and when it is dropped no force is left on the device.

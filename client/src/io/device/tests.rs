@@ -1,5 +1,6 @@
 //! That the last that a device gets is no force, however a session or its process ends.
 
+use mmt_shared::model::geometry::Vec2;
 use std::fs::File;
 use std::io::{Read, Write};
 use std::net::TcpListener;

@@ -8,8 +8,8 @@ use mmt_shared::io::clock::Clock;
 use mmt_shared::io::ticker::Ticker;
 use mmt_shared::time::TICK;
 
-use super::Shared;
 use super::serial::Serial;
+use super::shared::Shared;
 use crate::device::two_diy::{ANSWER_BYTES, RESET, TwoDiy, no_torques};
 
 /// How long an answer is waited for.

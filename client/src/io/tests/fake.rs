@@ -1,5 +1,6 @@
 //! A slave as small as the protocol allows.
 
+use mmt_shared::pairing::Pairing;
 use std::net::SocketAddr;
 
 use mmt_shared::channel::datagram_channel::DatagramChannel;

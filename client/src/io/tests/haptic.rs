@@ -1,5 +1,7 @@
 //! What the haptic loop promises, ticked by hand.
 
+use crate::operator::Operator;
+use crate::operator::trace::Trace;
 use std::ops::ControlFlow;
 
 use mmt_shared::channel::datagram_channel::DatagramChannel;

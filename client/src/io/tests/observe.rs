@@ -1,5 +1,6 @@
 //! An observer as a host: what it shows, and how it ends.
 
+use mmt_netem::io::socket::SocketExtras;
 use mmt_shared::io::transport::CLOSE_REVOKED;
 use mmt_shared::model::tool::Scene;
 use mmt_shared::wire::{Claim, Role};

@@ -11,6 +11,7 @@
 mod clock_map;
 mod filter;
 mod resampler;
+mod sample;
 #[cfg(test)]
 mod tests;
 
@@ -23,6 +24,7 @@ use super::scripted::{Scripted, View};
 use clock_map::ClockMap;
 use filter::Filter;
 use resampler::Resampler;
+pub use sample::PointerSample;
 
 /// How the readings of a hand are read.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -47,15 +49,6 @@ impl HandTuning {
 
 /// The HIP stays within this of the origin on each axis, m.
 pub const REACH_M: f64 = 1.5;
-
-/// Where the pointer was, and when by the page's clock.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PointerSample {
-    /// s, the page's clock.
-    pub page_s: f64,
-    /// m, world.
-    pub at: Vec2,
-}
 
 /// Who moves the HIP of a person's session.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -253,11 +246,5 @@ impl HandEvent {
     /// Whether it is of the hand itself; the others steer who works.
     pub fn is_of_the_hand(&self) -> bool {
         !matches!(self, Self::Drive(_) | Self::Pause(_) | Self::Finish)
-    }
-}
-
-impl PointerSample {
-    fn is_finite(&self) -> bool {
-        self.page_s.is_finite() && self.at.x.is_finite() && self.at.y.is_finite()
     }
 }

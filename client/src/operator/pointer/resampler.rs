@@ -4,9 +4,8 @@
 
 use std::collections::VecDeque;
 
+use super::sample::PointerSample;
 use mmt_shared::model::geometry::Vec2;
-
-use super::PointerSample;
 
 /// Readings kept: a quarter of a second at 1 kHz, more than play-out and silence together.
 const KEPT: usize = 256;

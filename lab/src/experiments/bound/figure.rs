@@ -1,8 +1,8 @@
 //! The bound's figure: the error that the schemes reach at each deadband, the updates of the schemes and of the oracle, and the
 //! one over the other.
 
+use super::case::{Group, Rule, TARGET, ratio};
 use super::trace::Bounded;
-use super::{Group, Rule, TARGET, ratio};
 use crate::experiment::prelude::*;
 
 /// How far the schemes stand apart at a deadband, in per cent: intervals that lie on each other cannot be read.

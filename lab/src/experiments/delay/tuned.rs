@@ -1,6 +1,7 @@
 //! Baselines at their best: each architecture tuned per delay with an equal budget, and judged on seeds that tuned nothing.
 
 mod figure;
+mod judged;
 mod tables;
 
 use super::choices::Choice;
@@ -9,6 +10,7 @@ use super::tuning::{Tried, best};
 use crate::architecture::{Architecture, run_tuned};
 use crate::experiment::prelude::*;
 use crate::trial::TrialError;
+pub(super) use judged::Judged;
 
 /// Every architecture at its best.
 pub(in crate::experiments) const TUNED: Experiment = Experiment {
@@ -28,12 +30,6 @@ const TUNING_SEEDS: u64 = 3;
 /// The first seed that tunes, and the first that judges, whatever the runner's.
 const TUNING: u64 = 10_001;
 const JUDGING: u64 = 20_001;
-
-/// An architecture at a delay: what it is run with where nobody tunes it, and tuned.
-pub(super) struct Judged<'a> {
-    pub(super) untuned: &'a Tried,
-    pub(super) tuned: &'a Tried,
-}
 
 /// Keeps `tuned.csv`, `tuned-choices.csv` and `tuned.svg`.
 fn run(runner: &Runner, request: &Request) -> Result<Findings, ExperimentError> {
@@ -96,10 +92,4 @@ fn run(runner: &Runner, request: &Request) -> Result<Findings, ExperimentError> 
 fn points() -> Vec<GridPoint> {
     let at = |of| DELAYS_MS.map(|ms| GridPoint::plain(of, ms));
     Architecture::ALL.into_iter().flat_map(at).collect()
-}
-
-impl Judged<'_> {
-    pub(super) fn point(&self) -> GridPoint {
-        self.tuned.case.point
-    }
 }

@@ -1,6 +1,6 @@
 //! The tables and the figure of random worlds.
 
-use super::Row;
+use super::row::Row;
 use crate::experiment::findings::Extent;
 use crate::experiment::prelude::*;
 use crate::statistics::quantile;

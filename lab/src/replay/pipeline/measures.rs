@@ -4,7 +4,6 @@ use mmt_shared::model::geometry::Vec2;
 use mmt_shared::time::TICK_S;
 use serde::Serialize;
 
-use super::PipelineReport;
 use super::course::Course;
 use crate::replay::config::ReplayConfig;
 use crate::replay::trigger::Contact;
@@ -82,4 +81,24 @@ impl Run {
             vector_mean: mean(vector()),
         }
     }
+}
+
+/// One scheme over one delay, over all pushes of a recording in their order.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct PipelineReport {
+    /// `mmt`, or `hold`: the last measured force.
+    pub system: &'static str,
+    /// When it sends.
+    pub scheme: String,
+    /// One-way delay, ms.
+    pub delay_ms: u64,
+    /// Updates that left the slave, of every cause.
+    pub sent: u64,
+    /// Time in contact by the recorded force, s.
+    pub contact_s: f64,
+    /// Updates per second of contact; none without contact.
+    pub contact_rate_hz: Option<f64>,
+    /// Errors of the rendered force.
+    #[serde(flatten)]
+    pub errors: Errors,
 }

@@ -4,16 +4,19 @@
 use std::collections::BTreeMap;
 use std::io;
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr, UdpSocket};
+use std::time::Duration;
 
 use mmt_shared::time::Time;
 use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
 
-use super::CLIENT_IDLE;
 use super::port::{Port, Received};
 use super::sockets::Sockets;
 use super::standing::{Standing, makes_room};
 use crate::capture::Sides;
 
+/// A client without a datagram in either direction for this long is forgotten: four times QUIC's own
+/// idle timeout in this project.
+pub const CLIENT_IDLE: Duration = Duration::from_secs(60);
 /// Descriptors besides one for each client: the program's own.
 const OTHER_DESCRIPTORS: u64 = 64;
 

@@ -1,5 +1,7 @@
 //! The relay on loopback: lower bounds of time only, and generous patience.
 
+use crate::counters::Tally;
+use crate::io::driver::DirectionCounters;
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr};
 use std::time::Instant;
 

@@ -8,7 +8,7 @@ use mmt_shared::report::{SessionStats, WireReport};
 use quinn::udp::{RecvMeta, Transmit};
 use serde::Serialize;
 
-use super::segments;
+use super::segments::segments;
 use crate::counters::Tally;
 use crate::io::driver::DirectionCounters;
 use crate::io::lateness::{Lateness, Recorder};

@@ -1,6 +1,7 @@
 //! The thread that sends each datagram at its time.
 
 use std::io;
+use std::net::{IpAddr, SocketAddr};
 use std::pin::Pin;
 use std::sync::{Arc, Mutex, MutexGuard};
 use std::task::{Context, Poll, Waker};
@@ -14,10 +15,10 @@ use quinn::udp::Transmit;
 use quinn::{AsyncUdpSocket, UdpPoller};
 
 use super::meter::SocketMeter;
-use super::{Address, SocketExtras, WrapError};
 use crate::config::{ConfigError, LinkConfig};
 use crate::direction::LinkId;
 use crate::io::driver::{Datagram, Driver, Outcome};
+use crate::io::record_file::RecordWriter;
 use crate::io::{lock, now};
 use crate::packet::Departure;
 
@@ -70,10 +71,9 @@ impl Release {
         seed: u64,
         id: LinkId,
         meter: &SocketMeter,
-        extras: SocketExtras,
+        record: Option<RecordWriter>,
     ) -> Result<Self, WrapError> {
-        let (record, lateness) = (extras.record, meter.recorder());
-        let driver = Driver::try_new(config, seed, id, now(), record, lateness)?;
+        let driver = Driver::try_new(config, seed, id, now(), record, meter.recorder())?;
         let shared = Arc::new(Shared {
             queue: Mutex::new(Queue {
                 driver,
@@ -82,9 +82,6 @@ impl Release {
             alarm: Arc::new(Alarm::try_new()?),
             meter: meter.clone(),
         });
-        if let Some(control) = extras.control {
-            control.attach(&shared)?;
-        }
         let sender = Sender {
             poller: inner.clone().create_io_poller(),
             inner: inner.clone(),
@@ -98,6 +95,11 @@ impl Release {
             shared,
             thread: Some(thread),
         })
+    }
+
+    /// What new settings are given to.
+    pub(super) fn shared(&self) -> &Arc<Shared> {
+        &self.shared
     }
 
     /// Puts a datagram on the link, now.
@@ -209,4 +211,22 @@ impl Sender {
         queue.driver.abandon();
         self.shared.publish(&queue);
     }
+}
+
+/// Where an outgoing datagram goes, and from which address.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Address {
+    pub(super) destination: SocketAddr,
+    pub(super) src_ip: Option<IpAddr>,
+}
+
+/// A socket could not be wrapped.
+#[derive(Debug, thiserror::Error)]
+pub enum WrapError {
+    /// The settings of the link are out of range.
+    #[error(transparent)]
+    Config(#[from] ConfigError),
+    /// The system gave no event descriptor or no thread.
+    #[error("no thread for the emulated link: {0}")]
+    Thread(#[from] io::Error),
 }

@@ -11,6 +11,7 @@ use mmt_shared::io::connect::connect;
 use mmt_shared::io::quic::{Traffic, client_endpoint};
 use mmt_shared::io::socket;
 use mmt_shared::io::stream::{read_frame, write_frame};
+use mmt_shared::model::architecture::Architecture;
 use mmt_shared::model::contact::Coupling;
 use mmt_shared::model::geometry::Vec2;
 use mmt_shared::model::sample::{HipCounts, HipSample};
@@ -20,8 +21,8 @@ use mmt_shared::pairing::{Pairing, Token};
 use mmt_shared::report::{MasterHalf, ReceivedUpdates, SlaveHalf};
 use mmt_shared::time::{TICK, Time};
 use mmt_shared::wire::{
-    Architecture, Claim, Command, DATAGRAM_MAX, Ending, Farewell, Hello, Label, Message, RawState,
-    Refusal, Role, STREAM_MESSAGE_MAX, SampleBlock, Side, StreamMessage, Welcome,
+    Claim, Command, DATAGRAM_MAX, Ending, Farewell, Hello, Label, Message, RawState, Refusal, Role,
+    STREAM_MESSAGE_MAX, SampleBlock, Side, StreamMessage, Welcome,
 };
 use quinn::{Connection, Endpoint, RecvStream, SendStream};
 use tokio::time::{interval, timeout};

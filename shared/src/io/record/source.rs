@@ -6,8 +6,8 @@ use rtrb::Consumer;
 
 use super::file::RecordWriter;
 use super::shown::Names;
-use super::sink::{Entry, Ticked};
-use super::{ROOM, Wall};
+use super::sink::{Entry, ROOM, Ticked};
+use super::wall::Wall;
 use crate::io::loop_thread::Frame;
 use crate::record::digest::RunDigest;
 use crate::record::messages::{Arrival, Loop, Reading, Session, Stamp};

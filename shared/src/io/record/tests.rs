@@ -1,5 +1,6 @@
 //! What a record keeps, and what becomes of it when a disk is full, stands still, or is cut off.
 
+use crate::record::messages::Stamp;
 use std::fs::OpenOptions;
 use std::os::unix::fs::OpenOptionsExt;
 use std::path::PathBuf;

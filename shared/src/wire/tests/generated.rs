@@ -1,6 +1,7 @@
 //! Messages of any content, and bytes that are none, as proptest makes them.
 
 use super::*;
+use crate::model::architecture::Architecture;
 
 fn any_envelope() -> impl Strategy<Value = Envelope> {
     let echo = (1_u32.., any::<u64>(), any::<u64>(), any::<u32>());

@@ -14,6 +14,7 @@ use mmt_client::device::DeviceProfile;
 use mmt_server::end::SlaveEnd;
 use mmt_server::slave::SlaveConfig;
 use mmt_shared::io::record::RecordWriter;
+use mmt_shared::model::architecture::Architecture;
 use mmt_shared::model::geometry::Vec2;
 use mmt_shared::pairing::Token;
 use mmt_shared::record::cdr::CdrWriter;
@@ -23,9 +24,7 @@ use mmt_shared::record::messages::{
     Stamp,
 };
 use mmt_shared::time::{TICK, Time};
-use mmt_shared::wire::{Architecture, Claim, DATAGRAM_MAX, Hello, Label, Role};
-
-use crate::fuzz::record::TOPICS;
+use mmt_shared::wire::{Claim, DATAGRAM_MAX, Hello, Label, Role};
 
 /// Ticks of each end.
 const TICKS: u64 = 6;
@@ -356,3 +355,18 @@ pub(in crate::fuzz) fn messages_of(
         Some((TOPICS[usize::from(head[0]) % TOPICS.len()], message))
     })
 }
+
+/// Names of topics, in the order in which the first byte of a message means them.
+pub(in crate::fuzz) const TOPICS: [&str; 11] = [
+    "/master/ticks",
+    "/slave/ticks",
+    "/master/session",
+    "/slave/session",
+    "/master/arrivals",
+    "/slave/arrivals",
+    "/master/packets",
+    "/slave/parameters",
+    "/master/link",
+    "/slave/loop",
+    "/master/readings",
+];

@@ -131,7 +131,7 @@ const PING: &str = "PING 192.0.2.1 (192.0.2.1) 56(84) bytes of data.
 
 pub(in crate::fuzz) fn traces() -> Vec<Vec<u8>> {
     let lens = "timestamp,rtt,uplink,downlink\n1705744800616897349,0,0,-1\n1705744800626565141,120.126123,72.439368,47.68675\n";
-    let record = String::from_utf8(super::packet_records().swap_remove(0)).unwrap();
+    let record = String::from_utf8(super::packets::packet_records().swap_remove(0)).unwrap();
     let of = [
         IRTT,
         PING,

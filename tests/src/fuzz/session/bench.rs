@@ -15,16 +15,17 @@ use mmt_lab::check::{
 use mmt_server::end::{SlaveEnd, SlaveGiven, session_config};
 use mmt_server::environment::BodyConfig;
 use mmt_server::slave::{Memory, SlaveConfig};
+use mmt_shared::model::architecture::Architecture;
 use mmt_shared::model::geometry::Vec2;
 use mmt_shared::model::settings::Mode;
 use mmt_shared::pairing::Token;
 use mmt_shared::time::{TICK, Time};
 use mmt_shared::wire::{
-    Architecture, Claim, DATAGRAM_MAX, Ending, Farewell, Hello, Label, Role, STREAM_MESSAGE_MAX,
-    Side, StreamMessage,
+    Claim, DATAGRAM_MAX, Ending, Farewell, Hello, Label, Role, STREAM_MESSAGE_MAX, Side,
+    StreamMessage,
 };
 
-use super::HEAD;
+use super::bytes::{HEAD, place};
 use super::judge::{MasterJudge, SlaveJudge};
 
 /// Datagrams of each side that an eavesdropper has.
@@ -145,7 +146,7 @@ impl Bench {
             samples_per_command: commands.samples_per_command,
             architecture,
             scene_hz: [0, 60, 30][usize::from(scenes % 3)],
-            hip: Vec2::new(-0.45, 0.0) + super::place(hip_x, hip_y),
+            hip: Vec2::new(-0.45, 0.0) + place(hip_x, hip_y),
             program: Label::clipped("fuzz"),
         };
         let config = world(kind);

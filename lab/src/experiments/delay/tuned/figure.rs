@@ -1,6 +1,6 @@
 //! The figure of the tuned architectures over the delay.
 
-use super::Judged;
+use super::judged::Judged;
 use crate::architecture::Architecture;
 use crate::experiment::prelude::*;
 use crate::experiments::delay::figure::line;

@@ -1,6 +1,6 @@
 //! What the tuned architectures came to: each beside itself untuned, and which is the nearest to the object at each delay.
 
-use super::Judged;
+use super::judged::Judged;
 use crate::architecture::{Architecture, DelayRow};
 use crate::experiment::prelude::*;
 use crate::experiments::delay::choices::number;
