@@ -15,8 +15,8 @@ use mmt_shared::time::TICK_S;
 /// Default of the limit, N. The hand presses with 8 N at the most (`device`'s profiles), so a tool that does what is felt
 /// stays below it; and it is the bound that outages are held to (15 N after 60 ms, `lab/src/world/tests/hard.rs`).
 pub const TOOL_FORCE_MAX_N: f64 = 15.0;
-/// Part of the limit that is left for what the prediction of a tick's force does not know: an object that moves within the tick,
-/// a sensor's noise. 3.8 % is the most in 30 000 first touches (`mmt reproduce touch`).
+/// Share of the limit that is left for what the prediction of a tick's force cannot have: an object that moves within the tick,
+/// a sensor's noise. Found by `mmt reproduce touch`, whose greatest force without it was less than so much above the limit.
 const MARGIN: f64 = 0.04;
 /// What is too slow, in messages.
 const APPROACH_NAME: &str =
