@@ -23,7 +23,8 @@ pub(crate) struct TwoPorts {
     way_m: f64,
     round_trip_ticks: usize,
     hip: Option<Vec2>,
-    tool: Option<Vec2>,
+    /// The tool, m, and the force on the object, N, in the last tick.
+    tool: Option<(Vec2, Vec2)>,
     /// Work of the tool on the object, J.
     tool_j: f64,
     /// The hand's way in a round trip at its longest, m.
@@ -62,8 +63,10 @@ impl TwoPorts {
         let Some(slave) = &tick.slave else {
             return;
         };
-        let before = self.tool.replace(slave.tool).unwrap_or(slave.tool);
-        self.tool_j += slave.true_force.dot(&(slave.tool - before));
+        let now = (slave.tool, slave.true_force);
+        let (tool, force) = self.tool.replace(now).unwrap_or(now);
+        // trapezoidal rule: a force that comes and goes from tick to tick does no work by that
+        self.tool_j += 0.5 * (force + slave.true_force).dot(&(slave.tool - tool));
         let hand_j = world.master().port().energy_j();
         let budget_j = WORK_SHARE * hand_j.max(0.0) + PRESS_N * self.way_max_m;
         self.excess_j = self.excess_j.max(self.tool_j - hand_j - budget_j);

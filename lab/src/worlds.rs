@@ -10,6 +10,7 @@ use mmt_netem::LinkConfig;
 use mmt_server::environment::{BodyConfig, EnvironmentConfig, SceneConfig, Wall};
 use mmt_server::sensing::{SensingConfig, VisionConfig};
 use mmt_server::slave::SlaveConfig;
+use mmt_server::tool::compliance::spring_for;
 use mmt_shared::model::contact::Coupling;
 use mmt_shared::model::geometry::{Pose, Vec2};
 use mmt_shared::model::params::GRAVITY;
@@ -97,11 +98,7 @@ impl RandomWorld {
                 environment,
                 scene,
                 sensing: sensor(&draws, default.sensing),
-                // what model.md advises for a contact of unknown stiffness
-                tool_compliance: Some(Coupling {
-                    stiffness_n_per_m: 1.2 * k_p,
-                    damping_ns_per_m: 30.0,
-                }),
+                tool_compliance: Some(spring_for(Coupling::for_stiffness(k_p))),
                 ..default
             },
             stiffness_n_per_m: Some(k_p),

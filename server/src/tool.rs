@@ -3,7 +3,7 @@
 //! It must never move the tool faster than the limit of play-out, never with more acceleration in free space, and never pass on
 //! f_m of a HIP that the tool is not at.
 
-pub(crate) mod compliance;
+pub mod compliance;
 pub mod energy;
 pub mod force;
 pub mod port;

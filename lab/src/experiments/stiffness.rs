@@ -1,6 +1,7 @@
 //! A contact whose stiffness nobody knows: from a third to ten times the rendered one, with a stiff and a compliant tool;
 //! and a soft one whose stiffness the device is given.
 
+use mmt_server::tool::compliance::spring_for;
 use mmt_shared::model::contact::Coupling;
 
 use crate::experiment::prelude::*;
@@ -21,11 +22,6 @@ const TOLD: [f64; 3] = [0.3, 0.5, 1.0];
 const DEVICE: Coupling = Coupling {
     stiffness_n_per_m: 1000.0,
     damping_ns_per_m: 10.0,
-};
-/// The spring of the compliant tool.
-const SPRING: Coupling = Coupling {
-    stiffness_n_per_m: 1200.0,
-    damping_ns_per_m: 30.0,
 };
 const CURVE: Curve = Curve::Useful(150);
 const DELTA: f64 = 0.10;
@@ -84,7 +80,7 @@ impl Case {
         });
         match self.tool {
             Tool::Stiff => {}
-            Tool::Compliant => world.slave.tool_compliance = Some(SPRING),
+            Tool::Compliant => world.slave.tool_compliance = Some(spring_for(DEVICE)),
             Tool::Told => {
                 world.stiffness_n_per_m = Some(stiffness_n_per_m);
                 // the mode's, over the device's coupling

@@ -4,6 +4,7 @@
 use std::time::Duration;
 
 use mmt_server::slave::Substitutes;
+use mmt_shared::model::geometry::{Pose, cross};
 use mmt_shared::model::settings::Mode;
 
 use super::*;
@@ -11,6 +12,7 @@ use crate::experiments::scenarios::SCENARIOS;
 use crate::setting::{MODES, paper_world};
 use crate::trial::{Running, Trial};
 use crate::world::{Given, WorldConfig};
+use crate::worlds::RandomWorld;
 
 /// What the budget has besides, J: f²/(2 k_p), which the contact stores at the tool's limit and gives back; 20 mJ
 /// from the beginning; and the tool's limit over the millimetre in which it brakes from 0.2 m/s.
@@ -98,4 +100,31 @@ fn no_scenario_and_no_delay_of_a_nominal_run_touches_the_bound() {
         let (ports, held) = run(&config, false);
         assert_eq!((held, ports.excess_j()), (0, 0.0), "{one_way_ms} ms");
     }
+}
+
+#[test]
+fn the_work_of_a_tool_that_shakes_is_about_what_the_object_takes() {
+    // with so little damping the force is zero in every second tick
+    let mut config = RandomWorld::new(11_150).config;
+    let spring = config.slave.tool_compliance.as_mut().unwrap();
+    spring.damping_ns_per_m = 30.0;
+    let mut world = World::try_new(&config).unwrap();
+    let mut ports = TwoPorts::new(0.0);
+    let (mut taken_j, mut losses) = (0.0, 0);
+    let mut before = (Vec2::zeros(), Pose::default());
+    for _ in 0..20_000 {
+        let tick = world.step();
+        ports.take(&world, &tick);
+        let Some(slave) = tick.slave else { continue };
+        // the force of a tick acts while the object goes to where it is in the next
+        let (force, from) = std::mem::replace(&mut before, (slave.true_force, slave.truth));
+        let way = slave.truth.position - from.position;
+        let turn = slave.truth.angle - from.angle;
+        taken_j += force.dot(&way) + turn * cross(slave.tool - from.position, force);
+        losses += u32::from(force.norm() > 1.0 && slave.true_force.norm() <= 0.0);
+    }
+    assert!(losses > 1000, "it does not shake: {losses}");
+    assert!(taken_j > 1.0, "{taken_j} J");
+    let ratio = ports.tool_j() / taken_j;
+    assert!((ratio - 1.0).abs() < 0.25, "{ratio}");
 }

@@ -12,6 +12,33 @@ const STIFFNESS_N_PER_M: (f64, f64) = (50.0, 30_000.0);
 /// Accepted damping, N s/m: a tool that gives at once by a force of a tick ago would shake.
 const DAMPING_NS_PER_M: (f64, f64) = (5.0, 300.0);
 
+/// Stiffness of the spring over k_p: a stiff contact then feels about like the rendered one.
+const OVER_DEVICE: f64 = 1.2;
+/// Stiffest contact over k_p that [`spring_for`] is meant for.
+const STIFFEST: f64 = 10.0;
+/// Least damping of such a spring, N s/m.
+const DAMPING_LEAST_NS_PER_M: f64 = 30.0;
+/// Damping over what just keeps the stiffest contact steady.
+const DAMPING_SHARE: f64 = 1.5;
+
+/// The spring for contacts of unknown stiffness, up to ten times that of the master's `device`, whose k_d they have.
+///
+/// The force comes a tick late. On a contact of k_e and k_d that does not move, D and K of the spring give
+/// (D + K T) y(k+1) = D y(k) − T k_e y(k) − k_d (y(k) − y(k−1)), which is steady where 2 D > 2 k_d + (k_e − K) T.
+/// With less damping the tool shakes at half of the tick's rate.
+#[must_use]
+pub fn spring_for(device: Coupling) -> Coupling {
+    let Coupling {
+        stiffness_n_per_m: k_p,
+        damping_ns_per_m: k_d,
+    } = device;
+    let steady = k_d + 0.5 * (STIFFEST - OVER_DEVICE) * k_p * TICK_S;
+    Coupling {
+        stiffness_n_per_m: OVER_DEVICE * k_p,
+        damping_ns_per_m: (DAMPING_SHARE * steady).max(DAMPING_LEAST_NS_PER_M),
+    }
+}
+
 /// How far the tool stands back.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Compliance {
@@ -73,6 +100,57 @@ mod tests {
         assert!((share - 0.632).abs() < 0.01, "{share}");
         let mut stiff = Compliance::try_new(None).unwrap();
         assert_eq!(stiff.step(force), (Vec2::zeros(), Vec2::zeros()));
+    }
+
+    /// The largest force on a contact that does not move, N, in the last of 1000 ticks after a blow of 1 N.
+    fn left_n(spring: Coupling, contact: Coupling) -> f64 {
+        let mut tool = Compliance::try_new(Some(spring)).unwrap();
+        let mut force = Vec2::new(1.0, 0.0);
+        for _ in 0..1000 {
+            let (back, rate) = tool.step(force);
+            force = -(back * contact.stiffness_n_per_m + rate * contact.damping_ns_per_m);
+        }
+        force.norm()
+    }
+
+    #[test]
+    fn the_spring_for_a_device_does_not_shake_on_a_contact_of_ten_times_its_stiffness() {
+        for k_p in [300.0, 1000.0, 2000.0, 3000.0] {
+            let device = Coupling::for_stiffness(k_p);
+            let spring = spring_for(device);
+            assert!(Compliance::try_new(Some(spring)).is_ok());
+            for times in [1.0, 3.0, 10.0] {
+                let stiffness_n_per_m = times * k_p;
+                let contact = Coupling {
+                    stiffness_n_per_m,
+                    ..device
+                };
+                let left = left_n(spring, contact);
+                assert!(left < 1e-6, "{k_p} N/m, {times} times: {left} N");
+            }
+        }
+        let advised = spring_for(Coupling::for_stiffness(1000.0));
+        assert_eq!(
+            (advised.stiffness_n_per_m, advised.damping_ns_per_m),
+            (1200.0, 30.0)
+        );
+    }
+
+    #[test]
+    fn a_tool_shakes_where_the_law_of_its_damping_is_broken_and_only_there() {
+        let device = Coupling::for_stiffness(3000.0);
+        let contact = Coupling {
+            stiffness_n_per_m: 30_000.0,
+            ..device
+        };
+        // k_d + (k_e − K) T / 2
+        let least = device.damping_ns_per_m + 0.5 * (30_000.0 - 3600.0) * TICK_S;
+        let with = |damping_ns_per_m| Coupling {
+            stiffness_n_per_m: 3600.0,
+            damping_ns_per_m,
+        };
+        assert!(left_n(with(1.05 * least), contact) < 1e-6);
+        assert!(left_n(with(0.95 * least), contact) > 1.0);
     }
 
     #[test]
