@@ -81,7 +81,10 @@ impl Device {
                 self.last_answer = Some(Instant::now());
             }
         }
-        if self.last_answer.is_none_or(|last_answer| last_answer.elapsed() > SILENCE) {
+        if self
+            .last_answer
+            .is_none_or(|last_answer| last_answer.elapsed() > SILENCE)
+        {
             self.flags = 0;
             self.force = (0.0, 0.0, 0.0);
         }
