@@ -37,14 +37,92 @@ fn a_session_that_was_not_asked_for_its_record_is_judged_and_a_broken_promise_fa
     });
 }
 
-/// Writes a record anew, with a bit of each digest of the slave changed; how many there are.
-fn with_other_digests(record: &Path) -> u32 {
+#[test]
+fn sessions_of_a_demo_follow_one_another_though_each_has_a_clock_of_its_own() {
+    in_real_time(|| {
+        let folder = tempfile::tempdir().unwrap();
+        let record = folder.path().join("demo.mcap");
+        let mut demo = Command::new(PROGRAM);
+        demo.args(["demo", "--duration", "2s", "--json", "--record"]);
+        assert!(demo.arg(&record).output().unwrap().status.success());
+        let messages = messages_of(&record);
+        write_twice(&record, &messages, 3_000_000_000);
+        assert_eq!(judge(&record), Ok(()));
+        write_twice(&record, &messages, 1_000_000_000);
+        let broken = judge(&record).unwrap_err();
+        assert!(broken.contains("one-operator"), "{broken}");
+    });
+}
+
+/// Writes a session twice, the second time with stamps that are so much later, ns, and the same times of its own clocks.
+fn write_twice(record: &Path, messages: &[(String, Vec<u8>)], later_ns: u64) {
+    fn later<M: Message>(
+        out: &mut RecordWriter,
+        topic: &'static str,
+        message: &[u8],
+        change: impl Fn(&mut M),
+    ) {
+        let mut message = M::read(message).unwrap();
+        change(&mut message);
+        out.put(topic, Stamp::default(), &message);
+    }
+    let mut out = RecordWriter::create(File::create(record).unwrap());
+    for number in 0..2 {
+        let by = later_ns * u64::from(number);
+        for (topic, message) in messages {
+            match &topic[..] {
+                "/master/session" => {
+                    later(&mut out, "/master/session", message, |of: &mut Session| {
+                        of.session += number;
+                        of.stamp.0 += by;
+                    })
+                }
+                "/slave/session" => {
+                    later(&mut out, "/slave/session", message, |of: &mut Session| {
+                        of.session += number;
+                        of.stamp.0 += by;
+                    })
+                }
+                "/master/arrivals" => {
+                    later(&mut out, "/master/arrivals", message, |of: &mut Arrival| {
+                        of.session += number;
+                    })
+                }
+                "/slave/arrivals" => {
+                    later(&mut out, "/slave/arrivals", message, |of: &mut Arrival| {
+                        of.session += number;
+                    })
+                }
+                "/master/ticks" => {
+                    later(&mut out, "/master/ticks", message, |of: &mut MasterTick| {
+                        of.session += number;
+                    })
+                }
+                "/slave/ticks" => later(&mut out, "/slave/ticks", message, |of: &mut SlaveTick| {
+                    of.session += number;
+                    of.stamp.0 += by;
+                }),
+                _ => {}
+            }
+        }
+    }
+    assert_eq!(out.finish(), None);
+}
+
+/// All messages of a record, each with its topic.
+fn messages_of(record: &Path) -> Vec<(String, Vec<u8>)> {
     let mut messages = Vec::new();
     read(record, |topic, message| -> Result<(), RecordError> {
         messages.push((topic.to_owned(), message.to_vec()));
         Ok(())
     })
     .unwrap();
+    messages
+}
+
+/// Writes a record anew, with a bit of each digest of the slave changed; how many there are.
+fn with_other_digests(record: &Path) -> u32 {
+    let messages = messages_of(record);
     let mut out = RecordWriter::create(File::create(record).unwrap());
     let mut ticks = 0;
     for (topic, message) in &messages {
