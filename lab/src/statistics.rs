@@ -3,6 +3,7 @@
 //! Student's t on the runs' own values, or on their logarithms for ratios. It must never hide how many
 //! values there were: an interval of fewer than two is absent.
 
+use mmt_shared::stats::values::mean;
 use serde::Serialize;
 
 /// 97.5 % points of Student's t for 1 to 30 degrees of freedom.
@@ -162,37 +163,6 @@ impl Slope {
     }
 }
 
-/// The mean; none without values.
-#[must_use]
-pub fn mean(values: impl IntoIterator<Item = f64>) -> Option<f64> {
-    let values: Vec<f64> = values.into_iter().collect();
-    (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
-}
-
-/// The median; none without values.
-#[must_use]
-pub fn median(values: impl IntoIterator<Item = f64>) -> Option<f64> {
-    let mut values: Vec<f64> = values.into_iter().collect();
-    values.sort_by(f64::total_cmp);
-    let upper = *values.get(values.len() / 2)?;
-    let lower = *values.get((values.len() - 1) / 2)?;
-    Some(f64::midpoint(lower, upper))
-}
-
-/// The least of rising values that a share (0 to 1) of all lies below; of all of them the largest. None without values.
-#[must_use]
-pub fn quantile(sorted: &[f64], share: f64) -> Option<f64> {
-    let place = (share * sorted.len() as f64) as usize;
-    sorted.get(place.min(sorted.len().checked_sub(1)?)).copied()
-}
-
-/// The value that so many per cent of rising values do not exceed (nearest rank). None without values.
-#[must_use]
-pub fn nearest_rank<T: Copy>(sorted: &[T], percent: usize) -> Option<T> {
-    let rank = (sorted.len() * percent).div_ceil(100);
-    sorted.get(rank.checked_sub(1)?).copied()
-}
-
 /// Abscissae at which two curves are compared.
 const PLACES: usize = 64;
 
@@ -208,8 +178,7 @@ pub fn log_ratio(first: &[(f64, f64)], second: &[(f64, f64)]) -> Option<f64> {
     let differences: Option<Vec<f64>> = places
         .map(|x| Some(interpolated(first, x)? - interpolated(second, x)?))
         .collect();
-    let differences = differences?;
-    Some(differences.iter().sum::<f64>() / differences.len() as f64)
+    mean(differences?)
 }
 
 /// A curve at an abscissa, joined by straight lines.
@@ -224,18 +193,6 @@ fn interpolated(curve: &[(f64, f64)], x: f64) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn a_quantile_is_one_of_the_values_with_that_share_below_it() {
-        let hundred: Vec<f64> = (0..100).map(f64::from).collect();
-        let of = |share| quantile(&hundred, share);
-        assert_eq!(
-            (of(0.0), of(0.05), of(0.95), of(1.0)),
-            (Some(0.0), Some(5.0), Some(95.0), Some(99.0))
-        );
-        assert_eq!(quantile(&[7.0], 0.99), Some(7.0));
-        assert_eq!(quantile(&[], 0.5), None);
-    }
 
     #[test]
     fn the_slope_of_a_hand_computed_case() {
@@ -262,7 +219,6 @@ mod tests {
         let one = Interval::of([2.0]).unwrap();
         assert_eq!((one.low, one.high), (2.0, 2.0));
         assert_eq!(Interval::of([]), None);
-        assert_eq!(median([]), None);
     }
 
     #[test]
@@ -317,11 +273,6 @@ mod tests {
         assert!((interval.p_against(interval.low).unwrap() - 0.05).abs() < 1e-4);
         assert_eq!(interval.p_against(3.0), Some(1.0));
         assert_eq!(Interval::of([2.0]).unwrap().p_against(0.0), None);
-    }
-
-    #[test]
-    fn the_median_of_an_even_number_is_the_middle() {
-        assert_eq!(median([4.0, 1.0, 3.0, 2.0]), Some(2.5));
     }
 
     #[test]

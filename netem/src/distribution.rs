@@ -4,6 +4,8 @@
 
 use std::time::Duration;
 
+use mmt_shared::stats::values::quantile;
+
 use crate::quantile::standard_normal;
 use crate::trace::{TraceError, meaningful_lines};
 
@@ -82,9 +84,7 @@ impl Table {
 
     /// In J.
     pub(crate) fn quantile(&self, p: f64) -> f64 {
-        let at = (p * self.sorted.len() as f64) as usize;
-        let entry = self.sorted.get(at).or(self.sorted.last());
-        f64::from(entry.copied().unwrap_or_default()) / TABLE_UNIT
+        f64::from(quantile(&self.sorted, p).unwrap_or_default()) / TABLE_UNIT
     }
 }
 

@@ -6,6 +6,7 @@
 use std::fmt;
 use std::time::Duration;
 
+use mmt_shared::stats::values::{mean, nearest_rank, standard_deviation};
 use mmt_shared::time::Time;
 use serde::Serialize;
 
@@ -14,7 +15,7 @@ use crate::counters::Drops;
 use crate::direction::LinkId;
 use crate::link::Link;
 use crate::packet::{DropCause, Fate, Packet};
-use crate::record::summary::{mean_run, nearest_rank};
+use crate::record::summary::mean_run;
 
 /// The length of the packets that are taken if nobody gives one, bytes: that of a small update. It matters where
 /// there is a rate.
@@ -78,13 +79,13 @@ impl LinkConfig {
 
     fn effect(&self, offers: &Offers) -> Result<Effect, ConfigError> {
         let stream = Stream::through(self, offers)?;
-        let mean_ms = mean(&stream.delays_ms);
+        let mean_ms = stream.mean_ms();
         // a wait is only that of the order where nothing else waits
         let waits_in_order =
             |link: &Self| link.order == Order::Fifo && link.profile.steps.is_empty();
         let in_order = self.links().all(waits_in_order);
         let free_mean_ms = if in_order && self.jitter_span() > Duration::ZERO {
-            mean(&Stream::through(&self.unordered(), offers)?.delays_ms)
+            Stream::through(&self.unordered(), offers)?.mean_ms()
         } else {
             mean_ms
         };
@@ -96,10 +97,10 @@ impl LinkConfig {
         let lengths = offers.packets.iter().map(|(_, bytes)| *bytes as f64);
         Ok(Effect {
             rate_hz: offers.rate_hz,
-            bytes: mean(&lengths.collect::<Vec<_>>()),
+            bytes: mean(lengths).unwrap_or_default(),
             mean_ms,
-            sd_ms: standard_deviation(&stream.delays_ms, mean_ms),
-            p99_ms: p99(&stream.delays_ms),
+            sd_ms: standard_deviation(&stream.delays_ms).unwrap_or_default(),
+            p99_ms: p99(&stream.delays_ms).unwrap_or_default(),
             waiting_ms: (mean_ms - free_mean_ms).max(0.0) + 0.0,
             loss: self.known_loss().unwrap_or(of_all(sampled)),
             burst_packets: known_burst.unwrap_or_else(|| mean_run(&offers.runs(&stream.lost))),
@@ -180,6 +181,11 @@ struct Stream {
 }
 
 impl Stream {
+    /// The mean delay; zero if nothing arrived.
+    fn mean_ms(&self) -> f64 {
+        mean(self.delays_ms.iter().copied()).unwrap_or_default()
+    }
+
     fn through(config: &LinkConfig, offers: &Offers) -> Result<Self, ConfigError> {
         let mut link = Link::try_new(config.clone(), SEED, LinkId::UP)?;
         let mut stream = Self {
@@ -228,18 +234,8 @@ impl Stream {
     }
 }
 
-fn mean(values: &[f64]) -> f64 {
-    // the sum of nothing is minus zero
-    (values.iter().sum::<f64>() + 0.0) / values.len().max(1) as f64
-}
-
-fn standard_deviation(values: &[f64], mean: f64) -> f64 {
-    let sum: f64 = values.iter().map(|x| (x - mean) * (x - mean)).sum();
-    ((sum + 0.0) / values.len().max(1) as f64).sqrt()
-}
-
-/// Nearest-rank 99th percentile; zero if nothing arrived.
-fn p99(values: &[f64]) -> f64 {
+/// The 99th percentile; none if nothing arrived.
+fn p99(values: &[f64]) -> Option<f64> {
     let mut sorted = values.to_vec();
     sorted.sort_unstable_by(f64::total_cmp);
     nearest_rank(&sorted, 0.99)

@@ -79,6 +79,7 @@ pub fn named(name: &str) -> Option<&'static Preset> {
 mod tests {
     use std::time::Duration;
 
+    use mmt_shared::stats::values::{self, rms, standard_deviation};
     use mmt_shared::time::Time;
 
     use super::*;
@@ -124,13 +125,6 @@ mod tests {
         (delays, lost)
     }
 
-    fn mean_and_sd(values: &[f64]) -> (f64, f64) {
-        let n = values.len() as f64;
-        let mean = values.iter().sum::<f64>() / n;
-        let squares = values.iter().map(|x| (x - mean).powi(2));
-        (mean, (squares.sum::<f64>() / n).sqrt())
-    }
-
     #[test]
     fn every_preset_has_the_mean_the_spread_and_the_loss_that_follow_from_its_words_by_hand() {
         // pieces of a distribution: share, from, to
@@ -172,7 +166,8 @@ mod tests {
             // 10.007 s apart, ten times the longest tau, packets are independent and meet no multiple of 15 s
             let n = 40_000;
             let (delays, found_lost) = met(name, Duration::from_millis(10_007), n);
-            let (found_mean, found_sd) = mean_and_sd(&delays);
+            let found_mean = values::mean(delays.iter().copied()).unwrap();
+            let found_sd = standard_deviation(&delays).unwrap();
             let spread = f64::from(n).sqrt();
             assert!(
                 (found_mean - mean).abs() <= 4.0 * sd / spread,
@@ -200,8 +195,7 @@ mod tests {
             let correlation = libm::expm1(s2 * rho) / libm::expm1(s2);
             let expected = sd * (2.0 * (1.0 - correlation)).sqrt();
             let (delays, _) = met(name, Duration::from_millis(1), 200_000);
-            let steps = delays.windows(2).map(|pair| (pair[1] - pair[0]).powi(2));
-            let step = (steps.sum::<f64>() / (delays.len() - 1) as f64).sqrt();
+            let step = rms(delays.windows(2).map(|pair| pair[1] - pair[0])).unwrap();
             assert!(
                 (step / expected - 1.0).abs() < 0.05,
                 "{name}: {step}, not {expected}"

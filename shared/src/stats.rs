@@ -1,9 +1,10 @@
-//! Statistics that fill while the system runs: quantiles, values of the last seconds, the queue in round trips, and what
-//! a session counts.
+//! Statistics: means and quantiles of values at hand, and what fills while the system runs: histograms, values of the last
+//! seconds, the queue in round trips, and what a session counts.
 //!
-//! Pure and of fixed size: time comes as an argument, and nothing allocates once it is made.
+//! Pure: time comes as an argument. What fills is of fixed size, and nothing of it allocates once it is made.
 
 pub mod histogram;
 pub mod queue;
 pub mod recent;
 pub mod session;
+pub mod values;

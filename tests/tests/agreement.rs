@@ -15,10 +15,10 @@ use std::time::Duration;
 
 use harness::hosts::{Hosts, HostsError};
 use harness::process::{Running, did_not_run, number};
-use mmt_lab::statistics::median;
 use mmt_lab::world::{World, WorldConfig};
 use mmt_netem::LinkConfig;
 use mmt_server::playout::PlayoutConfig;
+use mmt_shared::stats::values::median;
 use serde_json::Value;
 
 mod harness;

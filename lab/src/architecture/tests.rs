@@ -5,6 +5,7 @@ use mmt_client::operator::hand::{Hand, HandConfig};
 use mmt_netem::config::LinkConfig;
 use mmt_shared::model::geometry::Vec2;
 use mmt_shared::rng::Substream;
+use mmt_shared::stats::values;
 use mmt_shared::time::TICK_S;
 
 const RUN: Duration = Duration::from_secs(20);
@@ -39,8 +40,7 @@ fn rows(architecture: Architecture, one_way_ms: u64, k_p: f64) -> Vec<DelayRow> 
 
 /// The mean over the rows that have the number.
 fn mean(rows: &[DelayRow], of: impl Fn(&DelayRow) -> Option<f64>) -> f64 {
-    let values: Vec<f64> = rows.iter().filter_map(of).collect();
-    values.iter().sum::<f64>() / values.len() as f64
+    values::mean(rows.iter().filter_map(of)).unwrap_or(f64::NAN)
 }
 
 fn print(architecture: Architecture, one_way_ms: u64, k_p: f64, rows: &[DelayRow]) {

@@ -1,7 +1,9 @@
 //! Cases with the runs of their seeds, and the columns that summarise them.
 
+use mmt_shared::stats::values::median;
+
 use crate::digest::of_runs;
-use crate::statistics::{Interval, median};
+use crate::statistics::Interval;
 use crate::table::{Cell, Column};
 use crate::trial::Measured;
 

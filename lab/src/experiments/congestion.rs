@@ -93,8 +93,8 @@ fn columns<'a>() -> [Column<'a, BinRow<'a>>; 13] {
 mod tests {
     use super::bins::{FROM_S, UNTIL_S};
     use super::*;
-    use crate::statistics::median;
     use mmt_shared::channel::rate_control::StretchMax;
+    use mmt_shared::stats::values::median;
 
     const DURATION: Duration = Duration::from_secs(45);
 

@@ -6,10 +6,10 @@ use mmt_netem::presets::{PRESETS, Preset};
 use mmt_netem::record::summary::Summary;
 use mmt_netem::record::{End, Entry};
 use mmt_netem::{Link, Packet};
+use mmt_shared::stats::values::{quantile, rms};
 use mmt_shared::time::{TICK, Time};
 
 use crate::experiment::prelude::*;
-use crate::statistics::quantile;
 
 mod closed_form;
 
@@ -118,7 +118,7 @@ fn step_columns<'a>() -> [Column<'a, Group>; 8] {
     [
         column("preset", "", 0, |group| group.case.preset.name),
         column("step_rms_ms", "ms", 3, |group| group.case.known.step_rms_ms),
-        column("step_rms_ms_achieved", "ms", 3, |group| rms(&sorted(group, |met| &met.steps_ms))),
+        column("step_rms_ms_achieved", "ms", 3, |group| rms(sorted(group, |met| &met.steps_ms))),
         column("step_p50_ms", "ms", 3, |group| of_steps(group, 0.5)),
         column("step_p90_ms", "ms", 3, |group| of_steps(group, 0.9)),
         column("step_p99_ms", "ms", 3, |group| of_steps(group, 0.99)),
@@ -191,11 +191,6 @@ fn sorted(group: &Group, of: fn(&Met) -> &Vec<f64>) -> Vec<f64> {
     let mut values: Vec<f64> = group.runs.iter().flat_map(of).copied().collect();
     values.sort_by(f64::total_cmp);
     values
-}
-
-fn rms(values: &[f64]) -> Option<f64> {
-    let squares: f64 = values.iter().map(|value| value * value).sum();
-    (!values.is_empty()).then(|| (squares / values.len() as f64).sqrt())
 }
 
 /// Shares of packets at which a curve is drawn. The first and the last quarter of a per cent are left out:

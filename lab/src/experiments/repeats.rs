@@ -6,7 +6,7 @@
 use mmt_netem::config::LinkConfig;
 use mmt_server::repeats::Repeats;
 use mmt_shared::channel::rate_control::StretchMax;
-use mmt_shared::metrics::Staleness;
+use mmt_shared::stats::values::nearest_rank;
 
 use super::loss::{Loss, link};
 use crate::experiment::prelude::*;
@@ -183,14 +183,16 @@ fn columns<'a>() -> Vec<Column<'a, Row<'a>>> {
     columns
 }
 
-/// Staleness of all updates of all runs.
+/// Staleness of all updates of all runs, rising.
 fn times(runs: &[Measured]) -> Vec<Duration> {
     let of = runs.iter().flat_map(|run| run.staleness.iter().copied());
-    of.collect()
+    let mut times: Vec<Duration> = of.collect();
+    times.sort_unstable();
+    times
 }
 
 fn stale_ms(group: &Group, share: f64) -> Option<f64> {
-    let stale = Staleness::quantile(&mut times(&group.runs), share);
+    let stale = nearest_rank(&times(&group.runs), share);
     stale.map(|time| time.as_secs_f64() * 1e3)
 }
 
@@ -275,7 +277,7 @@ mod tests {
                 .collect()
         };
         let (none, updates) = (runs(Repeats::NONE, 0), runs(Repeats::recommended(), 0));
-        let p95 = |runs: &[Measured]| Staleness::quantile(&mut times(runs), 0.95).unwrap();
+        let p95 = |runs: &[Measured]| nearest_rank(&times(runs), 0.95).unwrap();
         let (without, with) = (p95(&none), p95(&updates));
         println!("95 % of updates within {without:?}, with repeats {with:?}");
         assert!(with < without.mul_f64(0.7));

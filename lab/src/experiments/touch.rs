@@ -12,10 +12,10 @@ use mmt_shared::model::geometry::Vec2;
 use mmt_shared::model::sample::{ForceCounts, HipCounts, HipSample};
 use mmt_shared::model::settings::{CONTACT_DAMPING_NS_PER_M, STIFFNESS_N_PER_M};
 use mmt_shared::rng::Substream;
+use mmt_shared::stats::values::quantile;
 use mmt_shared::time::{TICK_S, Time};
 
 use crate::experiment::prelude::*;
-use crate::statistics::quantile;
 use crate::trial::TrialError;
 
 /// The first touches.

@@ -1,6 +1,7 @@
 //! Delays of a run: of each way where both ends are there, and round trips by the echoes in what arrived.
 
 use mmt_shared::record::messages::Arrival;
+use mmt_shared::stats::values::nearest_rank;
 use mmt_shared::wire::{Datagram, Side};
 
 use super::packets::Matched;
@@ -50,9 +51,7 @@ type Spread = (&'static str, Vec<f64>);
 
 /// The delay that a share `q` of sorted delays does not exceed, ms.
 fn quantile_ms(delays: &[f64], q: f64) -> Option<f64> {
-    let last = delays.len().checked_sub(1)?;
-    let place = (q * last as f64).round() as usize;
-    delays.get(place).map(|delay| delay * 1e3)
+    nearest_rank(delays, q).map(|delay| delay * 1e3)
 }
 
 impl Spreads {

@@ -6,9 +6,9 @@
 //! again after each push from where the last fit ended. It must never give a number that is not finite.
 
 use mmt_shared::model::geometry::Vec2;
+use mmt_shared::stats::values::median;
 
 use super::surface::{Friction, Law, PushMotion};
-use crate::statistics::median;
 
 /// k: force errors well below it count by their square, well above by their size, N.
 const ROBUST_N: f64 = 0.3;

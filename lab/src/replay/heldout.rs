@@ -2,12 +2,12 @@
 
 use mmt_shared::model::geometry::Vec2;
 use mmt_shared::rng::Substream;
+use mmt_shared::stats::values::{mean, median};
 use serde::Serialize;
 
 use super::config::ReplayConfig;
 use super::fit::{Observation, fit};
 use super::surface::Law;
-use crate::statistics::{mean, median};
 
 /// | |predicted| − |measured| | / |measured|.
 pub(super) fn relative_error(predicted: Vec2, measured: Vec2) -> f64 {

@@ -22,9 +22,9 @@ pub use trigger::Packets;
 use mmt_shared::model::geometry::{Vec2, rotate};
 use mmt_shared::recording::{Push, Recording};
 
-use crate::statistics::quantile;
 use fit::{Observation, fit};
 use heldout::Split;
+use mmt_shared::stats::values::{mean_of_sum, quantile};
 use trigger::{Contact, TriggerTraffic};
 
 /// Replays a recording under every law: friction fitted to the pushes so far, the next push's force
@@ -191,7 +191,7 @@ impl Learner {
             predicted_n: predicted,
             relative_error: measured.map(|force| heldout::relative_error(predicted, force)),
             vector_error: measured.map(|force| (predicted - force).norm() / force.norm()),
-            held_error: mean(traffic.error_sum, traffic.samples),
+            held_error: mean_of_sum(traffic.error_sum, traffic.samples),
             updates: Rates::of(traffic.packets, push.duration_s(), contact_s),
         }
     }
@@ -220,14 +220,10 @@ impl Learner {
             centre_m: coupled.then_some(self.at_slave.centre_m),
             force_error: Spread::of(own().filter_map(|law| law.relative_error)),
             vector_error: Spread::of(own().filter_map(|law| law.vector_error)),
-            held_error: mean(self.error_sum, self.samples),
+            held_error: mean_of_sum(self.error_sum, self.samples),
             updates: Rates::of(self.packets, duration_s, contact_s),
         }
     }
-}
-
-fn mean(sum: f64, count: u64) -> Option<f64> {
-    (count > 0).then(|| sum / count as f64)
 }
 
 #[cfg(test)]

@@ -4,13 +4,13 @@
 use std::fmt;
 
 use mmt_shared::model::geometry::Vec2;
+use mmt_shared::stats::values::{mean, median, quantile};
 use serde::Serialize;
 
 use super::config::ReplayConfig;
 use super::heldout::HeldOut;
 use super::surface::Law;
 use super::trigger::Packets;
-use crate::statistics::{mean, median, quantile};
 use crate::table::{Column, Table, column};
 
 /// Median and mean of an error over pushes.

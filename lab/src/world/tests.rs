@@ -8,6 +8,7 @@ use mmt_server::slave::SlaveConfig;
 use mmt_shared::model::contact::Coupling;
 use mmt_shared::model::settings::Mode;
 use mmt_shared::pairing::Token;
+use mmt_shared::stats::values::median;
 use mmt_shared::wire::Welcome;
 
 mod estimation;
@@ -34,16 +35,6 @@ fn run(config: &WorldConfig, seconds: u64) -> World {
 
 fn relative_error(world: &World) -> f64 {
     world.force().relative_error.unwrap()
-}
-
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    let middle = values.len() / 2;
-    if values.len() % 2 == 1 {
-        values[middle]
-    } else {
-        values[middle - 1].midpoint(values[middle])
-    }
 }
 
 /// Every number that a report is made of.
@@ -102,7 +93,7 @@ fn the_default_network_lets_the_job_be_done() {
         );
         errors.push(relative_error(&world));
     }
-    let typical = median(errors.clone());
+    let typical = median(errors.iter().copied()).unwrap();
     assert!(
         typical <= 0.2,
         "relative force error {typical:.3}, by seed {errors:.3?}"

@@ -16,6 +16,7 @@ use std::time::{Duration, Instant};
 
 use mmt_netem::LinkConfig;
 use mmt_netem::io::relay::{Extras, Relay, RelayHandle};
+use mmt_shared::stats::values::quantile;
 
 mod cpu;
 
@@ -126,8 +127,7 @@ fn us(time: Duration) -> f64 {
 }
 
 fn at_us(sorted: &[Duration], share: f64) -> f64 {
-    let rank = (share * sorted.len() as f64) as usize;
-    sorted.get(rank).or(sorted.last()).copied().map_or(0.0, us)
+    quantile(sorted, share).map_or(0.0, us)
 }
 
 fn show(what: &str, sorted: &[Duration], less: Duration) {

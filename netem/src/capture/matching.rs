@@ -5,6 +5,7 @@
 use std::collections::BTreeMap;
 use std::net::IpAddr;
 
+use mmt_shared::stats::values::quantile;
 use mmt_shared::time::Time;
 
 use super::frame::Seen;
@@ -169,7 +170,7 @@ fn directions(from: &[Packet], to: &[Packet]) -> Option<(Pair, Option<Pair>)> {
     let mut median = |pair: &Pair| {
         let of_pair = differences.get_mut(pair)?;
         of_pair.sort_unstable();
-        of_pair.get(of_pair.len() / 2).copied()
+        quantile(of_pair, 0.5)
     };
     let Some(backward) = median(&back(one)) else {
         return Some((one, None));

@@ -2,6 +2,8 @@
 
 use std::time::Duration;
 
+use mmt_shared::stats::values;
+
 use super::*;
 use crate::config::{Delay, Limit, Loss, Order, Probability, Shape};
 use crate::direction::Direction;
@@ -92,10 +94,8 @@ fn delays(fates: &[Met]) -> Vec<Option<f64>> {
 }
 
 fn mean_and_sd(values: &[f64]) -> (f64, f64) {
-    let n = values.len() as f64;
-    let mean = values.iter().sum::<f64>() / n;
-    let variance = values.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / (n - 1.0);
-    (mean, variance.sqrt())
+    let mean = values::mean(values.iter().copied()).unwrap();
+    (mean, values::standard_deviation(values).unwrap())
 }
 
 /// The Kolmogorov–Smirnov distance to a distribution, times sqrt(n): 1.95 is exceeded once in 1000.

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use mmt_shared::stats::values::{mean, nearest_rank, standard_deviation};
 use serde::Serialize;
 
 use super::entry::{End, Entry};
@@ -129,18 +130,18 @@ impl Summary {
                 by_sending.push((sent, entry.number));
             }
         }
-        let n = delays_ms.len().max(1) as f64;
-        self.mean_ms = delays_ms.iter().sum::<f64>() / n;
-        let squares = delays_ms.iter().map(|x| (x - self.mean_ms).powi(2));
-        self.sd_ms = (squares.sum::<f64>() / n).sqrt();
+        self.mean_ms = mean(delays_ms.iter().copied()).unwrap_or_default();
+        self.sd_ms = standard_deviation(&delays_ms).unwrap_or_default();
         delays_ms.sort_unstable_by(f64::total_cmp);
         late_us.sort_unstable_by(f64::total_cmp);
-        self.p99_ms = nearest_rank(&delays_ms, 0.99);
-        self.lateness_us = [0.5, 0.99, 1.0].map(|share| nearest_rank(&late_us, share));
-        self.degraded = nearest_rank(&late_us, 0.999) > P999_DEGRADED_US;
+        let late = |share| nearest_rank(&late_us, share).unwrap_or_default();
+        self.p99_ms = nearest_rank(&delays_ms, 0.99).unwrap_or_default();
+        self.lateness_us = [0.5, 0.99, 1.0].map(late);
+        self.degraded = late(0.999) > P999_DEGRADED_US;
         self.delay_histogram = histogram(&delays_ms);
         by_sending.sort_unstable();
-        self.reordered = reordered(by_sending.iter().map(|(_, number)| *number)) / n;
+        let late = reordered(by_sending.iter().map(|(_, number)| *number));
+        self.reordered = late / delays_ms.len().max(1) as f64;
     }
 
     fn bursts(&mut self, mine: &[&Entry]) {
@@ -159,13 +160,6 @@ impl Summary {
 
 fn is_copy(entry: &Entry) -> bool {
     matches!(entry.end, End::Sent { copy: true, .. })
-}
-
-/// The value that a share of the sorted values does not exceed; zero of none.
-pub(crate) fn nearest_rank(sorted: &[f64], share: f64) -> f64 {
-    let rank = (sorted.len() as f64 * share).ceil() as usize;
-    let at = sorted.get(rank.saturating_sub(1)).or(sorted.last());
-    at.copied().unwrap_or(0.0)
 }
 
 /// How many arrive after one with a higher number.

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 use std::time::Duration;
 
+use mmt_shared::stats::values::quantile;
 use mmt_shared::time::duration_nanos;
 
 use super::{Sample, TraceError, irtt, lens, mmt, ping};
@@ -119,11 +120,7 @@ impl PathTrace {
     pub(crate) fn span(&self) -> Duration {
         let mut delays: Vec<_> = self.samples.iter().filter_map(|s| s.delay).collect();
         delays.sort_unstable();
-        let at = |share: f64| {
-            let rank = (share * delays.len() as f64) as usize;
-            delays.get(rank).or(delays.last()).copied()
-        };
-        let (low, high) = (at(0.005), at(0.995));
+        let (low, high) = (quantile(&delays, 0.005), quantile(&delays, 0.995));
         high.unwrap_or_default()
             .saturating_sub(low.unwrap_or_default())
     }

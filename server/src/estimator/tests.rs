@@ -5,6 +5,7 @@ mod paper;
 mod plant;
 
 use mmt_shared::model::geometry::Vec2;
+use mmt_shared::stats::values::quantile;
 use proptest::prelude::*;
 
 use super::filter::StateVariableFilter;
@@ -18,7 +19,7 @@ const PUSH_TICKS: u32 = 2200;
 fn median(values: &[f64]) -> f64 {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);
-    sorted[sorted.len() / 2]
+    quantile(&sorted, 0.5).unwrap()
 }
 
 /// Relative errors of m, b, c.

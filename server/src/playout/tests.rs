@@ -5,6 +5,7 @@ mod delay;
 use super::*;
 use mmt_shared::model::sample::{ForceCounts, HipCounts};
 use mmt_shared::rng::Substream;
+use mmt_shared::stats::values::rms;
 use mmt_shared::time::TICK_S;
 
 const MS: i64 = 1_000_000;
@@ -222,10 +223,8 @@ fn holding_the_newest_sample_is_far_worse_than_the_buffer_under_jitter() {
     let (_, played) = play(config, 1, 10_000, &mut random_transit(10 * MS));
     let error_of = |pairs: &[(f64, Vec2)]| {
         let error = |delay: f64| {
-            let squares = pairs
-                .iter()
-                .map(|(t, hip)| (hip - truth(t - delay)).norm_squared());
-            (squares.sum::<f64>() / pairs.len() as f64).sqrt()
+            let errors = pairs.iter().map(|(t, hip)| (hip - truth(t - delay)).norm());
+            rms(errors).unwrap()
         };
         (0..400)
             .map(|k| error(0.045 + f64::from(k) * 1e-4))

@@ -6,8 +6,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::mean;
 use crate::model::geometry::Vec2;
+use crate::stats::values::mean_of_sum;
 
 /// F_min, N: below, no force is perceived at all (section IV-B).
 pub const F_MIN_N: f64 = 0.04;
@@ -35,7 +35,7 @@ impl LogRatio {
     }
 
     fn mean(&self) -> Option<f64> {
-        mean(self.sum, self.n)
+        mean_of_sum(self.sum, self.n)
     }
 }
 
@@ -99,7 +99,7 @@ impl ForceMetrics {
     /// The metrics so far.
     pub fn summary(&self) -> ForceSummary {
         let (pmse_x, pmse_y) = (self.x.mean(), self.y.mean());
-        let of_contact = |sum| mean(sum, self.in_contact);
+        let of_contact = |sum| mean_of_sum(sum, self.in_contact);
         let ratio = (self.sum_measured2 > 0.0).then(|| self.sum_error2 / self.sum_measured2);
         ForceSummary {
             samples: Some(self.samples),

@@ -19,8 +19,3 @@ pub use peak::ForcePeak;
 pub use pose::PoseError;
 pub use staleness::Staleness;
 pub use updates::UpdateCounts;
-
-/// `sum / n`; absent when n is 0.
-fn mean(sum: f64, n: u64) -> Option<f64> {
-    (n > 0).then(|| sum / n as f64)
-}

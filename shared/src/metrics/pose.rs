@@ -1,7 +1,7 @@
 //! How far the local model's pose is from the true pose of the object, sample by sample.
 
-use super::mean;
 use crate::model::geometry::{Pose, wrap_angle};
+use crate::stats::values::mean_of_sum;
 
 /// Accumulates position and orientation error. Fixed size, no allocation.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -31,12 +31,12 @@ impl PoseError {
 
     /// Root mean square distance of the two centres, m; absent without samples.
     pub fn position_rms_m(&self) -> Option<f64> {
-        mean(self.sum_position2, self.n).map(f64::sqrt)
+        mean_of_sum(self.sum_position2, self.n).map(f64::sqrt)
     }
 
     /// Root mean square orientation error, wrapped to at most half a turn, rad; absent without samples.
     pub fn angle_rms_rad(&self) -> Option<f64> {
-        mean(self.sum_angle2, self.n).map(f64::sqrt)
+        mean_of_sum(self.sum_angle2, self.n).map(f64::sqrt)
     }
 
     /// Largest distance of the two centres, m; absent without samples.

@@ -40,13 +40,6 @@ impl Staleness {
     pub fn times(&self) -> &[Duration] {
         &self.known
     }
-
-    /// The time that the share `q` (0 to 1) of all `times` does not exceed (nearest rank); none without times.
-    pub fn quantile(times: &mut [Duration], q: f64) -> Option<Duration> {
-        times.sort_unstable();
-        let rank = libm::ceil(q.clamp(0.0, 1.0) * times.len() as f64) as usize;
-        times.get(rank.max(1) - 1).copied()
-    }
 }
 
 #[cfg(test)]
@@ -65,11 +58,6 @@ mod tests {
         // the second was lost, the third carries it as well
         staleness.known(at(70), 3);
         staleness.known(at(80), 3);
-        let ms = [50, 60, 50].map(Duration::from_millis);
-        assert_eq!(staleness.times(), ms);
-        let mut times = ms;
-        assert_eq!(Staleness::quantile(&mut times, 0.5), Some(ms[0]));
-        assert_eq!(Staleness::quantile(&mut times, 0.99), Some(ms[1]));
-        assert_eq!(Staleness::quantile(&mut [], 0.5), None);
+        assert_eq!(staleness.times(), [50, 60, 50].map(Duration::from_millis));
     }
 }

@@ -58,6 +58,8 @@ impl PushProfile {
 
 #[cfg(test)]
 mod tests {
+    use mmt_shared::stats::values::mean;
+
     use super::*;
 
     #[test]
@@ -87,7 +89,7 @@ mod tests {
         let speeds: Vec<f64> = (0..60_000)
             .map(|k| profile.speed(f64::from(k) * 1e-3) / profile.mean_speed)
             .collect();
-        let mean = speeds.iter().sum::<f64>() / speeds.len() as f64;
+        let mean = mean(speeds.iter().copied()).unwrap();
         let largest = speeds.iter().fold(0.0_f64, |a, x| a.max((x - 1.0).abs()));
         assert!((mean - 1.0).abs() < 0.02, "{mean}");
         assert!(largest <= 0.42 && largest > 0.38, "{largest}");

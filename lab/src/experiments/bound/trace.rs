@@ -10,11 +10,11 @@ use mmt_shared::model::geometry::Vec2;
 use mmt_shared::model::params::ModelParams;
 use mmt_shared::model::settings::ModelSettings;
 use mmt_shared::model::update::Cause;
+use mmt_shared::stats::values::quantile;
 use mmt_shared::time::{TICK_S, Time};
 
 use crate::experiment::findings::ExperimentError;
 use crate::oracle::{Oracle, Tick};
-use crate::statistics::quantile;
 use crate::trial::TrialError;
 use crate::world::{World, WorldConfig, WorldTick};
 

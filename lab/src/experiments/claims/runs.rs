@@ -5,11 +5,12 @@
 //! logarithmic axes. The ratio is averaged over the rates that both curves reach. Rate and PMSE of a run depend on
 //! one another, so the interval comes from leaving out one seed at a time (jackknife).
 
+use mmt_shared::stats::values::mean;
 use nalgebra::{RowVector3, SMatrix, SVector};
 
 use crate::experiment::grid::Group;
 use crate::setting::{Curve, DEADBANDS, Point, knee};
-use crate::statistics::{Interval, log_ratio, mean};
+use crate::statistics::{Interval, log_ratio};
 use crate::trial::Measured;
 
 /// A curve: (ln rate, ln PMSE), by rising rate.

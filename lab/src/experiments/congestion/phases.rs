@@ -1,8 +1,9 @@
 //! What the runs came to before, during and after congestion, as means over the seeds.
 
+use mmt_shared::stats::values::median;
+
 use super::bins::{AFTER_S, BIN, Bin, FROM_S, Group, UNTIL_S};
 use crate::experiment::prelude::*;
-use crate::statistics::median;
 
 /// The name of who answers and the phase, with the bins of each run in that phase.
 type Phase = grid::Group<(&'static str, &'static str), Vec<Bin>>;

@@ -19,7 +19,7 @@ fn recomputed(run: &Run<Point, Measured>) -> BTreeMap<&'static str, Cell> {
             .iter()
             .map(|(f_s, f_m)| (of(f_s).abs(), of(f_m).abs()));
         let logs = both.filter(|(s, m)| felt(*s) && felt(*m));
-        crate::statistics::mean(logs.map(|(s, m)| libm::log(s / m).powi(2)))
+        mmt_shared::stats::values::mean(logs.map(|(s, m)| libm::log(s / m).powi(2)))
     };
     let (x, y) = (pmse(|f| f.x), pmse(|f| f.y));
     let touching = pairs

@@ -1,9 +1,10 @@
 //! The tables and the figure of random worlds.
 
+use mmt_shared::stats::values::quantile;
+
 use super::row::Row;
 use crate::experiment::findings::Extent;
 use crate::experiment::prelude::*;
-use crate::statistics::quantile;
 use crate::table::Cell;
 
 /// The worst that are shown.

@@ -1,13 +1,13 @@
 //! How far a rendered force is from the recorded one, and what that cost.
 
 use mmt_shared::model::geometry::Vec2;
+use mmt_shared::stats::values::{mean, median};
 use mmt_shared::time::TICK_S;
 use serde::Serialize;
 
 use super::course::Course;
 use crate::replay::config::ReplayConfig;
 use crate::replay::trigger::Contact;
-use crate::statistics::{mean, median};
 
 /// Errors over the milliseconds of contact by the recorded force, onset included; none without contact.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]

@@ -7,6 +7,7 @@ use super::super::*;
 use mmt_server::playout::PlayoutConfig;
 use mmt_shared::model::params::ModelParams;
 use mmt_shared::model::settings::{Mode, ModelSettings, PoseCorrection};
+use mmt_shared::stats::values::{mean, median};
 
 const SEEDS: std::ops::RangeInclusive<u64> = 1..=10;
 /// What counts as sliding, m/s: the least speed at which the estimator listens.
@@ -28,20 +29,6 @@ fn experiment(seed: u64) -> WorldConfig {
         ..PlayoutConfig::default()
     };
     config.seeded(seed)
-}
-
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    let middle = values.len() / 2;
-    if values.len() % 2 == 1 {
-        values[middle]
-    } else {
-        values[middle - 1].midpoint(values[middle])
-    }
-}
-
-fn mean(values: &[f64]) -> f64 {
-    values.iter().sum::<f64>() / values.len() as f64
 }
 
 fn truth(world: &World) -> ModelParams {
@@ -87,7 +74,8 @@ fn after_30_s(lateral_max_m: f64) -> ([f64; 3], f64, f64) {
         pmse.push(world.force().pmse.unwrap());
         rate.push(world.outcome().updates.rate_hz().unwrap());
     }
-    (all.map(median), mean(&pmse), mean(&rate))
+    let all = all.map(|errors| median(errors).unwrap());
+    (all, mean(pmse).unwrap(), mean(rate).unwrap())
 }
 
 #[test]
@@ -127,7 +115,7 @@ fn the_first_push_shows_m_b_and_c_within_250_ms() {
         }
         last.iter_mut().zip(off).for_each(|(all, ms)| all.push(ms));
     }
-    let [m, b, c, force] = last.map(median);
+    let [m, b, c, force] = last.map(|values| median(values).unwrap());
     println!(
         "first push: within 10 % after m {m} b (as force) {b} c {c} force {force} ms of sliding"
     );
@@ -189,7 +177,7 @@ fn recovery(scheme: &str, seed: u64) -> Recovery {
 
 fn typical_recovery(scheme: &str) -> Recovery {
     let all: Vec<Recovery> = SEEDS.map(|seed| recovery(scheme, seed)).collect();
-    let of = |number: fn(&Recovery) -> f64| median(all.iter().map(number).collect());
+    let of = |number: fn(&Recovery) -> f64| median(all.iter().map(number)).unwrap();
     Recovery {
         estimate_ms: of(|r| r.estimate_ms),
         model_ms: of(|r| r.model_ms),
@@ -229,7 +217,7 @@ fn pushes_at_10_mm_per_s_show_c() {
         let [_, _, c] = errors(&world);
         all.push(c);
     }
-    let c = median(all);
+    let c = median(all).unwrap();
     println!("pushes at 10 mm/s: c {c:.4}");
     assert!(c <= 0.02);
 }
@@ -247,6 +235,7 @@ fn a_box_that_turns_more_easily_than_a_square_is_so_in_the_model() {
         assert!(e < 0.9 * by_9, "seed {seed}: {e} m, by (9) {by_9} m");
         pmse.push(world.force().pmse.unwrap());
     }
-    println!("no rotational damping: PMSE {:.4}", mean(&pmse));
-    assert!(mean(&pmse) <= 0.025);
+    let pmse = mean(pmse).unwrap();
+    println!("no rotational damping: PMSE {pmse:.4}");
+    assert!(pmse <= 0.025);
 }

@@ -4,6 +4,7 @@
 use super::delay::{FAULTS, Row};
 use super::*;
 use mmt_server::environment::Shape;
+use mmt_shared::stats::values::mean;
 
 const FIVE: std::ops::RangeInclusive<u64> = 1..=5;
 
@@ -128,11 +129,7 @@ fn without_delay_most_of_the_force_error_is_the_first_touch() {
         unknown.push(shares.sum().sqrt());
         known.push(of_known.sum().sqrt());
     }
-    let mean = |of: &[f64]| of.iter().sum::<f64>() / of.len() as f64;
-    println!(
-        "relative error {:.3} unknown, {:.3} known",
-        mean(&unknown),
-        mean(&known)
-    );
-    assert!(mean(&known) < mean(&unknown));
+    let [unknown, known] = [unknown, known].map(|errors| mean(errors).unwrap());
+    println!("relative error {unknown:.3} unknown, {known:.3} known");
+    assert!(known < unknown);
 }

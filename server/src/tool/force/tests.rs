@@ -3,6 +3,7 @@
 use super::*;
 use mmt_shared::model::settings::{CONTACT_DAMPING_NS_PER_M, STIFFNESS_N_PER_M};
 use mmt_shared::rng::Substream;
+use mmt_shared::stats::values::{mean, standard_deviation};
 
 const SOFT: Coupling = Coupling {
     stiffness_n_per_m: 1000.0,
@@ -173,9 +174,8 @@ fn a_coupling_that_leaves_less_than_a_tenth_of_a_metre_a_second_is_refused() {
 fn a_noisy_sensor_makes_the_force_no_more_unsteady_than_it_is() {
     let mut press = Press::new(15.0, SOFT, Some(1));
     let forces: Vec<f64> = (0..20_000).map(|_| press.tick(0.2)).skip(1000).collect();
-    let n = forces.len() as f64;
-    let mean = forces.iter().sum::<f64>() / n;
-    let deviation = (forces.iter().map(|f| (f - mean).powi(2)).sum::<f64>() / n).sqrt();
+    let mean = mean(forces.iter().copied()).unwrap();
+    let deviation = standard_deviation(&forces).unwrap();
     let most = forces.iter().copied().fold(0.0, f64::max);
     assert!((mean - PRESSED_N).abs() < 1e-3, "{mean} N");
     assert!(deviation < 0.0105, "{deviation} N at a noise of 0.01 N");
