@@ -127,26 +127,11 @@ impl ToolDrive {
         };
         let follows = self.own.is_none() && !self.passive;
         let period_s = played.period_s.max(TICK_S);
-        // nothing draws a tool that has to stand; it may give way all the same
-        let stops = played.stands && !follows;
-        let wanted = if stops {
-            let none = Vec2::zeros();
-            self.limits.towards(self.force.velocity(), none, period_s) * period_s
+        let (wanted, bounded) = if follows {
+            let way = played.hip - tool;
+            (way, way)
         } else {
-            played.hip - tool
-        };
-        let bounded = if follows || stops {
-            wanted
-        } else {
-            let goal = Goal {
-                way: wanted,
-                velocity: played.velocity,
-            };
-            let limits = MotionLimits {
-                speed_m_per_s: played.speed_max_m_per_s,
-                ..self.limits
-            };
-            limits.way(self.force.velocity(), goal, period_s)
+            self.drawn(tool, &played, period_s)
         };
         let free = if self.passive {
             self.port.allowed(bounded, period_s)
@@ -184,6 +169,26 @@ impl ToolDrive {
             force: played.force.filter(|_| !self.held_back),
             ..played
         }
+    }
+
+    /// The way of a tool that does not follow (m, in `period_s`): all that draws it, and the part that the limits of its motion
+    /// allow.
+    fn drawn(&self, tool: Vec2, played: &Played, period_s: f64) -> (Vec2, Vec2) {
+        let velocity = self.force.velocity();
+        if played.stands {
+            // nothing draws a tool that has to stand; it may give way all the same
+            let stop = self.limits.towards(velocity, Vec2::zeros(), period_s) * period_s;
+            return (stop, stop);
+        }
+        let goal = Goal {
+            way: played.hip - tool,
+            velocity: played.velocity,
+        };
+        let limits = MotionLimits {
+            speed_m_per_s: played.speed_max_m_per_s,
+            ..self.limits
+        };
+        (goal.way, limits.way(velocity, goal, period_s))
     }
 
     /// The part of a way (m, in `period_s`) that the energy allows: along the force no faster than the tool can brake in the way

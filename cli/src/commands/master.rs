@@ -14,9 +14,9 @@ use mmt_client::operator::pointer::Driver;
 use mmt_client::operator::scripted::ScriptedConfig;
 use mmt_client::operator::trace::Trace;
 use mmt_lab::layers::Program;
-use mmt_netem::Direction;
 use mmt_netem::io::socket::SocketExtras;
 use mmt_netem::trace::mmt::path_text;
+use mmt_netem::{Direction, LinkConfig};
 use mmt_shared::clean::clean;
 use mmt_shared::io::connect::ConnectError;
 use mmt_shared::io::emergency::EmergencyStop;
@@ -97,17 +97,8 @@ pub(crate) fn run(arguments: MasterArguments, messages: &Messages) -> Result<(),
     while host.is_running() {
         let master = Some(*live.borrow());
         viewer.look(None, master);
-        while let Some(order) = desk.as_mut().and_then(Desk::next_order) {
-            match order {
-                Order::End => stop.end(),
-                Order::Network(wish) => {
-                    let Some(desk) = &mut desk else { continue };
-                    desk.change_networks(&wish, &emulation, [Some(&mut link), None]);
-                    desk.show_about([("network", json!({"up": link.to_string()}))]);
-                }
-                // the object is another host's
-                Order::Restart(_) | Order::Study(_) => {}
-            }
+        if let Some(desk) = &mut desk {
+            attend(desk, &stop, &emulation, &mut link);
         }
     }
     drop(viewer);
@@ -121,6 +112,21 @@ pub(crate) fn run(arguments: MasterArguments, messages: &Messages) -> Result<(),
         record.finish(),
         judge(end),
     ])
+}
+
+/// Does what viewers ask for.
+fn attend(desk: &mut Desk, stop: &Stop, emulation: &Emulation, link: &mut LinkConfig) {
+    while let Some(order) = desk.next_order() {
+        match order {
+            Order::End => stop.end(),
+            Order::Network(wish) => {
+                desk.change_networks(&wish, emulation, [Some(link), None]);
+                desk.show_about([("network", json!({"up": link.to_string()}))]);
+            }
+            // the object is another host's
+            Order::Restart(_) | Order::Study(_) => {}
+        }
+    }
 }
 
 /// A master host at work and its snapshots.

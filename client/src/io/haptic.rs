@@ -26,6 +26,7 @@ use crate::end::{MasterEnd, MasterGiven};
 use crate::failsafe::LinkState;
 use crate::master::MasterTick;
 use crate::operator::Operator;
+use crate::operator::scripted::View;
 use crate::path::PathRecorder;
 
 mod snapshot;
@@ -173,23 +174,13 @@ impl HapticLoop {
         let view = self.end.update_model();
         let stops = self.emergency.is_set();
         self.end.stop(stops);
-        if self.end.stopped_by().is_some() {
-            self.operator.stand(period);
-        } else {
-            self.reading = self.operator.step(self.elapsed, &view, self.hand_force);
-        }
-        let reading = self.reading;
+        let reading = self.read_hand(period, &view);
         let engaged = self.operator.engaged();
         self.end.hold(engaged);
         let done = self.end.tick(stamp, reading);
         self.hand_force = done.hand_force;
         self.judge_pose();
-        if done.link == LinkState::Released && !self.releasing {
-            self.why.get_or_insert(SessionEnd::LinkSilent);
-        }
-        if self.end.master().model().not_finite() > 0 {
-            self.why.get_or_insert(SessionEnd::ModelBroken);
-        }
+        self.judge_tick(done.link);
         self.give_device(&done);
         let sent = now();
         if let Some(record) = &mut self.record {
@@ -216,6 +207,26 @@ impl HapticLoop {
             ControlFlow::Break(())
         } else {
             ControlFlow::Continue(())
+        }
+    }
+
+    /// Where the hand is, m; where it was, while the end is stopped.
+    fn read_hand(&mut self, period: Duration, view: &View) -> Vec2 {
+        if self.end.stopped_by().is_some() {
+            self.operator.stand(period);
+        } else {
+            self.reading = self.operator.step(self.elapsed, view, self.hand_force);
+        }
+        self.reading
+    }
+
+    /// Notes the reason if a tick has shown that the session cannot go on.
+    fn judge_tick(&mut self, link: LinkState) {
+        if link == LinkState::Released && !self.releasing {
+            self.why.get_or_insert(SessionEnd::LinkSilent);
+        }
+        if self.end.master().model().not_finite() > 0 {
+            self.why.get_or_insert(SessionEnd::ModelBroken);
         }
     }
 

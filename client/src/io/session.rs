@@ -2,6 +2,7 @@
 
 use std::pin::{Pin, pin};
 use std::sync::PoisonError;
+use std::time::Duration;
 
 use mmt_shared::io::clock::Clock;
 use mmt_shared::io::farewell::{
@@ -10,9 +11,10 @@ use mmt_shared::io::farewell::{
 use mmt_shared::io::loop_thread;
 use mmt_shared::io::network_task::{Event, NetworkTask};
 use mmt_shared::io::stream::delivered;
+use mmt_shared::io::transport::SendStream;
 use mmt_shared::io::wish::{Wish, asked_to_stop};
 use mmt_shared::model::geometry::{BoxFootprint, Pose};
-use mmt_shared::report::SlaveHalf;
+use mmt_shared::report::{MasterHalf, SlaveHalf};
 use mmt_shared::wire::{Ending, Side};
 use tokio::sync::watch;
 use tokio::time::{Instant, error::Elapsed, timeout_at};
@@ -152,17 +154,8 @@ pub(super) async fn operate(
     tracing::info!("the session ends: {why}");
     if session.task.is_connected() {
         let wait = farewell_wait(&connected.connection, timeouts.farewell);
-        let deadline = Instant::now() + wait;
         let half = half(&haptic, &session.task, &connected, duration);
-        let sent = send_farewell(&mut send, why.ending(), &half, wait).await;
-        if let Err(error) = sent {
-            tracing::warn!(%error, "the farewell did not reach the slave");
-        }
-        if session.task.awaits_farewell() {
-            session.farewell = answer(timeout_at(deadline, farewell).await);
-        } else {
-            delivered(&send, deadline.saturating_duration_since(Instant::now())).await;
-        }
+        session.part(why, &half, &mut send, farewell, wait).await;
     }
     // after a session that failed the slave keeps the operator's place for a while
     let ended_well = |farewell: &ReceivedFarewell<SlaveHalf>| farewell.ending != Ending::Failed;
@@ -221,6 +214,27 @@ impl Session<'_> {
                     self.end(self.loss());
                 }
             }
+        }
+    }
+
+    /// Sends the slave why the session ends and what this side has counted, and receives its farewell if that is still due; waits
+    /// no longer than `wait`.
+    async fn part(
+        &mut self,
+        why: SessionEnd,
+        half: &MasterHalf,
+        send: &mut SendStream,
+        farewell: impl Future<Output = FarewellRead>,
+        wait: Duration,
+    ) {
+        let deadline = Instant::now() + wait;
+        if let Err(error) = send_farewell(send, why.ending(), half, wait).await {
+            tracing::warn!(%error, "the farewell did not reach the slave");
+        }
+        if self.task.awaits_farewell() {
+            self.farewell = answer(timeout_at(deadline, farewell).await);
+        } else {
+            delivered(send, deadline.saturating_duration_since(Instant::now())).await;
         }
     }
 

@@ -70,6 +70,7 @@ impl<C> RunReport<C> {
     }
 
     /// The numbers that most people want.
+    #[rustfmt::skip]
     fn ten(&self) -> Vec<Row> {
         let (sent, received) = (&self.updates.sent, &self.updates.received);
         let (errors, hand, link) = (&self.force.errors, &self.force.hand, &self.link);
@@ -77,61 +78,21 @@ impl<C> RunReport<C> {
         let p = |name, of| after(name, number(of, 1, " ms"));
         let late = |of: &LoopReport| after("p99", number(of.lateness_us.p99, 1, " us"));
         let breaks = number(self.pushes.contact_breaks_per_push, 2, " breaks each");
+        let contact = number(sent.contact_rate_hz, 2, " /s of contact");
+        let rms = after("r.m.s.", number(errors.error_rms_n, 3, " N"));
+        let largest = after("max", number(hand.largest_n, 2, " N"));
+        let injected = number(self.passivity.energy_injected_j.times(1e3), 3, " mJ");
         vec![
             row("pushes", [count(self.pushes.completed, ""), breaks]),
-            row(
-                "updates",
-                [
-                    number(sent.rate_hz, 2, " /s"),
-                    number(sent.contact_rate_hz, 2, " /s of contact"),
-                    count(received.applied, " applied"),
-                ],
-            ),
-            row(
-                "force error",
-                [
-                    share(errors.relative_error),
-                    after("r.m.s.", number(errors.error_rms_n, 3, " N")),
-                ],
-            ),
-            row(
-                "force on the hand",
-                [
-                    after("max", number(hand.largest_n, 2, " N")),
-                    number(hand.largest_step_n, 2, " N in a tick"),
-                ],
-            ),
+            row("updates", [number(sent.rate_hz, 2, " /s"), contact, count(received.applied, " applied")]),
+            row("force error", [share(errors.relative_error), rms]),
+            row("force on the hand", [largest, number(hand.largest_step_n, 2, " N in a tick")]),
             row("mass", estimate(&self.model.mass_kg, " kg")),
-            row(
-                "position error",
-                [
-                    mm("r.m.s.", self.pose.position_rms_m),
-                    mm("max", self.pose.position_max_m),
-                ],
-            ),
-            row(
-                "energy by updates",
-                [number(
-                    self.passivity.energy_injected_j.times(1e3),
-                    3,
-                    " mJ",
-                )],
-            ),
-            row(
-                "round trip",
-                [p("p50", link.rtt_ms.p50), p("p99", link.rtt_ms.p99)],
-            ),
-            row(
-                "loss",
-                [
-                    after("up", share(link.loss_up)),
-                    after("down", share(link.loss_down)),
-                ],
-            ),
-            row(
-                "loops late",
-                [late(&self.haptic_loop), late(&self.slave_loop)],
-            ),
+            row("position error", [mm("r.m.s.", self.pose.position_rms_m), mm("max", self.pose.position_max_m)]),
+            row("energy by updates", [injected]),
+            row("round trip", [p("p50", link.rtt_ms.p50), p("p99", link.rtt_ms.p99)]),
+            row("loss", [after("up", share(link.loss_up)), after("down", share(link.loss_down))]),
+            row("loops late", [late(&self.haptic_loop), late(&self.slave_loop)]),
         ]
     }
 }

@@ -1,6 +1,7 @@
 //! A session of a demo, and the wait for the next.
 
 use std::net::{Ipv4Addr, SocketAddr};
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use mmt_client::commands::CommandConfig;
@@ -10,13 +11,14 @@ use mmt_client::io::{MasterConfiguration, MasterLive, MasterOptions, OperatorCho
 use mmt_client::operator::pointer::Driver;
 use mmt_lab::world::WorldConfig;
 use mmt_netem::Direction;
-use mmt_server::io::{SlaveConfiguration, SlaveOptions};
+use mmt_server::io::{SlaveConfiguration, SlaveLive, SlaveOptions};
 use mmt_shared::io::emergency::EmergencyStop;
 use mmt_shared::io::identity::Identity;
 use mmt_shared::io::transport::Transport;
 use mmt_shared::io::truth::{self, TruthReceiver, TruthSender};
 use mmt_shared::pairing::Pairing;
 use mmt_shared::report::{Both, RunReport};
+use tokio::sync::watch;
 
 use super::setting::{Setting, caption};
 use crate::args::DemoArguments;
@@ -28,6 +30,7 @@ use crate::commands::viewer::Viewer;
 use crate::commands::{master, slave};
 use crate::failure::Failure;
 use crate::stop::Stop;
+use crate::view::Caption;
 
 /// How long the slave may take to notice that the master has ended before it is asked to end as well.
 pub(super) const FAREWELL: Duration = Duration::from_secs(3);
@@ -71,7 +74,7 @@ impl Round<'_> {
         let Ok(started) = started.recv() else {
             return slave.join().map(|_| None);
         };
-        let mut caption = caption(arguments, &config, &started.pairing);
+        let caption = caption(arguments, &config, &started.pairing);
         let mut options = master_options(
             arguments,
             transport,
@@ -88,26 +91,12 @@ impl Round<'_> {
         }
         self.device.give(&mut options);
         let (master, master_live) = master::start(options, stop.receiver())?;
-        if let Some(desk) = &mut self.desk {
-            let (slave, master) = (started.live.clone(), master_live.clone());
-            let connected = move || Some(*slave.borrow()).filter(|slave| slave.connected);
-            desk.show(&caption, move || *master.borrow(), connected);
-            if !self.blind {
-                desk.show_about(self.setting.shown());
-            }
-            caption.setting = format!("{}  {}", desk.address(), caption.setting);
-        }
-        self.viewer.caption(caption);
+        self.show(caption, &started.live, &master_live);
         let mut master_ended = None;
         while master.is_running() || slave.is_running() {
             // copied first: a borrow that lives through the viewer's wait would stop the hosts' tasks
             let (slave_now, master_now) = (*started.live.borrow(), *master_live.borrow());
-            if self.blind {
-                std::thread::sleep(LOOK);
-            } else {
-                let slave_now = Some(slave_now).filter(|slave| slave.connected);
-                self.viewer.look(slave_now, Some(master_now));
-            }
+            self.look(slave_now, master_now);
             self.attend(&stop);
             self.finish_unwatched(&master_now);
             if self.stop.asked() || self.again.is_some() {
@@ -127,6 +116,35 @@ impl Round<'_> {
             desk.show_end(&end.map(|end| end.to_string()).unwrap_or_default());
         }
         Ok(Some((report, end)))
+    }
+
+    /// Shows what has begun, at the console if there is one and in the viewer.
+    fn show(
+        &mut self,
+        mut caption: Caption,
+        slave: &Arc<watch::Sender<SlaveLive>>,
+        master: &watch::Receiver<MasterLive>,
+    ) {
+        if let Some(desk) = &mut self.desk {
+            let (slave, master) = (Arc::clone(slave), master.clone());
+            let connected = move || Some(*slave.borrow()).filter(|slave| slave.connected);
+            desk.show(&caption, move || *master.borrow(), connected);
+            if !self.blind {
+                desk.show_about(self.setting.shown());
+            }
+            caption.setting = format!("{}  {}", desk.address(), caption.setting);
+        }
+        self.viewer.caption(caption);
+    }
+
+    /// Looks at both; where nothing is shown only time passes.
+    fn look(&mut self, slave: SlaveLive, master: MasterLive) {
+        if self.blind {
+            std::thread::sleep(LOOK);
+        } else {
+            let slave = Some(slave).filter(|slave| slave.connected);
+            self.viewer.look(slave, Some(master));
+        }
     }
 
     /// With a console the loop has no duration of its own: nobody's hand is taken away.
