@@ -3,6 +3,7 @@
 mod architecture;
 mod command;
 mod dissector;
+mod documents;
 mod golden;
 mod harness;
 mod plug_layout;

@@ -15,6 +15,7 @@ pub(crate) mod hosts;
 pub(crate) mod judge;
 pub(crate) mod process;
 pub(crate) mod python;
+pub(crate) mod rules;
 pub(crate) mod tshark;
 
 /// The root of the repository.
