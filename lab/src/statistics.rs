@@ -267,7 +267,7 @@ mod tests {
     }
 
     #[test]
-    fn a_mean_two_errors_away_is_tested_as_its_interval_says() {
+    fn a_mean_two_errors_away_is_tested_as_its_interval_shows() {
         let interval = Interval::of([1.0, 2.0, 3.0, 4.0, 5.0]).unwrap();
         // the end of a 95 % interval is where p is 5 %
         assert!((interval.p_against(interval.low).unwrap() - 0.05).abs() < 1e-4);

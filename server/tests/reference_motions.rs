@@ -50,7 +50,7 @@ fn assert_within_1_5_percent(what: &str, got: f64, want: f64) {
 }
 
 #[test]
-fn a_push_of_4_n_for_half_a_second_moves_as_far_as_newton_says() {
+fn a_push_of_4_n_for_half_a_second_moves_as_far_as_by_newtons_law() {
     let pose = pushed(reference(), Vec2::new(4.0, 0.0), 0.0, 500);
     assert_within_1_5_percent("push", pose.position.x, 0.34641);
     assert!(pose.position.y.abs() < 1e-12 && pose.angle.abs() < 1e-12);
@@ -81,14 +81,14 @@ fn friction_is_the_same_in_every_direction() {
 }
 
 #[test]
-fn a_stop_from_half_a_metre_per_second_slides_as_far_as_coulomb_says() {
+fn a_stop_from_half_a_metre_per_second_slides_as_far_as_by_coulombs_law() {
     let mut environment = with_twist(Twist::new(0.5, 0.0, 0.0));
     coast(&mut environment);
     assert_within_1_5_percent("stop", environment.pose().position.x, 0.04247);
 }
 
 #[test]
-fn a_spin_of_5_rad_per_second_dies_when_9_says() {
+fn a_spin_of_5_rad_per_second_dies_when_9_predicts() {
     let mut environment = with_twist(Twist::new(0.0, 0.0, 5.0));
     let seconds = coast(&mut environment);
     assert_within_1_5_percent("spin-down", seconds, 0.2664);

@@ -304,7 +304,7 @@ fn a_bare_datagram_is_known_by_its_magic() {
 }
 
 #[test]
-fn a_vector_with_another_value_is_told_from_what_is_shown() {
+fn a_vector_with_another_value_is_distinguished_from_what_is_shown() {
     let mut vectors = messages();
     vectors.retain(|vector| vector.name == "update/deadband");
     let test = "the dissector on an altered vector";

@@ -247,7 +247,7 @@ fn a_second_master_is_refused_by_name_and_disturbs_nobody() {
 }
 
 #[test]
-fn a_wrong_pairing_string_is_told_with_what_is_right_and_exit_code_2() {
+fn a_wrong_pairing_string_is_reported_with_what_is_right_and_exit_code_2() {
     in_real_time(|| {
         let good = "mmt://127.0.0.1:4433?pin=00&token=00";
         for wrong in [

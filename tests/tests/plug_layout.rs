@@ -108,7 +108,7 @@ fn held(heading: &str, head: &PlugHead, packet: &[u8]) -> (u16, Vec<f64>) {
 }
 
 #[test]
-fn the_document_says_where_each_number_of_a_reading_and_of_a_force_is() {
+fn the_document_states_where_each_number_of_a_reading_and_of_a_force_is() {
     let own = [0.5_f32, 1.5, 2.5, 3.5, 4.5, 5.5];
     let head = PlugHead { flags: 1, ..HEAD };
     let bytes = own.map(f32::to_le_bytes);
@@ -154,7 +154,7 @@ fn the_document_says_where_each_number_of_a_reading_and_of_a_force_is() {
 }
 
 #[test]
-fn the_document_says_where_each_number_of_a_command_and_of_an_answer_is() {
+fn the_document_states_where_each_number_of_a_command_and_of_an_answer_is() {
     let command = PlantCommand {
         tool: Vec2::new(0.1, 0.2),
         velocity: Vec2::new(0.3, 0.4),

@@ -211,7 +211,7 @@ fn objects_of_mujoco_are_pushed_over_the_emulated_network_within_the_contract() 
 }
 
 #[test]
-fn a_plant_that_dies_stops_the_tool_and_the_master_is_told_and_its_return_ends_that() {
+fn a_plant_that_dies_stops_the_tool_and_is_reported_to_the_master_and_its_return_ends_that() {
     in_real_time(|| {
         let Some(python) = python("a plant in Python", "socket") else {
             return;

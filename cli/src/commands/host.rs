@@ -54,7 +54,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_host_that_panics_is_a_failure_told_by_its_name() {
+    fn a_host_that_panics_is_a_failure_reported_by_its_name() {
         let host = spawn::<()>("slave", |_| panic!("on purpose")).unwrap();
         let failure = host.join().unwrap_err().to_string();
         assert!(failure.contains("the slave panicked"), "{failure}");

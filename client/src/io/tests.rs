@@ -340,7 +340,7 @@ async fn a_trace_ends_the_session_when_it_is_over() {
 }
 
 #[tokio::test]
-async fn the_emulated_link_loses_what_it_is_told_to_and_says_so() {
+async fn the_emulated_link_loses_what_is_set_and_reports_that() {
     let fake = Fake::new();
     let mut options = scripted(&fake);
     options.commands.samples_per_command = 1;

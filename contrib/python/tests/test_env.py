@@ -86,7 +86,7 @@ def test_seeds_are_the_runs_own():
     assert digest(seed=7, options={"config": {}}) == mmt.run(duration=0.5, seed=7).digest
 
 
-def test_an_env_says_what_is_wrong():
+def test_an_env_reports_what_is_wrong():
     env = mmt.Env(duration=0.02, ticks=10)
     with pytest.raises(RuntimeError, match="reset"):
         env.step((0.0, 0.0))

@@ -27,7 +27,7 @@ def test_the_deadband_in_python_is_the_deadband_to_the_bit():
     assert mmt.run(other, duration=6.0, start="paper-experiment").digest != own.digest
 
 
-def test_a_scheme_says_what_cause_its_updates_have():
+def test_a_scheme_states_what_cause_its_updates_have():
     names = iter(["deadband", "timer", "every_sample"])
     run = mmt.run(duration=0.5, trigger=lambda now: next(names, None))
     assert list(run.update[run.update != ""][:3]) == ["deadband", "timer", "every_sample"]

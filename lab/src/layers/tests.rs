@@ -122,7 +122,7 @@ fn every_number_of_the_default_file_has_a_range_and_none_below_it_is_taken() {
 }
 
 #[test]
-fn each_value_says_whether_it_is_the_programs_the_files_or_a_flags() {
+fn each_value_shows_whether_it_is_the_programs_the_files_or_a_flags() {
     let file = "seed = 5\n[slave.environment]\nmass_kg = 1.5\n[operator]\nhold_s = 0.5\n";
     let network = "delay 9ms".parse().unwrap();
     let flags = [Flag::network("--netem", "up", &network)];

@@ -138,7 +138,7 @@ fn a_body_that_is_not_accepted_is_named() {
 }
 
 #[test]
-fn traces_run_from_the_start_to_what_the_table_says() {
+fn traces_run_from_the_start_to_what_the_table_shows() {
     let body = body(0.7, 0.36, 0.3, 1.0);
     let (rows, traces) = (cases(&body).unwrap(), traces(&body).unwrap());
     assert_eq!(rows.len(), traces.len());

@@ -13,7 +13,7 @@ fn at_1_khz(words: &str) -> Effect {
 }
 
 #[test]
-fn a_constant_link_does_just_what_it_says() {
+fn a_constant_link_does_just_what_it_states() {
     let effect = at_1_khz("delay 50ms loss 1%");
     assert!((effect.mean_ms - 50.0).abs() < 1e-6, "{effect:?}");
     assert!((effect.p99_ms - 50.0).abs() < 1e-6 && effect.sd_ms < 1e-6);

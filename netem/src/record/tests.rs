@@ -66,7 +66,7 @@ proptest! {
     }
 
     #[test]
-    fn a_record_cut_off_or_broken_is_told_and_never_panics(
+    fn a_record_cut_off_or_broken_is_reported_and_never_panics(
         entries in prop::collection::vec(any_entry(), 1..5),
         at in any::<prop::sample::Index>(),
         byte in any::<u8>(),

@@ -199,7 +199,7 @@ fn mahimahi_traces_tell_their_rate() {
 }
 
 #[test]
-fn what_is_no_trace_is_told_with_its_line_and_reason() {
+fn what_is_no_trace_is_reported_with_its_line_and_reason() {
     let no_stamp = PING.replacen("[1700182801.100000] ", "", 1);
     let seqno = IRTT.replacen("\"true_down\"", "\"perhaps\"", 1);
     let no_rtt = IRTT

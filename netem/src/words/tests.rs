@@ -146,7 +146,7 @@ fn what_tc_knows_and_we_do_not_is_named_and_never_ignored() {
 }
 
 #[test]
-fn an_error_tells_the_word_its_column_and_what_was_expected() {
+fn an_error_shows_the_word_its_column_and_what_was_expected() {
     for (text, column, word, part) in [
         ("delay", 6, "", "a time with its unit"),
         ("delay 5xs", 7, "5xs", "a time with its unit"),

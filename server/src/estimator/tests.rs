@@ -280,7 +280,7 @@ fn a_change_of_mass_in_mid_push_is_followed() {
 }
 
 #[test]
-fn constant_speed_shows_nothing_so_the_values_are_held_and_it_says_so() {
+fn constant_speed_shows_nothing_so_the_values_are_held_and_that_is_reported() {
     for seed in 0..5 {
         let (mut estimator, mut plant) = learned(seed);
         let before = values(estimator.estimate());
@@ -316,7 +316,7 @@ fn friction_that_changes_at_constant_speed_is_still_found_as_force() {
 }
 
 #[test]
-fn a_push_at_3_mm_per_s_shows_c_alone_and_says_so() {
+fn a_push_at_3_mm_per_s_shows_c_alone_and_that_is_reported() {
     for seed in 0..5 {
         let (mut fresh, mut plant) = (recommended(|_| {}), Plant::new(seed, Noise::DEFAULT));
         let mut motion = Motion::of_operator(seed, 0);

@@ -176,7 +176,7 @@ fn a_tool_that_gives_by_itself_is_rendered_as_penetration() {
 }
 
 #[test]
-fn after_a_silence_the_tool_is_where_the_plant_says_and_waits_for_the_hand() {
+fn after_a_silence_the_tool_is_where_the_plant_reports_it_and_waits_for_the_hand() {
     let mut n = 0;
     let mut places = Vec::new();
     drive(3000, |command| {

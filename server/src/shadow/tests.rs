@@ -48,7 +48,7 @@ fn masses(shadow: &Shadow) -> [f64; 2] {
 }
 
 #[test]
-fn what_is_sent_is_ahead_at_once_and_confirmed_from_the_sample_that_says_so() {
+fn what_is_sent_is_ahead_at_once_and_confirmed_from_the_sample_that_acknowledges_it() {
     let mut shadow = shadow();
     play(&mut shadow, 1..=100);
     shadow.send(&update(1, 100, 2.0));

@@ -136,7 +136,7 @@ fn noise_in_free_space_never_fires() {
 }
 
 #[test]
-fn a_contact_of_one_side_counts_after_the_debounce_and_is_told_again_at_intervals() {
+fn a_contact_of_one_side_counts_after_the_debounce_and_is_sent_again_at_intervals() {
     for (slave, cause) in [
         (false, Cause::MasterOnlyContact),
         (true, Cause::SlaveOnlyContact),
@@ -155,7 +155,7 @@ fn a_contact_of_one_side_counts_after_the_debounce_and_is_told_again_at_interval
 }
 
 #[test]
-fn a_contact_of_one_side_that_lasts_while_the_hip_stands_is_told_ever_more_rarely_until_the_hip_moves()
+fn a_contact_of_one_side_that_lasts_while_the_hip_stands_is_sent_ever_more_rarely_until_the_hip_moves()
  {
     let mut trigger = trigger("useful 10% 150ms", Mode::Recommended);
     let stands = TriggerInput {
@@ -180,7 +180,7 @@ fn a_contact_of_one_side_that_lasts_while_the_hip_stands_is_told_ever_more_rarel
 }
 
 #[test]
-fn a_lost_contact_is_told_once() {
+fn a_lost_contact_is_sent_once() {
     let mut trigger = trigger("deadband 10%", Mode::Recommended);
     let free = TriggerInput {
         slave_in_contact: false,
@@ -362,7 +362,7 @@ fn adaptive_does_not_send_what_the_estimate_does_not_know() {
 }
 
 #[test]
-fn adaptive_says_where_a_held_face_is_the_sooner_the_more_the_force_is_wrong() {
+fn adaptive_sends_where_a_held_face_is_the_sooner_the_more_the_force_is_wrong() {
     let first_after = |f_m: f64| {
         let mut trigger = trigger("adaptive 10% 50ms", Mode::Recommended);
         assert!(trigger.step(Time::ZERO, &input(1.0, 2.0)).is_some());
@@ -408,7 +408,7 @@ fn what_was_lost_is_said_again_once_at_once_and_under_every_scheme() {
 }
 
 #[test]
-fn useful_says_where_a_held_face_is_once_a_period_while_the_force_is_wrong() {
+fn useful_sends_where_a_held_face_is_once_a_period_while_the_force_is_wrong() {
     let mut trigger = trigger("useful 10% 150ms", Mode::Recommended);
     let held = |f_m: f64| TriggerInput {
         sticking: true,

@@ -142,7 +142,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_request_never_fails_the_program_and_says_what_it_obtained() {
+    fn a_request_never_fails_the_program_and_reports_what_it_obtained() {
         // on a thread of its own, which takes the priority with it
         let text = std::thread::spawn(|| request().to_string()).join().unwrap();
         for name in ["SCHED_FIFO", "locked memory", "timer slack"] {

@@ -23,7 +23,7 @@ fn read(packet: &[u8]) -> Result<(PlugHead, &[u8]), NotTaken> {
 }
 
 #[test]
-fn a_packet_is_what_the_document_says_to_the_byte() {
+fn a_packet_is_what_the_document_states_to_the_byte() {
     let packet = packet();
     assert_eq!(&packet[..8], b"MMTL\x01\x01\x02\x01");
     assert_eq!(packet[8..12], [6, 5, 4, 3]);

@@ -306,7 +306,7 @@ fn the_table_shows_what_is_known_and_leaves_out_what_is_not() {
 }
 
 #[test]
-fn the_brief_is_a_sentence_and_ten_lines_and_a_spoilt_run_says_so_first() {
+fn the_brief_is_a_sentence_and_ten_lines_and_a_spoilt_run_reports_that_first() {
     let mut sound = full();
     sound.passivity.energy_injected_j = 0.002.into();
     for way in [&mut sound.emulation.up, &mut sound.emulation.down] {

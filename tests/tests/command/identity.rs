@@ -133,7 +133,7 @@ fn wrong_input_is_refused_with_what_to_do_and_changes_nothing() {
 }
 
 #[test]
-fn a_slave_without_a_token_of_an_operator_says_what_makes_one() {
+fn a_slave_without_a_token_of_an_operator_states_what_makes_one() {
     let (home, _) = home();
     done(&home, &["revoke", "operator"]);
     let listen = ["slave", "--listen", "127.0.0.1:0"];

@@ -112,7 +112,7 @@ fn a_demo_at_work_takes_new_networks_from_stdin() {
 }
 
 #[test]
-fn a_relay_carries_any_protocol_and_says_whether_it_was_in_time() {
+fn a_relay_carries_any_protocol_and_reports_whether_it_was_in_time() {
     let home = tempfile::tempdir().unwrap();
     let target = UdpSocket::bind("127.0.0.1:0").unwrap();
     target

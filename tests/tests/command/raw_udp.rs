@@ -30,7 +30,7 @@ fn pairing(host: &str) -> String {
 }
 
 #[test]
-fn a_demo_over_raw_udp_is_a_whole_session_and_says_that_it_is_insecure() {
+fn a_demo_over_raw_udp_is_a_whole_session_and_states_that_it_is_insecure() {
     let output = mmt(&[
         "demo",
         "--transport",

@@ -104,7 +104,7 @@ fn a_slave_that_nobody_comes_to_prints_its_pairing_string_and_an_empty_report() 
 }
 
 #[test]
-fn a_master_that_nobody_answers_says_so_with_a_code_of_its_own() {
+fn a_master_that_nobody_answers_reports_that_with_a_code_of_its_own() {
     let home = tempfile::tempdir().unwrap();
     // bound, so that no ICMP comes back, and never read from
     let silent = std::net::UdpSocket::bind("127.0.0.1:0").unwrap();

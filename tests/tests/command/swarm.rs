@@ -12,7 +12,7 @@ fn swarm(more: &[&str]) -> String {
 }
 
 #[test]
-fn each_fault_is_counted_by_its_name_and_the_text_says_what_the_document_has() {
+fn each_fault_is_counted_by_its_name_and_the_text_shows_what_the_document_has() {
     let extent = ["--seeds", "6", "--duration", "10s"];
     let document: Value =
         serde_json::from_str(&swarm(&[&extent[..], &["--json"]].concat())).unwrap();

@@ -148,7 +148,7 @@ fn one_run_and_three_shards_and_any_threads_make_the_same_bytes() {
 }
 
 #[test]
-fn an_interrupted_sweep_keeps_what_is_done_and_says_how_to_go_on() {
+fn an_interrupted_sweep_keeps_what_is_done_and_shows_how_to_go_on() {
     // far more than any machine does before the signal comes
     let bench = Bench::new("duration_s = 20\nseeds = { count = 10000 }\n");
     let part = bench.path().join("sweep/rows/1-of-1-1.csv");
@@ -190,7 +190,7 @@ fn an_interrupted_sweep_keeps_what_is_done_and_says_how_to_go_on() {
 }
 
 #[test]
-fn a_bad_plan_is_told_with_its_place_before_anything_is_made() {
+fn a_bad_plan_is_reported_with_its_place_before_anything_is_made() {
     let bench = Bench::new(&PLAN.replace("slave.trigger.scheme", "slave.triger.scheme"));
     let refused = bench.sweep(&[]);
     ends(
@@ -221,7 +221,7 @@ fn a_bad_plan_is_told_with_its_place_before_anything_is_made() {
 }
 
 #[test]
-fn a_dry_run_tells_the_rows_and_makes_nothing() {
+fn a_dry_run_shows_the_rows_and_makes_nothing() {
     let bench = Bench::new(PLAN);
     let output = bench.sweep(&["--dry-run", "--shard", "2/3"]);
     ends(&output, 0, &[]);
@@ -242,7 +242,7 @@ fn a_dry_run_tells_the_rows_and_makes_nothing() {
 }
 
 #[test]
-fn the_plan_of_the_document_is_one_with_the_rows_that_it_says() {
+fn the_plan_of_the_document_is_one_with_the_rows_that_it_states() {
     let text = include_str!("../../../docs/sweep.md");
     let plans = text
         .split("```toml\n")

@@ -49,7 +49,7 @@ fn the_command_line_comes_before_the_file_and_the_file_before_the_mode() {
 }
 
 #[test]
-fn repeats_and_stretch_are_the_modes_unless_the_file_or_the_command_line_says_otherwise() {
+fn repeats_and_stretch_are_the_modes_unless_the_file_or_the_command_line_states_otherwise() {
     let of = |words: &[&str]| {
         let config = options_of(words).config;
         (config.repeats_ms.to_string(), config.stretch_max.get())
@@ -94,7 +94,7 @@ fn only_the_session_of_a_slave_that_serves_once_decides_how_it_ends() {
 }
 
 #[test]
-fn a_slave_that_no_other_host_reaches_says_so_and_shows_no_secret() {
+fn a_slave_that_no_other_host_reaches_reports_that_and_shows_no_secret() {
     let pairing = |host: &str| {
         let text = format!("mmt://{host}:4433?pin={0}&token={0}", "5a".repeat(32));
         text.parse::<Pairing>().unwrap()

@@ -118,7 +118,7 @@ async fn each_end_of_an_observer_has_its_reason() {
 }
 
 #[tokio::test]
-async fn an_observer_that_is_refused_is_told_what_an_observer_can_do() {
+async fn an_observer_that_is_refused_receives_what_an_observer_can_do() {
     for (refusal, words) in [
         (Refusal::Busy, "as many observers"),
         (Refusal::WrongRole, "admits no observers"),

@@ -98,7 +98,7 @@ async fn a_name_is_looked_up_and_one_that_nobody_has_is_named_in_the_error() {
 }
 
 #[tokio::test]
-async fn a_slave_that_accepts_and_says_nothing_is_given_up() {
+async fn a_slave_that_accepts_and_sends_nothing_is_given_up() {
     let fake = Fake::new();
     let timeouts = Timeouts {
         welcome: Duration::from_millis(200),

@@ -35,7 +35,7 @@ fn a_path_is_linear_between_samples_and_holds_at_its_ends() {
 }
 
 #[test]
-fn a_carried_path_starts_where_it_is_told_and_keeps_its_shape() {
+fn a_carried_path_starts_where_it_is_set_and_keeps_its_shape() {
     let trace = Trace::from_csv(CSV).unwrap();
     let start = Vec2::new(-0.3, 0.1);
     let carried = trace.clone().starting_at(start);

@@ -178,8 +178,7 @@ mod tests {
     }
 
     #[test]
-    fn a_first_touch_of_another_body_than_the_one_that_the_master_was_told_of_is_judged_later_too()
-    {
+    fn a_first_touch_of_another_body_than_the_one_that_the_master_received_is_judged_later_too() {
         let mut body = TouchedBody::new(Vec2::zeros(), 0.05);
         let known: Vec<bool> = (0..60)
             .map(|_| body.is_known(Vec2::new(0.5, 0.0)))

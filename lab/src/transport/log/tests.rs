@@ -82,7 +82,7 @@ fn what_is_no_message_of_the_run_is_passed_over() {
 }
 
 #[test]
-fn the_digest_tells_any_nanosecond() {
+fn the_digest_shows_any_nanosecond() {
     assert_eq!(outcome(&[(0, 1)]).digest, outcome(&[(0, 1)]).digest);
     assert_ne!(outcome(&[(0, 1)]).digest, outcome(&[(0, 2)]).digest);
     assert_ne!(outcome(&[(0, 1)]).digest, outcome(&[(1, 1)]).digest);

@@ -44,7 +44,7 @@ fn overheads_and_cells_weigh_as_in_tc() {
 }
 
 #[test]
-fn a_queue_holds_what_its_limit_says_in_packets_bytes_and_time() {
+fn a_queue_holds_what_its_limit_states_in_packets_bytes_and_time() {
     // 8 ms a packet
     for (limit, held) in [
         ("5p", 5),

@@ -81,7 +81,7 @@ fn a_measured_distribution_is_met() {
 }
 
 #[test]
-fn correlation_by_packet_is_what_it_says_and_leaves_the_distribution() {
+fn correlation_by_packet_is_what_was_set_and_leaves_the_distribution() {
     let values = drawn("delay 50ms 5ms 60% distribution normal order free", 109);
     for (lag, expected) in [(1, 0.6), (2, 0.36), (5, 0.077_76)] {
         let found = correlation(&values, lag);

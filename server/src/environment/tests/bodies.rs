@@ -207,7 +207,7 @@ fn energy_of_no_body_grows_without_a_tool() {
 }
 
 #[test]
-fn a_centre_of_mass_off_the_centroid_turns_the_body_as_newton_says() {
+fn a_centre_of_mass_off_the_centroid_turns_the_body_by_newtons_law() {
     let offset = 0.06;
     for shape in shapes() {
         let mut environment = made(EnvironmentConfig {

@@ -212,7 +212,7 @@ async fn an_observer_whose_token_is_revoked_is_shown_no_more_and_the_session_goe
 }
 
 #[tokio::test]
-async fn a_silent_observer_is_left_and_says_nothing_to_the_session() {
+async fn a_silent_observer_is_left_and_sends_nothing_to_the_session() {
     let host = run(options());
     let mut observer = observer(&host, host.pairing.token).await;
     // it lives, and sends nothing any more

@@ -39,7 +39,7 @@ async fn closed_on(host: &Running, bytes: &[u8]) -> (u64, String) {
 }
 
 #[tokio::test]
-async fn what_is_no_hello_is_told_apart_by_the_code_of_the_close() {
+async fn what_is_no_hello_is_distinguished_by_the_code_of_the_close() {
     let host = run(options());
     let (none, _) = closed_on(&host, b"").await;
     assert_eq!(none, 2, "no hello");

@@ -22,7 +22,7 @@ fn plain(number: u32) -> Envelope {
 }
 
 #[test]
-fn round_trip_leaves_out_the_time_that_the_answer_was_held_whatever_the_other_clock_says() {
+fn round_trip_leaves_out_the_time_that_the_answer_was_held_whatever_the_other_clock_shows() {
     let (mut here, mut there) = (Peer::default(), Peer::default());
     let epoch = 1_000_000; // the other clock is far ahead
     for k in 0..100 {
@@ -52,7 +52,7 @@ fn numbers_begin_at_one_and_never_wrap() {
 }
 
 #[test]
-fn loss_reordering_and_duplicates_are_told_apart() {
+fn loss_reordering_and_duplicates_are_distinguished() {
     let mut peer = Peer::default();
     let arrivals: Vec<_> = [1, 2, 2, 5, 4, 4, 8]
         .into_iter()
@@ -175,7 +175,7 @@ fn an_echo_that_cannot_be_true_teaches_nothing() {
 }
 
 #[test]
-fn an_echo_counts_the_newest_and_says_how_long_it_was_held() {
+fn an_echo_counts_the_newest_and_states_how_long_it_was_held() {
     let mut peer = Peer::default();
     assert_eq!(peer.echo(ms(0)), None);
     peer.handle(ms(10), &plain(2));

@@ -58,7 +58,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_resolver_on_loopback_is_told_from_one_that_can_be_reached() {
+    fn a_resolver_on_loopback_is_distinguished_from_one_that_can_be_reached() {
         let stub = "# systemd\nnameserver 127.0.0.53\noptions edns0\nsearch .\n";
         assert!(only_on_loopback(stub));
         assert!(only_on_loopback("nameserver ::1\nnameserver 127.0.0.1\n"));
