@@ -77,20 +77,14 @@ pub(crate) fn run(arguments: MasterArguments, messages: &Messages) -> Result<(),
     if !link.is_transparent() {
         note(effect(Direction::Up, &link)?);
     }
-    let mut caption = Caption {
-        command: "master",
-        duration_s: options.duration.map(|time| time.as_secs_f64()),
-        setting: format!("slave at {}, {link}", options.pairing.address),
-        slave: options.pairing.address.to_string(),
-        truth: None,
-    };
+    let mut caption = caption(&options);
     arguments.transport.warning().into_iter().for_each(note);
     let path = options.path.clone();
     let (host, live) = start(options, stop.receiver())?;
     if let Some(desk) = &mut desk {
         let shown = live.clone();
         desk.show(&caption, move || *shown.borrow(), || None);
-        desk.show_about([("network", json!({"up": link.to_string()}))]);
+        show_network(desk, &link);
         caption.setting = format!("{}  {}", desk.address(), caption.setting);
     }
     let mut viewer = Viewer::new(caption, dashboard, messages, &stop);
@@ -114,6 +108,20 @@ pub(crate) fn run(arguments: MasterArguments, messages: &Messages) -> Result<(),
     ])
 }
 
+fn caption(options: &MasterOptions) -> Caption {
+    Caption {
+        command: "master",
+        duration_s: options.duration.map(|time| time.as_secs_f64()),
+        setting: format!("slave at {}, {}", options.pairing.address, options.netem),
+        slave: options.pairing.address.to_string(),
+        truth: None,
+    }
+}
+
+fn show_network(desk: &mut Desk, link: &LinkConfig) {
+    desk.show_about([("network", json!({"up": link.to_string()}))]);
+}
+
 /// Does what viewers ask for.
 fn attend(desk: &mut Desk, stop: &Stop, emulation: &Emulation, link: &mut LinkConfig) {
     while let Some(order) = desk.next_order() {
@@ -121,7 +129,7 @@ fn attend(desk: &mut Desk, stop: &Stop, emulation: &Emulation, link: &mut LinkCo
             Order::End => stop.end(),
             Order::Network(wish) => {
                 desk.change_networks(&wish, emulation, [Some(link), None]);
-                desk.show_about([("network", json!({"up": link.to_string()}))]);
+                show_network(desk, link);
             }
             // the object is another host's
             Order::Restart(_) | Order::Study(_) => {}

@@ -42,11 +42,15 @@ use start::{CHECK_EVERY, announce, start_error};
 /// breaks; of a report, its file is none.
 pub(crate) fn run(arguments: &NetemArguments, messages: &Messages) -> Result<(), Failure> {
     match &arguments.command {
-        Some(NetemCommand::Report(arguments)) => return report::run(arguments),
-        Some(NetemCommand::Trace(arguments)) => return trace::run(arguments),
-        Some(NetemCommand::Shell(arguments)) => return shell::run(arguments, messages),
-        None => {}
+        Some(NetemCommand::Report(arguments)) => report::run(arguments),
+        Some(NetemCommand::Trace(arguments)) => trace::run(arguments),
+        Some(NetemCommand::Shell(arguments)) => shell::run(arguments, messages),
+        None => relay(arguments, messages),
     }
+}
+
+/// Relays until asked to stop.
+fn relay(arguments: &NetemArguments, messages: &Messages) -> Result<(), Failure> {
     let (Some(listen), Some(to)) = (arguments.listen, &arguments.to) else {
         return Err(Failure::usage("a relay needs --listen and --to").remedy("give both"));
     };

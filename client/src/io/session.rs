@@ -157,9 +157,7 @@ pub(super) async fn operate(
         let half = half(&haptic, &session.task, &connected, duration);
         session.part(why, &half, &mut send, farewell, wait).await;
     }
-    // after a session that failed the slave keeps the operator's place for a while
-    let ended_well = |farewell: &ReceivedFarewell<SlaveHalf>| farewell.ending != Ending::Failed;
-    if session.farewell.as_ref().is_some_and(ended_well)
+    if session.ended_well()
         && let Some(resume) = &options.resume
     {
         resume.forget();
@@ -268,6 +266,12 @@ impl Session<'_> {
         } else {
             SessionEnd::ConnectionLost
         }
+    }
+
+    /// Whether the slave has ended a session that did not fail; after one that did it keeps the operator's place for a while.
+    fn ended_well(&self) -> bool {
+        let farewell = self.farewell.as_ref();
+        farewell.is_some_and(|farewell| farewell.ending != Ending::Failed)
     }
 
     fn handle_farewell(&mut self, read: FarewellRead) {
