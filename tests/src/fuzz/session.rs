@@ -135,20 +135,21 @@ fn step(bench: &mut Bench, op: Op, mut draws: Substream) {
         Op::TicksOf(side, ticks) => (0..ticks).for_each(|_| bench.tick_of(side)),
         Op::Reading(place) => bench.reading = place,
         Op::Velocity(velocity) => bench.velocity = velocity,
-        Op::Network(network) => bench.network = network,
+        Op::Network(network) => bench.path.network = network,
         Op::Flush(how) => bench.flush(how),
         Op::Replayed(from, which) => {
-            if let Some(bytes) = bench.captured(from, which) {
+            if let Some(bytes) = bench.path.captured(from, which) {
                 bench.arrives(from.other(), bytes);
             }
         }
         Op::Mutated(from, which) => {
-            if let Some(bytes) = bench.captured(from, which) {
+            if let Some(bytes) = bench.path.captured(from, which) {
                 bench.arrives_forged(from.other(), enemy::mutated(bytes, &mut draws));
             }
         }
         Op::Forged(from, which) => {
             if let Some(bytes) = bench
+                .path
                 .captured(from, which)
                 .and_then(|bytes| enemy::forged(&bytes, from, &mut draws))
             {
@@ -157,8 +158,9 @@ fn step(bench: &mut Bench, op: Op, mut draws: Substream) {
         }
         Op::Foreign(from, which) => {
             if let Some(bytes) = bench
+                .path
                 .of_earlier(from, which)
-                .or_else(|| bench.captured(from.other(), which))
+                .or_else(|| bench.path.captured(from.other(), which))
             {
                 bench.arrives_forged(from.other(), bytes);
             }

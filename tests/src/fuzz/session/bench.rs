@@ -1,18 +1,16 @@
 //! Two ends, what lies between them, and their clocks.
 
-use std::collections::VecDeque;
+mod ends;
+mod network;
+mod recovery;
+
 use std::time::Duration;
 
 use mmt_client::commands::CommandConfig;
 use mmt_client::device::DeviceProfile;
-use mmt_client::end::{MasterEnd, MasterGiven};
-use mmt_client::failsafe::LinkState;
-use mmt_client::limiter::ForceLimiter;
-use mmt_client::master::Master;
-use mmt_lab::check::{
-    MasterAbout, MasterChecks, MasterTicked, SlaveAbout, SlaveChecks, SlaveTicked,
-};
-use mmt_server::end::{SlaveEnd, SlaveGiven, session_config};
+use mmt_client::end::MasterGiven;
+use mmt_lab::check::{MasterTicked, SlaveTicked};
+use mmt_server::end::SlaveGiven;
 use mmt_server::environment::BodyConfig;
 use mmt_server::slave::{Memory, SlaveConfig};
 use mmt_shared::model::architecture::Architecture;
@@ -26,48 +24,9 @@ use mmt_shared::wire::{
 };
 
 use super::bytes::{HEAD, place};
-use super::judge::{MasterJudge, SlaveJudge};
-
-/// Datagrams of each side that an eavesdropper has.
-const CAPTURED: usize = 64;
-/// What the network holds back at most.
-const HELD: usize = 256;
-
-/// What becomes of datagrams.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Network {
-    /// They arrive at once.
-    Direct,
-    /// Those of one side are lost, or those of both.
-    Silent(bool, bool),
-    /// They are held back.
-    Holds,
-    /// They take so long.
-    Slow(Duration),
-}
-
-impl Network {
-    pub(super) fn of(kind: u8, number: u8) -> Self {
-        match kind % 6 {
-            0 => Self::Direct,
-            1 => Self::Silent(true, false),
-            2 => Self::Silent(false, true),
-            3 => Self::Silent(true, true),
-            4 => Self::Holds,
-            _ => Self::Slow(Duration::from_millis(u64::from(number) * 2)),
-        }
-    }
-}
-
-/// The ends of a session with their judges.
-struct Ends {
-    master: MasterEnd,
-    slave: SlaveEnd,
-    master_judge: MasterJudge,
-    slave_judge: SlaveJudge,
-    master_checks: MasterChecks,
-    slave_checks: SlaveChecks,
-}
+use ends::Ends;
+pub(super) use network::Network;
+use network::Path;
 
 /// A session and what lies around it.
 pub(super) struct Bench {
@@ -85,12 +44,7 @@ pub(super) struct Bench {
     pub(super) releasing: bool,
     /// The master's and the slave's.
     pub(super) stops: [bool; 2],
-    pub(super) network: Network,
-    /// On their way: to whom, when by the master's clock, what.
-    held: VecDeque<(Side, Time, Vec<u8>)>,
-    /// What left in this session, and in those before.
-    left: [VecDeque<Vec<u8>>; 2],
-    earlier: [VecDeque<Vec<u8>>; 2],
+    pub(super) path: Path,
     /// Whether an enemy has sent what an end may have believed, in this session.
     enemy: bool,
     /// What was seen, as bits.
@@ -173,10 +127,7 @@ impl Bench {
             engaged: true,
             releasing: false,
             stops: [false; 2],
-            network: Network::Direct,
-            held: VecDeque::new(),
-            left: Default::default(),
-            earlier: Default::default(),
+            path: Path::default(),
             enemy: false,
             seen: 0,
         }
@@ -252,7 +203,7 @@ impl Bench {
         self.seen |= 1 << (done.link as u64) | u64::from(done.rendered.in_contact()) << 4;
         leave
             .into_iter()
-            .for_each(|bytes| self.offer(Side::Master, bytes));
+            .for_each(|bytes| self.path.offer(self.master_now, Side::Master, bytes));
     }
 
     fn tick_slave(&mut self) {
@@ -289,55 +240,23 @@ impl Bench {
         self.seen |= u64::from(slave.is_disengaged()) << 7;
         leave
             .into_iter()
-            .for_each(|bytes| self.offer(Side::Slave, bytes));
-    }
-
-    /// The network takes a datagram.
-    fn offer(&mut self, from: Side, bytes: Vec<u8>) {
-        let captured = &mut self.left[usize::from(from == Side::Slave)];
-        if captured.len() == CAPTURED {
-            captured.pop_front();
-        }
-        captured.push_back(bytes.clone());
-        let due = match self.network {
-            Network::Direct => self.master_now,
-            Network::Silent(up, down) => {
-                let lost = if from == Side::Master { up } else { down };
-                if lost {
-                    return;
-                }
-                self.master_now
-            }
-            Network::Holds => Time::MAX,
-            Network::Slow(by) => self.master_now + by,
-        };
-        if self.held.len() == HELD {
-            self.held.pop_front();
-        }
-        self.held.push_back((from.other(), due, bytes));
+            .for_each(|bytes| self.path.offer(self.master_now, Side::Slave, bytes));
     }
 
     /// What is due arrives.
     fn deliver(&mut self) {
-        for _ in 0..self.held.len() {
-            let Some((to, due, bytes)) = self.held.pop_front() else {
-                return;
-            };
-            if due <= self.master_now {
-                self.arrives(to, bytes);
-            } else {
-                self.held.push_back((to, due, bytes));
-            }
+        for (to, bytes) in self.path.take_due(self.master_now) {
+            self.arrives(to, bytes);
         }
     }
 
     /// All that is on its way arrives at once: in order, the other way round, each twice, or every second.
     pub(super) fn flush(&mut self, how: u8) {
-        let mut held: Vec<_> = self.held.drain(..).collect();
+        let mut held = self.path.take_due(Time::MAX);
         if how & 1 != 0 {
             held.reverse();
         }
-        for (number, (to, _, bytes)) in held.into_iter().enumerate() {
+        for (number, (to, bytes)) in held.into_iter().enumerate() {
             match how & 6 {
                 2 => {
                     self.arrives(to, bytes.clone());
@@ -368,16 +287,6 @@ impl Bench {
     pub(super) fn arrives_forged(&mut self, to: Side, bytes: Vec<u8>) {
         self.enemy = true;
         self.arrives(to, bytes);
-    }
-
-    /// A datagram that left this side, the how-manieth from the newest.
-    pub(super) fn captured(&self, from: Side, which: u8) -> Option<Vec<u8>> {
-        chosen(&self.left[usize::from(from == Side::Slave)], which)
-    }
-
-    /// The same of a session that is over.
-    pub(super) fn of_earlier(&self, from: Side, which: u8) -> Option<Vec<u8>> {
-        chosen(&self.earlier[usize::from(from == Side::Slave)], which)
     }
 
     /// The slave's farewell comes, cut off behind so many bytes: a whole one ends the session.
@@ -416,149 +325,15 @@ impl Bench {
             at,
             memory.as_ref(),
         );
-        self.held.clear();
-        self.earlier = std::mem::take(&mut self.left);
+        self.path.begin_again();
         (self.releasing, self.enemy) = (false, false);
         self.reading = self.ends.slave.slave().tool_at();
         self.velocity = Vec2::zeros();
         self.seen |= 1 << 8;
     }
 
-    /// What holds of the session as a whole.
-    pub(super) fn judge_all(&self) {
-        let ends = &self.ends;
-        MasterJudge::reports(&ends.master);
-        SlaveJudge::reports(&ends.slave);
-        for verdict in [ends.master_checks.verdict(), ends.slave_checks.verdict()] {
-            assert!(verdict.holds(), "{verdict}");
-        }
-    }
-
-    /// Everybody behaves again: the session works, or it is over after two seconds at either end, as it is where an enemy used
-    /// up its numbers or set an emergency stop with one that is yet to come, and the next one works.
-    pub(super) fn recover(&mut self) {
-        self.network = Network::Direct;
-        (self.stops, self.engaged, self.velocity) = ([false; 2], true, Vec2::zeros());
-        self.rest(2300);
-        let over = self.releasing
-            || self.ends.master.channel().silence(self.master_now) > Duration::from_secs(1);
-        if over {
-            // the ramp
-            self.rest(200);
-        }
-        let released = self.ends.master.master().limiter().at_rest();
-        let stopped = self.ends.are_stopped();
-        assert!(
-            !stopped || self.enemy,
-            "an emergency stop that nobody holds"
-        );
-        // a master that never had an answer waits longer for one: the path may be of 4 s
-        let unheard = self.ends.slave.channel().silence(self.slave_now) > Duration::from_secs(2);
-        if over || released || unheard || stopped || self.ends.slave.is_disengaged() {
-            assert!(
-                released || !over,
-                "the hand of a session that is over is not released"
-            );
-            self.begin_again(true, Vec2::new(-0.5, 0.1));
-            for _ in 0..200 {
-                self.tick();
-            }
-        }
-        self.works();
-    }
-
-    /// The hand is where the tool is.
-    fn rest(&mut self, ticks: u32) {
-        for _ in 0..ticks {
-            self.reading = self.ends.slave.slave().tool_at();
-            self.tick();
-        }
-    }
-
-    /// Samples come through, updates would, and the hand is held.
-    fn works(&mut self) {
-        let before = self.ends.slave.counts().samples;
-        let mut link = LinkState::Released;
-        // a command of 32 samples takes 96 ms where congestion leaves two of three samples out
-        for _ in 0..120 {
-            self.tick();
-            link = LinkState::of_silence(self.ends.master.channel().silence(self.master_now));
-        }
-        let ends = &self.ends;
-        // an enemy that used up the numbers of this session has ended it as far as it could
-        assert_eq!(link, LinkState::Fresh, "the link does not come back");
-        assert!(ends.slave.counts().samples > before, "no samples come");
-        assert!(
-            !ends.slave.is_disengaged() && !ends.are_stopped(),
-            "the tool stands"
-        );
-        assert!(
-            ends.master.master().limiter().engaged(),
-            "the hand is not held"
-        );
-    }
-
     /// What was seen, as a sort of sequence.
     pub(super) fn seen(&self) -> u64 {
         self.seen
-    }
-}
-
-fn chosen(of: &VecDeque<Vec<u8>>, which: u8) -> Option<Vec<u8>> {
-    let back = usize::from(which) % of.len().max(1);
-    of.len()
-        .checked_sub(1 + back)
-        .and_then(|at| of.get(at))
-        .cloned()
-}
-
-impl Ends {
-    /// Whether an emergency stop is set, as either end has it.
-    fn are_stopped(&self) -> bool {
-        self.slave.stopped_by().is_some() || self.master.stopped_by().is_some()
-    }
-
-    /// Both ends of a session that begins now, after the welcome has crossed the wire.
-    fn new(
-        config: &SlaveConfig,
-        hello: &Hello,
-        device: &DeviceProfile,
-        commands: CommandConfig,
-        (master_now, slave_now): (Time, Time),
-        memory: Option<&Memory>,
-    ) -> Self {
-        let slave = SlaveEnd::of_session(slave_now, config, hello, memory).unwrap();
-        let welcome = slave.slave().welcome(Token::new([0; 32]), "any", "fuzz");
-        let mut out = [0; STREAM_MESSAGE_MAX];
-        let length = StreamMessage::Welcome((&welcome).into())
-            .encode(&mut out)
-            .unwrap();
-        let Ok(StreamMessage::Welcome(read)) = StreamMessage::decode(&out[..length], Side::Slave)
-        else {
-            panic!("a welcome that cannot be read");
-        };
-        let welcome = read.accept(&hello.coupling).unwrap();
-        let limiter = ForceLimiter::try_new(device.limits()).unwrap();
-        let master = Master::with_architecture(&welcome, limiter, hello.architecture);
-        let about = MasterAbout {
-            began: master_now,
-            limits: device.limits(),
-            settings: welcome.settings,
-            start: welcome.tool,
-        };
-        let of_slave = SlaveAbout {
-            began: slave_now,
-            config: session_config(config, hello),
-            coupling: hello.coupling,
-            tool: welcome.tool,
-        };
-        Self {
-            master: MasterEnd::new(master_now, master, commands),
-            slave,
-            master_judge: MasterJudge::new(device.limits()),
-            slave_judge: SlaveJudge::default(),
-            master_checks: MasterChecks::new(about),
-            slave_checks: SlaveChecks::new(of_slave),
-        }
     }
 }
