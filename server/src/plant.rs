@@ -17,7 +17,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::environment::Environment;
 use crate::motion_limits::MotionLimits;
-use crate::sensing::{Sensed, Sensing, VisionSample};
+use crate::sensing::{Sensed, Sensing, SensorFaults, VisionSample};
 use follower::Follower;
 
 pub use packet::{PlantAnswer, PlantCommand, SILENCE};
@@ -128,6 +128,13 @@ impl Plant {
         match self {
             Self::World { environment, .. } => environment,
             Self::Linked(plant) => &mut plant.stand_in,
+        }
+    }
+
+    /// From now on this of the simulated world's sensors is broken.
+    pub(crate) fn set_sensor_faults(&mut self, faults: SensorFaults) {
+        if let Self::World { sensing, .. } = self {
+            sensing.set_faults(faults);
         }
     }
 

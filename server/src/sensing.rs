@@ -17,6 +17,7 @@ use mmt_shared::time::Time;
 
 use config::IMAGES_MAX;
 pub use config::{SensingConfig, SensingError, VisionConfig};
+pub use force::ForceFault;
 use force::{ForceSensor, pair};
 
 /// What vision saw.
@@ -39,6 +40,15 @@ pub struct Sensed {
     pub vision: Option<VisionSample>,
 }
 
+/// What of the slave's sensors is broken; by default nothing.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct SensorFaults {
+    /// How the force sensor is.
+    pub force: Option<ForceFault>,
+    /// The camera takes no images.
+    pub no_images: bool,
+}
+
 /// The slave's sensors.
 #[derive(Clone, Debug)]
 pub struct Sensing {
@@ -55,6 +65,7 @@ pub struct Sensing {
     /// The last tick.
     last: Option<Time>,
     dropped: u64,
+    no_images: bool,
 }
 
 impl Sensing {
@@ -82,6 +93,7 @@ impl Sensing {
             on_their_way: VecDeque::with_capacity(IMAGES_MAX),
             last: None,
             dropped: 0,
+            no_images: false,
         })
     }
 
@@ -93,6 +105,12 @@ impl Sensing {
             force: self.force.measure(force),
             vision: self.image_due(now, object),
         }
+    }
+
+    /// From now on this is broken.
+    pub fn set_faults(&mut self, faults: SensorFaults) {
+        self.force.fault = faults.force;
+        self.no_images = faults.no_images;
     }
 
     /// How many images were lost because a newer one was due with them or too many were on their way.
@@ -113,7 +131,8 @@ impl Sensing {
             self.drop_images();
             self.next_image = Some(now);
         }
-        if self.period_ns > 0 && now >= *self.next_image.get_or_insert(now) {
+        let is_due = self.period_ns > 0 && now >= *self.next_image.get_or_insert(now);
+        if is_due && !self.no_images {
             self.take_image(now, object);
         }
         let mut newest = None;

@@ -70,6 +70,11 @@ pub struct SlaveChecks {
     velocity: Option<Vec2>,
     /// The tool's velocity as if it had gone its way in one tick, m/s.
     velocity_before: Vec2,
+    /// What the tool felt in the tick before, N.
+    felt: Vec2,
+    /// Whether the force sensor is broken, and whether the force may still be what it was then.
+    sensor_broken: bool,
+    unmeasured: bool,
     /// Whether an emergency stop was set in the tick before.
     stopped: bool,
     stops: bool,
@@ -119,6 +124,9 @@ impl SlaveChecks {
             tool: about.tool,
             velocity: Some(Vec2::zeros()),
             velocity_before: Vec2::zeros(),
+            felt: Vec2::zeros(),
+            sensor_broken: false,
+            unmeasured: false,
             stopped: false,
             stops: false,
             newest: None,
@@ -221,6 +229,11 @@ impl SlaveChecks {
         self.left = Some(update);
     }
 
+    /// Whether the force sensor is broken from now on: what it does not measure the limit of the tool's force cannot bound.
+    pub(crate) fn set_sensor_broken(&mut self, broken: bool) {
+        self.sensor_broken = broken;
+    }
+
     /// A tick, before what it sends leaves.
     pub fn ticked(&mut self, tick: &SlaveTicked<'_>) {
         self.stops = tick.given.stops;
@@ -245,7 +258,7 @@ impl SlaveChecks {
             self.judge_play(tick.now, done);
             self.judge_trigger(tick, done);
             self.judge_update(tick.now, done);
-            self.tool = done.tool;
+            (self.tool, self.felt) = (done.tool, done.f_s);
         }
         self.judge_counters(tick);
         let confirmed = tick.end.slave().shadow().newest_confirmed();

@@ -41,6 +41,12 @@ pub enum Fault {
     ReadingFar,
     /// The device gives the same place.
     ReadingFrozen,
+    /// The force sensor gives the same force.
+    ForceFrozen,
+    /// The force sensor is off by up to the strength times 30 N.
+    ForceOff,
+    /// The camera takes no images.
+    NoImages,
     /// Nobody holds the device.
     HandLetsGo,
     /// The master's emergency stop is set.
@@ -57,7 +63,7 @@ pub enum Fault {
 
 impl Fault {
     /// All of them.
-    pub const ALL: [Self; 22] = [
+    pub const ALL: [Self; 25] = [
         Self::UpSilent,
         Self::DownSilent,
         Self::BothSilent,
@@ -74,6 +80,9 @@ impl Fault {
         Self::ReadingNone,
         Self::ReadingFar,
         Self::ReadingFrozen,
+        Self::ForceFrozen,
+        Self::ForceOff,
+        Self::NoImages,
         Self::HandLetsGo,
         Self::MasterStops,
         Self::SlaveStops,

@@ -11,9 +11,10 @@ use mmt_client::master::{Master, MasterTick};
 use mmt_client::operator::Operator;
 use mmt_client::operator::scripted::Scripted;
 use mmt_server::end::{SlaveEnd, SlaveGiven, session_config};
+use mmt_server::sensing::{ForceFault, SensorFaults};
 use mmt_server::slave::{Memory, SlaveTick};
 use mmt_shared::model::architecture::Architecture;
-use mmt_shared::model::geometry::Vec2;
+use mmt_shared::model::geometry::{Vec2, rotate};
 use mmt_shared::pairing::Token;
 use mmt_shared::rng::Substream;
 use mmt_shared::time::{TICK, Time};
@@ -236,6 +237,9 @@ impl Session {
         }
         let stops = faults.has(Fault::SlaveStops);
         end.stop(stops);
+        let sensors = sensor_faults(faults);
+        end.slave_mut().set_sensor_faults(sensors);
+        self.checks.slave.set_sensor_broken(sensors.force.is_some());
         let done = end.tick(slave_now);
         let given = SlaveGiven { stops, plant: None };
         self.checks
@@ -247,6 +251,20 @@ impl Session {
             self.down.offer(now, bytes);
         }
         done
+    }
+}
+
+/// What of the slave's sensors is broken.
+fn sensor_faults(faults: &Now) -> SensorFaults {
+    let off = faults.strength(Fault::ForceOff);
+    let off = off.map(|strength| {
+        // the direction is any, and goes with the strength
+        ForceFault::Off(rotate(1e3 * strength, Vec2::x()) * (strength * FORCE_OFF_N))
+    });
+    let frozen = faults.has(Fault::ForceFrozen);
+    SensorFaults {
+        force: frozen.then_some(ForceFault::Frozen).or(off),
+        no_images: faults.has(Fault::NoImages),
     }
 }
 
@@ -266,6 +284,8 @@ fn disturbed(reading: Vec2, faults: &Now) -> Vec2 {
     reading
 }
 
+/// A force sensor is off by up to this, N.
+const FORCE_OFF_N: f64 = 30.0;
 /// The loop of a slave that is disengaged ends no later than this.
 const FAREWELL_TICKS: u32 = 50;
 /// From the end of a session to the beginning of the next.

@@ -2,12 +2,22 @@
 //!
 //! Lag and gain act on the force; bias, its drift and noise are added. Size and time are configured, the directions of
 //! bias and drift come from the seed, each from its own substream. Without errors it passes the force on bit by bit.
+//! A fault is what no configuration has: a sensor that breaks in mid-run.
 
 use mmt_shared::model::geometry::{Vec2, rotate};
 use mmt_shared::rng::Substream;
 use mmt_shared::time::TICK_S;
 
 use super::config::SensingConfig;
+
+/// How a force sensor is broken.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum ForceFault {
+    /// It gives the force of the moment in which it broke.
+    Frozen,
+    /// It is off by this, world frame, N.
+    Off(Vec2),
+}
 
 /// The sensor between tool and object.
 #[derive(Clone, Debug)]
@@ -21,6 +31,9 @@ pub(super) struct ForceSensor {
     /// Weight of the newest force in the lagging one; none without lag.
     weight: Option<f64>,
     lagging: Vec2,
+    /// What it gave last, N.
+    given: Vec2,
+    pub(super) fault: Option<ForceFault>,
 }
 
 impl ForceSensor {
@@ -34,6 +47,8 @@ impl ForceSensor {
             gain: config.force_gain,
             weight: (lag_s > 0.0).then(|| 1.0 - libm::exp(-TICK_S / lag_s)),
             lagging: Vec2::zeros(),
+            given: Vec2::zeros(),
+            fault: None,
         }
     }
 
@@ -46,7 +61,12 @@ impl ForceSensor {
         self.lagging = followed;
         let measured = followed * self.gain + self.bias + pair(&mut self.noise) * self.noise_n;
         self.bias += self.drift;
-        measured
+        self.given = match self.fault {
+            None => measured,
+            Some(ForceFault::Off(by)) => measured + by,
+            Some(ForceFault::Frozen) => self.given,
+        };
+        self.given
     }
 }
 

@@ -195,6 +195,45 @@ fn after_the_clock_was_set_back_images_come_again_and_none_of_before() {
 }
 
 #[test]
+fn sensors_break_as_they_are_bidden_and_are_whole_again_after() {
+    let mut sensing = Sensing::try_new(SensingConfig::ideal(), 1).unwrap();
+    let mut measured = |ms, faults, newtons| {
+        sensing.set_faults(SensorFaults {
+            force: faults,
+            no_images: true,
+        });
+        let force = Vec2::new(newtons, 0.0);
+        sensing
+            .sense(Time::from_millis(ms), TOOL, force, &pose())
+            .force
+            .x
+    };
+    assert_eq!(measured(1, None, 2.0), 2.0);
+    assert_eq!(measured(2, Some(ForceFault::Frozen), 5.0), 2.0);
+    let off = ForceFault::Off(Vec2::new(-3.0, 0.0));
+    assert_eq!(measured(3, Some(off), 5.0), 2.0);
+    assert_eq!(measured(4, None, 5.0), 5.0);
+    // no camera meanwhile, and then one image at once
+    let (mut blind, mut seen) = (SensorFaults::default(), Vec::new());
+    let mut sensing = Sensing::try_new(SensingConfig::default(), 1).unwrap();
+    for ms in 0..1000 {
+        blind.no_images = (200..800).contains(&ms);
+        sensing.set_faults(blind);
+        let image = sensing
+            .sense(Time::from_millis(ms), TOOL, FORCE, &pose())
+            .vision;
+        seen.extend(image.map(|image| image.taken));
+    }
+    let gap = |from, to| (Time::from_millis(from)..Time::from_millis(to));
+    assert!(
+        !seen.iter().any(|taken| gap(200, 800).contains(taken)),
+        "{seen:?}"
+    );
+    assert!(seen.contains(&Time::from_millis(800)), "{seen:?}");
+    assert_eq!(sensing.images_dropped(), 0);
+}
+
+#[test]
 fn wrong_settings_are_named() {
     let config = SensingConfig {
         force_noise_n: f64::NAN,
