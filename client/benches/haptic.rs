@@ -4,6 +4,7 @@
 #![allow(missing_docs, reason = "the criterion macros make undocumented items")]
 #![allow(clippy::unwrap_used, reason = "a bench is a test: it may panic")]
 
+use std::collections::VecDeque;
 use std::hint::black_box;
 use std::time::Duration;
 
@@ -31,6 +32,10 @@ use mmt_shared::wire::{DATAGRAM_MAX, Label, Message, Side, Welcome};
 struct Haptic {
     end: MasterEnd,
     slave: DatagramChannel,
+    /// What is on its way to the slave, with when it arrives.
+    on_way: VecDeque<(Time, Vec<u8>)>,
+    /// How long the way takes.
+    path: Duration,
     operator: Operator,
     hand_force: Vec2,
     now: Time,
@@ -39,6 +44,10 @@ struct Haptic {
 
 impl Haptic {
     fn new(mode: Mode) -> Self {
+        Self::over(mode, Duration::ZERO)
+    }
+
+    fn over(mode: Mode, path: Duration) -> Self {
         let device = DeviceProfile::default();
         let coupling = device.coupling();
         let welcome = Welcome {
@@ -55,6 +64,8 @@ impl Haptic {
         Self {
             end: MasterEnd::new(Time::ZERO, master, CommandConfig::default()),
             slave: DatagramChannel::new(Side::Slave, Time::ZERO),
+            on_way: VecDeque::new(),
+            path,
             operator: Operator::Scripted(Box::new(scripted)),
             hand_force: Vec2::zeros(),
             now: Time::ZERO,
@@ -98,8 +109,12 @@ impl Haptic {
         self.contact += u64::from(tick.rendered.in_contact());
         let sent = self.end.poll_transmit(self.now, out).unwrap();
         if let Some(length) = sent.filter(|_| phase_ms >= 90) {
+            let bytes = out.get(..length).unwrap().to_vec();
+            self.on_way.push_back((self.now + self.path, bytes));
+        }
+        while let Some((_, bytes)) = self.on_way.pop_front_if(|(at, _)| *at <= self.now) {
             // the heartbeat answers it: one that answers nothing is silence as well
-            self.slave.handle(self.now, out.get(..length).unwrap());
+            self.slave.handle(self.now, &bytes);
         }
         sent
     }
@@ -157,7 +172,8 @@ fn apply(criterion: &mut Criterion) {
 /// round trip of a second costs, sliced over 53 ticks.
 fn replay(criterion: &mut Criterion) {
     let mut out = [0; DATAGRAM_MAX];
-    let mut haptic = Haptic::new(Mode::Recommended);
+    // over a shorter way an update that answers a sample of a second ago would be too old
+    let mut haptic = Haptic::over(Mode::Recommended, Duration::from_millis(750));
     for _ in 0..10_000 {
         haptic.tick(&mut out);
     }
@@ -178,6 +194,7 @@ fn replay(criterion: &mut Criterion) {
             };
             haptic.receive(Message::Update(black_box(&update).into()));
             haptic.tick(&mut out);
+            assert_eq!(haptic.end.counts().newest_applied, sequence);
             while !haptic.end.master().model().is_replayed() {
                 haptic.tick(&mut out);
                 ticks += 1;
