@@ -224,7 +224,7 @@ fn sensors_break_as_they_are_bidden_and_are_whole_again_after() {
             .vision;
         seen.extend(image.map(|image| image.taken));
     }
-    let gap = |from, to| (Time::from_millis(from)..Time::from_millis(to));
+    let gap = |from, to| Time::from_millis(from)..Time::from_millis(to);
     assert!(
         !seen.iter().any(|taken| gap(200, 800).contains(taken)),
         "{seen:?}"

@@ -3,17 +3,10 @@
 use mmt_shared::model::contact::Coupling;
 use mmt_shared::model::geometry::BoxFootprint;
 
-use super::{Slave, SlaveConfig, SlaveError};
+use super::{SlaveConfig, SlaveError};
 use crate::environment::Environment;
 use crate::plant::{LinkedPlant, Plant};
-use crate::sensing::{self, Sensing, SensorFaults};
-
-impl Slave {
-    /// From now on this of the simulated world's sensors is broken: scenarios and the swarm do that, sessions never.
-    pub fn set_sensor_faults(&mut self, faults: SensorFaults) {
-        self.contact.plant_mut().set_sensor_faults(faults);
-    }
-}
+use crate::sensing::{self, Sensing};
 
 /// What the tool of a configuration meets: `environment`, or a plant for which it stands.
 pub(super) fn of_config(

@@ -7,6 +7,7 @@ use super::{Slave, SlaveTick};
 use crate::contact::Contact;
 use crate::estimator::Measured;
 use crate::playout::Played;
+use crate::sensing::SensorFaults;
 use crate::trigger::TriggerInput;
 
 /// An estimator of somebody else's: m (kg), b (N s/m) and c (N) after what was measured in a tick; none where the slave's own
@@ -85,6 +86,11 @@ impl Slave {
             truth: contact.truth,
             update: cause.and_then(|cause| self.update(cause, &played, &contact)),
         })
+    }
+
+    /// From now on this of the simulated world's sensors is broken: the swarm does that, sessions never.
+    pub fn set_sensor_faults(&mut self, faults: SensorFaults) {
+        self.contact.plant_mut().set_sensor_faults(faults);
     }
 
     /// The shadow takes the samples up to the one that is played; a lost update is sent again.
