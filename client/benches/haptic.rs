@@ -19,6 +19,7 @@ use mmt_client::operator::Operator;
 use mmt_client::operator::scripted::{Scripted, ScriptedConfig};
 use mmt_shared::channel::datagram_channel::DatagramChannel;
 use mmt_shared::fixtures::square_at_rest;
+use mmt_shared::io::loop_thread::Frame;
 use mmt_shared::model::geometry::Vec2;
 use mmt_shared::model::local_model::BodyState;
 use mmt_shared::model::params::ModelState;
@@ -33,7 +34,7 @@ struct Haptic {
     end: MasterEnd,
     slave: DatagramChannel,
     /// What is on its way to the slave, with when it arrives.
-    on_way: VecDeque<(Time, Vec<u8>)>,
+    on_way: VecDeque<Frame>,
     /// How long the way takes.
     path: Duration,
     operator: Operator,
@@ -64,7 +65,7 @@ impl Haptic {
         Self {
             end: MasterEnd::new(Time::ZERO, master, CommandConfig::default()),
             slave: DatagramChannel::new(Side::Slave, Time::ZERO),
-            on_way: VecDeque::new(),
+            on_way: VecDeque::with_capacity(16),
             path,
             operator: Operator::Scripted(Box::new(scripted)),
             hand_force: Vec2::zeros(),
@@ -109,12 +110,13 @@ impl Haptic {
         self.contact += u64::from(tick.rendered.in_contact());
         let sent = self.end.poll_transmit(self.now, out).unwrap();
         if let Some(length) = sent.filter(|_| phase_ms >= 90) {
-            let bytes = out.get(..length).unwrap().to_vec();
-            self.on_way.push_back((self.now + self.path, bytes));
+            let bytes = out.get(..length).unwrap();
+            self.on_way
+                .push_back(Frame::new(self.now + self.path, bytes));
         }
-        while let Some((_, bytes)) = self.on_way.pop_front_if(|(at, _)| *at <= self.now) {
+        while let Some(frame) = self.on_way.pop_front_if(|frame| frame.at <= self.now) {
             // the heartbeat answers it: one that answers nothing is silence as well
-            self.slave.handle(self.now, &bytes);
+            self.slave.handle(self.now, frame.bytes());
         }
         sent
     }

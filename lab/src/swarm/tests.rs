@@ -1,6 +1,7 @@
 //! The swarm is a function of its seed, its faults are there, and nothing that is promised breaks.
 
 use super::*;
+use crate::check::Invariant;
 use crate::io::swarm_of;
 
 const MINUTE: Duration = Duration::from_secs(60);
@@ -38,4 +39,25 @@ fn whatever_goes_wrong_what_is_promised_holds() {
     assert!(ran.iter().all(|one| one.same != Some(false)));
     let sessions: u64 = ran.iter().map(|one| one.swarmed.sessions).sum();
     assert!(sessions > 200, "{sessions}");
+}
+
+#[test]
+fn a_tool_that_a_broken_sensor_deceives_is_judged_again_once_it_has_come_back() {
+    // the force is above the limit while it lies; and the tool gives way to it during an emergency stop
+    for seed in [218, 852] {
+        let verdict = swarm(seed, MINUTE).unwrap().verdict;
+        assert!(verdict.holds(), "seed {seed}: {verdict}");
+        let checked = |of: Invariant| {
+            let mut judged = verdict.judged();
+            judged
+                .find(|(name, _)| *name == of)
+                .map_or(0, |(_, judged)| judged.checked)
+        };
+        let (force, all) = (checked(Invariant::ToolForce), checked(Invariant::ToolSpeed));
+        println!("seed {seed}: {force} of {all}");
+        assert!(
+            force < all && force * 10 > all * 8,
+            "seed {seed}: {force} of {all}"
+        );
+    }
 }

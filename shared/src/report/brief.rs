@@ -59,7 +59,7 @@ impl<C> RunReport<C> {
         match (share(self.force.errors.relative_error), rate, round_trip) {
             (Some(error), Some(rate), Some(rtt)) => {
                 format!(
-                    "The hand felt the object to {error}, with {rate} over a round trip of {rtt}."
+                    "The force that was felt was off by {error}, with {rate} over a round trip of {rtt}."
                 )
             }
             (None, Some(rate), Some(rtt)) => {

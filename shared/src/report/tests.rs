@@ -315,7 +315,7 @@ fn the_brief_is_a_sentence_and_ten_lines_and_a_spoilt_run_reports_that_first() {
     let shown = Brief(&sound).to_string();
     let lines: Vec<&str> = shown.lines().collect();
     assert!(
-        lines[2].starts_with("The hand felt the object to "),
+        lines[2].starts_with("The force that was felt was off by "),
         "{shown}"
     );
     let rows = lines.iter().filter(|line| line.starts_with("  ")).count();
