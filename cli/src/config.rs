@@ -3,7 +3,7 @@
 //! One configuration serves every program (`mmt_lab::layers`); what a file leaves out is the mode's, and the command line
 //! comes before the file.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use mmt_client::device::link::{DeviceFile, DeviceKind, DeviceLinkConfig};
 use mmt_lab::layers::{Flag, Layers, Program};
@@ -12,16 +12,20 @@ use mmt_lab::world::WorldConfig;
 use mmt_netem::LinkConfig;
 use mmt_server::environment::SceneConfig;
 use serde::Serialize;
-use serde::de::DeserializeOwned;
 
 use crate::failure::Failure;
 use crate::input::read_text;
+
+/// The option with the file of a scene.
+const SCENE: &str = "--scene";
 
 /// What the command line sets of a configuration.
 #[derive(Debug, Default)]
 pub(crate) struct Flags {
     keys: Vec<Flag>,
     seed: Option<u64>,
+    /// The file of the scene.
+    scene: Option<PathBuf>,
 }
 
 impl Flags {
@@ -63,9 +67,14 @@ impl Flags {
     ///
     /// # Errors
     /// The file cannot be read, is no TOML, or is no scene.
-    pub(crate) fn scene(self, path: Option<&Path>) -> Result<Self, Failure> {
-        let scene = path.map(scene).transpose()?;
-        Ok(self.set("--scene", &["slave.scene"], scene))
+    pub(crate) fn scene(mut self, path: Option<&Path>) -> Result<Self, Failure> {
+        if let Some(path) = path {
+            let (scene, text) = scene(path)?;
+            let flag = Flag::new(SCENE, "slave.scene", &scene);
+            self.keys.extend(flag.map(|flag| flag.read_from(text)));
+            self.scene = Some(path.to_owned());
+        }
+        Ok(self)
     }
 }
 
@@ -104,9 +113,12 @@ impl<'a> ConfigFile<'a> {
             flags: &flags.keys,
             seed: flags.seed,
         };
-        read(layers).map_err(|error| match self.path {
-            Some(path) => refused(path, "the configuration", "docs/configuration.md", &error),
-            None => Failure::usage(error).remedy("change that option"),
+        read(layers).map_err(|error| match (error.option(), &flags.scene, self.path) {
+            (Some(SCENE), Some(path), _) => refused_scene(path, &error),
+            (Some(_), ..) | (None, _, None) => Failure::usage(error).remedy("change that option"),
+            (None, _, Some(path)) => {
+                refused(path, "the configuration", "docs/configuration.md", &error)
+            }
         })
     }
 }
@@ -132,25 +144,28 @@ pub(crate) fn device_config(
     path: Option<&Path>,
 ) -> Result<DeviceLinkConfig, Failure> {
     let file = path.map_or(Ok(DeviceFile::default()), |path| {
-        read(path, "the device", "docs/plugs.md")
+        let text = read_text(path, "the device")?;
+        let read = toml::from_str(&text).map_err(|error| TextError::of(&text, &error));
+        read.map_err(|error| refused(path, "the device", "docs/plugs.md", &error))
     });
     file?.device(kind).map_err(|error| {
         Failure::usage(error).remedy("change that key in --device-config, or the device")
     })
 }
 
-/// The scene of a file.
+/// The scene of a file, and its text.
 ///
 /// # Errors
 /// The file cannot be read, is no TOML, or is no scene.
-pub(crate) fn scene(path: &Path) -> Result<SceneConfig, Failure> {
-    read(path, "the scene", "docs/scenes.md")
+fn scene(path: &Path) -> Result<(SceneConfig, String), Failure> {
+    let text = read_text(path, "the scene")?;
+    let read = toml::from_str(&text).map_err(|error| TextError::of(&text, &error));
+    let scene = read.map_err(|error| refused_scene(path, &error))?;
+    Ok((scene, text))
 }
 
-/// Reads a file that `page` describes.
-fn read<T: DeserializeOwned>(path: &Path, what: &str, page: &str) -> Result<T, Failure> {
-    let text = read_text(path, what)?;
-    toml::from_str(&text).map_err(|error| refused(path, what, page, &TextError::of(&text, &error)))
+fn refused_scene(path: &Path, error: &TextError) -> Failure {
+    refused(path, "the scene", "docs/scenes.md", error)
 }
 
 fn refused(path: &Path, what: &str, page: &str, error: &TextError) -> Failure {

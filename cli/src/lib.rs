@@ -40,14 +40,14 @@ pub fn run() -> ExitCode {
     note_panics();
     let arguments = match Arguments::try_parse() {
         Ok(arguments) => arguments,
+        Err(_) if lacks_live() => return fail(&no_live()),
         Err(error) => return answer(&error),
     };
     let outcomes = [execute(arguments.command), PANICS.judge()];
     let mut code = ExitCode::SUCCESS;
     // the last one is the first cause: a panic fails what else was under way
     for failure in outcomes.into_iter().filter_map(Result::err) {
-        output::note(&failure);
-        code = ExitCode::from(failure.exit().code());
+        code = fail(&failure);
     }
     stderr::settle(LAST_WORDS);
     code
@@ -81,6 +81,24 @@ fn execute(command: Command) -> Result<(), Failure> {
         Command::Man(arguments) => commands::manual::pages(&arguments),
         Command::Bench(arguments) => commands::bench::run(&arguments),
     }
+}
+
+/// Prints a failure; what the process ends with.
+fn fail(failure: &Failure) -> ExitCode {
+    output::note(failure);
+    ExitCode::from(failure.exit().code())
+}
+
+/// Whether `mmt live` is asked for and this build has none.
+fn lacks_live() -> bool {
+    let mut words = std::env::args_os();
+    !cfg!(feature = "live") && words.nth(1).is_some_and(|word| word == "live")
+}
+
+fn no_live() -> Failure {
+    Failure::usage("this build of mmt has no `mmt live`").remedy(
+        "take mmt from its packages, or build it with cargo install --path cli --features live (docs/records.md)",
+    )
 }
 
 /// Prints help, the version or what is wrong with the arguments.

@@ -11,6 +11,7 @@ mod template;
 #[cfg(test)]
 mod tests;
 
+use std::fmt::Display;
 use std::ops::Range;
 
 use mmt_netem::config::LinkConfig;
@@ -23,12 +24,12 @@ pub(crate) use idle::{DEVICE_STIFFNESS, MODEL_STIFFNESS, idle_in_sweep};
 pub use known::{Known, Origin};
 pub use template::template;
 
-use crate::overlay::{lay, lay_at};
+use crate::overlay::{lay, lay_at, lay_over};
 use crate::sweep::{Start, beginning};
 use crate::text_error::TextError;
 use crate::world::{World, WorldConfig};
-use keys::leaves_of;
 pub(crate) use keys::{at, configuration};
+use keys::{leaves_of, within};
 pub use program::Program;
 pub(crate) use program::SEED_KEYS;
 
@@ -44,6 +45,8 @@ pub struct Flag {
     value: String,
     /// The network itself, where the key is one: what it was read from may lie in files.
     network: Option<LinkConfig>,
+    /// The text that the value was read from, if it was.
+    text: Option<String>,
 }
 
 impl Flag {
@@ -56,7 +59,17 @@ impl Flag {
             key,
             value,
             network: None,
+            text: None,
         })
+    }
+
+    /// The same whose value, a table, was read from this text: what is refused of it has its place there.
+    #[must_use]
+    pub fn read_from(self, text: String) -> Self {
+        Self {
+            text: Some(text),
+            ..self
+        }
     }
 
     /// The flag `name` sets the network at `key`, `up` or `down`.
@@ -67,7 +80,17 @@ impl Flag {
             key,
             value: "\"none\"".to_owned(),
             network: Some(network.clone()),
+            text: None,
         }
+    }
+
+    /// The value, with the places of the text that it was read from.
+    fn read(&self) -> Result<DeValue<'_>, toml::de::Error> {
+        let mut value = DeValue::parse(&self.value)?.into_inner();
+        if let (DeValue::Table(whole), Some(text)) = (&mut value, &self.text) {
+            lay_over(whole, DeTable::parse(text)?.into_inner());
+        }
+        Ok(value)
     }
 }
 
@@ -110,14 +133,33 @@ impl<'a> Layers<'a> {
         })
     }
 
+    /// The configuration of a program whose device, if it has one, can be used with the stiffness that is given, N/m:
+    /// `device` judges it.
+    ///
+    /// # Errors
+    /// As [`Layers::config`], and what the device says to the stiffness, with its place.
+    pub fn config_with<E: Display>(
+        &self,
+        device: impl FnOnce(f64) -> Result<(), E>,
+    ) -> Result<WorldConfig, TextError> {
+        let config = self.config()?;
+        let key = DEVICE_STIFFNESS;
+        let stiffness = config.stiffness_n_per_m.filter(|_| self.program.uses(key));
+        if let Some(Err(error)) = stiffness.map(device) {
+            let place = at(self.given()?.get_ref(), key).map(Spanned::span);
+            return Err(self.blame(key, place, error));
+        }
+        Ok(config)
+    }
+
     /// The keys that file and flags give; those of flags stand behind the end of the file.
     fn given(&self) -> Result<Spanned<DeTable<'a>>, TextError> {
-        let read = |error| TextError::of(self.file, &error);
-        let mut given = configuration(self.file).map_err(read)?;
+        let mut given = configuration(self.file)?;
         for (n, flag) in self.flags.iter().enumerate() {
             let place = self.file.len() + 1 + n;
             let place = place..place;
-            let value = DeValue::parse(&flag.value).map_err(read)?.into_inner();
+            let value = flag.read();
+            let value = value.map_err(|error| TextError::of("", &error).of_option(flag.name))?;
             let value = Spanned::new(place.clone(), value);
             lay_at(given.get_mut(), flag.key, &place, value);
         }
@@ -164,7 +206,8 @@ impl<'a> Layers<'a> {
         Ok(config)
     }
 
-    /// Makes the world, and where that is refused finds the key to blame: the first one that is refused without the others.
+    /// Makes the world, and where that is refused finds the key to blame: the first one that is refused without the others, else
+    /// the first one without which the others are not.
     fn check(
         &self,
         start: Start,
@@ -176,20 +219,37 @@ impl<'a> Layers<'a> {
         };
         let mut leaves = Vec::new();
         leaves_of(given.get_ref(), "", &mut leaves);
-        let refused = leaves.into_iter().find(|(key, value)| {
-            let mut alone = DeTable::new();
-            lay_at(&mut alone, key, &value.span(), (*value).clone());
-            let config = self.laid(start, &Spanned::new(0..0, alone));
-            config.is_ok_and(|config| self.attempt(&config).is_err())
-        });
-        let Some((_, value)) = refused else {
-            return Err(TextError::at(self.file, None, error));
+        let attempt = |kept: &dyn Fn(usize) -> bool| {
+            let mut some = DeTable::new();
+            let kept = leaves.iter().enumerate().filter(|(n, _)| kept(*n));
+            for (_, (key, value)) in kept {
+                lay_at(&mut some, key, &value.span(), (*value).clone());
+            }
+            let config = self.laid(start, &Spanned::new(0..0, some)).ok()?;
+            Some(self.attempt(&config).is_err())
         };
-        let place = value.span();
-        Err(match self.flag_at(&place) {
-            Some(flag) => TextError::at("", None, format_args!("{}: {error}", flag.name)),
-            None => TextError::at(self.file, Some(place), error),
+        let alone = |n: &usize| attempt(&|other| other == *n) == Some(true);
+        let with_others = |n: &usize| attempt(&|other| other != *n) == Some(false);
+        let numbers = 0..leaves.len();
+        let refused = numbers.clone().find(alone);
+        let refused = refused.or_else(|| numbers.clone().find(with_others));
+        let refused = refused.and_then(|n| leaves.get(n));
+        Err(match refused {
+            Some((key, value)) => self.blame(key, Some(value.span()), error),
+            None => TextError::at(self.file, None, error),
         })
+    }
+
+    /// Why a key is refused whose value has this place: in the file, or in what a flag gave.
+    fn blame(&self, key: &str, place: Option<Range<usize>>, why: impl Display) -> TextError {
+        match self.flags.iter().rfind(|flag| within(key, flag.key)) {
+            None => TextError::at(self.file, place, why),
+            Some(flag) => match &flag.text {
+                Some(text) => TextError::at(text, place, why),
+                None => TextError::at("", None, format_args!("{}: {why}", flag.name)),
+            }
+            .of_option(flag.name),
+        }
     }
 
     /// Why no run could be so; empty of what a live program asks the device itself.
@@ -200,10 +260,5 @@ impl<'a> Layers<'a> {
         }
         let world = World::try_new(&config);
         world.map(drop).map_err(|error| error.to_string())
-    }
-
-    fn flag_at(&self, place: &Range<usize>) -> Option<&'a Flag> {
-        self.flags
-            .get(place.start.checked_sub(self.file.len() + 1)?)
     }
 }

@@ -10,6 +10,8 @@ use mmt_shared::spelling;
 pub struct TextError {
     what: String,
     place: Option<Place>,
+    /// The option to blame, where it is not the text.
+    option: Option<&'static str>,
 }
 
 /// A place in the text.
@@ -30,6 +32,7 @@ impl TextError {
         Self {
             what: what.to_string().trim_end().to_owned(),
             place: span.and_then(|span| Place::of(text, &span)),
+            option: None,
         }
     }
 
@@ -45,6 +48,19 @@ impl TextError {
             ),
             None => Self::at(text, error.span(), message),
         }
+    }
+
+    /// The same, where an option is to blame: the place, if there is one, is in the file that the option names.
+    #[must_use]
+    pub(crate) fn of_option(mut self, name: &'static str) -> Self {
+        self.option = Some(name);
+        self
+    }
+
+    /// The option to blame; none where it is the text itself.
+    #[must_use]
+    pub fn option(&self) -> Option<&'static str> {
+        self.option
     }
 
     /// Adds what was being looked at.

@@ -110,7 +110,8 @@ fn slave_of_a_killed_master(options: &[&str]) -> Running {
     // dropped, it is killed
     drop(master);
     let noticed = slave.wait_for_line(SOON, |line| {
-        line.contains("no command came") || line.contains("the connection was lost")
+        line.contains("the master has been silent for 2s: the session is over")
+            || line.contains("the connection was lost")
     });
     noticed.unwrap();
     slave

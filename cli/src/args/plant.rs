@@ -24,8 +24,16 @@ pub(crate) struct PlantArguments {
 
 impl PlantArguments {
     /// Whether a plant is to be plugged in: the command line comes before the file.
-    pub(crate) fn is_linked(&self, of_file: bool) -> bool {
-        self.plant.unwrap_or(of_file)
+    ///
+    /// # Errors
+    /// An address for one where none is.
+    pub(crate) fn is_linked(&self, of_file: bool) -> Result<bool, Failure> {
+        let linked = self.plant.unwrap_or(of_file);
+        if !linked && self.plant_listen.is_some() {
+            let what = "--plant-listen goes with --plant link only";
+            return Err(Failure::usage(what).remedy("add --plant link, or leave it out"));
+        }
+        Ok(linked)
     }
 
     /// Where the plug listens.

@@ -1,7 +1,7 @@
 //! The operator's console as a command serves it: what it shows, and what it may change.
 
 use mmt_client::io::MasterLive;
-use mmt_client::io::console::{Console, NetworkWish, Order, Source};
+use mmt_client::io::console::{Console, ConsoleError, NetworkWish, Order, Source};
 use mmt_client::io::hand_events::HandEvents;
 use mmt_client::observer::ObserverLive;
 use mmt_client::operator::pointer::HandEvent;
@@ -16,7 +16,7 @@ use serde_json::{Map, Value, json};
 
 use super::netem::wrap::Emulation;
 use crate::args::ConsoleArguments;
-use crate::failure::Failure;
+use crate::failure::{Exit, Failure};
 use crate::output::note;
 use crate::view::Caption;
 
@@ -34,6 +34,14 @@ struct Frame {
 #[derive(Serialize)]
 struct ObserverFrame {
     observer: ObserverLive,
+}
+
+fn failure(error: ConsoleError) -> Failure {
+    match error {
+        ConsoleError::Listen { .. } => Failure::new(Exit::Address, error)
+            .remedy("give another --console address, or port 0 for any free port"),
+        ConsoleError::Token(_) | ConsoleError::Thread(_) => Failure::failed(error),
+    }
 }
 
 /// Of a session what the hand meets, and no more: the remote object as last seen would show the delay.
@@ -77,7 +85,7 @@ impl Desk {
         let Some(options) = arguments.options(wanted)? else {
             return Ok(None);
         };
-        let console = Console::start(options, emergency.clone()).map_err(Failure::failed)?;
+        let console = Console::start(options, emergency.clone()).map_err(failure)?;
         note(format_args!("console: {}", console.address()));
         let causes: Vec<&str> = Cause::ALL.into_iter().map(Cause::name).collect();
         let presets: Vec<Value> = PRESETS

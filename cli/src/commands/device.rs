@@ -7,7 +7,7 @@ mod test;
 
 use crate::args::{DevicesArguments, DevicesCommand};
 use crate::failure::Failure;
-pub(super) use hand::{Device, profile};
+pub(super) use hand::{Device, configuration, profile};
 
 /// Runs `mmt device`.
 ///

@@ -36,7 +36,6 @@ use super::netem::wrap::{Emulation, effect};
 use super::record::Record;
 use super::viewer::Viewer;
 use crate::args::{DeviceWords, MasterArguments, OperatorWords, PairingWords};
-use crate::config::configuration;
 use crate::failure::{Exit, Failure};
 use crate::input::{read_line, read_text};
 use crate::log::Messages;
@@ -174,7 +173,8 @@ pub(super) fn judge(end: Option<SessionEnd>) -> Result<(), Failure> {
 fn options(arguments: &MasterArguments) -> Result<(MasterOptions, Option<f64>), Failure> {
     let pairing = pairing(&arguments.pairing)?;
     let path = arguments.config.as_deref();
-    let config = configuration(Program::Master, path, &arguments.flags())?;
+    let flags = arguments.flags();
+    let config = device::configuration(Program::Master, path, &flags, &arguments.device)?;
     let stiffness = config.stiffness_n_per_m;
     let options = MasterOptions {
         transport: arguments.transport.choose()?,

@@ -114,15 +114,7 @@ fn judge<C>(once: bool, report: Option<&RunReport<C>>) -> Result<(), Failure> {
 
 /// A plug for a plant, once one is plugged in; none if somebody ends the command before.
 fn plugged_in(listen: SocketAddr, stop: &Stop) -> Result<Option<PlantHost>, Failure> {
-    let plant = PlantHost::start(listen).map_err(|error| match error {
-        PlantHostError::Socket(PlugSocketError::Listen { .. }) => {
-            Failure::new(Exit::Address, error)
-                .remedy("give another --plant-listen address, or port 0 for any free port")
-        }
-        PlantHostError::Socket(_) | PlantHostError::Setup(_) | PlantHostError::Thread(_) => {
-            Failure::failed(error)
-        }
-    })?;
+    let plant = PlantHost::start(listen).map_err(plant_failure)?;
     note(format_args!("plant: {}", plant.address()));
     while !plant.wait(PLANT_WAIT) {
         if stop.asked() {
@@ -130,6 +122,19 @@ fn plugged_in(listen: SocketAddr, stop: &Stop) -> Result<Option<PlantHost>, Fail
         }
     }
     Ok(Some(plant))
+}
+
+/// Why no plant can be plugged in.
+pub(super) fn plant_failure(error: PlantHostError) -> Failure {
+    match error {
+        PlantHostError::Socket(PlugSocketError::Listen { .. }) => {
+            Failure::new(Exit::Address, error)
+                .remedy("give another --plant-listen address, or port 0 for any free port")
+        }
+        PlantHostError::Socket(_) | PlantHostError::Setup(_) | PlantHostError::Thread(_) => {
+            Failure::failed(error)
+        }
+    }
 }
 
 /// What to do on the other host; the secret stands on stdout only. `everywhere`: the slave listens at every address of this
@@ -207,7 +212,7 @@ fn options(arguments: &SlaveArguments, directory: &Path) -> Result<SlaveOptions,
     let path = arguments.config.as_deref();
     let world = configuration(Program::Slave, path, &arguments.flags()?)?;
     let mut config = world.slave;
-    config.plant.link = arguments.plant.is_linked(config.plant.link);
+    config.plant.link = arguments.plant.is_linked(config.plant.link)?;
     let transport = arguments.transport.choose()?;
     let permitted = transport.permit(arguments.listen);
     permitted.map_err(Failure::usage)?;

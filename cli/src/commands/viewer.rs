@@ -33,16 +33,22 @@ pub(super) struct Viewer {
 }
 
 impl Viewer {
-    /// A viewer; with a dashboard if `dashboard` and if there is a terminal for it.
+    /// A viewer; if `dashboard`, with a dashboard on a terminal that has room for it, and with its keys on a smaller one.
     pub(super) fn new(caption: Caption, dashboard: bool, messages: &Messages, stop: &Stop) -> Self {
-        Self {
+        let drawn = dashboard && Screen::has_room();
+        let viewer = Self {
             caption,
             history: History::default(),
-            screen: dashboard.then(|| Screen::take(messages)).flatten(),
+            screen: drawn.then(|| Screen::take(messages)).flatten(),
             keyboard: None,
             began: Instant::now(),
             next_line: Instant::now() + LINE,
             stop: stop.clone(),
+        };
+        if dashboard && Screen::is_there() {
+            viewer.with_keys()
+        } else {
+            viewer
         }
     }
 
@@ -63,7 +69,7 @@ impl Viewer {
 
     /// How many scenes a second are looked at, with a dashboard or without one.
     pub(super) fn scene_hz(dashboard: bool) -> u8 {
-        if dashboard && Screen::is_there() {
+        if dashboard && Screen::has_room() {
             SCENE_HZ
         } else {
             0

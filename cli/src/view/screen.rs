@@ -11,10 +11,13 @@ use crossterm::terminal::{
 };
 use ratatui::backend::CrosstermBackend;
 use ratatui::{Frame, Terminal};
+use rustix::termios::{Winsize, tcgetwinsize};
 
 use super::keys::{Keys, Wish, restore_keys};
 use crate::log::Messages;
 
+/// The smallest terminal on which the live view has all its numbers, columns and rows.
+const LEAST: (u16, u16) = (60, 15);
 /// Messages shown at the bottom.
 pub(super) const MESSAGES_MAX: usize = 3;
 
@@ -42,6 +45,11 @@ impl Screen {
     /// Whether there is a terminal to take.
     pub(crate) fn is_there() -> bool {
         io::stderr().is_terminal()
+    }
+
+    /// Whether there is one with room for the live view.
+    pub(crate) fn has_room() -> bool {
+        tcgetwinsize(io::stderr()).is_ok_and(fits)
     }
 
     /// Takes the terminal that stderr is; none if it is none, or cannot be drawn on.
@@ -98,5 +106,29 @@ impl Drop for Screen {
     fn drop(&mut self) {
         restore_terminal();
         self.messages.release();
+    }
+}
+
+fn fits(size: Winsize) -> bool {
+    let (columns, rows) = LEAST;
+    size.ws_col >= columns && size.ws_row >= rows
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_terminal_that_cuts_numbers_has_no_room() {
+        let fits = |ws_col, ws_row| {
+            fits(Winsize {
+                ws_row,
+                ws_col,
+                ws_xpixel: 0,
+                ws_ypixel: 0,
+            })
+        };
+        assert!(fits(60, 15) && fits(80, 24));
+        assert!(!fits(40, 24) && !fits(58, 14) && !fits(60, 14) && !fits(0, 0));
     }
 }

@@ -9,8 +9,8 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 use super::Layers;
-use super::idle::idle;
-use super::keys::{at, named, within};
+use super::idle::{DEVICE_STIFFNESS, idle};
+use super::keys::{at, line_of, named, within};
 use super::program::SEED_KEYS;
 use crate::overlay::{lay, lay_at};
 use crate::text_error::TextError;
@@ -79,16 +79,23 @@ impl Layers<'_> {
     /// Every key in its order: the keys of a table before the tables in it.
     ///
     /// # Errors
-    /// As [`Layers::config`].
+    /// As [`Layers::config_with`] of the default device.
     pub fn known(&self) -> Result<Vec<Known>, TextError> {
         let given = self.given()?;
-        let config = self.config()?;
+        let device = DeviceProfile::default();
+        let config = self.config_with(|k_p| device.used_with(Some(k_p), None).map(drop))?;
         let whole = whole(&config);
         let mut keys = Vec::new();
         let read = |error| TextError::of("", &error);
         let tree = toml::Value::try_from(&whole)
             .map_err(|error| TextError::at("", None, format_args!("no TOML: {error}")))?;
         walk(&whole, &tree, "", &mut keys).map_err(read)?;
+        // of a program without a device it may be one that the checks would refuse
+        let stiffness = config.stiffness_n_per_m.map(toml::Value::Float);
+        let given_stiffness = keys.iter_mut().find(|(key, _)| key == DEVICE_STIFFNESS);
+        if let (Some((_, value)), Some(_)) = (given_stiffness, &stiffness) {
+            *value = stiffness;
+        }
         let known = keys.into_iter().map(|(key, value)| Known {
             unit: unit_of(&key),
             accepted: accepted(&whole, &key, value.as_ref()),
@@ -112,9 +119,9 @@ impl Layers<'_> {
         while let Some(shorter) = path {
             if let Some(value) = at(given.get_ref(), shorter)
                 && (shorter == key || !value.get_ref().is_table())
-                && let Some(before) = self.file.get(..value.span().start)
+                && value.span().start <= self.file.len()
             {
-                return Origin::File(before.matches('\n').count() + 1);
+                return Origin::File(line_of(self.file, value.span().start));
             }
             path = shorter.rsplit_once('.').map(|(shorter, _)| shorter);
         }
@@ -133,6 +140,26 @@ pub(super) fn whole(config: &WorldConfig) -> WorldConfig {
     let estimator = EstimatorConfig::of_mode(config.slave.mode, coupling);
     whole.slave.estimator.get_or_insert(estimator);
     whole
+}
+
+/// Every key that the default has, written with dots.
+pub(super) fn keys() -> Vec<String> {
+    let mut keys = Vec::new();
+    if let Ok(tree) = toml::Value::try_from(whole(&WorldConfig::default())) {
+        leaves(&tree, "", &mut keys);
+    }
+    keys
+}
+
+fn leaves(tree: &toml::Value, path: &str, keys: &mut Vec<String>) {
+    for (name, value) in tree.as_table().into_iter().flatten() {
+        let key = format!("{path}{name}");
+        if value.is_table() {
+            leaves(value, &format!("{key}."), keys);
+        } else {
+            keys.push(key);
+        }
+    }
 }
 
 /// The unit that a key names.

@@ -180,10 +180,19 @@ fn a_file_of_a_slave_alone_means_what_it_has_always_meant() {
         .config()
         .unwrap_err()
         .to_string();
-    assert!(
-        error.contains("line 1") && error.contains("`mode`"),
-        "{error}"
-    );
+    for part in ["line 1, column 1", "`mode` is given twice", "in line 3"] {
+        assert!(error.contains(part), "{error}");
+    }
+    let twice = "seed = 1\n[environment]\nmass_kg = 1\n[slave.environment.contact]\nstiffness_n_per_m = 5e3\n";
+    let error = layers(Program::Slave, twice, &[]).config().unwrap_err();
+    let error = error.to_string();
+    for part in [
+        "line 2, column 2",
+        "`environment` is given twice",
+        "in line 4",
+    ] {
+        assert!(error.contains(part), "{error}");
+    }
 }
 
 #[test]
@@ -201,6 +210,17 @@ fn what_is_wrong_is_answered_with_line_caret_and_what_was_meant() {
     let word = refused("[slave.environment]\nmas_kg = 1.0\n");
     for part in ["line 2", "^^^^^^", "did you mean `mass_kg`?"] {
         assert!(word.contains(part), "{word}");
+    }
+    for (top, meant) in [
+        ("mod = \"paper\"\n", "did you mean `mode`?"),
+        ("mas_kg = 1.0\n", "`slave.environment.mass_kg` or"),
+        ("hold_s = 1.0\n", "did you mean `operator.hold_s`?"),
+    ] {
+        let error = refused(top);
+        assert!(
+            error.contains(meant) && error.contains("`trigger`"),
+            "{error}"
+        );
     }
     let flags = [Flag::new("--repeat-samples", "repeat_samples", &-1).unwrap()];
     assert!(layers(Program::Master, "", &flags).config().is_err());
@@ -240,4 +260,49 @@ fn a_start_that_is_not_the_programs_own_lies_below_the_file_and_is_checked_like_
     assert_ne!(paper.samples_per_command, live.samples_per_command);
     let wrong = over(Start::PaperExperiment, "seed = 2\noperator.push_speed = -1");
     assert!(wrong.unwrap_err().to_string().starts_with("line 2"));
+}
+
+#[test]
+fn a_stiffness_that_the_device_refuses_is_refused_with_its_place_and_shown_as_given_where_it_has_no_effect()
+ {
+    let file = "seed = 1\nstiffness_n_per_m = 1e9\n";
+    for program in [Program::Demo, Program::Master] {
+        let error = layers(program, file, &[]).known().unwrap_err().to_string();
+        for part in ["line 2, column 21", "^^^", "50 to 3000 N/m"] {
+            assert!(error.contains(part), "{error}");
+        }
+        let flags = [Flag::new("--stiffness", "stiffness_n_per_m", &40.0).unwrap()];
+        let error = layers(program, file, &flags).known().unwrap_err();
+        assert_eq!(error.option(), Some("--stiffness"));
+        assert!(error.to_string().starts_with("--stiffness: stiffness 40 "));
+    }
+    let of_slave = known(Program::Slave, file, &[], "stiffness_n_per_m");
+    assert_eq!(of_slave.value, Some(toml::Value::Float(1e9).to_string()));
+    assert_eq!(of_slave.accepted, "50 to 3000");
+}
+
+#[test]
+fn a_value_that_was_read_from_a_text_of_its_own_is_refused_with_its_place_there() {
+    #[derive(Serialize)]
+    struct Scene {
+        contact_friction: f64,
+        walls: Vec<[f64; 0]>,
+    }
+    let refused = |file: &str, text: &str, contact_friction: f64| {
+        let scene = Scene {
+            contact_friction,
+            walls: Vec::new(),
+        };
+        let flag = Flag::new("--scene", "slave.scene", &scene).unwrap();
+        let flags = [flag.read_from(text.to_owned())];
+        let error = layers(Program::Slave, file, &flags).config().unwrap_err();
+        (error.option(), error.to_string())
+    };
+    let (option, error) = refused("seed = 1\n", "\ncontact_friction = 6.0\n", 6.0);
+    assert_eq!(option, Some("--scene"));
+    assert!(error.starts_with("line 2, column 20"), "{error}");
+    // neither is refused without the other: the first one is to blame
+    let file = "[slave.environment]\npose = { position = [1.0, 0.0] }\n";
+    let (option, error) = refused(file, "[[walls]]\ndistance_m = 0.5\n", 0.0);
+    assert!(option.is_none() && error.starts_with("line 2"), "{error}");
 }

@@ -14,7 +14,7 @@ use super::given::{Given, outdone};
 use super::placed::{AxisHead, PlacedAxis, placed_axis};
 use super::plan::{Plan, ROWS_MAX, Seeds, Start, steps};
 use super::start::beginning;
-use crate::layers::{SEED_KEYS, configuration};
+use crate::layers::{SEED_KEYS, at, configuration};
 use crate::overlay::{lay, lay_at, lay_over};
 use crate::text_error::TextError;
 use crate::trial::{Change, TrialError};
@@ -102,6 +102,8 @@ struct Reader<'i> {
     start: Start,
     base: Spanned<DeTable<'i>>,
     axes: Vec<PlacedAxis<'i>>,
+    /// Where the plan has what the change makes of the object.
+    to: Option<Range<usize>>,
 }
 
 impl<'i> Reader<'i> {
@@ -133,10 +135,11 @@ impl<'i> Reader<'i> {
         let axes = axes.map(|(head, placed)| placed_axis(text, head, placed.get_ref()));
         let reader = Self {
             text,
-            below: configuration(below).map_err(|error| TextError::of(below, &error))?,
+            below: configuration(below)?,
             start: head.start,
             base,
             axes: axes.collect::<Result<_, _>>()?,
+            to: at(root.get_ref(), "change.to").map(place_of_value),
         };
         reader.check_keys()?;
         outdone(
@@ -262,8 +265,8 @@ impl<'i> Reader<'i> {
         named.collect::<Vec<_>>().join(", ")
     }
 
-    /// An error with the place that is to blame: the base, or the first axis whose value is refused without the
-    /// other axes, or no place where only values together are.
+    /// An error with the place that is to blame: the change where all is well without it, the base, or the first axis whose
+    /// value is refused without the other axes, or no place where only values together are.
     fn refused(
         &self,
         steps: &[Option<usize>],
@@ -274,6 +277,13 @@ impl<'i> Reader<'i> {
             let config = self.config(steps);
             config.is_ok_and(|config| attempt(&config, change).is_err())
         };
+        let whole = self.config(steps);
+        if whole.is_ok_and(|config| attempt(&config, None).is_ok()) {
+            let error = TextError::at(self.text, self.to.clone(), error);
+            let always = refuses(&vec![None; steps.len()]);
+            let named = self.named(steps);
+            return error.context(if always { "" } else { &named });
+        }
         if refuses(&vec![None; steps.len()]) {
             return TextError::at(self.text, Some(self.base.span()), error);
         }
@@ -289,6 +299,13 @@ impl<'i> Reader<'i> {
         });
         TextError::at(self.text, place, error).context(&self.named(steps))
     }
+}
+
+/// Where a value stands; of a table with one key that of the key's.
+fn place_of_value(value: &Spanned<DeValue>) -> Range<usize> {
+    let table = value.get_ref().as_table();
+    let only = table.and_then(|table| table.values().next());
+    only.unwrap_or(value).span()
 }
 
 /// Makes the world, and where there is a change makes it at once: whatever a run could refuse is refused here.

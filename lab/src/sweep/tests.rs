@@ -254,7 +254,7 @@ fn a_change_is_tried_before_anything_runs() {
     assert!(good.row(1).unwrap().trial.change.is_some());
     refuses(
         &change("contact_s = 1.0\nto = { friction_coefficient = -3.0 }"),
-        &["change", "-3"],
+        &["change", "-3", "line 6, column 31", "^^^^"],
     );
     refuses(
         &change("contact_s = -1.0\nto = { mass_kg = 1.0 }"),

@@ -118,6 +118,9 @@ pub enum EnvironmentError {
     /// A body of the scene is wrong; the first has number 1.
     #[error("scene: body {0}: {1}")]
     Body(usize, Box<EnvironmentError>),
+    /// A wall of the scene is wrong, or a body stands in it at the start; the first has number 1.
+    #[error("wall {0} of the scene: {1}")]
+    Wall(usize, OutOfRange),
     /// Two bodies of the scene are in each other at the start.
     #[error("scene: bodies {0} and {1} overlap")]
     Overlap(usize, usize),

@@ -127,12 +127,24 @@ impl SceneConfig {
         first: &Object,
         others: &[Object],
     ) -> Result<(), EnvironmentError> {
-        let walls = || config.wall.iter().chain(&self.walls);
+        // the wall of `[environment]` has no number
+        let of_scene = || (1..).map(Some).zip(&self.walls);
+        let walls = || {
+            config
+                .wall
+                .iter()
+                .map(|wall| (None, wall))
+                .chain(of_scene())
+        };
         let objects = || std::iter::once(first).chain(others);
-        for wall in walls() {
+        for (number, wall) in walls() {
             for object in objects().filter(|object| !object.fixed) {
                 let started = wall.check_start(&object.outline, &object.pose());
-                started.map_err(|error| self.named(object.number, error.into()))?;
+                let named = |error| match number {
+                    Some(number) => EnvironmentError::Wall(number, error),
+                    None => error.into(),
+                };
+                started.map_err(|error| self.named(object.number, named(error)))?;
             }
             world.insert_wall(wall, self.contact_friction);
         }

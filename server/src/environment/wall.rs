@@ -12,6 +12,11 @@ pub(super) const ANGLE_RAD: (f64, f64) = (-1000.0, 1000.0);
 /// Accepted distance of the wall from the origin, m.
 const WALL_M: (f64, f64) = (-2.0 * WORKSPACE_M, 2.0 * WORKSPACE_M);
 
+/// A body whose distance to a wall is smaller than this starts flush, m.
+const FLUSH_M: f64 = 1.0 / PER_M;
+/// Such distances in a metre.
+const PER_M: f64 = 1e9;
+
 /// A wall: all places p with n·p ≥ distance are solid, n = (cos angle, sin angle). The tool passes.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -48,7 +53,10 @@ impl Wall {
         in_range("wall distance", "m", self.distance_m, WALL_M)?;
         let least = self.distance_m - self.clearance(outline, pose);
         // a body may start flush: room for rounding
-        let room = (least - 1e-9, WALL_M.1);
-        in_range("wall distance", "m", self.distance_m, room)
+        if self.distance_m >= least - FLUSH_M {
+            return Ok(());
+        }
+        let least = (least * PER_M).round() / PER_M;
+        in_range("wall distance", "m", self.distance_m, (least, WALL_M.1))
     }
 }

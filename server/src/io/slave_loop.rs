@@ -202,6 +202,8 @@ impl SlaveLoop {
             rtt_ms: median.map(|rtt| rtt.as_secs_f64() * 1e3),
             up: channel.peer().incoming(),
             stopped_by: end.stopped_by(),
+            // what the model starts from, until there is more
+            estimate: [estimate.m, estimate.b, estimate.c],
             ..SlaveLive::default()
         };
         for (slot, (_, count)) in live.updates.iter_mut().zip(end.counts().updates.by_cause()) {
@@ -211,7 +213,6 @@ impl SlaveLoop {
             live = SlaveLive {
                 f_s: tick.f_s,
                 f_shadow: tick.f_shadow,
-                estimate: [estimate.m, estimate.b, estimate.c],
                 tool: tick.tool,
                 truth: tick.truth,
                 footprint: Some(slave.environment().footprint()),

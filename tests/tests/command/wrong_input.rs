@@ -161,6 +161,81 @@ fn a_wrong_configuration_is_refused_with_line_and_caret() {
 }
 
 #[test]
+fn a_stiffness_that_the_device_has_not_is_refused_with_line_and_caret_by_every_command_with_a_hand()
+{
+    let home = tempfile::tempdir().unwrap();
+    std::fs::write(home.path().join("c.toml"), "stiffness_n_per_m = 1e9\n").unwrap();
+    let pairing = pairing();
+    for command in [
+        &["demo"][..],
+        &["master", &pairing],
+        &["config", "show"],
+        &["config", "show", "master"],
+    ] {
+        let arguments = [command, &["--config", "c.toml"]].concat();
+        let parts = [
+            "c.toml: line 1, column 21",
+            "^^^",
+            "50 to 3000 N/m",
+            "correct that place",
+        ];
+        complains(&super::mmt(&home, &arguments).output().unwrap(), 2, &parts);
+    }
+    for command in [&["master", &pairing][..], &["config", "show", "master"]] {
+        let arguments = [command, &["--stiffness", "1e9"]].concat();
+        let parts = [
+            "error: --stiffness: stiffness 1000000000",
+            "change that option",
+        ];
+        refuses(&arguments, &parts);
+    }
+}
+
+#[test]
+fn a_scene_that_cannot_be_is_refused_by_its_own_file() {
+    let home = tempfile::tempdir().unwrap();
+    for (text, parts) in [
+        ("[[bodies]]\n[[bodies]]\n", &["bodies 1 and 2 overlap"][..]),
+        (
+            "contact_friction = 6\n",
+            &["line 1, column 20", "^", "contact friction 6"],
+        ),
+        (
+            "[[walls]]\ndistance_m = 0\n",
+            &["wall 1 of the scene", "0.18 to 10 m"],
+        ),
+    ] {
+        std::fs::write(home.path().join("sc.toml"), text).unwrap();
+        let arguments = ["demo", "--scene", "sc.toml"];
+        let output = super::mmt(&home, &arguments).output().unwrap();
+        complains(&output, 2, &["the scene sc.toml: line 1", "docs/scenes.md"]);
+        complains(&output, 2, parts);
+    }
+}
+
+#[test]
+fn an_option_without_the_one_that_it_goes_with_is_refused() {
+    let listen = ["--plant-listen", "127.0.0.1:0"];
+    let parts = ["--plant-listen goes with --plant link only", "leave it out"];
+    for command in [
+        &["slave", "--listen", "127.0.0.1:0"][..],
+        &["bench", "plant"],
+    ] {
+        refuses(&[command, &listen].concat(), &parts);
+    }
+}
+
+#[cfg(not(feature = "live"))]
+#[test]
+fn a_build_without_mmt_live_names_where_it_is() {
+    for arguments in [&["live", "run.mcap"][..], &["live", "--help"]] {
+        let parts = ["this build of mmt has no `mmt live`", "--features live"];
+        refuses(arguments, &parts);
+    }
+    refuses(&["fly", "live"], &["unrecognized subcommand"]);
+}
+
+#[test]
 fn a_wrong_trace_is_refused_with_file_and_line() {
     let home = tempfile::tempdir().unwrap();
     let pairing = pairing();
@@ -204,6 +279,14 @@ fn an_address_in_use_has_an_exit_code_of_its_own() {
         let (output, _home) = mmt(arguments);
         complains(&output, 5, &[&address, "--listen", "port 0"]);
     }
+    let linked = ["bench", "plant", "--plant", "link", "--plant-listen"];
+    let (output, _home) = mmt(&[&linked[..], &[&address]].concat());
+    complains(&output, 5, &[&address, "--plant-listen", "port 0"]);
+    let taken = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
+    let address = taken.local_addr().unwrap().to_string();
+    let console = format!("--console={address}");
+    let (output, _home) = mmt(&["demo", "--duration", "1s", &console]);
+    complains(&output, 5, &[&address, "--console", "port 0"]);
 }
 
 #[test]

@@ -9,6 +9,7 @@ use mmt_server::io::plant_link::LockStep;
 use serde::Serialize;
 
 use crate::args::PlantBenchArguments;
+use crate::commands::slave::plant_failure;
 use crate::config::{Flags, configuration};
 use crate::failure::Failure;
 use crate::output::{note, print, print_json};
@@ -52,7 +53,7 @@ pub(super) fn run(arguments: &PlantBenchArguments) -> Result<(), Failure> {
     let flags = Flags::default().set("--scheme", &["slave.trigger.scheme"], arguments.scheme);
     let path = arguments.config.as_deref();
     let mut slave = configuration(Program::Slave, path, &flags)?.slave;
-    slave.plant.link = arguments.plant.is_linked(slave.plant.link);
+    slave.plant.link = arguments.plant.is_linked(slave.plant.link)?;
     let linked = slave.plant.link;
     let config = WorldConfig {
         slave,
@@ -90,7 +91,7 @@ pub(super) fn run(arguments: &PlantBenchArguments) -> Result<(), Failure> {
 /// A plant, once one is plugged in; none if somebody ends the command before.
 fn plugged_in(arguments: &PlantBenchArguments, stop: &Stop) -> Result<Option<LockStep>, Failure> {
     let plant = LockStep::start(arguments.plant.listen()?);
-    let mut plant = plant.map_err(Failure::failed)?;
+    let mut plant = plant.map_err(plant_failure)?;
     note(format_args!("plant: {}", plant.address()));
     while !plant.wait() {
         if stop.asked() {

@@ -12,7 +12,7 @@ use mmt_shared::range::in_range;
 use serde_json::{Value, json};
 
 use crate::args::DemoArguments;
-use crate::config::configuration;
+use crate::commands::device;
 use crate::failure::Failure;
 use crate::view::Caption;
 
@@ -49,7 +49,8 @@ impl Setting {
     pub(super) fn config(&self) -> Result<WorldConfig, Failure> {
         let arguments = &self.arguments;
         let path = arguments.config.as_deref();
-        let mut config = configuration(Program::Demo, path, &arguments.flags()?)?;
+        let flags = arguments.flags()?;
+        let mut config = device::configuration(Program::Demo, path, &flags, &arguments.device)?;
         // nothing can be plugged in here
         config.slave.plant = PlantConfig::default();
         let environment = &mut config.slave.environment;

@@ -1,17 +1,20 @@
 //! The hand's device as a command uses it: a known one, or one that is plugged in.
 
+use std::path::Path;
 use std::sync::Mutex;
 
-use mmt_client::device::DeviceProfile;
 use mmt_client::device::link::DeviceLinkConfig;
+use mmt_client::device::{DeviceError, DeviceProfile};
 use mmt_client::io::device::ports::{SerialPort, serial_ports};
 use mmt_client::io::device::{DeviceAddress, DeviceHost, DeviceHostError};
 use mmt_client::io::{MasterOptions, OperatorChoice};
 use mmt_client::operator::pointer::{Driver, HandTuning};
+use mmt_lab::layers::Program;
+use mmt_lab::world::WorldConfig;
 use mmt_shared::io::plug_socket::PlugSocketError;
 
 use crate::args::{DeviceArguments, DeviceWords, PlugWords};
-use crate::config::device_config;
+use crate::config::{ConfigFile, Flags, device_config};
 use crate::failure::{Exit, Failure};
 use crate::output::note;
 
@@ -68,6 +71,36 @@ impl Device {
     }
 }
 
+/// A device before anybody uses it.
+enum Unused {
+    Known(DeviceProfile),
+    PluggedIn(DeviceLinkConfig),
+}
+
+impl Unused {
+    fn of(arguments: &DeviceArguments) -> Result<Self, Failure> {
+        // what goes with no plug is named before what is wrong with it
+        arguments.plug()?;
+        Ok(match &arguments.device {
+            DeviceWords::Known(profile) => Self::Known(*profile),
+            DeviceWords::PluggedIn(kind) => {
+                Self::PluggedIn(device_config(*kind, arguments.device_config.as_deref())?)
+            }
+        })
+    }
+
+    /// This device used with this stiffness (N/m) if one is given.
+    fn used_with(&self, stiffness: Option<f64>) -> Result<DeviceProfile, DeviceError> {
+        match self {
+            Self::Known(profile) => profile.used_with(stiffness, None),
+            Self::PluggedIn(config) => DeviceProfile::plugged_in(&DeviceLinkConfig {
+                stiffness_n_per_m: stiffness.unwrap_or(config.stiffness_n_per_m),
+                ..*config
+            }),
+        }
+    }
+}
+
 /// What the device that the arguments name can do, used with this stiffness (N/m) if one is given.
 ///
 /// # Errors
@@ -76,21 +109,23 @@ pub(in crate::commands) fn profile(
     arguments: &DeviceArguments,
     stiffness: Option<f64>,
 ) -> Result<DeviceProfile, Failure> {
-    // what goes with no plug is named before what is wrong with it
-    arguments.plug()?;
-    let profile = match &arguments.device {
-        DeviceWords::Known(profile) => profile.used_with(stiffness, None),
-        DeviceWords::PluggedIn(kind) => {
-            let config = device_config(*kind, arguments.device_config.as_deref())?;
-            DeviceProfile::plugged_in(&DeviceLinkConfig {
-                stiffness_n_per_m: stiffness.unwrap_or(config.stiffness_n_per_m),
-                ..config
-            })
-        }
-    };
-    profile.map_err(|error| match stiffness {
-        Some(_) => Failure::usage(format!("--stiffness: {error}")),
-        None => Failure::usage(error),
+    let used = Unused::of(arguments)?.used_with(stiffness);
+    used.map_err(Failure::usage)
+}
+
+/// The configuration of a program with a hand, with whose stiffness the device that the arguments name can be used.
+///
+/// # Errors
+/// As [`crate::config::configuration`], and what is wrong with the device.
+pub(in crate::commands) fn configuration(
+    program: Program,
+    path: Option<&Path>,
+    flags: &Flags,
+    arguments: &DeviceArguments,
+) -> Result<WorldConfig, Failure> {
+    let device = Unused::of(arguments)?;
+    ConfigFile::read(path)?.with(program, flags, |layers| {
+        layers.config_with(|stiffness| device.used_with(Some(stiffness)).map(drop))
     })
 }
 

@@ -377,8 +377,17 @@ fn a_wrong_scene_is_named() {
     };
     let error = wrong(&[cube(0.0, 0.0)], &[wall], 0.0);
     assert!(
-        error.starts_with("scene: body 1: environment: wall distance 0.1"),
+        error.starts_with("scene: body 1: wall 1 of the scene: wall distance 0.1"),
         "{error}"
+    );
+    let far = Wall {
+        distance_m: 2.0,
+        ..wall
+    };
+    let error = wrong(&[], &[far, wall], 0.0);
+    assert_eq!(
+        error,
+        "wall 2 of the scene: wall distance 0.1 is outside the accepted range 0.18 to 10 m"
     );
     assert!(wrong(&[], &[], -1.0).contains("contact friction -1"));
     let crossing = [(0.0, 0.0), (0.3, 0.3), (0.3, 0.0), (0.0, 0.4)];

@@ -21,7 +21,9 @@ pub(in crate::io) enum End {
     ThreadPanicked,
     #[error("the master ended ({:?})", .0.ending)]
     Farewell(Box<ReceivedFarewell<MasterHalf>>),
-    #[error("no command came for {DISENGAGE:?}: the tool stands until somebody engages it anew")]
+    #[error(
+        "the master has been silent for {DISENGAGE:?}: the session is over, and the tool stands until the next one"
+    )]
     Disengaged,
     #[error("nothing came from the master for {SILENCE_MAX:?}")]
     Silence,
