@@ -214,8 +214,16 @@ fn an_address_that_is_none_of_a_plug_is_refused_in_a_sentence() {
             let ended = running.end(Duration::from_secs(60)).unwrap();
             assert_eq!(ended.status.code(), Some(2), "{address}: {}", ended.err);
             assert_eq!(ended.err.trim().lines().count(), 1, "{}", ended.err);
-            assert!(ended.err.contains("udp://HOST:PORT?token="), "{}", ended.err);
-            assert!(ended.out.is_empty() && !ended.err.contains(&token), "{}", ended.err);
+            assert!(
+                ended.err.contains("udp://HOST:PORT?token="),
+                "{}",
+                ended.err
+            );
+            assert!(
+                ended.out.is_empty() && !ended.err.contains(&token),
+                "{}",
+                ended.err
+            );
         }
     }
 }

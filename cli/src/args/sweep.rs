@@ -6,6 +6,8 @@ use std::path::PathBuf;
 use clap::Args;
 use mmt_lab::sweep::Shard;
 
+use super::values;
+
 /// Arguments of `mmt sweep`.
 #[derive(Clone, Debug, Args)]
 pub(crate) struct SweepArguments {

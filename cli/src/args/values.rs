@@ -114,7 +114,9 @@ pub(crate) fn netem(text: &str) -> Result<LinkConfig, String> {
     mmt_netem::words::parse(text, &mut read).map_err(|error| {
         let pointer = error.pointer(text).replace('\n', "\n    ");
         let advice = match error.reason {
-            Reason::File { .. } => "check the path, and that the file is of the kind that this word takes",
+            Reason::File { .. } => {
+                "check the path, and that the file is of the kind that this word takes"
+            }
             _ => "write it as \"delay 50ms 5ms loss 1%\", or none",
         };
         format!("{error}\n\n    {pointer}\n\n{advice}")
@@ -123,8 +125,7 @@ pub(crate) fn netem(text: &str) -> Result<LinkConfig, String> {
 
 /// An update scheme in its words.
 pub(super) fn scheme(text: &str) -> Result<Scheme, String> {
-    text.parse()
-        .map_err(|error: SchemeError| error.to_string())
+    text.parse().map_err(|error: SchemeError| error.to_string())
 }
 
 /// Delta of (12) in per cent.

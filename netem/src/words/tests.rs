@@ -53,7 +53,10 @@ fn the_words_of_tc_are_taken_verbatim() {
 fn times_have_the_units_of_the_command_line_too() {
     let (minute, hour) = (Duration::from_secs(60), Duration::from_secs(3600));
     assert_eq!(parsed("delay 1min").delay, Delay::constant(minute));
-    assert_eq!(parsed("delay 1.5min").delay, Delay::constant(minute * 3 / 2));
+    assert_eq!(
+        parsed("delay 1.5min").delay,
+        Delay::constant(minute * 3 / 2)
+    );
     assert_eq!(parsed("delay 1h").delay, Delay::constant(hour));
 }
 

@@ -63,10 +63,22 @@ fn what_is_wrong_is_named() {
 #[test]
 fn a_number_without_its_unit_is_told_that_and_not_a_range() {
     for (text, told) in [
-        ("deadband 10", "the deadband '10' has no unit (%), as in 'deadband 10%'"),
-        ("dis 0.3 1s", "the force '0.3' has no unit (N), as in 'dis 0.3N 1000ms'"),
-        ("hybrid 10% 150", "the time '150' has no unit (ms or s), as in 'hybrid 10% 150ms'"),
-        ("adaptive 0 50ms", "the deadband '0' has no unit (%), as in 'adaptive 10% 50ms'"),
+        (
+            "deadband 10",
+            "the deadband '10' has no unit (%), as in 'deadband 10%'",
+        ),
+        (
+            "dis 0.3 1s",
+            "the force '0.3' has no unit (N), as in 'dis 0.3N 1000ms'",
+        ),
+        (
+            "hybrid 10% 150",
+            "the time '150' has no unit (ms or s), as in 'hybrid 10% 150ms'",
+        ),
+        (
+            "adaptive 0 50ms",
+            "the deadband '0' has no unit (%), as in 'adaptive 10% 50ms'",
+        ),
     ] {
         assert_eq!(text.parse::<Scheme>().unwrap_err().to_string(), told);
     }
