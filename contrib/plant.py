@@ -28,15 +28,26 @@ SILENCE_S = 0.020
 Command = collections.namedtuple("Command", "tool velocity stiffness damping force_max begins held periods")
 
 
+def endpoint(address):
+    """Host, port and token of an address as mmt prints it; a ValueError for what is none. The token is not shown."""
+    try:
+        parts = urllib.parse.urlsplit(address)
+        token = bytes.fromhex(urllib.parse.parse_qs(parts.query)["token"][0])
+        if parts.scheme == "udp" and parts.hostname and parts.port and len(token) == 16:
+            return parts.hostname, parts.port, token
+    except (KeyError, ValueError):
+        pass
+    raise ValueError("this is no address of a plug: give udp://HOST:PORT?token=… with 32 hexadecimal digits, as mmt printed it")
+
+
 class Plant:
     """One end of the link: take commands, send what was measured."""
 
     def __init__(self, address):
-        parts = urllib.parse.urlsplit(address)
-        self.token = bytes.fromhex(urllib.parse.parse_qs(parts.query)["token"][0])
-        family = socket.AF_INET6 if ":" in parts.hostname else socket.AF_INET
+        host, port, self.token = endpoint(address)
+        family = socket.AF_INET6 if ":" in host else socket.AF_INET
         self.socket = socket.socket(family, socket.SOCK_DGRAM)
-        self.socket.connect((parts.hostname, parts.port))
+        self.socket.connect((host, port))
         self.sequence = self.newest = self.received = self.lost = 0
 
     def answer(self, tool, velocity, force, pose=None, image_age_s=0.0):
@@ -140,12 +151,21 @@ def serve(plug, world, seconds=math.inf, image_hz=30):
 
 
 def asked(address, name):
-    """The address, from a line of standard input where it is `-`: it holds a token, which other users would see on a command line."""
-    if address != "-":
+    """The address, from a line of standard input where it is `-`: it holds a token, which other users would see on a command line.
+    Ends the program where it is none."""
+    if address == "-":
+        if sys.stdin.isatty():
+            print(f"the address behind “{name}: ”, as mmt printed it:", file=sys.stderr)
+        address = sys.stdin.readline().strip()
+    try:
+        host, port, _ = endpoint(address)
+        socket.getaddrinfo(host, port, type=socket.SOCK_DGRAM)
         return address
-    if sys.stdin.isatty():
-        print(f"the address behind “{name}: ”, as mmt printed it:", file=sys.stderr)
-    return sys.stdin.readline().strip()
+    except (OSError, UnicodeError):
+        print("nobody knows the host of this address: give it as mmt printed it", file=sys.stderr)
+    except ValueError as error:
+        print(error, file=sys.stderr)
+    sys.exit(2)
 
 
 def main():

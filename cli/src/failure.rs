@@ -68,6 +68,11 @@ impl Failure {
         self
     }
 
+    /// What is wrong and where, without what to do.
+    pub(crate) fn what(&self) -> &str {
+        &self.what
+    }
+
     /// How the process ends.
     pub(crate) fn exit(&self) -> Exit {
         self.exit

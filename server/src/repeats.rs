@@ -31,6 +31,9 @@ pub enum RepeatsError {
     /// Too many.
     #[error("{0} repeats; at most {REPEATS_MAX}")]
     Count(usize),
+    /// A number without its unit.
+    #[error("time '{0}' has no unit (ms); write 'none', '10ms' or '10ms 30ms'")]
+    Unit(String),
     /// A time out of range, or no time.
     #[error(
         "time '{0}' is outside the accepted range {min} to {max} ms; write 'none', '10ms' or '10ms 30ms'",
@@ -124,7 +127,13 @@ impl FromStr for Repeats {
             let digits = word
                 .strip_suffix("ms")
                 .and_then(|digits| digits.parse().ok());
-            digits.ok_or_else(|| RepeatsError::Time(word.to_owned()))
+            let is_bare = word.parse().is_ok_and(f64::is_finite);
+            let wrong = if is_bare {
+                RepeatsError::Unit
+            } else {
+                RepeatsError::Time
+            };
+            digits.ok_or_else(|| wrong(word.to_owned()))
         };
         let times: Vec<f64> = text.split_whitespace().map(ms).collect::<Result<_, _>>()?;
         if times.is_empty() {
@@ -202,9 +211,10 @@ mod tests {
     #[test]
     fn what_is_no_repeat_is_named() {
         let error = |text: &str| text.parse::<Repeats>().unwrap_err();
-        for wrong in ["", "10", "0ms", "1001ms", "nanms", "10ms soon"] {
+        for wrong in ["", "0ms", "1001ms", "nanms", "10ms soon"] {
             assert!(matches!(error(wrong), RepeatsError::Time(_)), "{wrong}");
         }
+        assert_eq!(error("10ms 30"), RepeatsError::Unit("30".to_owned()));
         assert_eq!(error("10ms 10ms"), RepeatsError::Order);
         assert_eq!(error("1ms 2ms 3ms 4ms 5ms"), RepeatsError::Count(5));
     }

@@ -1,13 +1,20 @@
-//! That the tables of `docs/plugs.md` say where each number of a packet is: they are read, and with them the packets.
+//! That the tables of `docs/plugs.md` say where each number of a packet is: they are read, and with them the packets. And that
+//! the examples of `contrib` refuse an address that is none.
 #![allow(
     clippy::unwrap_used,
     clippy::indexing_slicing,
     clippy::panic,
     reason = "a test may panic"
 )]
-#![allow(clippy::disallowed_methods, reason = "reads the document")]
+#![allow(
+    clippy::disallowed_methods,
+    clippy::disallowed_types,
+    reason = "reads the document, starts the examples"
+)]
 
 use std::net::SocketAddr;
+use std::process::Command;
+use std::time::Duration;
 
 use mmt_client::device::link::{DeviceLink, DeviceLinkConfig, HandOutput};
 use mmt_server::plant::{PlantAnswer, PlantCommand};
@@ -15,6 +22,8 @@ use mmt_shared::model::geometry::{Pose, Vec2};
 use mmt_shared::plug::{DEVICE_BYTES, PlugHead, PlugKind, PlugToken, encode};
 use mmt_shared::time::Time;
 
+use crate::harness::process::Running;
+use crate::harness::python::python;
 use crate::harness::root;
 
 const TOKEN: PlugToken = PlugToken::new([0xc3; 16]);
@@ -181,4 +190,40 @@ fn the_document_states_where_each_number_of_a_command_and_of_an_answer_is() {
     let (flags, numbers) = held(" Answer", &HEAD, &answer.packet(&TOKEN, &HEAD));
     assert_eq!(flags, 1);
     assert_eq!(numbers, [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 0.7, 0.8, 0.9, 0.25]);
+}
+
+#[test]
+fn an_address_that_is_none_of_a_plug_is_refused_in_a_sentence() {
+    let Some(python) = python("a wrong address at a plug's example", "socket") else {
+        return;
+    };
+    let token = "c3".repeat(16);
+    let wrong = [
+        String::new(),
+        "garbage".to_owned(),
+        "udp://127.0.0.1:9?token=no hexadecimal".to_owned(),
+        format!("udp://127.0.0.1:9?token={}", &token[2..]),
+        format!("udp://127.0.0.1:99999?token={token}"),
+        format!("udp://127.0.0.1?token={token}"),
+    ];
+    for program in ["hand.py", "plant.py"] {
+        for address in &wrong {
+            let mut command = Command::new(&python);
+            command.arg(root().join("contrib").join(program));
+            let running = Running::start_reading(command, &format!("{address}\n")).unwrap();
+            let ended = running.end(Duration::from_secs(60)).unwrap();
+            assert_eq!(ended.status.code(), Some(2), "{address}: {}", ended.err);
+            assert_eq!(ended.err.trim().lines().count(), 1, "{}", ended.err);
+            assert!(
+                ended.err.contains("udp://HOST:PORT?token="),
+                "{}",
+                ended.err
+            );
+            assert!(
+                ended.out.is_empty() && !ended.err.contains(&token),
+                "{}",
+                ended.err
+            );
+        }
+    }
 }

@@ -36,7 +36,7 @@ pub(crate) struct PlantBenchArguments {
     #[command(flatten)]
     pub(crate) plant: PlantArguments,
     /// How long the scripted operator pushes, in virtual time
-    #[arg(long, value_name = "TIME", default_value = "60s", value_parser = values::duration)]
+    #[arg(long, value_name = "TIME", default_value = "60s", value_parser = values::duration, allow_hyphen_values = true)]
     pub(crate) duration: Duration,
     /// Emulated network in each direction
     #[arg(long, value_name = "WORDS", default_value = "delay 50ms 5ms loss 1%", value_parser = values::netem)]
@@ -48,7 +48,7 @@ pub(crate) struct PlantBenchArguments {
     #[arg(long, value_name = "WORDS", value_parser = values::scheme)]
     pub(crate) scheme: Option<Scheme>,
     /// Seed of operator, sensors and network
-    #[arg(long, value_name = "N", default_value_t = 1)]
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = values::seed, allow_negative_numbers = true)]
     pub(crate) seed: u64,
     /// Print one JSON document instead of a table
     #[arg(long)]
@@ -59,13 +59,13 @@ pub(crate) struct PlantBenchArguments {
 #[derive(Clone, Copy, Debug, Args)]
 pub(crate) struct TransportBenchArguments {
     /// Messages a second
-    #[arg(long, value_name = "HZ", default_value_t = 1000, value_parser = clap::value_parser!(u32).range(1..=i64::from(RATE_MAX)))]
+    #[arg(long, value_name = "HZ", default_value_t = 1000, value_parser = values::whole::<u32>(1, RATE_MAX.into()), allow_negative_numbers = true)]
     pub(crate) rate: u32,
     /// How long, all turns of all carriers together
-    #[arg(long, value_name = "TIME", default_value = "60s", value_parser = values::duration)]
+    #[arg(long, value_name = "TIME", default_value = "60s", value_parser = values::duration, allow_hyphen_values = true)]
     pub(crate) duration: Duration,
     /// Bytes of a message
-    #[arg(long, value_name = "BYTES", default_value_t = 100, value_parser = clap::value_parser!(u16).range(BYTES_MIN as i64..=BYTES_MAX as i64))]
+    #[arg(long, value_name = "BYTES", default_value_t = 100, value_parser = values::whole::<u16>(BYTES_MIN as u64, BYTES_MAX as u64), allow_negative_numbers = true)]
     pub(crate) size: u16,
     /// Where the two ends run
     #[arg(long, default_value = "own", value_parser = cores())]

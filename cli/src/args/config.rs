@@ -51,7 +51,7 @@ pub(crate) struct ShowArguments {
     #[arg(long, value_name = "FILE")]
     pub(crate) config: Option<PathBuf>,
     /// Seed of everything
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = values::seed, allow_negative_numbers = true)]
     seed: Option<u64>,
     /// The bundle of choices
     #[arg(long, value_name = "NAME", value_parser = values::mode())]
@@ -69,13 +69,13 @@ pub(crate) struct ShowArguments {
     #[arg(long, value_name = "NAME", value_parser = values::architecture())]
     architecture: Option<Architecture>,
     /// Virtual stiffness k_p, N/m
-    #[arg(long, value_name = "N_PER_M")]
+    #[arg(long, value_name = "N_PER_M", value_parser = values::number, allow_negative_numbers = true)]
     stiffness: Option<f64>,
     /// HIP samples in a datagram
-    #[arg(long, value_name = "N", value_parser = values::samples_per_command())]
+    #[arg(long, value_name = "N", value_parser = values::samples_per_command, allow_negative_numbers = true)]
     samples_per_command: Option<u8>,
     /// How many datagrams before it each datagram repeats the samples of
-    #[arg(long, value_name = "N", value_parser = values::repeat_samples())]
+    #[arg(long, value_name = "N", value_parser = values::repeat_samples, allow_negative_numbers = true)]
     repeat_samples: Option<u8>,
     /// Greatest factor that congestion may stretch by
     #[arg(long, value_name = "FACTOR")]

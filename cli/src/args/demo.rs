@@ -21,13 +21,13 @@ use super::values;
 #[derive(Clone, Debug, Args)]
 pub(crate) struct DemoArguments {
     /// How long the operator works; a demo that a browser shows goes on until that is closed
-    #[arg(long, value_name = "TIME", default_value = "20s", value_parser = values::duration)]
+    #[arg(long, value_name = "TIME", default_value = "20s", value_parser = values::duration, allow_hyphen_values = true)]
     pub(crate) duration: Duration,
     /// Configuration of both sides, TOML (docs/configuration.md)
     #[arg(long, value_name = "FILE")]
     pub(crate) config: Option<PathBuf>,
     /// Seed of operator, sensors and network [default: the file's, else 1]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = values::seed, allow_negative_numbers = true)]
     pub(crate) seed: Option<u64>,
     /// Emulated network in each direction [default: the file's, else "delay 50ms 5ms loss 1%"]
     #[arg(long, value_name = "WORDS", value_parser = values::netem)]
@@ -63,7 +63,7 @@ pub(crate) struct DemoArguments {
     #[arg(long, value_name = "WORDS")]
     pub(crate) repeats: Option<Repeats>,
     /// How many commands before it each command repeats the samples of [default: the file's, else 0]
-    #[arg(long, value_name = "N", value_parser = values::repeat_samples())]
+    #[arg(long, value_name = "N", value_parser = values::repeat_samples, allow_negative_numbers = true)]
     pub(crate) repeat_samples: Option<u8>,
     /// Greatest factor that congestion may stretch Delta, T_update and the time between samples by; 1: off
     /// [default: the file's, else the mode's]

@@ -178,7 +178,7 @@ pub(crate) struct DeviceTestArguments {
     #[command(flatten)]
     pub(crate) device: DeviceArguments,
     /// How long, from its first reading on
-    #[arg(long, value_name = "TIME", default_value = "5s", value_parser = values::duration)]
+    #[arg(long, value_name = "TIME", default_value = "5s", value_parser = values::duration, allow_hyphen_values = true)]
     pub(crate) duration: Duration,
     /// A force along the world's x while the hand is held, N, 0 to 2
     #[arg(long, value_name = "N", default_value = "0", value_parser = gentle)]

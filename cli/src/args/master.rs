@@ -29,10 +29,10 @@ pub(crate) struct MasterArguments {
     #[arg(long, value_name = "WHO", default_value = "scripted", value_parser = values::operator)]
     pub(crate) operator: OperatorWords,
     /// Of recorded pushes only this one, from 0 [default: all, joined]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = values::whole::<usize>(0, u64::MAX), allow_negative_numbers = true)]
     pub(crate) push: Option<usize>,
     /// How long [default: until the operator has finished, or Ctrl-C]
-    #[arg(long, value_name = "TIME", value_parser = values::duration)]
+    #[arg(long, value_name = "TIME", value_parser = values::duration, allow_hyphen_values = true)]
     pub(crate) duration: Option<Duration>,
     /// The haptic device.
     #[command(flatten)]
@@ -41,7 +41,7 @@ pub(crate) struct MasterArguments {
     #[arg(long, value_name = "FILE")]
     pub(crate) config: Option<PathBuf>,
     /// Virtual stiffness k_p, N/m [default: the file's, else the device's]
-    #[arg(long, value_name = "N_PER_M")]
+    #[arg(long, value_name = "N_PER_M", value_parser = values::number, allow_negative_numbers = true)]
     pub(crate) stiffness: Option<f64>,
     /// Whose force the hand feels [default: the file's, else mmt]
     #[arg(long, value_name = "NAME", value_parser = values::architecture())]
@@ -62,16 +62,16 @@ pub(crate) struct MasterArguments {
     #[arg(long, value_name = "FILE")]
     pub(crate) record_path: Option<PathBuf>,
     /// Seed of operator and network [default: the file's, else 1]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = values::seed, allow_negative_numbers = true)]
     pub(crate) seed: Option<u64>,
     /// HIP samples (1 a millisecond) in a datagram [default: the file's, else 10]
-    #[arg(long, value_name = "N", value_parser = values::samples_per_command())]
+    #[arg(long, value_name = "N", value_parser = values::samples_per_command, allow_negative_numbers = true)]
     pub(crate) samples_per_command: Option<u8>,
     /// What carries the session.
     #[command(flatten)]
     pub(crate) transport: TransportArguments,
     /// How many datagrams before it each datagram repeats the samples of [default: the file's, else 0]
-    #[arg(long, value_name = "N", value_parser = values::repeat_samples())]
+    #[arg(long, value_name = "N", value_parser = values::repeat_samples, allow_negative_numbers = true)]
     pub(crate) repeat_samples: Option<u8>,
     /// Greatest factor that congestion may stretch the time between samples by; 1: off [default: the file's, else 3]
     #[arg(long, value_name = "FACTOR")]

@@ -41,27 +41,27 @@ pub(crate) struct NetemArguments {
     #[arg(long, value_name = "WORDS", default_value = "none", value_parser = values::netem)]
     pub(crate) down: LinkConfig,
     /// Seed of both
-    #[arg(long, value_name = "N", default_value_t = 1)]
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = values::seed, allow_negative_numbers = true)]
     pub(crate) seed: u64,
     /// Packets per second for which the effect of the networks is printed at the start
-    #[arg(long, value_name = "N", default_value_t = 100.0)]
+    #[arg(long, value_name = "N", default_value_t = 100.0, value_parser = values::number, allow_negative_numbers = true)]
     pub(crate) rate: f64,
     /// Length of these packets, bytes of UDP payload
-    #[arg(long, value_name = "N", default_value_t = mmt_netem::effect::BYTES)]
+    #[arg(long, value_name = "N", default_value_t = mmt_netem::effect::BYTES, value_parser = values::whole::<usize>(0, 65_507), allow_negative_numbers = true)]
     pub(crate) bytes: usize,
     /// Masters at one time; one more takes the place of one that does not talk with the slave, or is turned away
-    #[arg(long, value_name = "N", default_value_t = mmt_netem::io::relay::CLIENTS)]
+    #[arg(long, value_name = "N", default_value_t = mmt_netem::io::relay::CLIENTS, value_parser = values::whole::<usize>(1, 65_535), allow_negative_numbers = true)]
     pub(crate) clients: usize,
     #[command(flatten)]
     pub(crate) files: NetemFileArguments,
     /// Give every master a new port toward the slave this often, as a NAT that forgets
-    #[arg(long, value_name = "TIME", value_parser = values::duration)]
+    #[arg(long, value_name = "TIME", value_parser = values::duration, allow_hyphen_values = true)]
     pub(crate) rebind: Option<Duration>,
     /// Take commands from stdin while running, one a line: up WORDS, down WORDS, rebind
     #[arg(long)]
     pub(crate) control: bool,
     /// How long [default: until Ctrl-C]
-    #[arg(long, value_name = "TIME", value_parser = values::duration)]
+    #[arg(long, value_name = "TIME", value_parser = values::duration, allow_hyphen_values = true)]
     pub(crate) duration: Option<Duration>,
     /// Print the counters as JSON, after the address
     #[arg(long)]
@@ -100,7 +100,7 @@ pub(crate) struct NetemShellArguments {
     #[arg(long, value_name = "WORDS", default_value = "none", value_parser = values::netem)]
     pub(crate) down: LinkConfig,
     /// Seed of both
-    #[arg(long, value_name = "N", default_value_t = 1)]
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = values::seed, allow_negative_numbers = true)]
     pub(crate) seed: u64,
     /// Run this shell command at the other end, in a network of its own, instead of leading to the host's network; needs
     /// no root

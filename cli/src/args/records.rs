@@ -34,10 +34,10 @@ pub(crate) struct ReplayArguments {
     #[arg(long, value_name = "WORDS", value_parser = values::netem)]
     pub(crate) netem_down: Option<LinkConfig>,
     /// Random splits into fitted and held-out pushes
-    #[arg(long, value_name = "N", default_value_t = ReplayConfig::default().repeats, value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    #[arg(long, value_name = "N", default_value_t = ReplayConfig::default().repeats, value_parser = values::whole::<u32>(1, 10_000), allow_negative_numbers = true)]
     pub(crate) splits: u32,
     /// Seed of the splits
-    #[arg(long, value_name = "N", default_value_t = 1)]
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = values::seed, allow_negative_numbers = true)]
     pub(crate) seed: u64,
     /// Print one JSON document instead of tables
     #[arg(long)]
@@ -77,7 +77,7 @@ pub(crate) struct LiveArguments {
     #[arg(value_name = "FILE")]
     pub(crate) file: PathBuf,
     /// Port on 127.0.0.1; 0: any that is free
-    #[arg(long, value_name = "PORT", default_value_t = 8765)]
+    #[arg(long, value_name = "PORT", default_value_t = 8765, value_parser = values::whole::<u16>(0, 65_535), allow_negative_numbers = true)]
     pub(crate) port: u16,
 }
 

@@ -5,7 +5,7 @@ use std::num::NonZero;
 use std::path::PathBuf;
 use std::time::Duration;
 
-use clap::{Arg, ArgAction, ArgMatches, Args, Command, FromArgMatches, Subcommand, value_parser};
+use clap::{Arg, ArgAction, ArgMatches, Args, Command, FromArgMatches, Subcommand};
 use mmt_lab::experiment::description::{Argument, DURATION, Experiment, Request};
 use mmt_lab::experiment::findings::Extent;
 use mmt_lab::experiments::ALL;
@@ -22,13 +22,13 @@ pub(crate) struct ReproduceArguments {
     #[arg(long, global = true, value_name = "DIR", default_value = "figures")]
     pub(crate) out: PathBuf,
     /// N seeds, from 5001 on [default: each experiment's own number]
-    #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=10_000))]
+    #[arg(long, global = true, value_name = "N", value_parser = values::whole::<u64>(1, 10_000), allow_negative_numbers = true)]
     pub(crate) seeds: Option<u64>,
     /// Length of a run.
-    #[arg(long, global = true, value_name = "TIME", value_parser = values::duration, help = duration_help())]
+    #[arg(long, global = true, value_name = "TIME", value_parser = values::duration, allow_hyphen_values = true, help = duration_help())]
     pub(crate) duration: Option<Duration>,
     /// Threads [default: as many as the machine has cores]
-    #[arg(long, global = true, value_name = "N")]
+    #[arg(long, global = true, value_name = "N", value_parser = values::jobs, allow_negative_numbers = true)]
     pub(crate) jobs: Option<NonZero<usize>>,
     /// Print one JSON document instead of tables
     #[arg(long, global = true)]
@@ -103,7 +103,7 @@ fn subcommand(experiment: &Experiment) -> Command {
             Some((unit, default)) => arg
                 .help(format!("{} [default: {default}]", argument.help))
                 .value_name(unit)
-                .value_parser(value_parser!(f64))
+                .value_parser(values::number)
                 .allow_negative_numbers(true),
         }
     });

@@ -51,7 +51,7 @@ pub(crate) struct SlaveArguments {
     #[arg(long, value_name = "FILE")]
     pub(crate) record: Option<PathBuf>,
     /// Seed of sensors and network [default: the file's, else 1]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = values::seed, allow_negative_numbers = true)]
     pub(crate) seed: Option<u64>,
     /// Directory that keeps certificate, key and tokens (mmt identity) [default: $XDG_STATE_HOME/mmt]
     #[arg(long, value_name = "DIR")]
@@ -60,7 +60,7 @@ pub(crate) struct SlaveArguments {
     #[command(flatten)]
     pub(crate) transport: TransportArguments,
     /// How many observers may look on at a time, 0 to 64
-    #[arg(long, value_name = "N", default_value_t = 8, value_parser = values::observers())]
+    #[arg(long, value_name = "N", default_value_t = 8, value_parser = values::observers, allow_negative_numbers = true)]
     pub(crate) observers: u8,
     /// End after the first session
     #[arg(long)]

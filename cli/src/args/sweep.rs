@@ -6,6 +6,8 @@ use std::path::PathBuf;
 use clap::Args;
 use mmt_lab::sweep::Shard;
 
+use super::values;
+
 /// Arguments of `mmt sweep`.
 #[derive(Clone, Debug, Args)]
 pub(crate) struct SweepArguments {
@@ -22,7 +24,7 @@ pub(crate) struct SweepArguments {
     #[arg(long, value_name = "I/N", default_value_t = Shard::WHOLE, hide_default_value = true)]
     pub(crate) shard: Shard,
     /// Threads [default: as many as the machine has cores]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = values::jobs, allow_negative_numbers = true)]
     pub(crate) jobs: Option<NonZero<usize>>,
     /// Run nothing: put together what the shards have left in the folder
     #[arg(long, conflicts_with_all = ["shard", "jobs", "dry_run"])]

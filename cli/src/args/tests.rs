@@ -53,6 +53,34 @@ fn a_duration_has_a_unit_and_a_range() {
 }
 
 #[test]
+fn a_number_that_is_none_or_out_of_range_is_told_its_range() {
+    let seed = "write a whole number from 0 to 18446744073709551615";
+    let relay = ["netem", "--listen", "[::]:1", "--to", "h:1"];
+    let clients = [&relay[..], &["--clients", "0"]].concat();
+    for (words, range) in [
+        (&["demo", "--seed", "1.5"][..], seed),
+        (&["demo", "--seed", "abc"], seed),
+        (&["demo", "--seed", "-1"], seed),
+        (&["soak", "--seed", "18446744073709551616"], seed),
+        (&["swarm", "--first", "-1"], seed),
+        (&["swarm", "--jobs", "0"], "threads, 1 or more"),
+        (&["swarm", "--seeds", "0"], "from 1 to 1000000"),
+        (&["demo", "--repeat-samples", "32"], "from 0 to 31"),
+        (&["demo", "--duration", "-5s"], "from 1ms to 168 h"),
+        (
+            &["reproduce", "fig5", "--duration", "-5s"],
+            "from 1ms to 168 h",
+        ),
+        (&["config", "show", "--stiffness", "soft"], "write a number"),
+        (&clients, "from 1 to 65535"),
+    ] {
+        let text = complaint(words);
+        assert!(text.contains("invalid value"), "{words:?}: {text}");
+        assert!(text.contains(range), "{words:?}: {text}");
+    }
+}
+
+#[test]
 fn a_wrong_word_of_a_network_has_a_caret_below_it() {
     let text = complaint(&["demo", "--netem", "delay 50ms los 1%"]);
     let lines: Vec<&str> = text.lines().collect();
@@ -104,7 +132,7 @@ fn every_wrong_value_is_answered_with_its_option_and_what_would_be_right() {
         (
             &["master", "x", "--samples-per-command", "33"],
             "--samples-per-command",
-            "1..=32",
+            "1 to 32",
         ),
         (&["master", "x", "--duration", "20"], "--duration", "20s"),
         (
@@ -205,6 +233,6 @@ fn an_observer_takes_nothing_over_and_has_no_hand() {
     assert!(
         observers(&["--observers", "65"])
             .unwrap_err()
-            .contains("0..=64")
+            .contains("0 to 64")
     );
 }

@@ -3,13 +3,15 @@
 use std::convert::Infallible;
 use std::fmt;
 use std::net::SocketAddr;
-use std::path::PathBuf;
+use std::num::NonZero;
+use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use std::time::Duration;
 
-use clap::builder::{PossibleValue, PossibleValuesParser, RangedI64ValueParser, TypedValueParser};
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use mmt_netem::LinkConfig;
-use mmt_server::trigger::Scheme;
+use mmt_netem::words::Reason;
+use mmt_server::trigger::{Scheme, SchemeError};
 use mmt_shared::model::architecture::Architecture;
 use mmt_shared::model::settings::Mode;
 use mmt_shared::pairing::{Address, AddressError, Host, TOKENS_MAX};
@@ -105,22 +107,25 @@ pub(super) fn hours(text: &str) -> Result<f64, String> {
 /// A link in netem's words; a caret line points at the wrong one.
 pub(crate) fn netem(text: &str) -> Result<LinkConfig, String> {
     let mut read = |name: &str| {
-        let bytes = crate::input::read_bytes(std::path::Path::new(name), "the network's file");
-        let bytes = bytes.map_err(|failure| failure.to_string())?;
+        let bytes = crate::input::read_bytes(Path::new(name), "the network's file");
+        let bytes = bytes.map_err(|failure| failure.what().to_owned())?;
         mmt_netem::record::as_text(bytes).map_err(|error| error.to_string())
     };
     mmt_netem::words::parse(text, &mut read).map_err(|error| {
         let pointer = error.pointer(text).replace('\n', "\n    ");
-        format!("{error}\n\n    {pointer}\n\nwrite it as \"delay 50ms 5ms loss 1%\", or none")
+        let advice = match error.reason {
+            Reason::File { .. } => {
+                "check the path, and that the file is of the kind that this word takes"
+            }
+            _ => "write it as \"delay 50ms 5ms loss 1%\", or none",
+        };
+        format!("{error}\n\n    {pointer}\n\n{advice}")
     })
 }
 
 /// An update scheme in its words.
 pub(super) fn scheme(text: &str) -> Result<Scheme, String> {
-    text.parse()
-        .map_err(|error: mmt_server::trigger::SchemeError| {
-            format!("{error}; write it as \"hybrid 10% 150ms\"")
-        })
+    text.parse().map_err(|error: SchemeError| error.to_string())
 }
 
 /// Delta of (12) in per cent.
@@ -223,17 +228,47 @@ fn one_of<T: Clone + Send + Sync>(
     })
 }
 
+/// Any number; its range is checked where it is used.
+pub(super) fn number(text: &str) -> Result<f64, String> {
+    let number = text.parse().ok();
+    number.ok_or_else(|| "write a number, such as 1.5".to_owned())
+}
+
+/// A whole number from `least` to `most`.
+pub(super) fn whole<T: TryFrom<u64>>(
+    least: u64,
+    most: u64,
+) -> impl Fn(&str) -> Result<T, String> + Clone + Send + Sync + 'static {
+    move |text: &str| {
+        let number = text.parse::<u64>().ok();
+        let number = number.filter(|number| (least..=most).contains(number));
+        let number = number.and_then(|number| T::try_from(number).ok());
+        number.ok_or_else(|| format!("write a whole number from {least} to {most}"))
+    }
+}
+
+/// A seed.
+pub(super) fn seed(text: &str) -> Result<u64, String> {
+    whole(0, u64::MAX)(text)
+}
+
+/// Threads.
+pub(super) fn jobs(text: &str) -> Result<NonZero<usize>, String> {
+    let jobs = text.parse().ok();
+    jobs.ok_or_else(|| "write a whole number of threads, 1 or more".to_owned())
+}
+
 /// 1 to [`SAMPLES_MAX`].
-pub(super) fn samples_per_command() -> RangedI64ValueParser<u8> {
-    RangedI64ValueParser::new().range(1..=SAMPLES_MAX as i64)
+pub(super) fn samples_per_command(text: &str) -> Result<u8, String> {
+    whole(1, SAMPLES_MAX as u64)(text)
 }
 
 /// 0 to as many commands of one sample as a command has room for.
-pub(super) fn repeat_samples() -> RangedI64ValueParser<u8> {
-    RangedI64ValueParser::new().range(0..SAMPLES_MAX as i64)
+pub(super) fn repeat_samples(text: &str) -> Result<u8, String> {
+    whole(0, SAMPLES_MAX as u64 - 1)(text)
 }
 
 /// 0 to as many observers as a slave has tokens.
-pub(super) fn observers() -> RangedI64ValueParser<u8> {
-    RangedI64ValueParser::new().range(0..=TOKENS_MAX as i64)
+pub(super) fn observers(text: &str) -> Result<u8, String> {
+    whole(0, TOKENS_MAX as u64)(text)
 }

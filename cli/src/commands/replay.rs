@@ -106,6 +106,6 @@ fn recording(path: &Path) -> Result<Recording, Failure> {
     Recording::parse(&text).map_err(|error| {
         let what = format!("the recording {}: {error}", path.display());
         Failure::usage(what)
-            .remedy("give a file of recorded pushes; shared/src/recording/mod.rs has its grammar")
+            .remedy("give a file of recorded pushes; docs/replay.md has its grammar")
     })
 }

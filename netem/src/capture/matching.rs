@@ -32,6 +32,14 @@ pub enum MatchError {
     /// No packet is in both.
     #[error("no packet of one capture is in the other")]
     Nothing,
+    /// All packets are left out.
+    #[error(
+        "the contents of each of {packets} packets were sent more than once: nobody knows which is which"
+    )]
+    Ambiguous {
+        /// How many there are.
+        packets: u64,
+    },
     /// A delay below zero or beyond 1 h.
     #[error("a delay of {delay_ms} ms: the clocks of the two hosts differ")]
     Clocks {
@@ -70,7 +78,7 @@ impl Match {
     /// What packets met between the host of the first capture and that of the second.
     ///
     /// # Errors
-    /// No packet is in both, or their times make no delays.
+    /// No packet is in both, none of them has contents of its own, or their times make no delays.
     pub fn paths(self, from: &[Frame<'_>], to: &[Frame<'_>]) -> Result<Matched, MatchError> {
         let (from, to) = (packets(from), packets(to));
         let (up, down) = directions(&from, &to).ok_or(MatchError::Nothing)?;
@@ -87,6 +95,9 @@ impl Match {
         if let Some(down) = down {
             ambiguous += down.ambiguous;
             entries.extend(self::entries(&down, Direction::Down, -ahead, ahead)?);
+        }
+        if entries.is_empty() {
+            return Err(MatchError::Ambiguous { packets: ambiguous });
         }
         let first = entries.iter().map(|entry| entry.offered).min();
         let entries = entries.into_iter();

@@ -303,6 +303,20 @@ fn two_captures_of_one_path_show_delay_loss_and_copies_of_each_way() {
 }
 
 #[test]
+fn captures_in_which_every_packet_stands_twice_make_no_path() {
+    let there = udp([address(1, 10), address(2, 20)], 0, b"there");
+    // as on the loopback, or of all interfaces
+    let twice = [0, MS].map(|at_ns| Frame {
+        at_ns,
+        link_type: 101,
+        bytes: &there,
+        comment: "",
+    });
+    let refused = Match::default().paths(&twice, &twice);
+    assert_eq!(refused, Err(MatchError::Ambiguous { packets: 2 }));
+}
+
+#[test]
 fn one_clock_is_believed_and_two_that_cannot_be_are_refused() {
     let (here, there) = two_captures(0);
     let (here, there) = (read(&here).unwrap(), read(&there).unwrap());

@@ -6,7 +6,7 @@ use super::word::Word;
 use super::{ParseError, Reason};
 use crate::config::{DELAY_MAX, Probability, RATE_MAX_BIT_S};
 
-const A_TIME: &str = "a time with its unit, such as 50ms (s, ms, us, ns)";
+const A_TIME: &str = "a time with its unit, such as 50ms (h, min, s, ms, us, ns)";
 const A_TIME_HAS_A_UNIT: &str =
     "a unit after the number, such as 50ms: tc reads a bare number as us or as ns, by its version";
 const A_PERCENTAGE: &str = "a percentage, such as 1%";
@@ -33,6 +33,9 @@ pub(super) fn time(word: Word<'_>) -> Result<Duration, ParseError> {
     let (number, unit) = with_unit(word.text);
     let number = number.ok_or_else(|| word.expected(A_TIME))?;
     let nanos_per_unit = match unit.as_str() {
+        // tc has neither
+        "h" => 3600e9,
+        "min" => 60e9,
         "s" | "sec" | "secs" => 1e9,
         "ms" | "msec" | "msecs" => 1e6,
         "us" | "usec" | "usecs" => 1e3,
@@ -136,7 +139,8 @@ pub(super) fn whole(
     if !digits {
         return Err(word.expected(match what {
             "packets" => "a number of packets, such as 10000",
-            _ => "a number of bytes, such as 1500",
+            "bytes" => "a number of bytes, such as 1500",
+            _ => "a whole number, such as 42",
         }));
     }
     match word.text.parse() {

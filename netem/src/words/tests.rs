@@ -50,6 +50,17 @@ fn the_words_of_tc_are_taken_verbatim() {
 }
 
 #[test]
+fn times_have_the_units_of_the_command_line_too() {
+    let (minute, hour) = (Duration::from_secs(60), Duration::from_secs(3600));
+    assert_eq!(parsed("delay 1min").delay, Delay::constant(minute));
+    assert_eq!(
+        parsed("delay 1.5min").delay,
+        Delay::constant(minute * 3 / 2)
+    );
+    assert_eq!(parsed("delay 1h").delay, Delay::constant(hour));
+}
+
+#[test]
 fn plain_jitter_is_uniform() {
     let uniform = Delay::uniform(50 * MS, 5 * MS);
     assert_eq!(parsed("delay 50ms 5ms").delay, uniform);
@@ -153,8 +164,11 @@ fn an_error_shows_the_word_its_column_and_what_was_expected() {
         ("delay -5ms", 7, "-5ms", "a time with its unit"),
         ("delay 1e3ms", 7, "1e3ms", "a time with its unit"),
         ("delay nan", 7, "nan", "a time with its unit"),
-        ("delay 2h", 7, "2h", "a time with its unit"),
+        ("delay 2d", 7, "2d", "a time with its unit"),
+        ("delay 2h", 7, "2h", "3600s at most"),
+        ("delay 61min", 7, "61min", "3600s at most"),
         ("delay 50ms 3601s", 12, "3601s", "3600s at most"),
+        ("seed -1", 6, "-1", "expected a whole number"),
         (
             "delay 5ms distribution normal",
             11,

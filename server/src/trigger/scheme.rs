@@ -79,8 +79,20 @@ pub enum SchemeError {
         /// What was written.
         text: String,
     },
+    /// A number has no unit.
+    #[error("the {what} '{word}' has no unit ({units}), as in '{usage}'")]
+    Unit {
+        /// The word.
+        word: String,
+        /// What it should be.
+        what: &'static str,
+        /// The units that it can have.
+        units: &'static str,
+        /// How the scheme is written.
+        usage: String,
+    },
     /// A number is not a number with its unit, or out of range.
-    #[error("'{word}' is not a {what} from {min} to {max} {unit}")]
+    #[error("'{word}' is not a {what} from {min} to {max} {unit}, as in '{usage}'")]
     Number {
         /// The word.
         word: String,
@@ -92,6 +104,8 @@ pub enum SchemeError {
         max: f64,
         /// Unit of both.
         unit: &'static str,
+        /// How the scheme is written.
+        usage: String,
     },
 }
 
@@ -104,15 +118,16 @@ enum Threshold<'a> {
 }
 
 impl Threshold<'_> {
-    fn read(self, word: &str) -> Result<(), SchemeError> {
+    fn read(self, word: &str, usage: &str) -> Result<(), SchemeError> {
         match self {
             Self::Share(delta) => {
                 let range = (DELTA.0 * 100.0, DELTA.1 * 100.0);
-                let percent = number(word, digits(word, "%"), "deadband", range, "%")?;
-                *delta = percent / 100.0;
+                let value = digits(word, "%");
+                *delta = number((word, usage), value, "deadband", range, ("%", "%"))? / 100.0;
             }
             Self::Newtons(force) => {
-                *force = number(word, digits(word, "N"), "force", THRESHOLD_N, "N")?;
+                let value = digits(word, "N");
+                *force = number((word, usage), value, "force", THRESHOLD_N, ("N", "N"))?;
             }
         }
         Ok(())
@@ -232,11 +247,11 @@ impl FromStr for Scheme {
         let words: Vec<&str> = words.collect();
         match (scheme.terms(), words.as_slice()) {
             ((_, None, None), []) => {}
-            ((_, Some(threshold), None), [word]) => threshold.read(word)?,
-            ((_, None, Some(time)), [word]) => *time = period(word)?,
+            ((_, Some(threshold), None), [word]) => threshold.read(word, &usage)?,
+            ((_, None, Some(time)), [word]) => *time = period(word, &usage)?,
             ((_, Some(threshold), Some(time)), [word, late]) => {
-                threshold.read(word)?;
-                *time = period(late)?;
+                threshold.read(word, &usage)?;
+                *time = period(late, &usage)?;
             }
             ((scheme, ..), _) => {
                 return Err(SchemeError::Words {
@@ -262,27 +277,39 @@ fn digits(word: &str, unit: &str) -> Option<f64> {
     word.strip_suffix(unit)?.parse().ok()
 }
 
+/// A number in its range, whose unit is `unit`; it can be written with `units`.
 fn number(
-    word: &str,
+    (word, usage): (&str, &str),
     value: Option<f64>,
     what: &'static str,
     (min, max): (f64, f64),
-    unit: &'static str,
+    (unit, units): (&'static str, &'static str),
 ) -> Result<f64, SchemeError> {
-    value
-        .filter(|value| (min..=max).contains(value))
-        .ok_or_else(|| SchemeError::Number {
-            word: word.to_owned(),
+    let value = value.filter(|value| (min..=max).contains(value));
+    let is_bare = word.parse().is_ok_and(f64::is_finite);
+    let (word, usage) = (word.to_owned(), usage.to_owned());
+    match value {
+        Some(value) => Ok(value),
+        None if is_bare => Err(SchemeError::Unit {
+            word,
+            what,
+            units,
+            usage,
+        }),
+        None => Err(SchemeError::Number {
+            word,
             what,
             min,
             max,
             unit,
-        })
+            usage,
+        }),
+    }
 }
 
-fn period(word: &str) -> Result<Duration, SchemeError> {
+fn period(word: &str, usage: &str) -> Result<Duration, SchemeError> {
     let ms = digits(word, "ms").or_else(|| Some(digits(word, "s")? * 1e3));
-    let ms = number(word, ms, "time", PERIOD_MS, "ms")?;
+    let ms = number((word, usage), ms, "time", PERIOD_MS, ("ms", "ms or s"))?;
     Ok(Duration::from_nanos(libm::round(ms * 1e6) as u64))
 }
 

@@ -62,7 +62,11 @@ fn a_wrong_trace_or_record_is_refused_with_its_line() {
         ),
         (
             &["demo", "--netem", "rate trace none.up"],
-            &["none.up", "check the path"],
+            &[
+                "none.up\", column 12: cannot read",
+                "^^^^^^^",
+                "check the path",
+            ],
         ),
         (
             &["netem", "report", "record.csv"],
@@ -106,7 +110,10 @@ fn the_same_mistake_has_the_same_code_and_sentence_in_every_command() {
     }
     for command in &commands[..2] {
         let arguments = [command, &["--jobs", "0"][..]].concat();
-        let parts = ["invalid value '0' for '--jobs <N>': number would be zero"];
+        let parts = [
+            "invalid value '0' for '--jobs <N>': write a whole number",
+            "1 or more",
+        ];
         complains(&super::mmt(&home, &arguments).output().unwrap(), 2, &parts);
     }
 }
@@ -266,6 +273,23 @@ fn a_wrong_recording_is_refused_before_any_is_replayed() {
     complains(&output, 2, &["binary.txt", "UTF-8"]);
     refuses(&["replay", "none.txt"], &["none.txt", "check the path"]);
     refuses(&["replay", "."], &["path of a file"]);
+}
+
+#[test]
+fn a_file_beside_a_record_that_is_neither_record_nor_pushes_is_named() {
+    let home = tempfile::tempdir().unwrap();
+    std::fs::write(home.path().join("run.mcap"), b"\x89MCAP0\r\n").unwrap();
+    std::fs::write(home.path().join("plan.toml"), "seeds = 1\n").unwrap();
+    for (file, parts) in [
+        ("none.txt", &["none.txt", "check the path"][..]),
+        (
+            "plan.toml",
+            &["plan.toml is no record", "line 1", "what to do"],
+        ),
+    ] {
+        let output = super::mmt(&home, &["replay", "run.mcap", file]).output();
+        complains(&output.unwrap(), 2, parts);
+    }
 }
 
 #[test]

@@ -39,6 +39,9 @@ pub(super) fn run(arguments: &NetemTraceArguments) -> Result<(), Failure> {
             MatchError::Nothing => {
                 "capture both ends of one path at the same time, without offloading (ethtool -K)"
             }
+            MatchError::Ambiguous { .. } => {
+                "capture on one interface at each end, not on all, and packets that differ, such as those of a session of mmt"
+            }
             MatchError::Clocks { .. } => {
                 "capture packets of both directions and leave out --same-clock"
             }

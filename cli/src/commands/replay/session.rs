@@ -6,10 +6,12 @@ use std::sync::mpsc::Sender;
 use mmt_lab::again::{AgainError, RanAgain, SessionsAgain};
 use mmt_lab::what_if::{Otherwise, RecordedRun, WhatIfError};
 use mmt_shared::io::record::{Ended, RecordError, is_record, read};
+use mmt_shared::recording::Recording;
 use serde::Serialize;
 
 use crate::args::ReplayArguments;
 use crate::failure::Failure;
+use crate::input::read_text;
 use crate::output::{print, print_json};
 use crate::stop::Stop;
 
@@ -54,18 +56,26 @@ enum Error {
 /// Whether the files are records of sessions and not recorded pushes.
 ///
 /// # Errors
-/// One cannot be read, or there are both.
+/// There are both, or beside a record one that cannot be read or is neither.
 pub(super) fn are_records(files: &[PathBuf]) -> Result<bool, Failure> {
-    let mut records = 0;
-    for path in files {
-        // who cannot be read is named by who reads it whole
-        records += usize::from(is_record(path).unwrap_or(false));
+    // who cannot be read is named by who reads it whole
+    let is_one = |path: &&PathBuf| is_record(path).unwrap_or(false);
+    let (records, others): (Vec<_>, Vec<_>) = files.iter().partition(is_one);
+    if records.is_empty() || others.is_empty() {
+        return Ok(!records.is_empty());
     }
-    if records > 0 && records < files.len() {
-        let what = "some of the files are records of sessions and some are recorded pushes";
-        return Err(Failure::usage(what).remedy("replay them one kind at a time"));
+    for path in others {
+        let text = read_text(path, "the file")?;
+        Recording::parse(&text).map_err(|error| {
+            let shown = path.display();
+            let what = format!(
+                "{shown} is no record of a session, and no file of recorded pushes: {error}"
+            );
+            Failure::usage(what).remedy("leave it out, or give a file made with --record")
+        })?;
     }
-    Ok(records > 0)
+    let what = "some of the files are records of sessions and some are recorded pushes";
+    Err(Failure::usage(what).remedy("replay them one kind at a time"))
 }
 
 /// Runs every session of every record again.

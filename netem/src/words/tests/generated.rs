@@ -298,7 +298,7 @@ fn nearly_words() -> impl Strategy<Value = String> {
             "\u{0}",
         ])
         .prop_map(str::to_owned),
-        "[0-9.]{0,25}(s|ms|us|ns|%|)",
+        "[0-9.]{0,25}(h|min|s|ms|us|ns|%|)",
         "\\PC{0,4}",
     ];
     prop::collection::vec(word, 0..8).prop_map(|words| words.join(" "))

@@ -50,13 +50,36 @@ fn what_is_wrong_is_named() {
         error("hybrid 10%"),
         "the scheme 'hybrid' is written 'hybrid 10% 150ms', not 'hybrid 10%'"
     );
+    let range = "is not a time from 1 to 60000 ms, as in 'timer 150ms'";
+    for word in ["nans", "inf", "0ms", "61s", "150min"] {
+        assert_eq!(error(&format!("timer {word}")), format!("'{word}' {range}"));
+    }
     assert_eq!(
-        error("deadband 10"),
-        "'10' is not a deadband from 0.1 to 100 %"
+        error("dis 10% 1s"),
+        "'10%' is not a force from 0.001 to 100 N, as in 'dis 0.3N 1000ms'"
     );
-    assert_eq!(
-        error("timer nans"),
-        "'nans' is not a time from 1 to 60000 ms"
-    );
-    assert_eq!(error("timer 0ms"), "'0ms' is not a time from 1 to 60000 ms");
+}
+
+#[test]
+fn a_number_without_its_unit_is_told_that_and_not_a_range() {
+    for (text, told) in [
+        (
+            "deadband 10",
+            "the deadband '10' has no unit (%), as in 'deadband 10%'",
+        ),
+        (
+            "dis 0.3 1s",
+            "the force '0.3' has no unit (N), as in 'dis 0.3N 1000ms'",
+        ),
+        (
+            "hybrid 10% 150",
+            "the time '150' has no unit (ms or s), as in 'hybrid 10% 150ms'",
+        ),
+        (
+            "adaptive 0 50ms",
+            "the deadband '0' has no unit (%), as in 'adaptive 10% 50ms'",
+        ),
+    ] {
+        assert_eq!(text.parse::<Scheme>().unwrap_err().to_string(), told);
+    }
 }
