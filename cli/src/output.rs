@@ -69,6 +69,23 @@ pub(crate) fn make_folder(folder: &Path) -> Result<(), Failure> {
     })
 }
 
+/// Takes away a file that an earlier run of a command left, if it is there.
+///
+/// # Errors
+/// It is there and stays.
+pub(crate) fn take_away(path: &Path) -> Result<(), Failure> {
+    match std::fs::remove_file(path) {
+        Err(error) if error.kind() != ErrorKind::NotFound => {
+            let what = format!(
+                "cannot remove {} of an earlier run: {error}",
+                path.display()
+            );
+            Err(Failure::failed(what).remedy("give another folder with --out"))
+        }
+        _ => Ok(()),
+    }
+}
+
 /// The failure of a command that could not write a file to its folder; `what` names the file and the reason.
 pub(crate) fn unwritten(folder: &Path, what: impl Display) -> Failure {
     Failure::failed(what).remedy(format!(

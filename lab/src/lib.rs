@@ -13,6 +13,7 @@ pub mod forces;
 #[cfg(feature = "io")]
 pub mod io;
 pub mod layers;
+pub mod one_run;
 pub mod oracle;
 pub mod overlay;
 pub mod physics;

@@ -21,6 +21,9 @@ use crate::trial::TraceRow;
 use delays::Delays;
 use packets::Packets;
 
+/// The files of the forces, which a record without the slave's ticks does not have.
+pub const FORCES: [&str; 2] = ["forces.csv", "forces.svg"];
+
 /// A record, as far as it was handed over.
 #[derive(Default)]
 pub struct RecordReport {
@@ -136,8 +139,8 @@ impl RecordReport {
         let mut figures = Vec::new();
         let mut rows = None;
         if !self.trace.is_empty() {
-            rows = Some(("forces.csv", forces::forces(&self.trace)));
-            figures.push(("forces.svg", forces::figure(title, &self.trace)));
+            rows = Some((FORCES[0], forces::forces(&self.trace)));
+            figures.push((FORCES[1], forces::figure(title, &self.trace)));
         }
         figures.push(("packets.svg", matched.figure()));
         let delays = self.delays.with(&matched);

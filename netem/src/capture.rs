@@ -10,5 +10,5 @@ mod read;
 mod tests;
 
 pub use matching::{Match, MatchError, Matched};
-pub use pcapng::{Event, Sides, Writer};
+pub use pcapng::{Event, Sides, Writer, is_capture};
 pub use read::{Frame, read};

@@ -14,6 +14,12 @@ mod tests;
 
 pub use entry::{End, Entry, Heading};
 
+/// Whether bytes begin as a record of either form does.
+#[must_use]
+pub fn is_record(head: &[u8]) -> bool {
+    head.starts_with(binary::MAGIC) || head.starts_with(csv::RECORD.as_bytes())
+}
+
 /// Reads a record of either form.
 ///
 /// # Errors

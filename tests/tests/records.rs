@@ -128,6 +128,13 @@ fn a_demo_is_recorded_runs_again_and_is_read_by_decoders_that_know_nothing_of_it
             "a trace for an operator"
         );
         decoded(record, &tables);
+        for command in ["report", "check"] {
+            let twice = Running::mmt(&[command, record, record]).unwrap();
+            let twice = twice.end(GENEROUS).unwrap();
+            assert_eq!(twice.status.code(), Some(2), "{}", twice.err);
+            let why = "session 1 of the master was given before";
+            assert!(twice.err.contains(why), "{}", twice.err);
+        }
         reported(record, &folder.path().join("report"), &report);
     });
 }

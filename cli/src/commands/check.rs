@@ -4,9 +4,10 @@ use std::path::PathBuf;
 
 use mmt_lab::again::AgainError;
 use mmt_lab::check::{CheckError, Invariant, Judged, RecordChecks, Verdict, Violation};
-use mmt_shared::io::record::{Ended, RecordError, read};
+use mmt_shared::io::record::{Ended, RecordError};
 use serde::Serialize;
 
+use super::records::read_run;
 use crate::args::CheckArguments;
 use crate::failure::Failure;
 use crate::output::{print, print_json};
@@ -66,15 +67,13 @@ pub(crate) fn run(arguments: &CheckArguments) -> Result<(), Failure> {
 /// Judges the records of one run, and whether all of them are whole.
 ///
 /// # Errors
-/// One cannot be read or is of another version.
+/// One cannot be read or is of another version, or they are not of one run.
 pub(super) fn judge(files: &[PathBuf]) -> Result<(RecordChecks, bool), Failure> {
     let mut checks = RecordChecks::default();
-    let mut is_whole = true;
-    for path in files {
-        let ended = read(path, |topic, message| -> Result<(), Error> {
-            Ok(checks.take(topic, message)?)
-        });
-        let ended = ended.map_err(|error| {
+    let read = read_run(
+        files,
+        |topic, message| -> Result<(), Error> { Ok(checks.take(topic, message)?) },
+        |path, error| {
             let what = format!("the record {}: {error}", path.display());
             let remedy = match error {
                 Error::Check(CheckError::Again(AgainError::OtherProgram { .. })) => {
@@ -83,9 +82,9 @@ pub(super) fn judge(files: &[PathBuf]) -> Result<(RecordChecks, bool), Failure> 
                 _ => "give files of one run that mmt made with --record",
             };
             Failure::usage(what).remedy(remedy)
-        })?;
-        is_whole &= ended == Ended::Whole;
-    }
+        },
+    )?;
+    let is_whole = read.ended.iter().all(|ended| *ended == Ended::Whole);
     Ok((checks, is_whole))
 }
 

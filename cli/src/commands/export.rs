@@ -9,11 +9,11 @@ use std::path::{Path, PathBuf};
 use mmt_client::operator::trace::CSV_HEADER;
 use mmt_shared::io::record::{Ended, RecordError, read};
 use mmt_shared::record::messages::{MasterTick, Message};
-use mmt_shared::record::table::{Row, row};
+use mmt_shared::record::table::{Row, row, topics};
 
 use crate::args::ExportArguments;
 use crate::failure::Failure;
-use crate::output::{self, make_folder, note, print};
+use crate::output::{self, make_folder, note, print, take_away};
 
 /// A table being written.
 struct Sheet {
@@ -34,7 +34,7 @@ enum Error {
 /// Runs `mmt export`.
 ///
 /// # Errors
-/// The record cannot be read, or a table cannot be written.
+/// The record cannot be read or has no session, or a table cannot be written.
 pub(crate) fn run(arguments: &ExportArguments) -> Result<(), Failure> {
     make_folder(&arguments.out)?;
     let mut sheets = BTreeMap::new();
@@ -45,6 +45,15 @@ pub(crate) fn run(arguments: &ExportArguments) -> Result<(), Failure> {
     });
     let ended = ended.and_then(|ended| finished.map(|()| ended));
     let ended = ended.map_err(|error| failure(arguments, error))?;
+    if sheets.is_empty() {
+        return Err(Failure::usage("there is no session in this record")
+            .remedy("give a file that mmt made with --record"));
+    }
+    for name in topics().map(sheet_name).chain([HAND.to_owned()]) {
+        if !sheets.contains_key(&name) {
+            take_away(&arguments.out.join(format!("{name}.csv")))?;
+        }
+    }
     for sheet in sheets.values() {
         print(format_args!(
             "{}: {} rows",
@@ -69,14 +78,18 @@ fn export(record: &Path, out: &Path, sheets: &mut BTreeMap<String, Sheet>) -> Re
             return Ok(());
         };
         // only known topics have rows: the name is one of ours
-        let name = topic.trim_start_matches('/').replace('/', "-");
-        put(sheets, out, &name, &row.map_err(broken)?)?;
+        put(sheets, out, &sheet_name(topic), &row.map_err(broken)?)?;
         if topic == "/master/ticks" {
             let tick = MasterTick::read(message).map_err(broken)?;
             put(sheets, out, HAND, &hand.row(&tick))?;
         }
         Ok(())
     })
+}
+
+/// The table of a topic.
+fn sheet_name(topic: impl AsRef<str>) -> String {
+    topic.as_ref().trim_start_matches('/').replace('/', "-")
 }
 
 /// The table of what the device read: a trace for `mmt master --operator`.

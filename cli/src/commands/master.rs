@@ -1,8 +1,9 @@
 //! `mmt master`: the host with the hand.
 
+mod path_file;
+
 use std::io::IsTerminal as _;
 use std::path::Path;
-use std::sync::PoisonError;
 
 use mmt_client::commands::CommandConfig;
 use mmt_client::io::console::Order;
@@ -15,7 +16,6 @@ use mmt_client::operator::scripted::ScriptedConfig;
 use mmt_client::operator::trace::Trace;
 use mmt_lab::layers::Program;
 use mmt_netem::io::socket::SocketExtras;
-use mmt_netem::trace::mmt::path_text;
 use mmt_netem::{Direction, LinkConfig};
 use mmt_shared::clean::clean;
 use mmt_shared::io::connect::ConnectError;
@@ -42,6 +42,7 @@ use crate::log::Messages;
 use crate::output::{note, print_report};
 use crate::stop::Stop;
 use crate::view::Caption;
+use path_file::PathFile;
 
 /// Where a recorded path is carried to start, m: 5 cm before the west face of the model at its start, which
 /// is 20 cm from the origin.
@@ -57,6 +58,7 @@ pub(crate) fn run(arguments: MasterArguments, messages: &Messages) -> Result<(),
     device.give(&mut options);
     let record = Record::start(arguments.record.as_deref())?;
     options.record = record.recorder();
+    let path_file = PathFile::claim(arguments.record_path.as_deref())?;
     // not before the pairing has been read from stdin: the orders come after it
     let mut link = options.netem.clone();
     let seed = options.netem_seed;
@@ -96,11 +98,11 @@ pub(crate) fn run(arguments: MasterArguments, messages: &Messages) -> Result<(),
     }
     drop(viewer);
     let report = RunReport::from(host.join()?);
-    let kept = arguments.record_path.as_deref().zip(path.as_ref());
+    let kept = path_file.zip(path.as_ref());
     let end = live.borrow().ended;
     conclude([
         print_report(&report, arguments.json, arguments.full),
-        kept.map_or(Ok(()), |(file, path)| keep_path(file, path)),
+        kept.map_or(Ok(()), |(file, path)| file.keep(path)),
         emulation.finish(),
         record.finish(),
         judge(end),
@@ -220,15 +222,6 @@ fn resume_file(pairing: &Pairing) -> Option<ResumeFile> {
             None
         }
     }
-}
-
-/// Writes the path that the session met, to be met again as a trace.
-fn keep_path(file: &Path, path: &SharedPath) -> Result<(), Failure> {
-    let shown = file.display();
-    let met = path.lock().unwrap_or_else(PoisonError::into_inner).path();
-    let path = met.map_err(|why| Failure::failed(format!("no path for {shown}: {why}")))?;
-    std::fs::write(file, path_text(path.samples()))
-        .map_err(|error| Failure::failed(format!("cannot write the path {shown}: {error}")))
 }
 
 pub(super) fn pairing(words: &PairingWords) -> Result<Pairing, Failure> {

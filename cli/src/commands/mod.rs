@@ -18,6 +18,7 @@ pub(crate) mod master;
 pub(crate) mod netem;
 pub(crate) mod observe;
 mod record;
+mod records;
 pub(crate) mod replay;
 pub(crate) mod report;
 pub(crate) mod reproduce;

@@ -3,14 +3,15 @@
 use std::path::Path;
 
 use mmt_lab::io::Folder;
-use mmt_lab::record_report::{Findings, RecordReport};
-use mmt_shared::io::record::{Ended, RecordError, read};
+use mmt_lab::record_report::{FORCES, Findings, RecordReport};
+use mmt_shared::io::record::{Ended, RecordError};
 use serde::Serialize;
 use serde_json::{Map, Value};
 
+use super::records::read_run;
 use crate::args::ReportArguments;
 use crate::failure::Failure;
-use crate::output::{make_folder, note, print, print_json, unwritten};
+use crate::output::{make_folder, note, print, print_json, take_away, unwritten};
 
 /// The report as one document.
 #[derive(Serialize)]
@@ -26,14 +27,18 @@ struct Document<'a> {
 /// Runs `mmt report`.
 ///
 /// # Errors
-/// A record cannot be read, or a file cannot be written.
+/// A record cannot be read or has no session, the records are not of one run, or a file cannot be written.
 pub(crate) fn run(arguments: &ReportArguments) -> Result<(), Failure> {
     let mut report = RecordReport::default();
-    for path in &arguments.files {
-        let ended = take(&mut report, path).map_err(|error| {
+    let read = read_run(
+        &arguments.files,
+        |topic, message| take(&mut report, topic, message),
+        |path, error: RecordError| {
             Failure::usage(format!("the record {}: {error}", path.display()))
                 .remedy("give a file that mmt made with --record")
-        })?;
+        },
+    )?;
+    for (path, ended) in arguments.files.iter().zip(read.with_sessions()?) {
         if ended == Ended::CutOff {
             let path = path.display();
             note(format_args!(
@@ -69,12 +74,10 @@ pub(crate) fn run(arguments: &ReportArguments) -> Result<(), Failure> {
     Ok(())
 }
 
-fn take(report: &mut RecordReport, path: &Path) -> Result<Ended, RecordError> {
-    read(path, |topic, message| {
-        report.take(topic, message).map_err(|why| {
-            let topic = topic.to_owned();
-            RecordError::Message { topic, why }
-        })
+fn take(report: &mut RecordReport, topic: &str, message: &[u8]) -> Result<(), RecordError> {
+    report.take(topic, message).map_err(|why| {
+        let topic = topic.to_owned();
+        RecordError::Message { topic, why }
     })
 }
 
@@ -85,6 +88,11 @@ fn keep(findings: &Findings, out: &Path) -> Result<(), Failure> {
     let folder = Folder::open(out).map_err(failed)?;
     for (name, table) in findings.tables.iter().chain(&findings.forces) {
         folder.keep(name, &table.to_csv()).map_err(failed)?;
+    }
+    if findings.forces.is_none() {
+        FORCES
+            .iter()
+            .try_for_each(|name| take_away(&out.join(name)))?;
     }
     for (name, figure) in &findings.figures {
         let drawn = figure.draw();

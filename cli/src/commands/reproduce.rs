@@ -6,7 +6,8 @@ use std::sync::mpsc::Sender;
 
 use mmt_lab::experiment::findings::{ExperimentError, Section};
 use mmt_lab::io::{FRESH_SEED, Folder, Runner};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
 
 use crate::args::ReproduceArguments;
 use crate::failure::Failure;
@@ -17,8 +18,7 @@ use crate::stop::Stop;
 /// The file that lists what was run.
 const MANIFEST: &str = "manifest.json";
 
-/// `manifest.json`: what was run, with what, and what came of it, after each experiment. Nothing in it depends on the
-/// machine or the hour.
+/// What was run, with what, and what came of it, after each experiment. Nothing in it depends on the machine or the hour.
 #[derive(Clone, Debug, Serialize)]
 struct Manifest {
     program: &'static str,
@@ -26,6 +26,52 @@ struct Manifest {
     experiments: Vec<Section>,
     /// Every file with its SHA-256.
     files: BTreeMap<String, String>,
+}
+
+/// `manifest.json`: a manifest, and before it what an earlier run of this version has left in the folder.
+#[derive(Debug, Serialize, Deserialize)]
+struct Kept {
+    program: String,
+    version: String,
+    experiments: Vec<Value>,
+    files: BTreeMap<String, String>,
+}
+
+impl Kept {
+    /// What is in the folder; nothing where it has no manifest of this version.
+    fn in_folder(folder: &Path) -> Self {
+        let text = std::fs::read_to_string(folder.join(MANIFEST)).unwrap_or_default();
+        let kept: Option<Self> = serde_json::from_str(&text).ok();
+        let version = env!("CARGO_PKG_VERSION");
+        kept.filter(|kept| kept.version == version)
+            .unwrap_or_else(|| Self {
+                program: "mmt".to_owned(),
+                version: version.to_owned(),
+                experiments: Vec::new(),
+                files: BTreeMap::new(),
+            })
+    }
+
+    /// The same once this has been run: an experiment that was run before gives way.
+    fn after(&self, manifest: &Manifest) -> serde_json::Result<Self> {
+        let of_now: Vec<Value> = manifest
+            .experiments
+            .iter()
+            .map(serde_json::to_value)
+            .collect::<Result<_, _>>()?;
+        let name = |section: &Value| section.get("experiment").cloned();
+        let before = self.experiments.iter();
+        let stays = |of: &&Value| of_now.iter().all(|now| name(now) != name(of));
+        let experiments = before.filter(stays).chain(&of_now).cloned().collect();
+        let mut files = self.files.clone();
+        files.extend(manifest.files.clone());
+        Ok(Self {
+            program: self.program.clone(),
+            version: self.version.clone(),
+            experiments,
+            files,
+        })
+    }
 }
 
 /// Runs `mmt reproduce`. Whoever asks for its end keeps the experiments that are done.
@@ -76,6 +122,7 @@ fn every_experiment(
     done: &Sender<Manifest>,
 ) -> Result<(), Failure> {
     let progress = |what: &str, done, whole| bar.show(what, done, whole);
+    let before = Kept::in_folder(folder.path());
     let runner = Runner::new(folder, arguments.jobs, &progress).from_seed(FRESH_SEED);
     let mut manifest = Manifest {
         program: "mmt",
@@ -91,7 +138,8 @@ fn every_experiment(
         manifest.files = runner.folder().kept();
         manifest.files.remove(MANIFEST);
         let failed = |error| Failure::failed(format!("cannot write {MANIFEST}: {error}"));
-        let text = serde_json::to_string_pretty(&manifest).map_err(failed)?;
+        let kept = before.after(&manifest).map_err(failed)?;
+        let text = serde_json::to_string_pretty(&kept).map_err(failed)?;
         let kept = runner.keep(MANIFEST, format!("{text}\n").as_bytes());
         kept.map_err(explained)?;
         if done.send(manifest.clone()).is_err() {

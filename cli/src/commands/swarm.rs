@@ -1,6 +1,9 @@
 //! `mmt swarm`: random worlds with random faults in virtual time, judged as `mmt check` judges records.
 
 use std::collections::BTreeMap;
+use std::num::NonZero;
+use std::sync::mpsc::Sender;
+use std::time::Duration;
 
 use mmt_lab::check::Verdict;
 use mmt_lab::io::{Repeated, swarm_of};
@@ -12,6 +15,10 @@ use crate::args::SwarmArguments;
 use crate::failure::Failure;
 use crate::output::{counts, print, print_json};
 use crate::progress::Bar;
+use crate::stop::Stop;
+
+/// A person who ends a swarm loses no more seeds than this.
+const BLOCK: usize = 50;
 
 #[derive(Debug, Serialize)]
 struct Document {
@@ -39,28 +46,40 @@ struct Failed {
     what: Vec<String>,
 }
 
-/// Runs `mmt swarm`.
+/// Runs `mmt swarm`. Whoever asks for its end keeps the seeds that are done.
 ///
 /// # Errors
-/// Something that is promised did not hold, or two runs of one seed differ; stdout cannot be written to.
+/// Something that is promised did not hold, or two runs of one seed differ; the end was asked for before the last seed; stdout
+/// cannot be written to.
 pub(crate) fn run(arguments: &SwarmArguments) -> Result<(), Failure> {
     let all = || (arguments.first..).take(usize::try_from(arguments.seeds).unwrap_or(usize::MAX));
     let seeds: Vec<u64> = arguments
         .seed
         .map_or_else(|| all().collect(), |seed| vec![seed]);
-    let bar = Bar::new();
-    let progress = |what: &str, done, whole| bar.show(what, done, whole);
-    let ran = swarm_of(&seeds, arguments.duration, arguments.jobs, &progress);
-    bar.clear();
-    let ran = ran.map_err(|error| Failure::failed(format!("a random world is none: {error}")))?;
+    let wanted = seeds.len();
+    let (bar, mut ran) = (Bar::new(), Vec::new());
+    let shown = bar.clone();
+    let (duration, jobs) = (arguments.duration, arguments.jobs);
+    let left = Stop::on_signals()?.until_asked(
+        move |done| in_blocks(&seeds, duration, jobs, &bar, &done),
+        |block: Vec<Repeated>| {
+            ran.extend(block);
+            Ok(())
+        },
+    )?;
+    shown.clear();
     let document = document(arguments, &ran);
     if arguments.json {
         print_json(&document)?;
     } else {
         show(arguments, &document, &ran)?;
     }
-    if document.holds {
+    if document.holds && !left {
         return Ok(());
+    }
+    if document.holds {
+        return Err(Failure::interrupted(ran.len(), wanted, "seeds")
+            .remedy("what is printed is of these; --first begins at the next one"));
     }
     let what = format!(
         "{} of {} seeds broke a promise",
@@ -68,6 +87,25 @@ pub(crate) fn run(arguments: &SwarmArguments) -> Result<(), Failure> {
         document.seeds
     );
     Err(Failure::failed(what).remedy("run a seed again with the command that is printed for it"))
+}
+
+/// Runs the seeds in blocks and sends each block that is done.
+fn in_blocks(
+    seeds: &[u64],
+    duration: Duration,
+    jobs: Option<NonZero<usize>>,
+    bar: &Bar,
+    done: &Sender<Vec<Repeated>>,
+) -> Result<(), Failure> {
+    for (block, before) in seeds.chunks(BLOCK).zip((0..).step_by(BLOCK)) {
+        let progress = |what: &str, done: usize, _| bar.show(what, before + done, seeds.len());
+        let ran = swarm_of(block, duration, jobs, &progress);
+        let ran = ran.map_err(|error| Failure::failed(format!("a random world is none: {error}")));
+        if done.send(ran?).is_err() {
+            break;
+        }
+    }
+    Ok(())
 }
 
 fn document(arguments: &SwarmArguments, ran: &[Repeated]) -> Document {

@@ -82,6 +82,12 @@ pub struct Writer {
     epoch: Duration,
 }
 
+/// Whether bytes begin as a capture does.
+#[must_use]
+pub fn is_capture(head: &[u8]) -> bool {
+    head.starts_with(&SECTION.to_le_bytes())
+}
+
 impl Writer {
     /// `epoch`: the time since 1970 at [`Time::ZERO`].
     #[must_use]

@@ -7,11 +7,12 @@ use std::io::{self, BufWriter, Write};
 use std::path::Path;
 use std::time::{Duration, SystemTime};
 
+use mmt_shared::io::output_file;
 use mmt_shared::time::Time;
 
 use super::file_thread::{FileThread, Queue};
 use super::now;
-use crate::capture::{Event, Writer};
+use crate::capture::{Event, Writer, is_capture};
 use crate::record::Heading;
 
 /// Packets that may wait for the disk: 0.8 s at 20 000 packets a second. One more is missed and counted.
@@ -44,12 +45,12 @@ impl CaptureWriter {
 }
 
 impl CaptureFile {
-    /// Creates the file, an older one of that name is overwritten.
+    /// Creates the file, an older capture of that name is overwritten.
     ///
     /// # Errors
-    /// The file cannot be written, or no thread is to be had.
+    /// The file cannot be written, something else is in it or writes it, or no thread is to be had.
     pub fn create(path: &Path, heading: &Heading) -> io::Result<Self> {
-        let mut file = BufWriter::new(File::create(path)?);
+        let mut file = BufWriter::new(output_file::create(path, is_capture)?);
         file.write_all(&Writer::heading(heading))?;
         file.flush()?;
         let today = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH);

@@ -4,11 +4,12 @@ use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::path::Path;
 
+use mmt_shared::io::output_file;
 use mmt_shared::time::Time;
 
 use super::file_thread::{FileThread, Queue};
 use super::now;
-use crate::record::{Entry, Heading, binary, csv};
+use crate::record::{Entry, Heading, binary, csv, is_record};
 
 /// Packets that may wait for the disk: 3 s at 20 000 packets a second. One more is missed and counted.
 const WAITING_MAX: usize = 1 << 16;
@@ -47,14 +48,14 @@ enum Form {
 }
 
 impl RecordFile {
-    /// Creates the file, an older one of that name is overwritten. A name that ends in `.csv` makes it
+    /// Creates the file, an older record of that name is overwritten. A name that ends in `.csv` makes it
     /// CSV, any other the binary form. The times of the record count from now.
     ///
     /// # Errors
-    /// The file cannot be written, or no thread is to be had.
+    /// The file cannot be written, something else is in it or writes it, or no thread is to be had.
     pub fn create(path: &Path, heading: &Heading) -> io::Result<Self> {
         let text = path.extension().is_some_and(|end| end == "csv");
-        let mut file = BufWriter::new(File::create(path)?);
+        let mut file = BufWriter::new(output_file::create(path, is_record)?);
         let mut bytes = Vec::new();
         let form = if text {
             bytes.extend_from_slice(csv::heading(heading).as_bytes());

@@ -8,7 +8,8 @@ use super::entry::{End, Entry, Heading, NO_LINE};
 use crate::direction::Direction;
 use crate::trace::TraceError;
 
-const RECORD: &str = "# mmt netem record 1";
+/// The first line.
+pub(super) const RECORD: &str = "# mmt netem record 1";
 const COLUMNS: &str = "direction,number,offered_ns,due_ns,sent_ns,bytes,backlog,fate,reason";
 
 /// The lines before the first packet.

@@ -35,6 +35,12 @@ pub(super) fn parse(text: &str, direction: Direction) -> Result<Vec<Sample>, Tra
     Ok(originals.map(sample).collect())
 }
 
+/// Whether bytes begin as the text of a path does.
+#[must_use]
+pub fn is_path(head: &[u8]) -> bool {
+    head.starts_with(PATH.as_bytes())
+}
+
 /// A path as text, for whoever measured one: reads back as a trace.
 #[must_use]
 pub fn path_text(samples: &[Sample]) -> String {

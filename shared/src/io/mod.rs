@@ -20,6 +20,7 @@ pub mod identity;
 pub mod identity_file;
 pub mod loop_thread;
 pub mod network_task;
+pub mod output_file;
 pub mod plug_socket;
 pub mod quic;
 pub mod raw_udp;

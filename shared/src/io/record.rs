@@ -21,6 +21,9 @@ use std::sync::mpsc::{self, Receiver, RecvTimeoutError, Sender, TryRecvError};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
+use mcap::MAGIC;
+
+use crate::io::output_file;
 use crate::record::messages::Session;
 use crate::time::Time;
 use crate::wire::Side;
@@ -83,10 +86,10 @@ pub struct Recorder {
 }
 
 impl Recorder {
-    /// Creates the file; an older one of that name is overwritten.
+    /// Creates the file; an older record of that name is overwritten.
     ///
     /// # Errors
-    /// It cannot be created, or no thread is to be had.
+    /// It cannot be created, something else is in it or writes it, or no thread is to be had.
     pub fn create(path: &Path) -> io::Result<Self> {
         Self::written_by(write, path)
     }
@@ -96,7 +99,7 @@ impl Recorder {
         write: impl FnOnce(File, &Receiver<Order>, &AtomicU64) -> Option<String> + Send + 'static,
         path: &Path,
     ) -> io::Result<Self> {
-        let file = File::create(path)?;
+        let file = output_file::create(path, |head| head.starts_with(MAGIC))?;
         let (orders, inbox) = mpsc::channel();
         let (outcome, done) = mpsc::channel();
         let missed = Arc::new(AtomicU64::new(0));

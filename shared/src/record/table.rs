@@ -15,33 +15,44 @@ pub struct Row {
     pub cells: Vec<String>,
 }
 
-/// What `$of` makes of a message of whichever type its topic has; none of a topic that has no flat messages.
-macro_rules! by_topic {
-    ($topic:expr, $message:expr, $of:ident) => {{
-        let (side, what) = $topic.strip_prefix('/')?.split_once('/')?;
-        Some(match (side, what) {
-            ("master", "ticks") => $of::<MasterTick>($message),
-            ("master", "readings") => $of::<Reading>($message),
-            ("slave", "ticks") => $of::<SlaveTick>($message),
-            ("master" | "slave", "session") => $of::<Session>($message),
-            ("master" | "slave", "arrivals") => $of::<Arrival>($message),
-            ("master" | "slave", "packets") => $of::<Packet>($message),
-            ("master" | "slave", "parameters") => $of::<Parameters>($message),
-            ("master" | "slave", "link") => $of::<Link>($message),
-            ("master" | "slave", "loop") => $of::<Loop>($message),
-            _ => return None,
-        })
-    }};
+/// The topics of flat messages, each with `$of` of the type that it has.
+macro_rules! flat {
+    ($of:ident) => {
+        [
+            ("/master/ticks", $of::<MasterTick> as fn(&[u8]) -> _),
+            ("/master/readings", $of::<Reading>),
+            ("/slave/ticks", $of::<SlaveTick>),
+            ("/master/session", $of::<Session>),
+            ("/slave/session", $of::<Session>),
+            ("/master/arrivals", $of::<Arrival>),
+            ("/slave/arrivals", $of::<Arrival>),
+            ("/master/packets", $of::<Packet>),
+            ("/slave/packets", $of::<Packet>),
+            ("/master/parameters", $of::<Parameters>),
+            ("/slave/parameters", $of::<Parameters>),
+            ("/master/link", $of::<Link>),
+            ("/slave/link", $of::<Link>),
+            ("/master/loop", $of::<Loop>),
+            ("/slave/loop", $of::<Loop>),
+        ]
+    };
+}
+
+/// The topics of flat messages.
+pub fn topics() -> impl Iterator<Item = &'static str> {
+    flat!(row_of).into_iter().map(|(topic, _)| topic)
 }
 
 /// The row of a message; none of a topic that has no flat messages.
 pub fn row(topic: &str, message: &[u8]) -> Option<Result<Row, CdrError>> {
-    by_topic!(topic, message, row_of)
+    let of = flat!(row_of).into_iter().find(|(of, _)| *of == topic);
+    of.map(|(_, row)| row(message))
 }
 
 /// The values of a message below the names of its fields; none of a topic that has no flat messages.
 pub fn values(topic: &str, message: &[u8]) -> Option<Result<Named, CdrError>> {
-    by_topic!(topic, message, values_of)
+    let of = flat!(values_of).into_iter().find(|(of, _)| *of == topic);
+    of.map(|(_, values)| values(message))
 }
 
 /// Names and values of the fields of a message.

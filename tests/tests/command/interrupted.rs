@@ -7,6 +7,7 @@ use serde_json::Value;
 
 use super::runs::recording;
 use super::{PATIENCE, hearing_hang_up, mmt, start};
+use crate::harness::process::Running;
 
 #[test]
 fn experiments_that_are_done_when_a_person_ends_reproduce_are_kept() {
@@ -32,6 +33,37 @@ fn experiments_that_are_done_when_a_person_ends_reproduce_are_kept() {
     for name in files.keys() {
         assert!(home.path().join("kept").join(name).exists(), "{name}");
     }
+}
+
+#[test]
+fn seeds_that_are_done_when_a_person_ends_a_swarm_are_judged() {
+    let home = tempfile::tempdir().unwrap();
+    let swarm = ["swarm", "--seeds", "1000000", "--duration", "3s"];
+    let running = Running::start(mmt(&home, &swarm)).unwrap();
+    running.wait_for_handler(PATIENCE);
+    running.signal(Signal::INT).unwrap();
+    let ended = running.end(PATIENCE).unwrap();
+    assert_eq!(ended.status.code(), Some(1), "{}", ended.err);
+    assert!(
+        ended.err.contains("of 1000000 seeds are done"),
+        "{}",
+        ended.err
+    );
+    assert!(
+        ended.out.join("\n").contains("seeds of 3 s"),
+        "{:?}",
+        ended.out
+    );
+}
+
+#[test]
+fn a_demo_that_a_person_ends_before_its_session_begins_ends_well() {
+    let home = tempfile::tempdir().unwrap();
+    let running = Running::start(mmt(&home, &["demo", "--no-console"])).unwrap();
+    running.wait_for_handler(PATIENCE);
+    running.signal(Signal::INT).unwrap();
+    let ended = running.end(PATIENCE).unwrap();
+    assert_eq!(ended.status.code(), Some(0), "{}", ended.err);
 }
 
 #[test]

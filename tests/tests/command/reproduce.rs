@@ -86,6 +86,31 @@ fn fig5_is_the_same_bytes_again_and_its_samples_say_what_its_rows_say() {
 }
 
 #[test]
+fn experiments_of_one_folder_are_listed_together_each_as_it_was_run_last() {
+    let place = tempfile::tempdir().unwrap();
+    for seeds in ["1", "2"] {
+        let fig5 = ["fig5", "--seeds", seeds, "--duration", "1s"];
+        assert!(mmt(&fig5, place.path()).status.success());
+        let fig7 = ["fig7", "--seeds", "1", "--duration", "1s"];
+        assert!(mmt(&fig7, place.path()).status.success());
+    }
+    let written = files(place.path());
+    let manifest: Value = serde_json::from_slice(&written["manifest.json"]).unwrap();
+    let experiments = manifest["experiments"].as_array().unwrap();
+    let shown = |key: &str| {
+        experiments
+            .iter()
+            .map(|of| of[key].clone())
+            .collect::<Vec<_>>()
+    };
+    assert_eq!(shown("experiment"), ["fig5", "fig7"]);
+    assert_eq!(experiments[0]["extent"]["seeds"], 2);
+    for name in written.keys().filter(|name| *name != "manifest.json") {
+        assert!(manifest["files"][name].is_string(), "{name}");
+    }
+}
+
+#[test]
 fn physics_takes_any_body_and_refuses_what_is_none() {
     let place = tempfile::tempdir().unwrap();
     let output = mmt(

@@ -87,6 +87,54 @@ fn a_wrong_trace_or_record_is_refused_with_its_line() {
 }
 
 #[test]
+fn a_file_that_holds_something_else_or_is_being_written_is_refused_and_nothing_is_lost() {
+    let home = tempfile::tempdir().unwrap();
+    let file = home.path().join("c.toml");
+    std::fs::write(&file, "seed = 3\n").unwrap();
+    let pairing = pairing();
+    let other = "cannot write the";
+    for arguments in [
+        &["demo", "--config", "c.toml", "--record", "c.toml"][..],
+        &["demo", "--netem-record", "c.toml"],
+        &["master", &pairing, "--record-path", "c.toml"],
+    ] {
+        let parts = [
+            other,
+            "c.toml: it holds something else, which would be lost",
+        ];
+        complains(&super::mmt(&home, arguments).output().unwrap(), 2, &parts);
+    }
+    assert_eq!(std::fs::read_to_string(&file).unwrap(), "seed = 3\n");
+    let twice = ["demo", "--record", "z", "--netem-record", "z"];
+    let parts = [
+        other,
+        "another run writes it, or another option of this one",
+    ];
+    complains(&super::mmt(&home, &twice).output().unwrap(), 2, &parts);
+    // before a session begins, not after it
+    let nowhere = ["master", &pairing, "--record-path", "none/x.csv"];
+    let parts = ["cannot write the path none/x.csv", "what to do"];
+    complains(&super::mmt(&home, &nowhere).output().unwrap(), 2, &parts);
+}
+
+#[test]
+fn a_record_without_a_session_is_refused() {
+    let home = tempfile::tempdir().unwrap();
+    std::fs::write(home.path().join("empty"), "").unwrap();
+    // as a process leaves it that is killed at once
+    std::fs::write(home.path().join("head"), b"\x89MCAP0\r\n\x01\x10").unwrap();
+    for arguments in [
+        ["report", "empty"],
+        ["export", "empty"],
+        ["report", "head"],
+        ["replay", "head"],
+    ] {
+        let parts = ["there is no session in th", "made with --record"];
+        complains(&super::mmt(&home, &arguments).output().unwrap(), 2, &parts);
+    }
+}
+
+#[test]
 fn the_same_mistake_has_the_same_code_and_sentence_in_every_command() {
     let home = tempfile::tempdir().unwrap();
     std::fs::write(

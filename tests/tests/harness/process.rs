@@ -240,6 +240,22 @@ impl Running {
         self.signal(Signal::INT)
     }
 
+    /// Waits until it takes Ctrl-C as a wish.
+    pub(crate) fn wait_for_handler(&self, within: Duration) {
+        let status = format!("/proc/{}/status", self.child.id());
+        let takes_interrupts = || {
+            let status = std::fs::read_to_string(&status).unwrap_or_default();
+            let caught = status.lines().find_map(|line| line.strip_prefix("SigCgt:"));
+            let mask = caught.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok());
+            mask.is_some_and(|mask| mask & 2 == 2)
+        };
+        let end = Instant::now() + within;
+        while !takes_interrupts() {
+            assert!(Instant::now() < end, "{} takes no Ctrl-C", self.name);
+            std::thread::sleep(Duration::from_millis(5));
+        }
+    }
+
     /// Sends it a signal.
     ///
     /// # Errors

@@ -18,6 +18,7 @@ use mmt_shared::io::transport::Transport;
 use mmt_shared::io::truth::{self, TruthReceiver, TruthSender};
 use mmt_shared::pairing::Pairing;
 use mmt_shared::report::{Both, RunReport};
+use mmt_shared::wire::Ending;
 use tokio::sync::watch;
 
 use super::setting::{Setting, caption};
@@ -61,7 +62,7 @@ pub(super) type Ended = Option<(
 )>;
 
 impl Round<'_> {
-    /// Runs slave and master to their end; none if the slave ended before it listened.
+    /// Runs slave and master to their end; none if the slave ended before it listened, or a person's wish came before they met.
     pub(super) fn session(&mut self) -> Result<Ended, Failure> {
         let config = self.setting.config()?;
         let arguments = &self.setting.arguments;
@@ -92,15 +93,20 @@ impl Round<'_> {
         self.device.give(&mut options);
         let (master, master_live) = master::start(options, stop.receiver())?;
         self.show(caption, &started.live, &master_live);
-        let mut master_ended = None;
+        let (mut met, mut master_ended) = (false, None);
         while master.is_running() || slave.is_running() {
             // copied first: a borrow that lives through the viewer's wait would stop the hosts' tasks
             let (slave_now, master_now) = (*started.live.borrow(), *master_live.borrow());
+            met |= slave_now.connected;
             self.look(slave_now, master_now);
             self.attend(&stop);
             self.finish_unwatched(&master_now);
             if self.stop.asked() || self.again.is_some() {
                 stop.end();
+                // a slave that nobody has met waits for nobody now
+                if !met {
+                    stop_slave.end();
+                }
             }
             if !master.is_running() {
                 let since = *master_ended.get_or_insert_with(Instant::now);
@@ -110,6 +116,9 @@ impl Round<'_> {
             }
         }
         let (master, slave) = (master.join(), slave.join());
+        if !met && self.stop.ending() == Ending::Interrupted && master.is_err() {
+            return Ok(None);
+        }
         let report = RunReport::of_both(master?, slave?);
         let end = master_live.borrow().ended;
         if let Some(desk) = &mut self.desk {

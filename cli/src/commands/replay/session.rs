@@ -5,11 +5,12 @@ use std::sync::mpsc::Sender;
 
 use mmt_lab::again::{AgainError, RanAgain, SessionsAgain};
 use mmt_lab::what_if::{Otherwise, RecordedRun, WhatIfError};
-use mmt_shared::io::record::{Ended, RecordError, is_record, read};
+use mmt_shared::io::record::{Ended, RecordError, is_record};
 use mmt_shared::recording::Recording;
 use serde::Serialize;
 
 use crate::args::ReplayArguments;
+use crate::commands::records::read_run;
 use crate::failure::Failure;
 use crate::input::read_text;
 use crate::output::{print, print_json};
@@ -90,7 +91,7 @@ pub(super) fn run(arguments: &ReplayArguments) -> Result<(), Failure> {
     let (mut records, files) = (Vec::new(), arguments.files.clone());
     let every_file = move |done: Sender<Record>| {
         for path in &files {
-            let record = again(path).map_err(|error| failure(path, &error))?;
+            let record = again(path)?;
             if done.send(record).is_err() {
                 break;
             }
@@ -132,12 +133,12 @@ pub(super) fn otherwise(arguments: &ReplayArguments) -> Otherwise {
 /// The recorded hand in virtual time, as it was and otherwise.
 fn what_if(arguments: &ReplayArguments, otherwise: &Otherwise) -> Result<(), Failure> {
     let mut run = RecordedRun::default();
-    for path in &arguments.files {
-        let taken = read(path, |topic, message| -> Result<(), Error> {
-            Ok(run.take(topic, message)?)
-        });
-        taken.map_err(|error| failure(path, &error))?;
-    }
+    read_run(
+        &arguments.files,
+        |topic, message| -> Result<(), Error> { Ok(run.take(topic, message)?) },
+        |path, error| failure(path, &error),
+    )?
+    .with_sessions()?;
     let answer = run.answer(otherwise).map_err(|error| {
         Failure::usage(error).remedy("give the record of a demo, or those of both hosts of one run")
     })?;
@@ -148,12 +149,17 @@ fn what_if(arguments: &ReplayArguments, otherwise: &Otherwise) -> Result<(), Fai
     }
 }
 
-fn again(path: &Path) -> Result<Record, Error> {
+fn again(path: &PathBuf) -> Result<Record, Failure> {
     let mut sessions = SessionsAgain::default();
-    let ended = read(path, |topic, message| -> Result<(), Error> {
-        sessions.take(topic, message)?;
-        Ok(())
-    })?;
+    let read = read_run(
+        std::slice::from_ref(path),
+        |topic, message| -> Result<(), Error> {
+            sessions.take(topic, message)?;
+            Ok(())
+        },
+        |path, error| failure(path, &error),
+    )?;
+    let ended = read.with_sessions()?;
     let ran = sessions.ran().map(|(side, session, ran)| {
         let RanAgain {
             ticks,
@@ -171,7 +177,7 @@ fn again(path: &Path) -> Result<Record, Error> {
     });
     Ok(Record {
         file: path.display().to_string(),
-        is_whole: ended == Ended::Whole,
+        is_whole: ended == [Ended::Whole],
         sessions: ran.collect(),
     })
 }
