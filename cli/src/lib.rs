@@ -38,16 +38,17 @@ const LAST_WORDS: Duration = Duration::from_secs(1);
 /// Runs the command line of this process.
 pub fn run() -> ExitCode {
     note_panics();
-    let arguments = match Arguments::try_parse() {
-        Ok(arguments) => arguments,
-        Err(_) if lacks_live() => return fail(&no_live()),
+    let ended = match Arguments::try_parse() {
+        Ok(arguments) => execute(arguments.command),
+        Err(_) if lacks_live() => Err(no_live()),
         Err(error) => return answer(&error),
     };
-    let outcomes = [execute(arguments.command), PANICS.judge()];
+    let outcomes = [ended, PANICS.judge()];
     let mut code = ExitCode::SUCCESS;
     // the last one is the first cause: a panic fails what else was under way
     for failure in outcomes.into_iter().filter_map(Result::err) {
-        code = fail(&failure);
+        output::note(&failure);
+        code = ExitCode::from(failure.exit().code());
     }
     stderr::settle(LAST_WORDS);
     code
@@ -81,12 +82,6 @@ fn execute(command: Command) -> Result<(), Failure> {
         Command::Man(arguments) => commands::manual::pages(&arguments),
         Command::Bench(arguments) => commands::bench::run(&arguments),
     }
-}
-
-/// Prints a failure; what the process ends with.
-fn fail(failure: &Failure) -> ExitCode {
-    output::note(failure);
-    ExitCode::from(failure.exit().code())
 }
 
 /// Whether `mmt live` is asked for and this build has none.

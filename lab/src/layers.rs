@@ -10,6 +10,7 @@ mod program;
 mod template;
 #[cfg(test)]
 mod tests;
+mod whole;
 
 use std::fmt::Display;
 use std::ops::Range;

@@ -121,7 +121,7 @@ mod tests {
 
     fn bytes(message: &impl Message) -> Vec<u8> {
         let mut out = CdrWriter::default();
-        message.write(&mut out);
+        message.write(out.begin());
         out.message().to_vec()
     }
 

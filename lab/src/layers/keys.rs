@@ -6,7 +6,7 @@ use serde::de::DeserializeOwned;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue, Deserializer};
 
-use super::known::keys;
+use super::whole::keys;
 use crate::overlay::lay_at;
 use crate::text_error::TextError;
 use crate::world::WorldConfig;

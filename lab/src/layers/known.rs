@@ -3,7 +3,6 @@
 //! What is accepted is what the checks answer to a value that cannot be; the unit is the end of the key.
 
 use mmt_client::device::DeviceProfile;
-use mmt_server::estimator::EstimatorConfig;
 use serde::Serialize;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
@@ -12,6 +11,7 @@ use super::Layers;
 use super::idle::{DEVICE_STIFFNESS, idle};
 use super::keys::{at, line_of, named, within};
 use super::program::SEED_KEYS;
+use super::whole::whole;
 use crate::overlay::{lay, lay_at};
 use crate::text_error::TextError;
 use crate::world::{World, WorldConfig};
@@ -126,39 +126,6 @@ impl Layers<'_> {
             path = shorter.rsplit_once('.').map(|(shorter, _)| shorter);
         }
         Origin::Default
-    }
-}
-
-/// The same run with the parts written out that are the mode's where they are left out.
-pub(super) fn whole(config: &WorldConfig) -> WorldConfig {
-    let device = DeviceProfile::default();
-    let used = device.used_with(config.stiffness_n_per_m, None);
-    let coupling = used.unwrap_or(device).coupling();
-    let mut whole = config.clone();
-    whole.stiffness_n_per_m = Some(coupling.stiffness_n_per_m);
-    whole.settings = Some(config.model_settings(coupling));
-    let estimator = EstimatorConfig::of_mode(config.slave.mode, coupling);
-    whole.slave.estimator.get_or_insert(estimator);
-    whole
-}
-
-/// Every key that the default has, written with dots.
-pub(super) fn keys() -> Vec<String> {
-    let mut keys = Vec::new();
-    if let Ok(tree) = toml::Value::try_from(whole(&WorldConfig::default())) {
-        leaves(&tree, "", &mut keys);
-    }
-    keys
-}
-
-fn leaves(tree: &toml::Value, path: &str, keys: &mut Vec<String>) {
-    for (name, value) in tree.as_table().into_iter().flatten() {
-        let key = format!("{path}{name}");
-        if value.is_table() {
-            leaves(value, &format!("{key}."), keys);
-        } else {
-            keys.push(key);
-        }
     }
 }
 

@@ -53,7 +53,7 @@ fn what_the_default_file_leaves_out_can_be_taken_in_and_is_the_same_run() {
             .unwrap();
         let flags = of_mode(mode);
         let own = layers(Program::Sweep, "", &flags).config().unwrap();
-        assert_eq!(known::whole(&config), known::whole(&own));
+        assert_eq!(whole::whole(&config), whole::whole(&own));
     }
 }
 
@@ -72,7 +72,7 @@ fn the_default_file_has_every_key_with_unit_and_range() {
         let found = text.lines().any(|other| other.starts_with(line));
         assert!(found, "{line} is not in:\n{text}");
     }
-    let whole = known::whole(&WorldConfig::default());
+    let whole = whole::whole(&WorldConfig::default());
     let tree = toml::to_string(&whole).unwrap();
     let mut leaves = Vec::new();
     let tree = DeTable::parse(&tree).unwrap();

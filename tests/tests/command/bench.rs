@@ -83,10 +83,10 @@ fn the_table_has_the_targets() {
 #[test]
 fn what_cannot_be_measured_is_refused_with_the_range() {
     for (option, value, range) in [
-        ("--rate", "0", "1..=10000"),
-        ("--rate", "10001", "1..=10000"),
-        ("--size", "15", "16..=1024"),
-        ("--size", "1025", "16..=1024"),
+        ("--rate", "0", "from 1 to 10000"),
+        ("--rate", "10001", "from 1 to 10000"),
+        ("--size", "15", "from 16 to 1024"),
+        ("--size", "1025", "from 16 to 1024"),
         ("--duration", "60", "such as 20s"),
         ("--cores", "two", "own, any"),
     ] {
