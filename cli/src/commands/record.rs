@@ -26,7 +26,7 @@ impl Record {
                 "cannot write the record {}: {error}",
                 path.display()
             ))
-            .remedy("give --record the path of a file in a folder that is there")
+            .remedy("give --record a name that is free, or that of an older record, in a folder that is there")
         })?;
         Ok(Self(Some(recorder)))
     }

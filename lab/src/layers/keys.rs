@@ -71,7 +71,8 @@ fn bring_home(text: &str, given: &mut DeTable) -> Result<(), TextError> {
         let own = format!("slave.{name}");
         let moved = shared.is_none() && !all.contains(&name);
         if moved && !of_slave.contains(&name) {
-            let known = [all, of_slave].concat();
+            let more = of_slave.into_iter().filter(|name| !all.contains(name));
+            let known: Vec<String> = all.iter().cloned().chain(more).collect();
             return Err(TextError::at(text, Some(place), unknown(&name, &known)));
         }
         let mut homes = shared.map_or_else(Vec::new, |(_, homes)| homes.to_vec());

@@ -27,7 +27,7 @@ impl PathFile {
         let shown = path.display().to_string();
         let file = output_file::claim(path, is_path).map_err(|error| {
             Failure::usage(format!("cannot write the path {shown}: {error}"))
-                .remedy("give --record-path the path of a file in a folder that is there")
+                .remedy("give --record-path a name that is free, or that of an older path, in a folder that is there")
         })?;
         Ok(Some(Self { file, shown }))
     }

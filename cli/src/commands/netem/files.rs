@@ -68,5 +68,7 @@ pub(super) fn record_file(path: &Path, heading: &Heading) -> Result<RecordFile, 
 
 fn cannot_write(what: &str, path: &Path, error: impl Display) -> Failure {
     let what = format!("cannot write the {what} {}: {error}", path.display());
-    Failure::usage(what).remedy("give a path that can be written")
+    Failure::usage(what).remedy(
+        "give a name that is free, or that of an older file of its kind, in a folder that is there",
+    )
 }
