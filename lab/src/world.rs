@@ -90,7 +90,15 @@ impl World {
     /// # Errors
     /// When a number of the configuration is not accepted.
     pub fn try_new(config: &WorldConfig) -> Result<Self, WorldError> {
-        Self::operated(config, |view| {
+        Self::at_device(config, DeviceProfile::default())
+    }
+
+    /// The same whose hand has this device, used with the stiffness of the configuration.
+    ///
+    /// # Errors
+    /// As [`World::try_new`].
+    pub fn at_device(config: &WorldConfig, device: DeviceProfile) -> Result<Self, WorldError> {
+        Self::operated(config, device, |view| {
             let scripted = Scripted::try_new(config.operator, view)?;
             Ok(Operator::Scripted(Box::new(scripted)))
         })
@@ -101,15 +109,17 @@ impl World {
     /// # Errors
     /// As [`World::try_new`].
     pub fn along(config: &WorldConfig, hand: Trace) -> Result<Self, WorldError> {
-        Self::operated(config, |_| Ok(Operator::Trace(hand)))
+        let device = DeviceProfile::default();
+        Self::operated(config, device, |_| Ok(Operator::Trace(hand)))
     }
 
     fn operated(
         config: &WorldConfig,
+        device: DeviceProfile,
         operator: impl FnOnce(View) -> Result<Operator, WorldError>,
     ) -> Result<Self, WorldError> {
         config.commands().check()?;
-        let device = DeviceProfile::default().used_with(config.stiffness_n_per_m, None)?;
+        let device = device.used_with(config.stiffness_n_per_m, None)?;
         let settings = config.model_settings(device.coupling());
         let mut slave = Slave::with_settings(&config.slave(), settings)?;
         let scheme = config.slave.trigger.scheme.to_string();

@@ -49,7 +49,8 @@ fn estimators(criterion: &mut Criterion) {
     let ticks = push();
     for (name, mode) in [("paper", Mode::Paper), ("recommended", Mode::Recommended)] {
         let coupling = Coupling::for_stiffness(1000.0);
-        let mut estimator = Estimator::new(&EstimatorConfig::of_mode(mode, coupling), coupling);
+        let mut estimator =
+            Estimator::new(&EstimatorConfig::of_mode(mode, coupling), coupling, 8.0);
         let mut next = ticks.iter().cycle();
         criterion.bench_function(&format!("estimator/{name}"), |bencher| {
             bencher.iter(|| next.next().map(|tick| estimator.step(black_box(tick))));

@@ -14,7 +14,7 @@ const TICKS: u32 = 100_000;
 #[must_use]
 pub fn estimator_tick_ms(mode: Mode) -> f64 {
     let coupling = Coupling::for_stiffness(1000.0);
-    let mut estimator = Estimator::new(&EstimatorConfig::of_mode(mode, coupling), coupling);
+    let mut estimator = Estimator::new(&EstimatorConfig::of_mode(mode, coupling), coupling, 8.0);
     let began = thread_cpu_time();
     for k in 0..TICKS {
         let t = f64::from(k) * TICK_S;

@@ -22,7 +22,7 @@ use hold::Hold;
 
 pub use measures::{Errors, PipelineReport};
 
-/// Update scheme of mmt. Chosen on `black-patch` alone.
+/// Update scheme of mmt. Chosen on `black-patch`; the other recordings were in view when the model was made.
 const MMT: Scheme = Scheme::Deadband { delta: 0.08 };
 /// Deadbands of the held force.
 const HELD: [f64; 3] = [0.10, 0.15, 0.20];

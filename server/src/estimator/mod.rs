@@ -98,14 +98,15 @@ enum Kind {
 }
 
 impl Estimator {
-    /// An estimator at its prior, of an object touched through `coupling`. Settings from outside pass
+    /// An estimator at its prior, of an object touched through `coupling` by a hand that presses with no more than
+    /// `hand_force_max_n`, N. Settings from outside pass
     /// [`EstimatorConfig::check`] first.
     #[must_use]
-    pub fn new(config: &EstimatorConfig, coupling: Coupling) -> Self {
+    pub fn new(config: &EstimatorConfig, coupling: Coupling, hand_force_max_n: f64) -> Self {
         Self(match config {
             EstimatorConfig::Paper(config) => Kind::Paper(PaperEstimator::new(config, coupling)),
             EstimatorConfig::Recommended(config) => {
-                Kind::Recommended(RecommendedEstimator::new(config))
+                Kind::Recommended(RecommendedEstimator::new(config, hand_force_max_n))
             }
             EstimatorConfig::QuasiStatic(config) => {
                 Kind::QuasiStatic(QuasiStaticEstimator::new(config))

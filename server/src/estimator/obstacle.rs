@@ -13,8 +13,6 @@ const HOLD_TICKS: u32 = 20;
 const PUSH_NEEDS: (f64, f64) = (3.0, 1.0);
 /// How long that must last, ticks.
 const IMPACT_TICKS: u32 = 5;
-/// An object that this force does not move is held by something that the hand does not move, N: the default device's limit.
-const HAND_GIVES_N: f64 = 8.0;
 /// Friction that is sent for an object that stands, as a multiple of the force, where friction is known: as an obstacle it
 /// gives way to nothing. Where friction is not known, it is at least the force.
 const MARGIN: f64 = 2.0;
@@ -49,8 +47,10 @@ pub(super) struct Friction {
 }
 
 /// Watches for an obstacle.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 pub(super) struct Obstacle {
+    /// An object that this force does not move is held by something that the hand does not move, N.
+    hand_force_max_n: f64,
     held_ticks: u32,
     hard_ticks: u32,
     stands: bool,
@@ -58,6 +58,17 @@ pub(super) struct Obstacle {
 }
 
 impl Obstacle {
+    /// Nothing is known; no hand presses with more than this, N.
+    pub(super) fn new(hand_force_max_n: f64) -> Self {
+        Self {
+            hand_force_max_n,
+            held_ticks: 0,
+            hard_ticks: 0,
+            stands: false,
+            holding: None,
+        }
+    }
+
     /// Takes the force (N), the share m a + b v of it that is `needed` to move the object so (N), how it moves, and the
     /// friction as it was estimated before. True in the tick in which the object is found to stand against an obstacle.
     pub(super) fn step(
@@ -97,7 +108,7 @@ impl Obstacle {
     fn stand(&mut self, force: f64, known: bool) {
         let (margin, enough) = if known { (MARGIN, ENOUGH) } else { (1.0, 1.0) };
         if self.holding.is_none_or(|holding| force > enough * holding) {
-            let held = force > HAND_GIVES_N;
+            let held = force > self.hand_force_max_n;
             self.holding = Some(if held { OBSTACLE_N } else { margin * force });
         }
     }
@@ -110,7 +121,7 @@ impl Obstacle {
 
     /// Contact was lost.
     pub(super) fn clear(&mut self) {
-        *self = Self::default();
+        *self = Self::new(self.hand_force_max_n);
     }
 }
 
@@ -127,6 +138,7 @@ mod tests {
         known: true,
         seen: true,
     };
+    const HAND_N: f64 = 8.0;
     const UNKNOWN: Friction = Friction {
         c: 1.0,
         known: false,
@@ -135,7 +147,7 @@ mod tests {
 
     /// Presses from 0 to `most` N at a rate in N/ms, then holds it for 100 ticks.
     fn press(rate: f64, most: f64) -> Obstacle {
-        let mut obstacle = Obstacle::default();
+        let mut obstacle = Obstacle::new(HAND_N);
         let rise = (most / rate) as u32;
         for n in 0..rise + 100 {
             obstacle.step((rate * f64::from(n)).min(most), 0.0, MotionState::Sticks, C);
@@ -153,7 +165,7 @@ mod tests {
 
     #[test]
     fn friction_that_is_not_known_is_at_least_the_force_and_what_no_hand_moves_is_held() {
-        let mut obstacle = Obstacle::default();
+        let mut obstacle = Obstacle::new(HAND_N);
         let mut press = |force, motion, friction| {
             (0..20).for_each(|_| {
                 obstacle.step(force, 0.0, motion, friction);
@@ -176,7 +188,7 @@ mod tests {
 
     #[test]
     fn static_friction_that_gives_way_within_20_ms_is_no_obstacle() {
-        let mut obstacle = Obstacle::default();
+        let mut obstacle = Obstacle::new(HAND_N);
         for _ in 0..19 {
             assert!(!obstacle.step(1.5 * C.c, 0.0, MotionState::Sticks, C));
         }
@@ -196,7 +208,7 @@ mod tests {
 
     #[test]
     fn an_object_that_moves_on_under_a_force_beyond_any_push_has_hit_something() {
-        let mut obstacle = Obstacle::default();
+        let mut obstacle = Obstacle::new(HAND_N);
         for (force, sent) in [(3.0 * C.c + 1.0, None), (10.0, Some(10.0))] {
             for _ in 0..5 {
                 assert!(!obstacle.step(force, 0.0, MotionState::SlidesOn, C));

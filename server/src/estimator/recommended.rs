@@ -93,9 +93,9 @@ pub(super) struct RecommendedEstimator {
 }
 
 impl RecommendedEstimator {
-    /// At the prior.
+    /// At the prior; no hand presses with more than `hand_force_max_n`, N.
     #[must_use]
-    pub(super) fn new(config: &RecommendedConfig) -> Self {
+    pub(super) fn new(config: &RecommendedConfig, hand_force_max_n: f64) -> Self {
         let speed_min = config
             .gate
             .speed_min_m_per_s
@@ -116,7 +116,7 @@ impl RecommendedEstimator {
             filter: StateVariableFilter::new(config.cutoff_rad_per_s),
             recursive,
             copies: [recursive; 2],
-            obstacle: Obstacle::default(),
+            obstacle: Obstacle::new(hand_force_max_n),
             began: None,
             estimate,
         }

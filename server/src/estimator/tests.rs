@@ -34,13 +34,13 @@ fn values(estimate: &Estimate) -> [f64; 3] {
 fn recommended(change: impl FnOnce(&mut RecommendedConfig)) -> Estimator {
     let mut config = RecommendedConfig::new(COUPLING);
     change(&mut config);
-    Estimator::new(&EstimatorConfig::Recommended(config), COUPLING)
+    Estimator::new(&EstimatorConfig::Recommended(config), COUPLING, 8.0)
 }
 
 fn paper(change: impl FnOnce(&mut PaperConfig)) -> Estimator {
     let mut config = PaperConfig::default();
     change(&mut config);
-    Estimator::new(&EstimatorConfig::Paper(config), COUPLING)
+    Estimator::new(&EstimatorConfig::Paper(config), COUPLING, 8.0)
 }
 
 /// One push and the way to the next face; `see` gets each tick of the push.

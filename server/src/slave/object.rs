@@ -31,6 +31,8 @@ pub(super) struct ObjectEstimate {
     /// Whether a mass too light for the coupling is brought to the least that is accepted.
     raises_mass: bool,
     coupling: Coupling,
+    /// No hand presses with more, N.
+    hand_force_max_n: f64,
     observer_config: ObserverConfig,
     estimator_config: EstimatorConfig,
     /// Number of the body.
@@ -83,6 +85,7 @@ impl ObjectEstimate {
         let [m, b, c] = mbc;
         in_range("start model: side", "m", start.side_m, SIDE_M)?;
         estimator.check()?;
+        let hand_force_max_n = config.tool_energy.hand_force_max_n;
         let footprint = (seen.first().copied()).unwrap_or(BoxFootprint::square(start.side_m));
         let params = ModelParams::of_square(m, b, c, footprint.mean_side(), &coupling)?;
         let start = Found {
@@ -92,13 +95,14 @@ impl ObjectEstimate {
         };
         Ok(Self {
             observer: PoseObserver::new(observer, pose, footprint),
-            estimator: Estimator::new(&estimator, coupling),
+            estimator: Estimator::new(&estimator, coupling, hand_force_max_n),
             params,
             refused: 0,
             images_too_old: 0,
             // the paper's block fit may give anything, and what is out of range is no estimate
             raises_mass: matches!(estimator, EstimatorConfig::Recommended(_)),
             coupling,
+            hand_force_max_n,
             observer_config: observer,
             estimator_config: estimator,
             body: 0,
@@ -160,7 +164,7 @@ impl ObjectEstimate {
         self.params =
             ModelParams::try_new(m, b, c, inertia, e, &self.coupling).unwrap_or(self.start_params);
         let estimator = self.estimator_config.starting_at(found.mbc);
-        self.estimator = Estimator::new(&estimator, self.coupling);
+        self.estimator = Estimator::new(&estimator, self.coupling, self.hand_force_max_n);
         self.observer = PoseObserver::new(self.observer_config, pose, found.footprint);
     }
 

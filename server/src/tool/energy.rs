@@ -38,7 +38,8 @@ const SHARE: (f64, f64) = (0.0, 10.0);
 pub struct EnergyConfig {
     /// Whether the tool is held beyond the budget. Default: yes; in paper mode no, the paper has no such bound.
     pub bounded: bool,
-    /// The hand is credited with no more force than this, N. Default 8: the largest of the devices' profiles.
+    /// No hand presses with more than this, N: it is credited with no more, and an object that more does not move is held by something
+    /// else. Default 8: the largest of the devices' profiles.
     pub hand_force_max_n: f64,
     /// The tool may give as much more than the hand did, as a share of the hand's work. Default 0.25: the error of an ordinary
     /// force sensor's gain, twice, and of an estimate.

@@ -1,5 +1,8 @@
 //! An object that does not move: nobody can know before a round trip, and the hand has gone on by then.
 
+use mmt_client::device::DeviceProfile;
+use mmt_client::device::link::DeviceLinkConfig;
+
 use super::*;
 
 /// Delay of the play-out, ms: part of the round trip.
@@ -89,6 +92,50 @@ fn what_does_not_move_is_felt_to_give_way_for_a_round_trip_and_then_where_it_is(
                     "{felt:?}"
                 );
             }
+        }
+    }
+}
+
+/// Force at which an object starts to move that an ordinary hand cannot push, N; and that of a hand and a device that can.
+const HEAVY_N: f64 = 12.0;
+const STRONG_N: f64 = 16.0;
+
+#[test]
+fn what_starts_to_move_at_12_n_is_pushed_by_a_hand_and_a_device_that_can() {
+    for one_way_ms in [0, 50, 125] {
+        for seed in 21..=23 {
+            let mut config = over(&format!("delay {one_way_ms}ms"), seed);
+            let environment = &mut config.slave.environment;
+            environment.mass_kg = 3.0;
+            environment.friction_coefficient = HEAVY_N / (3.0 * 9.81);
+            config.operator.press_max_n = STRONG_N;
+            config.slave.tool_energy.hand_force_max_n = STRONG_N;
+            let device = DeviceLinkConfig {
+                force_max_n: STRONG_N,
+                stiffness_n_per_m: 1000.0,
+                ..DeviceLinkConfig::default()
+            };
+            let device = DeviceProfile::plugged_in(&device).unwrap();
+            let mut world = World::at_device(&config, device).unwrap();
+            let mut last = world.slave().environment().pose().position;
+            let mut way_m = 0.0;
+            world.run(Duration::from_secs(30), |tick| {
+                if let Some(slave) = &tick.slave {
+                    way_m += (slave.truth.position - last).norm();
+                    last = slave.truth.position;
+                }
+            });
+            let (outcome, at) = (world.outcome(), (one_way_ms, seed));
+            assert!(way_m > 1.0, "{at:?}: pushed over {way_m} m");
+            assert_eq!(world.slave().tool_energy().held_ticks(), 0, "{at:?}");
+            let error = relative_error(&world);
+            assert!(error <= 0.15, "{at:?}: {error}");
+            let pose_m = outcome.pose.position_max_m().unwrap();
+            let round_trip_s = (2 * one_way_ms + PLAYOUT_MS) as f64 * 1e-3;
+            assert!(pose_m <= 0.010 + 0.1 * round_trip_s, "{at:?}: {pose_m} m");
+            let c = world.slave().estimate().c;
+            assert!((c - HEAVY_N).abs() < 0.1, "{at:?}: {c} N");
+            assert!(outcome.energy_injected_j <= 1e-9, "{at:?}");
         }
     }
 }
