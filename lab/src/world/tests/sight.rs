@@ -133,3 +133,33 @@ fn without_delay_most_of_the_force_error_is_the_first_touch() {
     println!("relative error {unknown:.3} unknown, {known:.3} known");
     assert!(known < unknown);
 }
+
+#[test]
+fn a_stiff_contact_is_lost_only_while_a_model_that_is_too_large_shrinks_under_the_hand() {
+    let sides = [(0.36, 0), (0.40, 2)];
+    for ((side_m, most), seed) in sides
+        .into_iter()
+        .flat_map(|of| [31, 32, 33].map(|seed| (of, seed)))
+    {
+        let mut config = over("", seed);
+        config.stiffness_n_per_m = Some(3000.0);
+        config.slave.start.side_m = side_m;
+        let mut world = World::try_new(&config).unwrap();
+        // until the tool has touched the object for half a second, and later
+        let (mut touched_ms, mut held, mut lost) = (0, false, [0, 0]);
+        world.run(Duration::from_secs(30), |tick| {
+            touched_ms += u32::from(tick.slave.as_ref().is_some_and(|slave| slave.in_contact));
+            let holds = tick.master.rendered.in_contact();
+            lost[usize::from(touched_ms > 500)] += u64::from(held && !holds);
+            held = holds;
+        });
+        let [shrinking, later] = lost;
+        let pushes = world.operator().pushes_completed().unwrap();
+        assert_eq!(
+            later, pushes,
+            "{side_m} m, seed {seed}: the end of each push"
+        );
+        assert!(shrinking <= most, "{side_m} m, seed {seed}: {shrinking}");
+        assert_eq!(shrinking > 0, side_m > 0.36, "{side_m} m, seed {seed}");
+    }
+}
