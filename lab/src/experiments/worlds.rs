@@ -26,7 +26,6 @@ pub(super) const EXPERIMENT: Experiment = Experiment {
         },
     ],
     duration: Duration::from_secs(20),
-    in_all: false,
     ..Experiment::new(
         "worlds",
         "Random worlds by one documented distribution: force error, packets, pose, energy, and the worst ten",
