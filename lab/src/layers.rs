@@ -138,7 +138,7 @@ impl<'a> Layers<'a> {
     /// `device` judges it.
     ///
     /// # Errors
-    /// As [`Layers::config`], and what the device says to the stiffness, with its place.
+    /// As [`Layers::config`], and why the device refuses the stiffness, with its place.
     pub fn config_with<E: Display>(
         &self,
         device: impl FnOnce(f64) -> Result<(), E>,

@@ -12,7 +12,7 @@ pub(super) use hand::{Device, configuration, profile};
 /// Runs `mmt device`.
 ///
 /// # Errors
-/// Wrong input, or a device that does not do.
+/// Wrong input, or a device that is unfit.
 pub(crate) fn run(arguments: &DevicesArguments) -> Result<(), Failure> {
     match &arguments.command {
         DevicesCommand::List(arguments) => list::run(arguments),

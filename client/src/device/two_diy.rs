@@ -138,7 +138,7 @@ impl TwoDiy {
         self.posture = could_be.then_some(posture);
     }
 
-    /// Nothing has come: after a while the hand is let go. Whether that is now.
+    /// Nothing has come in this tick. Returns whether the device has been silent for so long that the hand is let go now.
     pub fn miss(&mut self, now: Time, give: impl FnMut(HandEvent)) -> bool {
         let silent = self.hand.is_silent(now);
         if silent {

@@ -63,7 +63,7 @@ mod tests {
         Vec2::new(2.0 + libm::sin(ms as f64 * 0.02), 0.5)
     }
 
-    /// A force that is felt `late_ms` after it was met, or before if negative, taken to be so by `aligned_ms`.
+    /// The error of a force that is felt `late_ms` after it was met (before, if negative), aligned by `aligned_ms`.
     fn error(late_ms: i64, aligned_ms: i64, gain: f64) -> f64 {
         let mut error = AlignedError::default();
         let at = |ms: u64, by: i64| ms.checked_add_signed(by);

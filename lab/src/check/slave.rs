@@ -229,7 +229,7 @@ impl SlaveChecks {
         self.left = Some(update);
     }
 
-    /// Whether the force sensor is broken from now on: what it does not measure the limit of the tool's force cannot bound.
+    /// Whether the force sensor is broken from now on. The limit of the tool's force bounds only what the sensor measures.
     pub(crate) fn set_sensor_broken(&mut self, broken: bool) {
         self.sensor_broken = broken;
     }

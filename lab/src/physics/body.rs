@@ -11,7 +11,7 @@ pub struct Body {
     pub mass_kg: f64,
     /// Side l, m. Default 0.36: the real cube's.
     pub side_m: f64,
-    /// Friction coefficient mu, above zero. Default 0.3: a study's choice.
+    /// Friction coefficient mu, above zero. Default 0.3, a choice: the paper gives none.
     pub friction_coefficient: f64,
     /// Viscous damping b, N s/m; turning is damped by b l²/6. Default 0: closed forms of Coulomb alone.
     pub damping_ns_per_m: f64,

@@ -33,7 +33,7 @@ pub struct WorldConfig {
     pub architecture: Architecture,
     /// New samples in a command.
     pub samples_per_command: u8,
-    /// How many commands before it each command repeats the samples of.
+    /// Each command repeats the samples of this many commands before it.
     pub repeat_samples: u8,
     /// By how much congestion may stretch the time between the master's samples; 1: not at all.
     pub stretch_max: StretchMax,

@@ -45,7 +45,7 @@ pub struct EnvironmentConfig {
     pub centre_of_mass_m: Vec2,
     /// Mass m, kg. Default 0.7: the real cube's.
     pub mass_kg: f64,
-    /// Friction coefficient mu between sliding body and ground. Default 0.3: a study's choice.
+    /// Friction coefficient mu between sliding body and ground. Default 0.3, a choice: the paper gives none.
     pub friction_coefficient: f64,
     /// What breaks a resting body away, by what brakes a sliding one. Default 1.
     pub static_ratio: f64,
@@ -55,7 +55,7 @@ pub struct EnvironmentConfig {
     pub patches: Bounded<GroundPatch, PATCHES_MAX>,
     /// A wall that stops the body. Default: none.
     pub wall: Option<Wall>,
-    /// Viscous damping b, N s/m. Default 3: a study's choice, so that (1) has something to find.
+    /// Viscous damping b, N s/m. Default 3, a choice: the paper gives none, and (1) has something to find.
     pub damping_ns_per_m: f64,
     /// Rotational damping, N m s; none means that of a film under the footprint, b l²/6 for a square.
     /// The local model lacks it on purpose.

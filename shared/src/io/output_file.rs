@@ -19,7 +19,7 @@ pub fn create(path: &Path, is_of_kind: impl Fn(&[u8]) -> bool) -> io::Result<Fil
     Ok(file)
 }
 
-/// Takes away what the file holds; what is no file holds nothing.
+/// Takes away what the file holds. A pipe or a device holds nothing.
 ///
 /// # Errors
 /// The system refuses that.

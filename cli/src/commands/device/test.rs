@@ -87,7 +87,7 @@ impl From<&Histogram> for Spread {
 /// Runs `mmt device test`.
 ///
 /// # Errors
-/// Wrong input, nobody there, or a device that does not do.
+/// Wrong input, nobody there, or a device that is unfit.
 pub(super) fn run(arguments: &DeviceTestArguments) -> Result<(), Failure> {
     let stop = Stop::on_signals()?;
     let device = Device::start(&arguments.device, None)?;

@@ -82,7 +82,7 @@ impl Receiver {
     /// Takes what is there out of `port`, or enough for once.
     ///
     /// # Errors
-    /// Those of recvmmsg, but nothing to receive is none.
+    /// Those of recvmmsg. That there is nothing to receive is no error.
     pub(crate) fn receive(
         &mut self,
         port: &Port,
