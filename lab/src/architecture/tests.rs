@@ -1,4 +1,4 @@
-//! What is known of each architecture from the literature must hold here. Print the tables with `--nocapture`.
+//! What is known of each architecture from the literature must hold here.
 
 use super::*;
 use mmt_client::operator::hand::{Hand, HandConfig};

@@ -1,5 +1,5 @@
 //! What delay does to the hand: the table of `docs/model.md`, the shadow's bounds, and passivity over
-//! worlds that are drawn at random. Print with `--nocapture`.
+//! worlds that are drawn at random.
 
 use super::*;
 use mmt_client::operator::scripted::Picture;

@@ -1,5 +1,5 @@
 //! What it costs not to know the object's size: at a second and more one way, where it decides, and without
-//! delay. `docs/limits.md` has the numbers; print them with `--nocapture`.
+//! delay. `docs/limits.md` has what follows from it.
 
 use super::delay::{FAULTS, Row};
 use super::*;
