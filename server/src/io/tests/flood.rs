@@ -4,13 +4,13 @@ use mmt_shared::channel::datagram_channel::DatagramChannel;
 use mmt_shared::io::loop_thread::{self, ARRIVALS_PER_TICK};
 use mmt_shared::io::schedule::Tick;
 use mmt_shared::model::contact::Coupling;
+use mmt_shared::model::geometry::Vec2;
 use mmt_shared::time::Time;
 use mmt_shared::wire::{DATAGRAM_MAX, Hello, Label, Message, Role, Side};
 
 use super::*;
 use crate::end::SlaveEnd;
 use crate::io::slave_loop::{SlaveLoop, Snapshot};
-use mmt_shared::model::geometry::Vec2;
 
 fn hello() -> Hello {
     Hello {
