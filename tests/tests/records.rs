@@ -14,7 +14,7 @@
 
 use std::path::Path;
 use std::process::Command;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use mmt_client::operator::trace::Trace;
 use serde_json::Value;
@@ -259,14 +259,17 @@ fn each_host_of_two_keeps_a_record_that_runs_again_by_itself() {
 #[test]
 fn a_full_disk_costs_the_record_and_neither_the_session_nor_its_report() {
     in_real_time(|| {
-        let ended = mmt(&[
-            "demo",
-            "--duration",
-            "2s",
-            "--json",
-            "--record",
-            "/dev/full",
-        ]);
+        let demo = ["demo", "--duration", "8s", "--json"];
+        let demo = [&demo[..], &["--record", "/dev/full"]].concat();
+        let mut demo = Running::mmt(&demo).unwrap();
+        let is_told = |line: &str| line.contains("the record ends here, the session goes on");
+        let told = demo.wait_for_line(GENEROUS, is_told).unwrap();
+        assert!(told.contains("No space left"), "{told}");
+        // at once, and not with the report
+        let told = Instant::now();
+        let ended = demo.end(GENEROUS).unwrap();
+        let went_on = ended.at.duration_since(told);
+        assert!(went_on > Duration::from_secs(3), "{went_on:?}");
         let report = ended.document(0).unwrap();
         assert_eq!(report["ending"], "finished");
         assert_eq!(ended.status.code(), Some(1), "{}", ended.err);

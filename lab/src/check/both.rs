@@ -6,6 +6,7 @@ use mmt_shared::record::digest::RunDigest;
 use mmt_shared::time::Time;
 use mmt_shared::wire::{Datagram, Side};
 
+use super::channel::Intake;
 use super::{Invariant, Verdict};
 
 /// What an end counted until the end.
@@ -69,17 +70,23 @@ impl Way {
         Some((datagram.envelope.number, digest.value()))
     }
 
-    /// Sent = received + lost + sent after the newest that arrived. Where an enemy sent as well nobody counts that.
+    /// Sent = received + lost + sent after the newest that arrived, where lost is what left and was not taken when it arrived,
+    /// if it did. Where an enemy sent as well nobody counts that.
     fn judge_balance(&self, from: Totals, to: Totals, at: Time, verdict: &mut Verdict) {
         if !self.forged.is_empty() {
             return;
         }
-        let (sent, lost) = (self.left.len(), to.newest.saturating_sub(to.received));
-        let after = self.left.range(to.newest.saturating_add(1)..).count();
-        let known = u64::from(to.received) + u64::from(lost) + after as u64;
-        let holds = from.sent as usize == sent && known == sent as u64;
+        let mut intake = Intake::default();
+        let numbers = self.arrived.iter().map(|(_, number, _)| *number);
+        let came = numbers.filter(|number| intake.takes(*number) && self.left.contains_key(number));
+        let came = came.count();
+        let newest = intake.newest;
+        let (sent, before) = (self.left.len(), self.left.range(..=newest).count());
+        let (lost, after) = (before.saturating_sub(came), sent - before);
+        let known = to.received as usize + lost + after;
+        let holds = (from.sent as usize, to.newest) == (sent, newest) && known == sent;
         verdict.judge(Invariant::CountersBalance, at, holds, || {
-            format!("{sent} datagrams left the {:?}, {after} after the newest that arrived: {from:?} {to:?}", self.from)
+            format!("{sent} datagrams left the {:?}, {came} came, {lost} were lost, {after} left after the newest that arrived: {from:?} {to:?}", self.from)
         });
     }
 
@@ -125,5 +132,61 @@ impl Both {
         self.up.judge_balance(master, slave, began, &mut verdict);
         self.down.judge_balance(slave, master, began, &mut verdict);
         verdict
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use mmt_shared::channel::datagram_channel::DatagramChannel;
+    use mmt_shared::wire::{DATAGRAM_MAX, Message};
+
+    use super::*;
+
+    const AT: fn(u64) -> Time = Time::from_millis;
+
+    /// One way of which these numbers arrive, of so many; and whether its balance holds with these totals.
+    fn balances(left: u32, arrive: &[u32], totals: Totals) -> bool {
+        let mut channel = DatagramChannel::new(Side::Master, Time::ZERO);
+        let mut way = Way::new(Side::Master);
+        let all: Vec<Vec<u8>> = (1..=left)
+            .map(|n| {
+                let mut out = [0; DATAGRAM_MAX];
+                let length = channel.encode(AT(u64::from(n)), Message::Heartbeat, &mut out);
+                out[..length.unwrap().unwrap()].to_vec()
+            })
+            .collect();
+        all.iter().for_each(|bytes| way.left(bytes));
+        for number in arrive {
+            way.arrived(AT(5000), &all[*number as usize - 1]);
+        }
+        let from = Totals {
+            sent: left,
+            received: 0,
+            newest: 0,
+        };
+        let mut verdict = Verdict::since(Time::ZERO);
+        way.judge_balance(from, totals, AT(5000), &mut verdict);
+        verdict.holds()
+    }
+
+    #[test]
+    fn what_an_end_received_is_held_against_what_arrived() {
+        let totals = |received, newest| Totals {
+            sent: 0,
+            received,
+            newest,
+        };
+        // one is lost, one is there twice, one is overtaken, one follows the newest
+        let arrive = [1, 2, 2, 4, 6, 5];
+        assert!(balances(7, &arrive, totals(5, 6)));
+        for miscounted in [4, 6] {
+            assert!(!balances(7, &arrive, totals(miscounted, 6)), "{miscounted}");
+        }
+        assert!(!balances(7, &arrive, totals(5, 7)));
+        assert!(balances(7, &[], totals(0, 0)));
+        // the first after a long gap is not taken before the next confirms it, and one from long ago is not taken at all
+        let arrive = [1, 2, 1500, 1501, 3, 2];
+        assert!(balances(1501, &arrive, totals(3, 1501)));
+        assert!(!balances(1501, &arrive, totals(4, 1501)));
     }
 }

@@ -28,6 +28,40 @@ struct Newest {
     stopped: bool,
 }
 
+/// Which numbers an end takes: each once, none from long ago, and one far ahead only when another confirms it.
+#[derive(Default)]
+pub(super) struct Intake {
+    seen: BTreeSet<u32>,
+    /// The last number that was too far ahead.
+    far: u32,
+    /// The newest that it took.
+    pub(super) newest: u32,
+}
+
+impl Intake {
+    /// Whether it takes the next that arrives.
+    pub(super) fn takes(&mut self, number: u32) -> bool {
+        let newest = self.newest;
+        let too_far = number.saturating_sub(newest) >= WINDOW;
+        if too_far && (number == self.far || number.abs_diff(self.far) >= WINDOW) {
+            self.far = number;
+            return false;
+        }
+        if number == 0 || newest.saturating_sub(number) >= WINDOW || !self.seen.insert(number) {
+            return false;
+        }
+        while self
+            .seen
+            .first()
+            .is_some_and(|first| newest.saturating_sub(*first) > 2 * WINDOW)
+        {
+            self.seen.pop_first();
+        }
+        self.newest = newest.max(number);
+        true
+    }
+}
+
 /// One end's datagrams.
 pub(super) struct ChannelChecks {
     side: Side,
@@ -41,9 +75,7 @@ pub(super) struct ChannelChecks {
     /// Round trips of the last 10 s: the least and the longest of each tenth of a second that has any, by its beginning.
     round_trips: VecDeque<(Time, Duration, Duration)>,
     latest: Option<Duration>,
-    seen: BTreeSet<u32>,
-    /// The last number that was too far ahead.
-    far: u32,
+    intake: Intake,
     newest: Option<Newest>,
     received: u32,
     /// All that arrived, datagrams or not.
@@ -66,8 +98,7 @@ impl ChannelChecks {
             answered: 0,
             round_trips: VecDeque::new(),
             latest: None,
-            seen: BTreeSet::new(),
-            far: 0,
+            intake: Intake::default(),
             newest: None,
             received: 0,
             handled: 0,
@@ -82,26 +113,13 @@ impl ChannelChecks {
         self.handled += 1;
         let datagram = Datagram::decode(bytes, self.side.other()).ok()?;
         let number = datagram.envelope.number;
-        let newest = self.newest.map_or(0, |newest| newest.number);
-        let too_far = number.saturating_sub(newest) >= WINDOW;
-        if too_far && (number == self.far || number.abs_diff(self.far) >= WINDOW) {
-            self.far = number;
+        if !self.intake.takes(number) {
             return None;
-        }
-        if number == 0 || newest.saturating_sub(number) >= WINDOW || !self.seen.insert(number) {
-            return None;
-        }
-        while self
-            .seen
-            .first()
-            .is_some_and(|first| newest.saturating_sub(*first) > 2 * WINDOW)
-        {
-            self.seen.pop_first();
         }
         self.received += 1;
         self.last_arrival = self.last_arrival.max(Some(at));
         self.answer(at, &datagram);
-        if number > newest {
+        if self.intake.newest == number {
             self.newest = Some(Newest {
                 number,
                 sent: datagram.envelope.sent,

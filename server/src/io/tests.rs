@@ -1,6 +1,7 @@
 //! The host from outside, over loopback: sessions, refusals, endings.
 
 mod crowd;
+mod flood;
 mod identity;
 mod lease;
 mod master;

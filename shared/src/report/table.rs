@@ -6,6 +6,7 @@ use super::{
     Counts, EmulationReport, EstimateReport, LoopReport, MessagesReport, Number, QuantilesReport,
     RunReport, WireReport,
 };
+use crate::clean::clean;
 
 /// Width of the first column.
 const LABEL: usize = 26;
@@ -52,7 +53,7 @@ pub(super) fn happened(word: &str, of: Option<&Counts>) -> impl Iterator<Item = 
     counts(word, of).filter(move |(_, cells)| *cells != never)
 }
 
-/// Rows under a title; no title without a row.
+/// Rows under a title; no title without a row. A peer may have made up what stands in them.
 pub(super) fn section(out: &mut fmt::Formatter<'_>, title: &str, rows: Vec<Row>) -> fmt::Result {
     let mut title = Some(title);
     let known = |(_, cells): &Row| cells.iter().any(Option::is_some);
@@ -61,9 +62,9 @@ pub(super) fn section(out: &mut fmt::Formatter<'_>, title: &str, rows: Vec<Row>)
             writeln!(out, "\n{title}")?;
         }
         // a label or a cell that is full still ends with a space
-        let mut line = format!("  {label:width$} ", width = LABEL - 1);
+        let mut line = format!("  {:width$} ", clean(&label), width = LABEL - 1);
         for cell in cells {
-            let text = cell.as_deref().unwrap_or("-");
+            let text = cell.as_deref().map_or("-".to_owned(), clean);
             line.push_str(&format!("{text:width$} ", width = CELL - 1));
         }
         writeln!(out, "{}", line.trim_end())?;

@@ -306,6 +306,30 @@ fn the_table_shows_what_is_known_and_leaves_out_what_is_not() {
 }
 
 #[test]
+fn no_name_that_a_peer_made_up_steers_a_terminal_or_forges_a_line() {
+    let shown = |name: &str| {
+        let mut report = full();
+        let counts = || Some(named([(name, 3)]));
+        report.architecture.name = Some(name.to_owned());
+        report.updates.sent.by_cause = counts();
+        report.updates.sent.repeated_by_cause = counts();
+        report.updates.received.dropped = counts();
+        report.drops = counts();
+        format!("{report}{}", Brief(&report))
+    };
+    let hostile = shown("timer\u{1b}[2J\n  completed   9\u{202e}");
+    let unfit = |c: char| (c.is_control() && c != '\n') || c == '\u{202e}';
+    assert!(!hostile.contains(unfit), "{hostile:?}");
+    let lines = shown("timer").lines().count();
+    assert_eq!(hostile.lines().count(), lines, "{hostile}");
+    assert_eq!(
+        hostile.matches("timer?[2J?  completed").count(),
+        5,
+        "{hostile}"
+    );
+}
+
+#[test]
 fn the_brief_is_a_sentence_and_ten_lines_and_a_spoilt_run_reports_that_first() {
     let mut sound = full();
     sound.passivity.energy_injected_j = 0.002.into();

@@ -79,15 +79,24 @@ pub(super) fn stream_messages() -> Vec<Vec<u8>> {
 }
 
 pub(super) fn reports() -> Vec<Vec<u8>> {
-    use mmt_shared::report::{MasterHalf, SlaveHalf};
+    use mmt_shared::report::{MasterHalf, SlaveHalf, named};
+    // a name of ours, and one that a peer makes up
+    let counts = || Some(named([("timer", 3), ("x\u{1b}[2J\n  sent  9\u{202e}", 1)]));
     let mut master = MasterHalf::default();
+    master.updates.dropped = counts();
+    master.session.architecture.name = Some("tdpa\u{1b}[1m".to_owned());
+    master.session.architecture.round_trip_ms = 15.0.into();
     master
         .session
         .drops
         .insert("datagrams_malformed".to_owned(), 3);
     master.session.outgoing.expected = 1000;
+    let mut slave = SlaveHalf::default();
+    slave.updates.by_cause = counts();
+    slave.updates.repeated_by_cause = counts();
     vec![
         serde_json::to_vec(&master).unwrap(),
+        serde_json::to_vec(&slave).unwrap(),
         serde_json::to_vec(&SlaveHalf::default()).unwrap(),
         b"{}".to_vec(),
     ]

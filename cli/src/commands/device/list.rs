@@ -5,6 +5,7 @@ use std::net::SocketAddr;
 
 use mmt_client::io::device::ports::{SerialPort, serial_ports};
 use mmt_client::io::device::version;
+use mmt_shared::clean::clean;
 use serde::Serialize;
 
 use crate::args::DeviceListArguments;
@@ -79,6 +80,8 @@ impl fmt::Display for Document {
             why,
             ..
         } = &self.inverse3;
+        // what calls itself so may be anything
+        let service_version = service_version.as_deref().map(clean);
         match (why, service_version) {
             (Some(why), _) => writeln!(f, "inverse3  no Inverse Service at {service}: {why}")?,
             (None, Some(version)) => {
@@ -94,7 +97,8 @@ impl fmt::Display for Document {
         }
         for (n, port) in self.two_diy.ports.iter().enumerate() {
             let end = if n == 0 { "" } else { "\n" };
-            let product = port.product.as_deref().unwrap_or("reports no name");
+            let product = port.product.as_deref().map(clean);
+            let product = product.as_deref().unwrap_or("reports no name");
             let board = if port.looks_like_a_board {
                 ", looks like the board"
             } else {
@@ -107,5 +111,36 @@ impl fmt::Display for Document {
             )?;
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_a_service_and_a_device_call_themselves_steers_no_terminal_and_forges_no_line() {
+        let hostile = || Some("3.1\x1b[2J\n2diy      forged".to_owned());
+        let document = Document {
+            version: "0",
+            command: "device list",
+            link: "--device link",
+            inverse3: Service {
+                service: ([127, 0, 0, 1], 10001).into(),
+                reachable: true,
+                service_version: hostile(),
+                why: None,
+            },
+            two_diy: Ports {
+                ports: vec![SerialPort {
+                    port: "/dev/ttyACM0".into(),
+                    product: hostile(),
+                    looks_like_a_board: true,
+                }],
+            },
+        };
+        let shown = document.to_string();
+        assert_eq!(shown.lines().count(), 3, "{shown:?}");
+        assert!(!shown.contains('\x1b'), "{shown:?}");
     }
 }

@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use mmt_shared::clean::clean;
 use serde::Serialize;
 
 /// How a finding is judged.
@@ -43,7 +44,8 @@ impl Finding {
         Self {
             subject,
             verdict: Verdict::Fit,
-            found: found.to_string(),
+            // what a peer wrote may stand in it
+            found: clean(&found.to_string()),
             remedy: None,
         }
     }
@@ -89,5 +91,22 @@ mod tests {
         assert!(
             lines[0].starts_with("advised  clock") && lines[1].ends_with("what to do: use tsc")
         );
+    }
+
+    #[test]
+    fn the_words_of_a_peer_steer_no_terminal_and_forge_no_finding() {
+        let hostile = "closed by peer: bye\x1b[2J\r\nfit      slave             answers\u{202e}";
+        let of_peer = [
+            Finding::fit("slave", hostile),
+            Finding::of("slave", Verdict::Unfit, hostile, "look again"),
+        ];
+        for finding in of_peer {
+            let unfit = |c: char| (c.is_control() && c != '\n') || c == '\u{202e}';
+            let shown = finding.to_string();
+            let lines = 1 + usize::from(finding.remedy.is_some());
+            assert!(!shown.contains(unfit), "{shown:?}");
+            assert_eq!(shown.lines().count(), lines, "{shown:?}");
+            assert!(shown.contains("bye?[2J??fit"), "{shown:?}");
+        }
     }
 }

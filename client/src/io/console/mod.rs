@@ -243,3 +243,6 @@ async fn socket(
 fn refuse(refusal: Refusal) -> Response {
     (StatusCode::FORBIDDEN, refusal.to_string()).into_response()
 }
+
+#[cfg(test)]
+mod tests;

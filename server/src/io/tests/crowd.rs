@@ -69,8 +69,8 @@ async fn let_in(from: impl Fn(u32) -> IpAddr) -> usize {
     let host = run(options());
     let pairing = host.pairing.clone();
     let come = async {
-        // they have been at it for a while
-        sleep(Duration::from_secs(1)).await;
+        // they have taken every place
+        sleep(Duration::from_secs(3)).await;
         times_let_in(&pairing, COMES).await
     };
     let let_in = tokio::select! {
