@@ -266,7 +266,8 @@ struct Parts {
 impl Parts {
     fn of(slave: &Slave) -> Self {
         let coupling = slave.settings().coupling;
-        let estimator = |mode| Estimator::new(&EstimatorConfig::of_mode(mode, coupling), coupling);
+        let estimator =
+            |mode| Estimator::new(&EstimatorConfig::of_mode(mode, coupling), coupling, 8.0);
         Self {
             estimators: [estimator(Mode::Paper), estimator(Mode::Recommended)],
             trigger: Trigger::new(TriggerConfig::of_mode(Mode::Recommended)),
