@@ -6,6 +6,7 @@
 
 mod both;
 mod channel;
+mod intake;
 mod master;
 mod record;
 mod session;

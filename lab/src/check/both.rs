@@ -6,7 +6,7 @@ use mmt_shared::record::digest::RunDigest;
 use mmt_shared::time::Time;
 use mmt_shared::wire::{Datagram, Side};
 
-use super::channel::Intake;
+use super::intake::Intake;
 use super::{Invariant, Verdict};
 
 /// What an end counted until the end.

@@ -1,6 +1,6 @@
 //! One end's datagrams: numbers, stamps, echoes, the heartbeat, and for how long either way has been silent.
 
-use std::collections::{BTreeSet, VecDeque};
+use std::collections::VecDeque;
 use std::time::Duration;
 
 use mmt_shared::channel::datagram_channel::DatagramChannel;
@@ -8,12 +8,11 @@ use mmt_shared::time::Time;
 use mmt_shared::wire::{Datagram, Side};
 
 use super::both::Totals;
+use super::intake::Intake;
 use super::{Invariant, Verdict};
 
 /// At least this often something leaves.
 const HEARTBEAT: Duration = Duration::from_millis(50);
-/// Numbers so far behind the newest are not judged by an end, and one so far ahead waits for a second.
-pub(super) const WINDOW: u32 = 1024;
 /// An end remembers its departures 10 ms apart: the first without an answer may be this much older than the one it remembers.
 const DEPARTURES: Duration = Duration::from_millis(20);
 const TENTH: Duration = Duration::from_millis(100);
@@ -26,40 +25,6 @@ struct Newest {
     number: u32,
     sent: Time,
     stopped: bool,
-}
-
-/// Which numbers an end takes: each once, none from long ago, and one far ahead only when another confirms it.
-#[derive(Default)]
-pub(super) struct Intake {
-    seen: BTreeSet<u32>,
-    /// The last number that was too far ahead.
-    far: u32,
-    /// The newest that it took.
-    pub(super) newest: u32,
-}
-
-impl Intake {
-    /// Whether it takes the next that arrives.
-    pub(super) fn takes(&mut self, number: u32) -> bool {
-        let newest = self.newest;
-        let too_far = number.saturating_sub(newest) >= WINDOW;
-        if too_far && (number == self.far || number.abs_diff(self.far) >= WINDOW) {
-            self.far = number;
-            return false;
-        }
-        if number == 0 || newest.saturating_sub(number) >= WINDOW || !self.seen.insert(number) {
-            return false;
-        }
-        while self
-            .seen
-            .first()
-            .is_some_and(|first| newest.saturating_sub(*first) > 2 * WINDOW)
-        {
-            self.seen.pop_first();
-        }
-        self.newest = newest.max(number);
-        true
-    }
 }
 
 /// One end's datagrams.

@@ -16,7 +16,8 @@ use mmt_shared::wire::{Command, Datagram, Message, Side};
 mod hand;
 
 use super::both::Totals;
-use super::channel::{ChannelChecks, WINDOW};
+use super::channel::ChannelChecks;
+use super::intake::WINDOW;
 use super::{Invariant, Verdict};
 
 /// The contract's thresholds, not those of the code.
