@@ -69,7 +69,7 @@ invariants! {
     /// Nothing while stale.
     UpdateStale "update-stale" "no update that came while the link was stale is applied";
     /// Nothing too old.
-    UpdateAge "update-age" "no update is applied that answers a sample of longer ago than the path, play-out and 250 ms";
+    UpdateAge "update-age" "no update is applied that answers a sample of longer ago than the path and 750 ms";
     /// Good updates count.
     UpdateTaken "update-taken" "an accepted update that came while the link was not stale is in use in the next tick";
     /// Numbers of the model.

@@ -133,9 +133,9 @@ fn a_demo_is_recorded_runs_again_and_is_read_by_decoders_that_know_nothing_of_it
             let twice = twice.end(GENEROUS).unwrap();
             assert_eq!(twice.status.code(), Some(2), "{}", twice.err);
             // whichever end began it first
-            let told = ["session 1 of the", "was given before"];
+            let why = ["session 1 of the", "was given before"];
             assert!(
-                told.iter().all(|part| twice.err.contains(part)),
+                why.iter().all(|part| twice.err.contains(part)),
                 "{}",
                 twice.err
             );
@@ -267,13 +267,13 @@ fn a_full_disk_costs_the_record_and_neither_the_session_nor_its_report() {
         let demo = ["demo", "--duration", "8s", "--json"];
         let demo = [&demo[..], &["--record", "/dev/full"]].concat();
         let mut demo = Running::mmt(&demo).unwrap();
-        let is_told = |line: &str| line.contains("the record ends here, the session goes on");
-        let told = demo.wait_for_line(GENEROUS, is_told).unwrap();
-        assert!(told.contains("No space left"), "{told}");
+        let is_reported = |line: &str| line.contains("the record ends here, the session goes on");
+        let message = demo.wait_for_line(GENEROUS, is_reported).unwrap();
+        assert!(message.contains("No space left"), "{message}");
         // at once, and not with the report
-        let told = Instant::now();
+        let reported = Instant::now();
         let ended = demo.end(GENEROUS).unwrap();
-        let went_on = ended.at.duration_since(told);
+        let went_on = ended.at.duration_since(reported);
         assert!(went_on > Duration::from_secs(3), "{went_on:?}");
         let report = ended.document(0).unwrap();
         assert_eq!(report["ending"], "finished");

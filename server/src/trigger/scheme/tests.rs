@@ -61,8 +61,8 @@ fn what_is_wrong_is_named() {
 }
 
 #[test]
-fn a_number_without_its_unit_is_told_that_and_not_a_range() {
-    for (text, told) in [
+fn a_number_without_its_unit_is_answered_with_its_units_and_not_a_range() {
+    for (text, message) in [
         (
             "deadband 10",
             "the deadband '10' has no unit (%), as in 'deadband 10%'",
@@ -80,6 +80,6 @@ fn a_number_without_its_unit_is_told_that_and_not_a_range() {
             "the deadband '0' has no unit (%), as in 'adaptive 10% 50ms'",
         ),
     ] {
-        assert_eq!(text.parse::<Scheme>().unwrap_err().to_string(), told);
+        assert_eq!(text.parse::<Scheme>().unwrap_err().to_string(), message);
     }
 }
