@@ -11,7 +11,7 @@ use std::time::Duration;
 use criterion::{BatchSize, Criterion, criterion_group, criterion_main};
 use mmt_client::commands::CommandConfig;
 use mmt_client::device::DeviceProfile;
-use mmt_client::end::MasterEnd;
+use mmt_client::end::{MasterEnd, MasterGiven};
 use mmt_client::failsafe::LinkState;
 use mmt_client::limiter::ForceLimiter;
 use mmt_client::master::Master;
@@ -105,7 +105,7 @@ impl Haptic {
             // a silent link would release the hand
             self.receive(Message::Heartbeat);
         }
-        let tick = self.end.tick(self.now, reading);
+        let tick = self.end.tick(self.now, &MasterGiven::held_at(reading));
         self.hand_force = tick.hand_force;
         self.contact += u64::from(tick.rendered.in_contact());
         let sent = self.end.poll_transmit(self.now, out).unwrap();

@@ -15,7 +15,7 @@ use mmt_shared::wire::{DecodeError, Side, StreamMessage, Welcome, WelcomeError};
 use serde::{Deserialize, Serialize};
 
 use crate::commands::CommandConfig;
-use crate::end::MasterEnd;
+use crate::end::{MasterEnd, MasterGiven};
 use crate::limiter::{ForceLimiter, Limits};
 use crate::master::{Master, MasterTick as Done};
 
@@ -155,13 +155,13 @@ impl EndAgain for MasterAgain {
     }
 
     fn tick(&mut self, tick: &MasterTick) -> u64 {
-        if tick.releases {
-            self.end.release();
-        }
-        self.end.stop(tick.stops);
-        self.end.hold(tick.engaged);
-        let reading = Vec2::new(tick.reading_x_m, tick.reading_y_m);
-        let done = self.end.tick(Time::from_nanos(tick.deadline_ns), reading);
+        let given = MasterGiven {
+            reading: Vec2::new(tick.reading_x_m, tick.reading_y_m),
+            engaged: tick.engaged,
+            releases: tick.releases,
+            stops: tick.stops,
+        };
+        let done = self.end.tick(Time::from_nanos(tick.deadline_ns), &given);
         self.digest.tick(&done);
         let value = self.digest.value();
         self.done = Some(done);

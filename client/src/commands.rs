@@ -58,17 +58,17 @@ impl CommandConfig {
     /// Names the one that is out of range.
     pub fn check(&self) -> Result<(), OutOfRange> {
         let most = SAMPLES_MAX as f64;
-        let (news, repeats) = (self.samples_per_command, self.repeat_samples);
+        let (new, repeats) = (self.samples_per_command, self.repeat_samples);
         all_in_range([
-            ("samples per command", "", f64::from(news), (1.0, most)),
+            ("samples per command", "", f64::from(new), (1.0, most)),
             ("repeat samples", "", f64::from(repeats), (0.0, most - 1.0)),
         ])
     }
 
     /// The most samples that a command can have.
     pub fn samples_at_most(&self) -> usize {
-        let news = usize::from(self.samples_per_command).max(1);
-        (news * (1 + usize::from(self.repeat_samples))).min(SAMPLES_MAX)
+        let new = usize::from(self.samples_per_command).max(1);
+        (new * (1 + usize::from(self.repeat_samples))).min(SAMPLES_MAX)
     }
 }
 
@@ -149,14 +149,14 @@ impl CommandPacker {
         if self.config.repeat_samples == 0 {
             return self.block;
         }
-        let news = self.block.len();
+        let new = self.block.len();
         let all = if stretch > 1.0 {
-            news
+            new
         } else {
             self.config.samples_at_most()
         };
         let whole = joined(&self.repeated, &self.block, all);
-        let keep = news * usize::from(self.config.repeat_samples);
+        let keep = new * usize::from(self.config.repeat_samples);
         self.repeated = joined(&self.repeated, &self.block, keep.min(SAMPLES_MAX));
         whole
     }

@@ -61,7 +61,7 @@ pub struct MasterCounts {
     pub messages_overtaken: u64,
 }
 
-/// What a tick of the master's end is given besides its deadline.
+/// What a tick of the master's end is given besides its deadline; all that a record has to keep of it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MasterGiven {
     /// The device's HIP, m, world.
@@ -70,8 +70,22 @@ pub struct MasterGiven {
     pub engaged: bool,
     /// Whether the hand is to be released from this tick on.
     pub releases: bool,
-    /// Whether the master's emergency stop is set.
+    /// Whether the master's emergency stop is set. While either side's is there is no force on the hand; afterwards it is
+    /// engaged anew.
     pub stops: bool,
+}
+
+impl MasterGiven {
+    /// A hand holds the device at `reading` (m, world), and nothing else happens.
+    #[must_use]
+    pub fn held_at(reading: Vec2) -> Self {
+        Self {
+            reading,
+            engaged: true,
+            releases: false,
+            stops: false,
+        }
+    }
 }
 
 /// The master's end.
@@ -183,22 +197,6 @@ impl MasterEnd {
         self.change.as_ref()
     }
 
-    /// Begins to ramp the force out: the session ends.
-    pub fn release(&mut self) {
-        self.master.release();
-    }
-
-    /// Whether a hand holds the device from now on ([`Master::hold`]).
-    pub fn hold(&mut self, engaged: bool) {
-        self.master.hold(engaged && self.stopped_by().is_none());
-    }
-
-    /// Sets or clears the master's emergency stop. While either side's is set there is no force on the hand; afterwards it
-    /// is engaged by [`MasterEnd::hold`].
-    pub fn stop(&mut self, stopped: bool) {
-        self.channel.stop(stopped);
-    }
-
     /// Whose emergency stop is set; none if neither's.
     pub fn stopped_by(&self) -> Option<Side> {
         self.channel.stopped_by()
@@ -260,7 +258,8 @@ impl MasterEnd {
         path.is_some_and(|path| TICK * ticks as u32 > path + ANSWER_MAX)
     }
 
-    /// Applies the newest accepted update, as the next tick would; returns what the operator sees of the model then.
+    /// Applies the newest accepted update, as the next tick would; returns what the operator sees of the model then. For a
+    /// hand that looks before it moves.
     pub fn update_model(&mut self) -> View {
         if let Some(update) = self.update.take() {
             let change = self.change_by(&update);
@@ -289,15 +288,21 @@ impl MasterEnd {
         }
     }
 
-    /// One sample period. `now` is the tick's deadline, the stamp of its sample; `reading` the device's HIP (m, world).
-    pub fn tick(&mut self, now: Time, reading: Vec2) -> MasterTick {
+    /// One sample period. `now` is the tick's deadline, the stamp of its sample.
+    pub fn tick(&mut self, now: Time, given: &MasterGiven) -> MasterTick {
         self.update_model();
+        if given.releases {
+            self.master.release();
+        }
+        self.channel.stop(given.stops);
+        let stopped = self.stopped_by().is_some();
+        self.master.hold(given.engaged && !stopped);
         if let Some(answers) = self.answers {
             self.counts.age.push(now, answers);
         }
         let silence = self.channel.silence(now);
-        self.master.stop(self.stopped_by().is_some());
-        let tick = self.master.tick(now, reading, silence);
+        self.master.stop(stopped);
+        let tick = self.master.tick(now, given.reading, silence);
         self.counts.on_hand.push(tick.hand_force);
         self.counts.breaks.push(self.master.view().in_contact);
         self.commands.push(tick.sample, self.channel.stretch());

@@ -37,7 +37,7 @@ pub struct MasterTick {
     /// What the model did.
     pub rendered: Rendered,
     /// Force on the object that is felt, N, before the limiter: the model's (f_m) or, with TDPA, the tool's.
-    pub felt: Vec2,
+    pub displayed: Vec2,
     /// Goes to the device: force on the hand, N, world, limited.
     pub hand_force: Vec2,
     /// The link as this tick saw it.
@@ -222,17 +222,21 @@ impl Master {
         if self.model.not_finite() > 0 {
             self.release();
         }
-        let felt = match &mut self.tdpa {
+        let displayed = match &mut self.tdpa {
             Some(tdpa) => tdpa.step(hip),
             None => rendered.force,
         };
-        let force = ForceCounts::nearest(felt);
+        let force = ForceCounts::nearest(displayed);
         let sample = HipSample {
             stamp,
             hip: counts,
             force,
         };
-        let wanted = if self.stopped { Vec2::zeros() } else { -felt };
+        let wanted = if self.stopped {
+            Vec2::zeros()
+        } else {
+            -displayed
+        };
         let hand_force = self.limiter.limit(wanted);
         if let Some(tdpa) = &mut self.tdpa {
             tdpa.displayed(hand_force);
@@ -242,7 +246,7 @@ impl Master {
             sample,
             port: self.tdpa.as_ref().map(TdpaHand::port),
             rendered,
-            felt,
+            displayed,
             hand_force,
             link: self.link,
         }

@@ -15,7 +15,7 @@ use std::time::Duration;
 use crate::baselines::message::OVERHEAD_BYTES;
 use crate::baselines::{Baseline, Tuning};
 use mmt_client::device::DeviceProfile;
-use mmt_client::operator::scripted::Picture;
+use mmt_client::operator::scripted::VisualFeedback;
 use mmt_server::playout::PlayoutBuffer;
 use mmt_shared::model::settings::{ModelSettings, PoseCorrection};
 use serde::Serialize;
@@ -26,14 +26,14 @@ use bilateral::pushes;
 
 /// What stands between the hand and the object.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Architecture {
+pub enum ComparedArchitecture {
     /// Force crosses the network.
     Bilateral(Baseline),
     /// A model's parameters cross it; how the model's pose is corrected.
     Mediated(PoseCorrection),
 }
 
-impl Architecture {
+impl ComparedArchitecture {
     /// Position–force with passivity control.
     pub const TDPA: Self = Self::Bilateral(Baseline::Tdpa);
     /// The live system's own.
@@ -103,7 +103,7 @@ pub struct DelayRow {
 /// # Errors
 /// As [`run_tuned`].
 pub fn run(
-    architecture: Architecture,
+    architecture: ComparedArchitecture,
     config: &WorldConfig,
     duration: Duration,
 ) -> Result<DelayRow, WorldError> {
@@ -118,18 +118,19 @@ pub fn run(
 /// # Errors
 /// When a number of the configuration is not accepted.
 pub fn run_tuned(
-    architecture: Architecture,
+    architecture: ComparedArchitecture,
     tuning: &Tuning,
     config: &WorldConfig,
     duration: Duration,
 ) -> Result<DelayRow, WorldError> {
     match architecture {
-        Architecture::Bilateral(baseline) => {
-            let mut world = Bilateral::try_new(config, (baseline, tuning), Picture::Delayed)?;
+        ComparedArchitecture::Bilateral(baseline) => {
+            let mut world =
+                Bilateral::try_new(config, (baseline, tuning), VisualFeedback::Delayed)?;
             world.run(duration);
             Ok(bilateral_row(&world, duration))
         }
-        Architecture::Mediated(correction) => {
+        ComparedArchitecture::Mediated(correction) => {
             let device = DeviceProfile::default().used_with(config.stiffness_n_per_m, None)?;
             let settings = ModelSettings {
                 correction,
@@ -179,7 +180,7 @@ fn world_row(mut world: World, duration: Duration) -> DelayRow {
         let in_contact = world.master().view().in_contact;
         let hip = tick.master.sample.hip.metres();
         felt.push_hand(tick.now, hip, -tick.master.hand_force, pushes && in_contact);
-        aligned.push_felt(tick.now, tick.master.felt);
+        aligned.push_felt(tick.now, tick.master.displayed);
         if let Some(slave) = &tick.slave {
             aligned.push_met(slave.stamp, slave.true_force);
             felt.push_tool(slave.stamp, slave.tool, slave.f_s, slave.in_contact);

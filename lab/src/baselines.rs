@@ -50,12 +50,6 @@ impl Baseline {
         matches!(self, Self::DeadbandForce | Self::TdpaDeadband)
     }
 
-    /// Whether the time-domain passivity approach watches the ports.
-    #[must_use]
-    pub const fn has_passivity_control(self) -> bool {
-        matches!(self, Self::Tdpa | Self::TdpaDeadband)
-    }
-
     /// Name in tables and arguments.
     #[must_use]
     pub const fn name(self) -> &'static str {

@@ -27,7 +27,7 @@ mod worlds;
 use crate::experiment::description::Experiment;
 
 /// Every experiment, in the order in which they run.
-pub const ALL: [&Experiment; 21] = [
+pub const ALL: &[&Experiment] = &[
     &physics::PHYSICS,
     &fig5::FIG5,
     &bound::EXPERIMENT,

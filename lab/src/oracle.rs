@@ -128,7 +128,7 @@ fn fewest(start: usize, ends: &[usize]) -> Option<usize> {
 
 #[cfg(test)]
 mod tests {
-    use mmt_shared::model::contact::Coupling;
+    use mmt_shared::fixtures::COUPLING;
     use mmt_shared::model::geometry::Twist;
     use mmt_shared::model::settings::Mode;
     use mmt_shared::rng::Substream;
@@ -176,11 +176,6 @@ mod tests {
         assert_eq!(fewest(2, &[2, 5, 4, 5, 5, 6]), Some(2));
         assert_eq!(fewest(1, &[1, 1, 4, 4]), None, "nothing mends tick 1");
     }
-
-    const COUPLING: Coupling = Coupling {
-        stiffness_n_per_m: 1000.0,
-        damping_ns_per_m: 10.0,
-    };
 
     fn params(c: f64) -> ModelParams {
         ModelParams::of_square(0.7, 3.0, c, 0.36, &COUPLING).unwrap()

@@ -13,7 +13,7 @@ mod motion;
 mod reference;
 
 pub use body::{Body, PhysicsError};
-use motion::{Kind, Motion, Run};
+use motion::{Kind, MeasuredMotion, ReferenceMotion};
 pub use motion::{Source, TracePoint};
 
 /// One row of the table.
@@ -51,10 +51,10 @@ pub struct PhysicsTrace {
 /// # Errors
 /// When the environment does not accept the body, or it has no friction.
 pub fn cases(body: &Body) -> Result<Vec<PhysicsCase>, PhysicsError> {
-    let motions = Motion::all(&body.checked()?);
+    let motions = ReferenceMotion::all(&body.checked()?);
     let mut cases = Vec::new();
     for motion in &motions {
-        let run = Run::of(motion)?;
+        let run = MeasuredMotion::of(motion)?;
         for kind in motion.kinds() {
             cases.push(case(motion, &run, *kind));
         }
@@ -68,10 +68,10 @@ pub fn cases(body: &Body) -> Result<Vec<PhysicsCase>, PhysicsError> {
 /// # Errors
 /// As [`cases`].
 pub fn traces(body: &Body) -> Result<Vec<PhysicsTrace>, PhysicsError> {
-    let motions = Motion::all(&body.checked()?);
+    let motions = ReferenceMotion::all(&body.checked()?);
     let mut traces = Vec::new();
     for motion in &motions {
-        let run = Run::of(motion)?;
+        let run = MeasuredMotion::of(motion)?;
         for kind in motion.kinds() {
             traces.push(PhysicsTrace {
                 case: kind.case,
@@ -83,7 +83,7 @@ pub fn traces(body: &Body) -> Result<Vec<PhysicsTrace>, PhysicsError> {
     Ok(traces)
 }
 
-fn case(motion: &Motion, run: &Run, kind: Kind) -> PhysicsCase {
+fn case(motion: &ReferenceMotion, run: &MeasuredMotion, kind: Kind) -> PhysicsCase {
     let (unit, reference, measured) = if kind.timed {
         ("s", run.reference_seconds, run.measured_seconds)
     } else {

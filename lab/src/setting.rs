@@ -7,7 +7,7 @@
 use std::time::Duration;
 
 use mmt_client::device::DeviceProfile;
-use mmt_client::operator::scripted::{Picture, ScriptedConfig};
+use mmt_client::operator::scripted::{ScriptedConfig, VisualFeedback};
 use mmt_server::playout::PlayoutConfig;
 use mmt_server::sensing::VisionConfig;
 use mmt_server::slave::SlaveConfig;
@@ -203,7 +203,7 @@ pub fn paper_world(mode: Mode, scheme: Scheme) -> WorldConfig {
     };
     WorldConfig {
         operator: ScriptedConfig {
-            view: Picture::Delayed,
+            view: VisualFeedback::Delayed,
             hold_s: 0.0,
             ..ScriptedConfig::default()
         },

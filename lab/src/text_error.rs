@@ -9,14 +9,14 @@ use mmt_shared::spelling;
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub struct TextError {
     what: String,
-    place: Option<Place>,
+    place: Option<Location>,
     /// The option to blame, where it is not the text.
     option: Option<&'static str>,
 }
 
 /// A place in the text.
 #[derive(Clone, Debug, PartialEq, Eq)]
-struct Place {
+struct Location {
     /// From 1.
     line: usize,
     /// Characters of the line before the place.
@@ -31,7 +31,7 @@ impl TextError {
     pub(crate) fn at(text: &str, span: Option<Range<usize>>, what: impl fmt::Display) -> Self {
         Self {
             what: what.to_string().trim_end().to_owned(),
-            place: span.and_then(|span| Place::of(text, &span)),
+            place: span.and_then(|span| Location::of(text, &span)),
             option: None,
         }
     }
@@ -80,7 +80,7 @@ fn meant(message: &str) -> Option<&str> {
     spelling::meant(wrong, words)
 }
 
-impl Place {
+impl Location {
     fn of(text: &str, span: &Range<usize>) -> Option<Self> {
         if span.start > text.len() {
             return None;

@@ -20,7 +20,7 @@ use mmt_shared::report::TrueForce;
 use mmt_shared::time::TICK_S;
 use serde::{Deserialize, Serialize};
 
-use crate::world::{Traffic, World, WorldConfig, WorldError, WorldTick};
+use crate::world::{World, WorldConfig, WorldError, WorldTick, WorldTraffic};
 use recovery::Watch;
 
 /// The first second of contact is the opening: the model starts wrong there.
@@ -124,7 +124,7 @@ pub struct Measured {
     /// From the sending of each update until the master knew it or a newer one.
     pub staleness: Vec<Duration>,
     /// Messages, datagrams and bits that were sent.
-    pub traffic: Traffic,
+    pub traffic: WorldTraffic,
     /// The forces, tick by tick; empty unless the trial is traced.
     pub trace: Vec<TraceRow>,
     /// SHA-256 of the world's event log.

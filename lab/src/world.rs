@@ -11,11 +11,12 @@ use mmt_client::end::{MasterEnd, MasterGiven};
 use mmt_client::limiter::ForceLimiter;
 use mmt_client::master::{Master, MasterTick};
 use mmt_client::operator::Operator;
-use mmt_client::operator::scripted::{Picture, Scripted, View};
+use mmt_client::operator::scripted::{Scripted, View, VisualFeedback};
 use mmt_client::operator::trace::Trace;
 use mmt_netem::link::LinkId;
 use mmt_netem::{Direction, Link, Packet};
 use mmt_server::end::{SlaveEnd, SlaveGiven};
+use mmt_server::plant::PlantAnswer;
 use mmt_server::slave::{Slave, SlaveTick, Substitutes};
 use mmt_shared::metrics::{PoseError, Staleness};
 use mmt_shared::model::geometry::Vec2;
@@ -28,22 +29,22 @@ use crate::check::SessionChecks;
 
 mod config;
 mod datagram;
+pub(crate) mod delayed_view;
 mod delivery;
 mod given;
 mod measures;
 mod outcome;
 mod packets;
-pub(crate) mod picture;
 mod plant;
 mod slave_clock;
 
 pub use config::{WorldConfig, WorldError};
 pub use given::Given;
-pub use outcome::{Outcome, Traffic};
+pub use outcome::{Outcome, WorldTraffic};
 pub use packets::{WorldPacket, WorldPackets};
 
 use datagram::Datagram;
-use picture::{DelayedPicture, scene};
+use delayed_view::{DelayedView, scene};
 use slave_clock::SlaveClock;
 
 /// By how much the slave's clock is ahead of the master's at the start: nothing may depend on it.
@@ -68,7 +69,7 @@ pub struct World {
     operator: Operator,
     hand_force: Vec2,
     /// What the operator looks at, if it is not the local model.
-    picture: Option<DelayedPicture>,
+    delayed_view: Option<DelayedView>,
     up: Link<Datagram>,
     down: Link<Datagram>,
     /// The delay of `down`, without jitter.
@@ -77,6 +78,8 @@ pub struct World {
     staleness: Staleness,
     pose: PoseError,
     log: Sha256,
+    /// What a plant of somebody else's measured, for the next tick of the slave.
+    answer: Option<PlantAnswer>,
     /// Kept where somebody asks for them.
     packets: Option<Box<WorldPackets>>,
     /// They see every tick of every test, and of runs that ask for it.
@@ -146,7 +149,8 @@ impl World {
             master: MasterEnd::new(Time::ZERO + down_delay, master, config.commands()),
             operator,
             hand_force: Vec2::zeros(),
-            picture: (config.operator.view == Picture::Delayed).then(|| DelayedPicture::new(view)),
+            delayed_view: (config.operator.view == VisualFeedback::Delayed)
+                .then(|| DelayedView::new(view)),
             up: Link::try_new(config.up.clone(), config.seed, LinkId::UP)?,
             down: Link::try_new(config.down.clone(), config.seed, LinkId::DOWN)?,
             down_delay,
@@ -157,6 +161,7 @@ impl World {
             staleness: Staleness::default(),
             pose: PoseError::default(),
             log: Sha256::new(),
+            answer: None,
             packets: None,
         })
     }
@@ -213,15 +218,10 @@ impl World {
 
     fn master_tick(&mut self, hip: Option<Vec2>) -> MasterTick {
         let reading = hip.unwrap_or_else(|| self.operated_hip());
-        let tick = self.master.tick(self.now, reading);
+        let given = MasterGiven::held_at(reading);
+        let tick = self.master.tick(self.now, &given);
         self.hand_force = tick.hand_force;
         if self.judges {
-            let given = MasterGiven {
-                reading,
-                engaged: true,
-                releases: false,
-                stops: false,
-            };
             self.checks
                 .master_ticked(self.now, given, &tick, &self.master);
         }
@@ -249,9 +249,9 @@ impl World {
     /// What the operator sees; contact is felt, not seen.
     fn seen(&mut self) -> View {
         let model = self.master().view();
-        let (picture, master) = (self.picture.as_mut(), self.master.master());
-        picture.map_or(model, |picture| {
-            let seen = picture.seen(self.now);
+        let (delayed, master) = (self.delayed_view.as_mut(), self.master.master());
+        delayed.map_or(model, |delayed| {
+            let seen = delayed.seen(self.now);
             View {
                 pose: master.seen_by_hand(seen.pose),
                 in_contact: model.in_contact,
@@ -277,19 +277,19 @@ impl World {
         if others.scheme.is_some() {
             self.checks.slave.other_scheme();
         }
-        let tick = self.slave.tick_with(now, others);
+        let given = SlaveGiven {
+            stops: false,
+            plant: self.answer.take(),
+        };
+        let tick = self.slave.tick_with(now, &given, others);
         if self.judges {
-            let given = SlaveGiven {
-                stops: false,
-                plant: None,
-            };
             self.checks
                 .slave_ticked(now, given, tick.as_ref(), &self.slave);
         }
         if let Some(tick) = &tick {
-            if let Some(picture) = &mut self.picture {
+            if let Some(delayed) = &mut self.delayed_view {
                 let scene = scene(self.slave.slave().environment(), tick.in_contact);
-                picture.show(self.now + self.down_delay, scene);
+                delayed.show(self.now + self.down_delay, scene);
             }
             if let Some(then) = self.master().model().history().at(tick.stamp) {
                 let model = then.motion.pose;
@@ -316,7 +316,7 @@ impl World {
     /// Every number that either side felt or sent goes into the log, bit by bit.
     fn log_tick(&mut self, master: &MasterTick, slave: Option<&SlaveTick>) {
         let mut number = |value: f64| self.log.update(value.to_bits().to_le_bytes());
-        [master.felt, master.hand_force].iter().for_each(|f| {
+        [master.displayed, master.hand_force].iter().for_each(|f| {
             number(f.x);
             number(f.y);
         });

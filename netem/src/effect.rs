@@ -6,7 +6,7 @@
 use std::fmt;
 use std::time::Duration;
 
-use mmt_shared::stats::values::{mean, nearest_rank, standard_deviation};
+use mmt_shared::stats::values::{mean, quantile, standard_deviation};
 use mmt_shared::time::Time;
 use serde::Serialize;
 
@@ -238,7 +238,7 @@ impl Stream {
 fn p99(values: &[f64]) -> Option<f64> {
     let mut sorted = values.to_vec();
     sorted.sort_unstable_by(f64::total_cmp);
-    nearest_rank(&sorted, 0.99)
+    quantile(&sorted, 0.99)
 }
 
 /// One line for a person.

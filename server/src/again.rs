@@ -12,7 +12,7 @@ use mmt_shared::time::Time;
 use mmt_shared::wire::{Claim, DecodeError, Hello, HelloError, Side, StreamMessage};
 use serde::{Deserialize, Serialize};
 
-use crate::end::SlaveEnd;
+use crate::end::{SlaveEnd, SlaveGiven};
 use crate::plant::PlantAnswer;
 use crate::slave::{Memory, SlaveConfig, SlaveError, SlaveTick as Done};
 
@@ -160,12 +160,13 @@ impl EndAgain for SlaveAgain {
 
     fn tick(&mut self, tick: &SlaveTick) -> u64 {
         let now = Time::from_nanos(tick.deadline_ns);
-        if let Ok((_, Some(answer))) = PlantAnswer::read(&NO_TOKEN, &tick.plant) {
-            let anew = tick.plant_anew;
-            self.end.handle_plant(now, &PlantAnswer { anew, ..answer });
-        }
-        self.end.stop(tick.stops);
-        let done = self.end.tick(now);
+        let (anew, read) = (tick.plant_anew, PlantAnswer::read(&NO_TOKEN, &tick.plant));
+        let answer = read.ok().and_then(|(_, answer)| answer);
+        let given = SlaveGiven {
+            stops: tick.stops,
+            plant: answer.map(|answer| PlantAnswer { anew, ..answer }),
+        };
+        let done = self.end.tick(now, &given);
         self.digest.tick(&done);
         let value = self.digest.value();
         self.done = done;

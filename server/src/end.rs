@@ -44,10 +44,11 @@ pub struct SlaveEndConfig {
     pub scene_hz: u8,
 }
 
-/// What a tick of the slave's end is given besides its deadline.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// What a tick of the slave's end is given besides its deadline; all that a record has to keep of it. By default nothing.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SlaveGiven {
-    /// Whether the slave's emergency stop is set, or the plant that is plugged in is silent.
+    /// Whether the slave's emergency stop is set, or the plant that is plugged in is silent. While either side's stop is set
+    /// the tool stands where it is.
     pub stops: bool,
     /// What the plant that is plugged in measured, if it has since the tick before.
     pub plant: Option<PlantAnswer>,
@@ -74,14 +75,10 @@ pub struct SlaveCounts {
     pub messages_overtaken: u64,
 }
 
-/// The slave of a session that a master opens with `hello`: play-out waits as long as its packing needs.
+/// The slave of a session that a master opens with `hello`.
 #[must_use]
 pub fn session_config(config: &SlaveConfig, hello: &Hello) -> SlaveConfig {
-    let playout = config.playout;
-    SlaveConfig {
-        playout: playout.for_session(hello.samples_per_command, hello.architecture),
-        ..config.clone()
-    }
+    config.for_session(hello.samples_per_command, hello.architecture)
 }
 
 /// The slave's end.
@@ -182,11 +179,6 @@ impl SlaveEnd {
         self.config.architecture
     }
 
-    /// Sets or clears the slave's emergency stop. While either side's is set the tool stands where it is.
-    pub fn stop(&mut self, stopped: bool) {
-        self.channel.stop(stopped);
-    }
-
     /// Whose emergency stop is set; none if neither's.
     #[must_use]
     pub fn stopped_by(&self) -> Option<Side> {
@@ -245,11 +237,6 @@ impl SlaveEnd {
         }
     }
 
-    /// Takes in what the plant that is plugged in measured; it came at `now`.
-    pub fn handle_plant(&mut self, now: Time, answer: &PlantAnswer) {
-        self.slave.handle_plant(now, answer);
-    }
-
     /// Where that plant has to move the tool after the newest tick; none in the simulated world.
     #[must_use]
     pub fn plant_command(&self) -> Option<PlantCommand> {
@@ -261,12 +248,21 @@ impl SlaveEnd {
     }
 
     /// One sample period; `now` is the tick's deadline. None before the first HIP sample is due.
-    pub fn tick(&mut self, now: Time) -> Option<SlaveTick> {
-        self.tick_with(now, Substitutes::default())
+    pub fn tick(&mut self, now: Time, given: &SlaveGiven) -> Option<SlaveTick> {
+        self.tick_with(now, given, Substitutes::default())
     }
 
     /// The same with stages of somebody else's.
-    pub fn tick_with(&mut self, now: Time, others: Substitutes<'_>) -> Option<SlaveTick> {
+    pub fn tick_with(
+        &mut self,
+        now: Time,
+        given: &SlaveGiven,
+        others: Substitutes<'_>,
+    ) -> Option<SlaveTick> {
+        if let Some(answer) = &given.plant {
+            self.slave.handle_plant(now, answer);
+        }
+        self.channel.stop(given.stops);
         let silence = self.slave.playout().silence();
         self.disengaged |= silence.is_some_and(|silence| silence >= DISENGAGE);
         let holds = silence.is_some_and(|silence| silence >= HOLD);

@@ -14,7 +14,7 @@ use mmt_shared::report::{Number, SentUpdates, SessionStats, SlaveHalf};
 use mmt_shared::time::Time;
 use mmt_shared::wire::{Message, Side};
 
-/// Updates that a look holds: what a slave that sends every sample makes in half of the time between two looks.
+/// Updates that an observer view holds: what a slave that sends every sample makes in half of the time between two views.
 const RECENT_MAX: usize = 8;
 /// The newest update is sent again after this: no observer acknowledges one, and on a silent path the loss of the last update
 /// would stay.
@@ -51,7 +51,7 @@ impl RecentUpdates {
 
 /// What there is to be seen of a slave at a moment.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Look {
+pub struct ObserverView {
     /// Number of the operator's session; 0 before the first.
     pub session: u64,
     /// What the operator's master was sent.
@@ -67,7 +67,7 @@ pub struct Look {
 pub struct Feed {
     channel: DatagramChannel,
     scene_hz: u8,
-    look: Look,
+    view: ObserverView,
     /// Sequence of the newest update that was taken of this session.
     taken: u32,
     /// The newest update as it was sent: with a sequence of this feed, which goes on across sessions.
@@ -81,14 +81,14 @@ pub struct Feed {
 }
 
 impl Feed {
-    /// A feed from `now` on, with at most `scene_hz` scenes a second (1/s). It begins with the newest update of the look.
+    /// A feed from `now` on, with at most `scene_hz` scenes a second (1/s). It begins with the newest update of the view.
     #[must_use]
-    pub fn new(now: Time, scene_hz: u8, look: &Look) -> Self {
-        let newest = look.updates.newest();
+    pub fn new(now: Time, scene_hz: u8, view: &ObserverView) -> Self {
+        let newest = view.updates.newest();
         Self {
             channel: DatagramChannel::new(Side::Slave, now),
             scene_hz,
-            look: *look,
+            view: *view,
             taken: newest.map_or(0, |update| update.sequence.saturating_sub(1)),
             newest: None,
             update_sent: now,
@@ -101,11 +101,11 @@ impl Feed {
     }
 
     /// Takes in what there is to be seen now.
-    pub fn show(&mut self, look: &Look) {
-        if look.session != self.look.session {
+    pub fn show(&mut self, view: &ObserverView) {
+        if view.session != self.view.session {
             self.taken = 0;
         }
-        self.look = *look;
+        self.view = *view;
     }
 
     /// Takes in a datagram that arrived at `at`.
@@ -144,7 +144,7 @@ impl Feed {
         now: Time,
         out: &mut [u8],
     ) -> Result<Option<usize>, NumbersSpent> {
-        self.channel.stop(self.look.stopped);
+        self.channel.stop(self.view.stopped);
         if let Some(update) = self.take_update() {
             return self.send(now, update, out);
         }
@@ -171,7 +171,7 @@ impl Feed {
 
     /// The next update that the observer has not been sent, with a sequence of this feed.
     fn take_update(&mut self) -> Option<Update> {
-        let update = self.look.updates.after(self.taken)?;
+        let update = self.view.updates.after(self.taken)?;
         self.taken = update.sequence;
         self.sent.sent(update.cause);
         let sequence = self.newest.map_or(0, |newest| newest.sequence) + 1;
@@ -201,13 +201,13 @@ impl Feed {
     /// When the next scene is due; never while there is none that the observer has not been sent.
     fn scene_due(&self) -> Option<Time> {
         let period = SECOND.checked_div(self.scene_hz.into())?;
-        let is_new = self.look.scene.is_some() && self.look.scene != self.scene;
+        let is_new = self.view.scene.is_some() && self.view.scene != self.scene;
         is_new.then(|| self.scene_sent + period)
     }
 
     fn take_due_scene(&mut self, now: Time) -> Option<Scene> {
         self.scene_due().filter(|due| *due <= now)?;
-        (self.scene, self.scene_sent) = (self.look.scene, now);
+        (self.scene, self.scene_sent) = (self.view.scene, now);
         self.scene
     }
 

@@ -6,9 +6,10 @@
 //! the centre to each face. Pure; it must never use the true pose.
 
 mod centre;
+mod contact_force;
 mod contact_frame;
 mod face_map;
-mod felt;
+mod ground_moment;
 mod past;
 mod penetration;
 mod slow;
@@ -17,7 +18,6 @@ mod tangent_tracker;
 mod touch;
 mod track;
 mod tracker;
-mod turning;
 mod vision;
 
 use mmt_shared::model::contact::Coupling;
@@ -34,8 +34,8 @@ use slow::SlowTracker;
 use track::Track;
 use tracker::{BoxTracker, Tracker};
 
+pub use contact_force::ContactForce;
 pub use contact_frame::ContactFrame;
-pub use felt::Felt;
 
 /// Drift of a box that nobody touches, m per square root of a second.
 const REST_DRIFT_M: f64 = 1e-5;
@@ -192,14 +192,14 @@ impl PoseObserver {
         &mut self,
         now: Time,
         tool: Vec2,
-        felt: impl Into<Felt>,
+        force: impl Into<ContactForce>,
         in_contact: bool,
         params: &ModelParams,
     ) {
         match self.tracker {
             _ if !in_contact => self.let_go(params),
-            Tracker::Slow(_) => self.touch_slowly(tool, &felt.into()),
-            _ => self.touch(tool, &felt.into(), params),
+            Tracker::Slow(_) => self.touch_slowly(tool, &force.into()),
+            _ => self.touch(tool, &force.into(), params),
         }
         self.penetration.remember(tool);
         self.past.push(Past {

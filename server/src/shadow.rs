@@ -112,6 +112,18 @@ impl Shadow {
         self.lost
     }
 
+    /// Updates that the master has not acknowledged: those that are lost, and those that it may still acknowledge.
+    #[must_use]
+    pub fn unacknowledged(&self) -> u64 {
+        self.lost + self.waiting()
+    }
+
+    /// Updates that the master may still acknowledge.
+    fn waiting(&self) -> u64 {
+        let waiting = self.sent.iter().filter(|u| u.sequence > self.given_up);
+        waiting.count() as u64
+    }
+
     /// Whether nothing that was sent is on its way.
     #[must_use]
     pub fn nothing_in_flight(&self) -> bool {
@@ -144,7 +156,8 @@ impl Shadow {
     /// Applies an update that is sent now.
     pub fn send(&mut self, update: &Update) {
         if self.sent.len() == SENT_MAX {
-            self.sent.pop_front();
+            let oldest = self.sent.pop_front();
+            self.lost += u64::from(oldest.is_some_and(|u| u.sequence > self.given_up));
         }
         self.sent.push_back(*update);
         self.ahead.apply(update);
@@ -245,8 +258,7 @@ impl Shadow {
             return None;
         }
         let (given_up, cause) = (last.sequence, last.cause);
-        let waiting = self.sent.iter().filter(|u| u.sequence > self.given_up);
-        self.lost += waiting.count() as u64;
+        self.lost += self.waiting();
         self.given_up = given_up;
         self.make_anew();
         Some(cause)

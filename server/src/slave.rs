@@ -9,7 +9,7 @@ use mmt_shared::metrics::ForceMetrics;
 use mmt_shared::model::contact::Coupling;
 use mmt_shared::model::geometry::{Pose, Twist, Vec2};
 use mmt_shared::model::params::ModelState;
-use mmt_shared::model::sample::{ForceCounts, HipSample};
+use mmt_shared::model::sample::ForceCounts;
 use mmt_shared::model::settings::ModelSettings;
 use mmt_shared::model::tool::{HandPort, Scene, Tool};
 use mmt_shared::model::update::Update;
@@ -273,13 +273,6 @@ impl Slave {
     /// Holds the tool where it is, or no longer ([`PlayoutBuffer::hold`]).
     pub fn hold_tool(&mut self, held: bool) {
         self.playout.hold(held);
-    }
-
-    /// Takes in a HIP sample that arrived at `now`, and the newest update that the master had when it
-    /// sent the sample.
-    pub fn handle_sample(&mut self, now: Time, sample: &HipSample, newest_update: u32) {
-        self.playout.push(now, sample);
-        self.shadow.acknowledge(sample, newest_update);
     }
 
     /// From now on the trigger's thresholds and times are `by` as large as configured: the answer to congestion.

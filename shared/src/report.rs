@@ -16,7 +16,7 @@ mod table;
 use serde::Serialize;
 
 use crate::metrics::ForceSummary;
-use crate::wire::Ending;
+use crate::wire::{Ending, Side};
 
 pub use brief::Brief;
 pub use master::{
@@ -177,49 +177,21 @@ impl<C> RunReport<C> {
         }
     }
 
-    /// The path, as the master saw it; of the slave what is known.
-    fn seen_by_master(self, own: SessionStats, slave: Option<&SessionStats>) -> Self {
-        let (loss_up, loss_down) = own.losses(slave);
+    /// The path, as the end of this side saw it; of the other what is known.
+    fn seen_by(self, side: Side, own: SessionStats, other: Option<&SessionStats>) -> Self {
+        let (of_sent, of_received) = own.losses(other);
+        let loss = UpDown::of_sender(side, of_sent, of_received);
+        let unsent_of_other = other.and_then(|other| other.unsent);
+        let unsent = UpDown::of_sender(side, own.unsent, unsent_of_other);
         Self {
-            messages: UpDown {
-                up: own.sent,
-                down: own.received,
-            },
-            wire: UpDown {
-                up: own.wire_sent,
-                down: own.wire_received,
-            },
+            messages: UpDown::of_sender(side, own.sent, own.received),
+            wire: UpDown::of_sender(side, own.wire_sent, own.wire_received),
             link: LinkReport {
                 rtt_ms: own.rtt_ms,
-                loss_up,
-                loss_down,
-                unsent_up: own.unsent,
-                unsent_down: slave.and_then(|slave| slave.unsent),
-                ..self.link
-            },
-            drops: Some(own.drops),
-            ..self
-        }
-    }
-
-    /// The path, as the slave saw it; of the master what is known.
-    fn seen_by_slave(self, own: SessionStats, master: Option<&SessionStats>) -> Self {
-        let (loss_down, loss_up) = own.losses(master);
-        Self {
-            messages: UpDown {
-                up: own.received,
-                down: own.sent,
-            },
-            wire: UpDown {
-                up: own.wire_received,
-                down: own.wire_sent,
-            },
-            link: LinkReport {
-                rtt_ms: own.rtt_ms,
-                loss_up,
-                loss_down,
-                unsent_up: master.and_then(|master| master.unsent),
-                unsent_down: own.unsent,
+                loss_up: loss.up,
+                loss_down: loss.down,
+                unsent_up: unsent.up,
+                unsent_down: unsent.down,
                 ..self.link
             },
             drops: Some(own.drops),
@@ -235,7 +207,7 @@ impl<C> From<MasterSession<C>> for RunReport<C> {
         let slave = session.other.unwrap_or_default();
         Self::of_halves("master", session.configuration, session.own, slave)
             .ended(session.seed, session.duration_s, session.ending)
-            .seen_by_master(own, other.as_ref())
+            .seen_by(Side::Master, own, other.as_ref())
     }
 }
 
@@ -246,7 +218,7 @@ impl<C> From<SlaveSession<C>> for RunReport<C> {
         let master = session.other.unwrap_or_default();
         Self::of_halves("slave", session.configuration, master, session.own)
             .ended(session.seed, session.duration_s, session.ending)
-            .seen_by_slave(own, other.as_ref())
+            .seen_by(Side::Slave, own, other.as_ref())
     }
 }
 
@@ -276,7 +248,7 @@ impl<M, S> RunReport<Both<M, S>> {
             names.map(move |(name, n)| (format!("{side}_{name}"), n))
         };
         let drops = of_side("master", up.drops.clone());
-        let mut report = report.seen_by_master(up, down.as_ref().filter(|_| answered));
+        let mut report = report.seen_by(Side::Master, up, down.as_ref().filter(|_| answered));
         let mut drops: Counts = drops.collect();
         if let Some(down) = down {
             report.link.unsent_down = down.unsent;
@@ -295,6 +267,17 @@ pub struct UpDown<T> {
     pub up: T,
     /// Slave to master.
     pub down: T,
+}
+
+impl<T> UpDown<T> {
+    /// Of what this side sends, and of what the other sends.
+    fn of_sender(side: Side, sent: T, received: T) -> Self {
+        let (up, down) = match side {
+            Side::Master => (sent, received),
+            Side::Slave => (received, sent),
+        };
+        Self { up, down }
+    }
 }
 
 /// Updates: what the trigger sent and what became of it.

@@ -25,7 +25,7 @@ use mmt_client::operator::Operator;
 use mmt_client::operator::pointer::{Driver, HandEvent, HandTuning, Person, PointerSample};
 use mmt_client::operator::scripted::{Scripted, ScriptedConfig};
 use mmt_client::path::PathRecorder;
-use mmt_server::end::{SlaveEnd, SlaveEndConfig};
+use mmt_server::end::{SlaveEnd, SlaveEndConfig, SlaveGiven};
 use mmt_server::estimator::{Estimator, EstimatorConfig, Measured, Seen};
 use mmt_server::playout::{PlayoutBuffer, PlayoutConfig};
 use mmt_server::repeats::Repeats;
@@ -175,7 +175,7 @@ impl Loop {
             self.slave.handle_datagram(now, frame.bytes());
             self.up.push(frame);
         }
-        let tick = self.slave.tick(now);
+        let tick = self.slave.tick(now, &SlaveGiven::default());
         let mut out = [0; DATAGRAM_MAX];
         while let Some(length) = self.slave.poll_transmit(now, &mut out).unwrap() {
             self.network.deliver(now, &out[..length]);

@@ -57,7 +57,7 @@ pub(crate) struct Chosen {
 
 impl Subcommand for Chosen {
     fn augment_subcommands(command: Command) -> Command {
-        let command = command.subcommands(ALL.map(subcommand));
+        let command = command.subcommands(ALL.iter().copied().map(subcommand));
         command.subcommand(Command::new("all").about("All of these, in one folder"))
     }
 
@@ -78,7 +78,7 @@ impl FromArgMatches for Chosen {
         let wanted = |experiment: &&Experiment| {
             experiment.name == name || name == "all" && experiment.in_all
         };
-        let named = ALL.into_iter().filter(wanted);
+        let named = ALL.iter().copied().filter(wanted);
         let named: Vec<&Experiment> = named.collect();
         // `all` takes none of them
         let arguments = named.iter().filter(|experiment| experiment.name == name);
@@ -123,7 +123,8 @@ fn given(argument: &Argument, matches: &ArgMatches) -> Option<(&'static str, f64
 /// The lengths of runs that are not most experiments'.
 fn duration_help() -> String {
     let others = ALL
-        .into_iter()
+        .iter()
+        .copied()
         .filter(|experiment| experiment.duration != DURATION);
     let other = |of: &Experiment| format!("{}: {}s", of.name, of.duration.as_secs());
     let others: Vec<String> = others.map(other).collect();

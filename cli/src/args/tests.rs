@@ -186,11 +186,7 @@ fn every_help_has_examples() {
 
 #[test]
 fn every_experiment_can_be_asked_for_and_all_of_them() {
-    for name in ALL
-        .map(|experiment| experiment.name)
-        .into_iter()
-        .chain(["all"])
-    {
+    for name in ALL.iter().map(|experiment| experiment.name).chain(["all"]) {
         let Ok(Command::Reproduce(reproduce)) = parse(&["reproduce", name]) else {
             panic!("{name}");
         };

@@ -64,7 +64,7 @@ fn felt(master: &MasterLive) -> MasterLive {
 }
 
 /// A console, and what it shows besides the frames.
-pub(super) struct Desk {
+pub(super) struct SessionConsole {
     console: Console,
     about: Map<String, Value>,
     sessions: u64,
@@ -72,7 +72,7 @@ pub(super) struct Desk {
     blind: bool,
 }
 
-impl Desk {
+impl SessionConsole {
     /// Starts a console if the arguments ask for one, or if it is `wanted` without; notes its address.
     ///
     /// # Errors

@@ -4,7 +4,7 @@ use mmt_lab::world::WorldConfig;
 use mmt_netem::Direction;
 
 use super::conclusion::conclude;
-use super::console::Desk;
+use super::console::SessionConsole;
 use super::device::Device;
 use super::master;
 use super::netem::wrap::{Emulation, effect};
@@ -42,13 +42,13 @@ pub(crate) fn run(arguments: &DemoArguments, messages: &Messages) -> Result<(), 
     let record = Record::start(arguments.record.as_deref())?;
     let stop = Stop::on_signals()?;
     let dashboard = !arguments.json && !arguments.emulation.netem_control;
-    let mut desk = Desk::start(
+    let mut console = SessionConsole::start(
         &arguments.console,
         dashboard && Screen::is_there(),
         stop.emergency(),
     )?;
     let emulation = &arguments.emulation;
-    let emulation = Emulation::start(emulation, desk.is_some(), *seed, Some(up), Some(down))?;
+    let emulation = Emulation::start(emulation, console.is_some(), *seed, Some(up), Some(down))?;
     let mut viewer = Viewer::new(Caption::default(), dashboard, messages, &stop);
     let ended = loop {
         let mut round = Round {
@@ -59,7 +59,7 @@ pub(crate) fn run(arguments: &DemoArguments, messages: &Messages) -> Result<(), 
             stop: &stop,
             dashboard,
             viewer: &mut viewer,
-            desk: desk.as_mut(),
+            console: console.as_mut(),
             blind: false,
             again: None,
         };

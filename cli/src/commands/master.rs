@@ -29,7 +29,7 @@ use serde_json::json;
 use tokio::sync::watch;
 
 use super::conclusion::conclude;
-use super::console::{self, Desk};
+use super::console::{self, SessionConsole};
 use super::device::{self, Device};
 use super::host::{Host, spawn};
 use super::netem::wrap::{Emulation, effect};
@@ -65,15 +65,15 @@ pub(crate) fn run(arguments: MasterArguments, messages: &Messages) -> Result<(),
     let wanted = matches!(arguments.operator, OperatorWords::Pointer);
     let stop = Stop::on_signals()?;
     options.emergency = stop.emergency().clone();
-    let mut desk = Desk::start(&arguments.console, wanted, stop.emergency())?;
-    let controlled = desk.is_some();
+    let mut console = SessionConsole::start(&arguments.console, wanted, stop.emergency())?;
+    let controlled = console.is_some();
     let emulation = Emulation::start(&arguments.emulation, controlled, seed, Some(&link), None)?;
     options.netem_extras = emulation.extras(Direction::Up);
     let dashboard = !arguments.json && !emulation.takes_orders();
     options.scene_hz = Viewer::scene_hz(dashboard);
-    if let Some(desk) = &desk {
+    if let Some(console) = &console {
         options.scene_hz = console::SCENE_HZ;
-        options.events = std::sync::Mutex::new(Some(desk.events()));
+        options.events = std::sync::Mutex::new(Some(console.events()));
     }
     if !link.is_transparent() {
         note(effect(Direction::Up, &link)?);
@@ -82,18 +82,18 @@ pub(crate) fn run(arguments: MasterArguments, messages: &Messages) -> Result<(),
     arguments.transport.warning().into_iter().for_each(note);
     let path = options.path.clone();
     let (host, live) = start(options, stop.receiver())?;
-    if let Some(desk) = &mut desk {
+    if let Some(console) = &mut console {
         let shown = live.clone();
-        desk.show(&caption, move || *shown.borrow(), || None);
-        show_network(desk, &link);
-        caption.setting = format!("{}  {}", desk.address(), caption.setting);
+        console.show(&caption, move || *shown.borrow(), || None);
+        show_network(console, &link);
+        caption.setting = format!("{}  {}", console.address(), caption.setting);
     }
     let mut viewer = Viewer::new(caption, dashboard, messages, &stop);
     while host.is_running() {
         let master = Some(*live.borrow());
         viewer.look(None, master);
-        if let Some(desk) = &mut desk {
-            attend(desk, &stop, &emulation, &mut link);
+        if let Some(console) = &mut console {
+            attend(console, &stop, &emulation, &mut link);
         }
     }
     drop(viewer);
@@ -119,18 +119,18 @@ fn caption(options: &MasterOptions) -> Caption {
     }
 }
 
-fn show_network(desk: &mut Desk, link: &LinkConfig) {
-    desk.show_about([("network", json!({"up": link.to_string()}))]);
+fn show_network(console: &mut SessionConsole, link: &LinkConfig) {
+    console.show_about([("network", json!({"up": link.to_string()}))]);
 }
 
 /// Does what viewers ask for.
-fn attend(desk: &mut Desk, stop: &Stop, emulation: &Emulation, link: &mut LinkConfig) {
-    while let Some(order) = desk.next_order() {
+fn attend(console: &mut SessionConsole, stop: &Stop, emulation: &Emulation, link: &mut LinkConfig) {
+    while let Some(order) = console.next_order() {
         match order {
             Order::End => stop.end(),
             Order::Network(wish) => {
-                desk.change_networks(&wish, emulation, [Some(link), None]);
-                show_network(desk, link);
+                console.change_networks(&wish, emulation, [Some(link), None]);
+                show_network(console, link);
             }
             // the object is another host's
             Order::Restart(_) | Order::Study(_) => {}

@@ -9,7 +9,7 @@ use mmt_shared::report::RunReport;
 use tokio::sync::watch;
 
 use super::conclusion::conclude;
-use super::console::{self, Desk};
+use super::console::{self, SessionConsole};
 use super::host::{Host, spawn};
 use super::master::{host_failure, judge, pairing};
 use super::netem::wrap::{Emulation, effect};
@@ -41,8 +41,8 @@ pub(crate) fn run(arguments: &MasterArguments, messages: &Messages) -> Result<()
     }
     arguments.transport.warning().into_iter().for_each(note);
     let dashboard = !arguments.json && !emulation.takes_orders();
-    let mut desk = Desk::start(&arguments.console, false, stop.emergency())?;
-    options.scene_hz = match &desk {
+    let mut console = SessionConsole::start(&arguments.console, false, stop.emergency())?;
+    options.scene_hz = match &console {
         Some(_) => console::SCENE_HZ,
         None => Viewer::scene_hz(dashboard).max(SCENE_HZ),
     };
@@ -54,10 +54,10 @@ pub(crate) fn run(arguments: &MasterArguments, messages: &Messages) -> Result<()
         truth: None,
     };
     let (host, live) = start(options, stop.receiver())?;
-    if let Some(desk) = &mut desk {
+    if let Some(console) = &mut console {
         let shown = live.clone();
-        desk.show_observer(&caption, move || *shown.borrow());
-        caption.setting = format!("{}  {}", desk.address(), caption.setting);
+        console.show_observer(&caption, move || *shown.borrow());
+        caption.setting = format!("{}  {}", console.address(), caption.setting);
     }
     let mut viewer = Viewer::new(caption, dashboard, messages, &stop);
     while host.is_running() {

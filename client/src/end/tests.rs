@@ -69,7 +69,7 @@ fn datagram(slave: &mut DatagramChannel, now: Time, what: Message) -> Vec<u8> {
 
 /// Ticks once and returns what the end sends, as the slave reads it.
 fn tick(end: &mut MasterEnd, slave: &mut DatagramChannel, ms: u64) -> Vec<Message> {
-    end.tick(AT(ms), Vec2::new(-0.3, 0.0));
+    end.tick(AT(ms), &MasterGiven::held_at(Vec2::new(-0.3, 0.0)));
     let mut out = [0; DATAGRAM_MAX];
     let mut all = Vec::new();
     while let Some(length) = end.poll_transmit(AT(ms), &mut out).unwrap() {
@@ -172,7 +172,7 @@ fn each_cause_for_which_an_update_is_not_applied_has_a_name_of_its_own() {
     let mut lost = |end: &mut MasterEnd, from_ms: u64, to_ms: u64| {
         for ms in from_ms..=to_ms {
             let mut out = [0; DATAGRAM_MAX];
-            end.tick(AT(ms), Vec2::new(-0.3, 0.0));
+            end.tick(AT(ms), &MasterGiven::held_at(Vec2::new(-0.3, 0.0)));
             while let Some(length) = end.poll_transmit(AT(ms), &mut out).unwrap() {
                 newest = out[..length].to_vec();
             }
@@ -278,7 +278,7 @@ fn a_heartbeat_goes_out_when_nothing_else_did() {
     for ms in 1..=120 {
         let mut out = [0; DATAGRAM_MAX];
         let now = Time::ZERO + TICK * ms;
-        end.tick(AT(1), Vec2::zeros());
+        end.tick(AT(1), &MasterGiven::held_at(Vec2::zeros()));
         while let Some(length) = end.poll_transmit(now, &mut out).unwrap() {
             sent.push((ms, slave.handle(now, &out[..length]).unwrap().message));
         }

@@ -26,7 +26,6 @@ use crate::end::{MasterEnd, MasterGiven};
 use crate::failsafe::LinkState;
 use crate::master::MasterTick;
 use crate::operator::Operator;
-use crate::operator::scripted::View;
 use crate::path::PathRecorder;
 
 mod snapshot;
@@ -171,25 +170,14 @@ impl HapticLoop {
         self.receive(side);
         self.handle_events(stamp);
         let releases = self.consider_end(side.is_stopped());
-        let view = self.end.update_model();
-        let stops = self.emergency.is_set();
-        self.end.stop(stops);
-        let reading = self.read_hand(period, &view);
-        let engaged = self.operator.engaged();
-        self.end.hold(engaged);
-        let done = self.end.tick(stamp, reading);
+        let given = self.read_hand(period, releases);
+        let done = self.end.tick(stamp, &given);
         self.hand_force = done.hand_force;
         self.judge_pose();
         self.judge_tick(done.link);
         self.give_device(&done);
         let sent = now();
         if let Some(record) = &mut self.record {
-            let given = MasterGiven {
-                reading,
-                engaged,
-                releases,
-                stops,
-            };
             record.ticked(Ticked {
                 tick,
                 given,
@@ -210,14 +198,21 @@ impl HapticLoop {
         }
     }
 
-    /// Where the hand is, m; where it was, while the end is stopped.
-    fn read_hand(&mut self, period: Duration, view: &View) -> Vec2 {
-        if self.end.stopped_by().is_some() {
+    /// What the tick is given: the hand is where it was while either side's emergency stop is set.
+    fn read_hand(&mut self, period: Duration, releases: bool) -> MasterGiven {
+        let view = self.end.update_model();
+        let stops = self.emergency.is_set();
+        if stops || self.end.channel().other().stopped {
             self.operator.stand(period);
         } else {
-            self.reading = self.operator.step(self.elapsed, view, self.hand_force);
+            self.reading = self.operator.step(self.elapsed, &view, self.hand_force);
         }
-        self.reading
+        MasterGiven {
+            reading: self.reading,
+            engaged: self.operator.engaged(),
+            releases,
+            stops,
+        }
     }
 
     /// Notes the reason if a tick has shown that the session cannot go on.
@@ -335,9 +330,6 @@ impl HapticLoop {
             self.why.get_or_insert(SessionEnd::OperatorFinished);
         }
         self.releasing = self.why.is_some() || is_stopped;
-        if self.releasing {
-            self.end.release();
-        }
         self.releasing
     }
 }

@@ -78,7 +78,7 @@ impl Topics for MasterTopics {
         let hip = done.sample.hip.metres();
         let hip = Standard::Pose(Pose::new(hip.x, hip.y, 0.0));
         out.put_standard("/master/hip", stamp, hip);
-        out.put_standard("/master/force", stamp, Standard::Force(done.felt));
+        out.put_standard("/master/force", stamp, Standard::Force(done.displayed));
         out.put_standard(
             "/master/hand_force",
             stamp,
@@ -105,8 +105,8 @@ fn message(about: &TickAbout, tick: &Ticked<MasterGiven, MasterTick>) -> TickMes
         sent_ns: tick.sent.as_nanos(),
         hip_x_m: hip.x,
         hip_y_m: hip.y,
-        f_m_x_n: done.felt.x,
-        f_m_y_n: done.felt.y,
+        f_m_x_n: done.displayed.x,
+        f_m_y_n: done.displayed.y,
         hand_x_n: done.hand_force.x,
         hand_y_n: done.hand_force.y,
         in_contact: done.rendered.in_contact(),

@@ -20,7 +20,7 @@ use super::route;
 use nudge_policy::NudgePolicy;
 use push_profile::PushProfile;
 
-pub use config::{Picture, ScriptedConfig};
+pub use config::{ScriptedConfig, VisualFeedback};
 pub use view::{Phase, View};
 
 /// A push or an approach that takes longer is given up, s: the box is blocked or not there.

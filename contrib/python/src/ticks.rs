@@ -81,7 +81,7 @@ impl Ticks {
         self.time.push(tick.now.as_secs_f64());
         self.hip
             .extend_from_slice(master.sample.hip.metres().as_slice());
-        self.f_m.extend_from_slice(master.felt.as_slice());
+        self.f_m.extend_from_slice(master.displayed.as_slice());
         self.hand_force
             .extend_from_slice(master.hand_force.as_slice());
         self.touching.push(master.rendered.in_contact());

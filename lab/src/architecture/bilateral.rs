@@ -14,7 +14,7 @@ use mmt_client::device::DeviceProfile;
 use mmt_client::limiter::ForceLimiter;
 use mmt_client::master::PortObserver;
 use mmt_client::operator::Operator;
-use mmt_client::operator::scripted::{Phase, Picture, Scripted};
+use mmt_client::operator::scripted::{Phase, Scripted, VisualFeedback};
 use mmt_netem::config::{LinkConfig, Loss};
 use mmt_netem::counters::Tally;
 use mmt_netem::link::LinkId;
@@ -27,7 +27,7 @@ use mmt_shared::time::{TICK, Time};
 
 use super::aligned::AlignedError;
 use super::felt::FeltMasses;
-use crate::world::picture::{DelayedPicture, scene};
+use crate::world::delayed_view::{DelayedView, scene};
 use crate::world::{WorldConfig, WorldError};
 
 /// Least smoothing of waves on a path with jitter or loss, ticks: several packets that are lost in a row.
@@ -65,8 +65,8 @@ pub struct Bilateral {
     pub(super) hand_force: Vec2,
     up: Link<ToSlave>,
     down: Link<ToMaster>,
-    picture: DelayedPicture,
-    picture_delay: Duration,
+    delayed_view: DelayedView,
+    view_delay: Duration,
     /// From a tick of the tool's to the tick in which the hand has its force: what is sent in a tick is there in the
     /// next at the soonest.
     way_down: Duration,
@@ -77,15 +77,15 @@ pub struct Bilateral {
 impl Bilateral {
     /// A world at time zero with the scripted operator.
     ///
-    /// There is no local model to look at: [`Picture::Delayed`] is what arrives, at the link's delay and without loss
-    /// or jitter; [`Picture::Model`] is the scene as it is, which no operator at a distance could see.
+    /// There is no local model to look at: [`VisualFeedback::Delayed`] is what arrives, at the link's delay and without loss
+    /// or jitter; [`VisualFeedback::Model`] is the scene as it is, which no operator at a distance could see.
     ///
     /// # Errors
     /// When a number of the configuration is not accepted.
     pub fn try_new(
         config: &WorldConfig,
         (baseline, tuning): (Baseline, &Tuning),
-        picture: Picture,
+        visual_feedback: VisualFeedback,
     ) -> Result<Self, WorldError> {
         let device = DeviceProfile::default().used_with(config.stiffness_n_per_m, None)?;
         let smoothing_up = smoothing_ticks(&config.up);
@@ -120,10 +120,10 @@ impl Bilateral {
             hand_force: Vec2::zeros(),
             up: Link::try_new(config.up.clone(), config.seed, LinkId::UP)?,
             down: Link::try_new(config.down.clone(), config.seed, LinkId::DOWN)?,
-            picture: DelayedPicture::new(view),
-            picture_delay: match picture {
-                Picture::Delayed => down_delay,
-                Picture::Model => Duration::ZERO,
+            delayed_view: DelayedView::new(view),
+            view_delay: match visual_feedback {
+                VisualFeedback::Delayed => down_delay,
+                VisualFeedback::Model => Duration::ZERO,
             },
             way_down: down_delay.max(TICK),
             outcome: BilateralOutcome::default(),
@@ -153,7 +153,7 @@ impl Bilateral {
     /// One millisecond with the scripted operator, in the order of [`crate::world::World::step`].
     pub fn step(&mut self) -> Option<BilateralSlaveTick> {
         let elapsed = self.now.saturating_since(Time::ZERO);
-        let view = self.picture.seen(self.now + TICK);
+        let view = self.delayed_view.seen(self.now + TICK);
         let hip = self.operator.step(elapsed, &view, self.hand_force);
         let pushes = pushes(&self.operator) && view.in_contact;
         self.step_at(hip, pushes)
@@ -203,7 +203,7 @@ impl Bilateral {
         let made_j = outcome.hand_port.energy_j() - outcome.tool_port.energy_j();
         outcome.network_min_j = outcome.network_min_j.min(made_j);
         let scene = scene(self.slave.environment(), tick.in_contact);
-        self.picture.show(self.now + self.picture_delay, scene);
+        self.delayed_view.show(self.now + self.view_delay, scene);
         Some(tick)
     }
 }

@@ -25,13 +25,13 @@ fn over(words: &str, k_p: f64, seed: u64) -> WorldConfig {
 fn plain(
     config: &WorldConfig,
     baseline: Baseline,
-    picture: Picture,
+    visual_feedback: VisualFeedback,
 ) -> Result<Bilateral, WorldError> {
-    Bilateral::try_new(config, (baseline, &Tuning::default()), picture)
+    Bilateral::try_new(config, (baseline, &Tuning::default()), visual_feedback)
 }
 
 /// Runs of three seeds over one delay.
-fn rows(architecture: Architecture, one_way_ms: u64, k_p: f64) -> Vec<DelayRow> {
+fn rows(architecture: ComparedArchitecture, one_way_ms: u64, k_p: f64) -> Vec<DelayRow> {
     let words = format!("delay {one_way_ms}ms");
     (1..=3)
         .map(|seed| run(architecture, &over(&words, k_p, seed), RUN).unwrap())
@@ -43,7 +43,7 @@ fn mean(rows: &[DelayRow], of: impl Fn(&DelayRow) -> Option<f64>) -> f64 {
     values::mean(rows.iter().filter_map(of)).unwrap_or(f64::NAN)
 }
 
-fn print(architecture: Architecture, one_way_ms: u64, k_p: f64, rows: &[DelayRow]) {
+fn print(architecture: ComparedArchitecture, one_way_ms: u64, k_p: f64, rows: &[DelayRow]) {
     let pushes: u64 = rows.iter().map(|row| row.pushes).sum();
     println!(
         "{:18} {k_p:4} N/m {one_way_ms:4} ms {pushes:3} pushes {:6.2} breaks {:5.2} N peak {:6.3} error {:7.1} packets/s \
@@ -63,7 +63,7 @@ fn print(architecture: Architecture, one_way_ms: u64, k_p: f64, rows: &[DelayRow
 #[test]
 fn what_watches_its_energy_makes_none_and_what_does_not_breaks_contact() {
     for baseline in Baseline::ALL {
-        let architecture = Architecture::Bilateral(baseline);
+        let architecture = ComparedArchitecture::Bilateral(baseline);
         let mut peak_at_zero_n = 0.0;
         for one_way_ms in [0, 1, 2, 5, 10, 14, 20, 50, 100, 250] {
             let rows = rows(architecture, one_way_ms, 1000.0);
@@ -83,7 +83,10 @@ fn what_watches_its_energy_makes_none_and_what_does_not_breaks_contact() {
                 };
                 assert!((least..most).contains(&mass), "{baseline:?}: {mass}");
             }
-            let watched = baseline.has_passivity_control() || baseline == Baseline::Waves;
+            let watched = matches!(
+                baseline,
+                Baseline::Tdpa | Baseline::TdpaDeadband | Baseline::Waves
+            );
             if watched {
                 assert!(
                     made_mj > -1.0,
@@ -114,7 +117,7 @@ fn what_watches_its_energy_makes_none_and_what_does_not_breaks_contact() {
 
 /// The least one-way delay of `tried` with more than two breaks per push at position–force.
 fn limit_ms(k_p: f64, tried: impl IntoIterator<Item = u64>) -> Option<u64> {
-    let architecture = Architecture::Bilateral(Baseline::PositionForce);
+    let architecture = ComparedArchitecture::Bilateral(Baseline::PositionForce);
     tried.into_iter().find(|one_way_ms| {
         let rows = rows(architecture, *one_way_ms, k_p);
         print(architecture, *one_way_ms, k_p, &rows);
@@ -137,7 +140,7 @@ fn position_force_limit_cycles_beyond_a_delay_that_falls_with_stiffness() {
 #[test]
 fn without_delay_position_force_is_direct_coupling() {
     let config = over("delay 0ms", 1000.0, 1);
-    let mut world = plain(&config, Baseline::PositionForce, Picture::Delayed).unwrap();
+    let mut world = plain(&config, Baseline::PositionForce, VisualFeedback::Delayed).unwrap();
     let start = world.operator.start();
     let (mut sensed, mut touched) = (Vec2::zeros(), 0);
     for n in 0..8000 {
@@ -166,28 +169,29 @@ fn without_delay_position_force_is_direct_coupling() {
 #[test]
 fn a_run_is_a_function_of_its_configuration_and_of_what_the_operator_sees() {
     let config = over("delay 100ms 5ms loss 5%", 1000.0, 7);
-    for architecture in Architecture::ALL {
+    for architecture in ComparedArchitecture::ALL {
         let row = || run(architecture, &config, Duration::from_secs(6)).unwrap();
         assert_eq!(row(), row(), "{}", architecture.name());
     }
-    let error = |picture| {
-        let mut world = plain(&config, Baseline::Waves, picture).unwrap();
+    let error = |visual_feedback| {
+        let mut world = plain(&config, Baseline::Waves, visual_feedback).unwrap();
         world.run(Duration::from_secs(6));
         world.force().relative_error
     };
-    assert_ne!(error(Picture::Delayed), error(Picture::Model));
+    assert_ne!(error(VisualFeedback::Delayed), error(VisualFeedback::Model));
 }
 
 #[test]
 fn mediated_architectures_give_the_same_columns() {
-    for architecture in &Architecture::ALL[Baseline::ALL.len()..] {
+    for architecture in &ComparedArchitecture::ALL[Baseline::ALL.len()..] {
         for one_way_ms in [0, 50, 250] {
             let rows = rows(*architecture, one_way_ms, 1000.0);
             print(*architecture, one_way_ms, 1000.0, &rows);
             for row in rows {
                 assert!(row.pose_rms_mm.unwrap() < 50.0);
                 assert!(row.packet_rate_hz < 100.0 && row.wire_rate_hz > row.packet_rate_hz);
-                let replay = *architecture == Architecture::Mediated(PoseCorrection::Replay);
+                let replay =
+                    *architecture == ComparedArchitecture::Mediated(PoseCorrection::Replay);
                 assert!(!replay || row.breaks_per_push.unwrap() < 1.5);
                 assert!(!replay || row.apparent_mass_ratio.unwrap() < 1.5);
             }
@@ -207,7 +211,7 @@ fn least_with_random_hand(baseline: Baseline, words: &str, noise_n: f64, seed: u
     };
     let mut config = over(words, 1000.0, seed);
     config.slave.sensing.force_noise_n = noise_n;
-    let mut world = plain(&config, baseline, Picture::Delayed).unwrap();
+    let mut world = plain(&config, baseline, VisualFeedback::Delayed).unwrap();
     let mut wish = world.operator.start();
     let mut hand = Hand::new(hand, seed, wish);
     let mut velocity = Vec2::zeros();
@@ -269,8 +273,8 @@ fn tdpa_and_the_model_cross_at_a_short_delay_and_a_stiff_device_breaks_contact_w
                 print(architecture, one_way_ms, k_p, &rows);
                 rows
             };
-            let tdpa = of(Architecture::Bilateral(Baseline::Tdpa));
-            let mmt = of(Architecture::Mediated(PoseCorrection::Replay));
+            let tdpa = of(ComparedArchitecture::Bilateral(Baseline::Tdpa));
+            let mmt = of(ComparedArchitecture::Mediated(PoseCorrection::Replay));
             let error = |rows: &[DelayRow]| mean(rows, |row| row.relative_error);
             let crosses_ms = if k_p > 1000.0 { 5 } else { 8 };
             assert_eq!(
@@ -298,7 +302,7 @@ fn the_live_master_feels_the_tool_from_the_first_sample_and_makes_no_energy() {
             let touches = tick.slave.is_some_and(|slave| slave.in_contact);
             touched_ms = touched_ms.or(touches.then_some(ms));
             // before, the hand feels the drag that pays its port's reserve
-            let felt = touched_ms.is_some() && tick.master.felt.norm() > 0.1;
+            let felt = touched_ms.is_some() && tick.master.displayed.norm() > 0.1;
             felt_ms = felt_ms.or(felt.then_some(ms));
         }
         let outcome = world.outcome();

@@ -71,7 +71,7 @@ pub struct SlaveChecks {
     /// The tool's velocity as if it had gone its way in one tick, m/s.
     velocity_before: Vec2,
     /// What the tool felt in the tick before, N.
-    felt: Vec2,
+    f_s: Vec2,
     /// Whether the force sensor is broken, and whether the force may still be what it was then.
     sensor_broken: bool,
     unmeasured: bool,
@@ -124,7 +124,7 @@ impl SlaveChecks {
             tool: about.tool,
             velocity: Some(Vec2::zeros()),
             velocity_before: Vec2::zeros(),
-            felt: Vec2::zeros(),
+            f_s: Vec2::zeros(),
             sensor_broken: false,
             unmeasured: false,
             stopped: false,
@@ -258,7 +258,7 @@ impl SlaveChecks {
             self.judge_play(tick.now, done);
             self.judge_trigger(tick, done);
             self.judge_update(tick.now, done);
-            (self.tool, self.felt) = (done.tool, done.f_s);
+            (self.tool, self.f_s) = (done.tool, done.f_s);
         }
         self.judge_counters(tick);
         let confirmed = tick.end.slave().shadow().newest_confirmed();

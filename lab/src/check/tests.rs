@@ -108,17 +108,11 @@ impl Shown {
             self.master.handle_datagram(now, bytes);
             self.checks.came_down(now, bytes);
         }
-        self.master.hold(true);
-        let mut done = self.master.tick(now, hip);
+        let given = MasterGiven::held_at(hip);
+        let mut done = self.master.tick(now, &given);
         if let (Change::Master(change), true) = (self.change, shown) {
             change(&mut done);
         }
-        let given = MasterGiven {
-            reading: hip,
-            engaged: true,
-            releases: false,
-            stops: false,
-        };
         self.checks.master_ticked(now, given, &done, &self.master);
         let mut up = Vec::new();
         let mut out = [0; DATAGRAM_MAX];
@@ -149,12 +143,11 @@ impl Shown {
             self.checks
                 .came_up(now, &changed(bytes, Side::Master, change.filter(|_| shown)));
         }
-        self.slave.stop(stops);
-        let mut done = self.slave.tick(now);
+        let given = SlaveGiven { stops, plant: None };
+        let mut done = self.slave.tick(now, &given);
         if let (Change::Slave(change), Some(done), true) = (self.change, &mut done, shown) {
             change(done);
         }
-        let given = SlaveGiven { stops, plant: None };
         self.checks
             .slave_ticked(now, given, done.as_ref(), &self.slave);
         let mut down = Vec::new();

@@ -49,8 +49,8 @@ fn run(runner: &Runner, request: &Request) -> Result<Findings, ExperimentError> 
     runner.keep_table("delay-limits.csv", &limits)?;
     runner.keep_figure("delay.svg", &figure::figure(&groups))?;
 
-    let pictures = measure(runner, request, "delay-view", picture_points())?;
-    let views = tables::views(&pictures);
+    let runs = measure(runner, request, "delay-view", picture_points())?;
+    let views = tables::views(&runs);
     runner.keep_table("delay-view.csv", &views)?;
 
     let near = measure(runner, request, "delay-crossing", crossing::points())?;

@@ -3,7 +3,7 @@
 //! The text leaves choices open, or a reader may take it otherwise. Every combination of them runs the whole of section
 //! IV-B. A claim that holds in all of them does not hang on how the paper is read.
 
-use mmt_client::operator::scripted::Picture;
+use mmt_client::operator::scripted::VisualFeedback;
 use mmt_server::estimator::{EstimatorConfig, ObjectMotion, PaperConfig};
 
 use super::claims::{Claim, Runs, Verdict, claims, points, verdicts};
@@ -28,7 +28,7 @@ pub(super) static READINGS: [Variant; 5] = [
         world.operator.hold_s = 0.4;
     }),
     ("operator sees the local model", |world| {
-        world.operator.view = Picture::Model;
+        world.operator.view = VisualFeedback::Model;
     }),
 ];
 

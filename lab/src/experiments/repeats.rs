@@ -6,7 +6,7 @@
 use mmt_netem::config::LinkConfig;
 use mmt_server::repeats::Repeats;
 use mmt_shared::channel::rate_control::StretchMax;
-use mmt_shared::stats::values::nearest_rank;
+use mmt_shared::stats::values::quantile;
 
 use super::loss::{Loss, link};
 use crate::experiment::prelude::*;
@@ -192,7 +192,7 @@ fn times(runs: &[Measured]) -> Vec<Duration> {
 }
 
 fn stale_ms(group: &Group, share: f64) -> Option<f64> {
-    let stale = nearest_rank(&times(&group.runs), share);
+    let stale = quantile(&times(&group.runs), share);
     stale.map(|time| time.as_secs_f64() * 1e3)
 }
 
@@ -277,7 +277,7 @@ mod tests {
                 .collect()
         };
         let (none, updates) = (runs(Repeats::NONE, 0), runs(Repeats::recommended(), 0));
-        let p95 = |runs: &[Measured]| nearest_rank(&times(runs), 0.95).unwrap();
+        let p95 = |runs: &[Measured]| quantile(&times(runs), 0.95).unwrap();
         let (without, with) = (p95(&none), p95(&updates));
         println!("95 % of updates within {without:?}, with repeats {with:?}");
         assert!(with < without.mul_f64(0.7));

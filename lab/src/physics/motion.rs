@@ -24,7 +24,7 @@ const COAST_MAX_S: f64 = 60.0;
 
 /// Where the body is: displacement (m), or its part along the motion, and angle (rad).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-struct Place {
+struct Displacement {
     shift: f64,
     angle: f64,
 }
@@ -58,13 +58,13 @@ enum What {
 
 /// One motion of one body.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Motion {
+pub(super) struct ReferenceMotion {
     body: Dynamics,
     what: What,
     kinds: &'static [Kind],
 }
 
-impl Motion {
+impl ReferenceMotion {
     /// The motions in the order of the table.
     pub(super) fn all(body: &Dynamics) -> Vec<Self> {
         const PUSH: &[Kind] = &[kind("push", false, false)];
@@ -144,14 +144,14 @@ impl Motion {
     /// What the environment does from tick to tick, and when it comes to rest or the motion ends (s).
     ///
     /// Rest comes between two ticks: at the rate of braking of the last two in which it moved.
-    fn measure(&self) -> Result<(Vec<Place>, f64), PhysicsError> {
+    fn measure(&self) -> Result<(Vec<Displacement>, f64), PhysicsError> {
         let (force, torque, seconds) = self.drive();
         let mut environment = Environment::try_new(self.body.config)?;
         if let What::Coast(v, omega) = self.what {
             environment.set_twist(Twist::new(v, 0.0, omega));
         }
         let ticks = (seconds.unwrap_or(COAST_MAX_S) / TICK_S).round() as usize;
-        let mut motion = vec![Place::default()];
+        let mut motion = vec![Displacement::default()];
         let speed = |twist: Twist| match self.what {
             What::Coast(0.0, _) => twist.angular.abs(),
             _ => twist.linear.norm(),
@@ -165,7 +165,7 @@ impl Motion {
                 What::Push(..) | What::Hold(..) => pose.position.norm(),
             };
             let angle = pose.angle;
-            motion.push(Place { shift, angle });
+            motion.push(Displacement { shift, angle });
             if seconds.is_some() {
                 continue;
             }
@@ -184,7 +184,7 @@ impl Motion {
     }
 
     /// What it should do, each place with its time (s), from the start to the end.
-    fn expect(&self, measured_seconds: f64) -> Vec<(f64, Place)> {
+    fn expect(&self, measured_seconds: f64) -> Vec<(f64, Displacement)> {
         let body = &self.body;
         let slide = |f: f64, v: f64| Line {
             m: body.m,
@@ -197,18 +197,19 @@ impl Motion {
                 let t = end * k as f64 / TRACE_POINTS as f64;
                 let x = line.at(t);
                 let (shift, angle) = if turns { (0.0, x) } else { (x, 0.0) };
-                (t, Place { shift, angle })
+                (t, Displacement { shift, angle })
             };
             (0..=TRACE_POINTS).map(at).collect()
         };
-        let at_rest = |s| vec![(0.0, Place::default()), (s, Place::default())];
+        let at_rest = |s| vec![(0.0, Displacement::default()), (s, Displacement::default())];
         let patch = |force, torque, start: State, seconds| {
             let fine = FinePatch::new(body, force, torque);
             if start == [0.0; 6] && fine.holds() {
                 return at_rest(seconds);
             }
             let states = fine.run(start, seconds, STEPS);
-            let seen = |(t, [shift, _, angle, ..]): (f64, State)| (t, Place { shift, angle });
+            let seen =
+                |(t, [shift, _, angle, ..]): (f64, State)| (t, Displacement { shift, angle });
             states.into_iter().map(seen).collect()
         };
         match self.what {
@@ -256,17 +257,17 @@ fn durations(body: &Dynamics) -> (f64, f64) {
 }
 
 /// A motion, measured and as it should be.
-pub(super) struct Run {
-    measured: Vec<Place>,
-    reference: Vec<(f64, Place)>,
+pub(super) struct MeasuredMotion {
+    measured: Vec<Displacement>,
+    reference: Vec<(f64, Displacement)>,
     /// Time until the body rested or the motion ended, s.
     pub(super) measured_seconds: f64,
     /// The same as it should be, s.
     pub(super) reference_seconds: f64,
 }
 
-impl Run {
-    pub(super) fn of(motion: &Motion) -> Result<Self, PhysicsError> {
+impl MeasuredMotion {
+    pub(super) fn of(motion: &ReferenceMotion) -> Result<Self, PhysicsError> {
         let (measured, measured_seconds) = motion.measure()?;
         let reference = motion.expect(measured_seconds);
         let reference_seconds = reference.last().map_or(0.0, |(t, _)| *t);
@@ -281,7 +282,7 @@ impl Run {
     /// Reference and measured value at the end: angle (rad) or displacement (m).
     pub(super) fn ends(&self, turns: bool) -> (f64, f64) {
         let reference = self.reference.last().map(|(_, place)| place);
-        let end = |place: Option<&Place>| place.map_or(0.0, |place| place.part(turns));
+        let end = |place: Option<&Displacement>| place.map_or(0.0, |place| place.part(turns));
         (end(reference), end(self.measured.last()))
     }
 
@@ -291,7 +292,7 @@ impl Run {
         let stride = last.div_ceil(TRACE_POINTS - 1).max(1);
         let every = self.measured.iter().enumerate();
         let shown = every.filter(|(tick, _)| tick % stride == 0 || *tick == last);
-        let point = |(tick, place): (usize, &Place)| {
+        let point = |(tick, place): (usize, &Displacement)| {
             let t_s = tick as f64 * TICK_S;
             TracePoint {
                 t_s,
@@ -303,24 +304,24 @@ impl Run {
     }
 
     /// The reference between its two nearest instants; after its end it rests.
-    fn expected_at(&self, t: f64) -> Place {
+    fn expected_at(&self, t: f64) -> Displacement {
         let after = self.reference.partition_point(|(at, _)| *at <= t);
         let before = self.reference.get(after.saturating_sub(1));
         match (before, self.reference.get(after)) {
             (Some((t0, a)), Some((t1, b))) => {
                 let share = (t - t0) / (t1 - t0);
-                Place {
+                Displacement {
                     shift: a.shift + (b.shift - a.shift) * share,
                     angle: a.angle + (b.angle - a.angle) * share,
                 }
             }
             (Some((_, place)), None) => *place,
-            _ => Place::default(),
+            _ => Displacement::default(),
         }
     }
 }
 
-impl Place {
+impl Displacement {
     /// The angle, or the displacement.
     fn part(&self, turns: bool) -> f64 {
         if turns { self.angle } else { self.shift }

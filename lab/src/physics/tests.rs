@@ -77,8 +77,8 @@ fn odd_bodies_move_as_the_references_say() {
         body(0.06, 1.0, 0.3, 0.1),
     ] {
         shown(&body);
-        for motion in Motion::all(&body.checked().unwrap()) {
-            let run = Run::of(&motion).unwrap();
+        for motion in ReferenceMotion::all(&body.checked().unwrap()) {
+            let run = MeasuredMotion::of(&motion).unwrap();
             for kind in motion.kinds() {
                 let row = case(&motion, &run, *kind);
                 // a period of 1 ms is that much of a motion that is over soon
@@ -116,8 +116,8 @@ fn the_smallest_and_the_heaviest_body_have_every_row() {
 fn an_environment_that_is_wrong_by_a_tenth_shows() {
     let mut dynamics = Body::DEFAULT.checked().unwrap();
     dynamics.config.friction_coefficient *= 1.1;
-    for motion in Motion::all(&dynamics) {
-        let run = Run::of(&motion).unwrap();
+    for motion in ReferenceMotion::all(&dynamics) {
+        let run = MeasuredMotion::of(&motion).unwrap();
         for kind in motion.kinds() {
             let row = case(&motion, &run, *kind);
             let held = row.case.starts_with("hold");

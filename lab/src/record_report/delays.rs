@@ -1,7 +1,7 @@
 //! Delays of a run: of each way where both ends are there, and round trips by the echoes in what arrived.
 
 use mmt_shared::record::messages::Arrival;
-use mmt_shared::stats::values::nearest_rank;
+use mmt_shared::stats::values::quantile;
 use mmt_shared::wire::{Datagram, Side};
 
 use super::packets::Matched;
@@ -51,7 +51,7 @@ type Spread = (&'static str, Vec<f64>);
 
 /// The delay that a share `q` of sorted delays does not exceed, ms.
 fn quantile_ms(delays: &[f64], q: f64) -> Option<f64> {
-    nearest_rank(delays, q).map(|delay| delay * 1e3)
+    quantile(delays, q).map(|delay| delay * 1e3)
 }
 
 impl Spreads {

@@ -168,7 +168,7 @@ impl<'a> Run<'a> {
 }
 
 fn note_master(digest: &mut RunDigest, done: &MasterTick) {
-    [done.felt, done.hand_force, done.sample.hip.metres()]
+    [done.displayed, done.hand_force, done.sample.hip.metres()]
         .iter()
         .for_each(|vector| note(digest, [vector.x, vector.y]));
 }

@@ -176,30 +176,23 @@ impl Session {
             end.handle_datagram(at, &bytes);
             self.checks.came_down(at, &bytes);
         }
-        let over = self.releasing;
-        if over {
-            end.release();
-        }
         let view = end.update_model();
         let stops = faults.has(Fault::MasterStops);
-        end.stop(stops);
-        if end.stopped_by().is_some() {
+        if stops || end.channel().other().stopped {
             self.operator.stand(TICK);
         } else if !faults.has(Fault::ReadingFrozen) {
             let elapsed = now.saturating_since(self.began);
             self.reading = self.operator.step(elapsed, &view, self.hand_force);
         }
-        let reading = disturbed(self.reading, faults);
-        let engaged = !faults.has(Fault::HandLetsGo);
-        end.hold(engaged);
-        let done = end.tick(now, reading);
-        self.hand_force = done.hand_force;
+        let over = self.releasing;
         let given = MasterGiven {
-            reading,
-            engaged,
+            reading: disturbed(self.reading, faults),
+            engaged: !faults.has(Fault::HandLetsGo),
             releases: over,
             stops,
         };
+        let done = end.tick(now, &given);
+        self.hand_force = done.hand_force;
         self.checks.master_ticked(now, given, &done, end);
         let mut out = [0; DATAGRAM_MAX];
         while let Ok(Some(length)) = end.poll_transmit(now, &mut out) {
@@ -235,13 +228,14 @@ impl Session {
         if self.farewell_ticks > FAREWELL_TICKS {
             return None;
         }
-        let stops = faults.has(Fault::SlaveStops);
-        end.stop(stops);
         let sensors = sensor_faults(faults);
         end.slave_mut().set_sensor_faults(sensors);
         self.checks.slave.set_sensor_broken(sensors.force.is_some());
-        let done = end.tick(slave_now);
-        let given = SlaveGiven { stops, plant: None };
+        let given = SlaveGiven {
+            stops: faults.has(Fault::SlaveStops),
+            plant: None,
+        };
+        let done = end.tick(slave_now, &given);
         self.checks
             .slave_ticked(slave_now, given, done.as_ref(), end);
         let mut out = [0; DATAGRAM_MAX];

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use mmt_shared::stats::values::nearest_rank;
+use mmt_shared::stats::values::quantile;
 use mmt_shared::time::{Time, duration_nanos};
 use sha2::{Digest, Sha256};
 
@@ -131,8 +131,8 @@ impl Log {
         FlowOutcome {
             possible: possible as u64,
             delivered: (self.arrivals.len() - stale) as u64,
-            added_p50_ms: nearest_rank(&added, 0.5).map(millis),
-            added_p99_ms: nearest_rank(&added, 0.99).map(millis),
+            added_p50_ms: quantile(&added, 0.5).map(millis),
+            added_p99_ms: quantile(&added, 0.99).map(millis),
             added_max_ms: added.last().copied().map(millis),
             stale: stale as u64,
             fresh_ms: self.fresh().map(millis),

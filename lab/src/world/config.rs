@@ -101,14 +101,10 @@ impl WorldConfig {
         self.settings.unwrap_or_else(of_mode)
     }
 
-    /// The slave; where the tool may be felt, with the play-out of a session.
+    /// The slave, as in a live session.
     pub(super) fn slave(&self) -> SlaveConfig {
-        let mut slave = self.slave.clone();
-        if self.architecture.feels_tool() {
-            let (packing, architecture) = (self.samples_per_command, self.architecture);
-            slave.playout = slave.playout.for_session(packing, architecture);
-        }
-        slave
+        let samples_per_command = self.commands().samples_per_command;
+        (self.slave).for_session(samples_per_command, self.architecture)
     }
 
     /// How the master sends.

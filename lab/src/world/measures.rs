@@ -11,7 +11,7 @@ use mmt_shared::metrics::ForceSummary;
 use sha2::Digest;
 
 use super::datagram::Datagram;
-use super::{Outcome, Traffic, World};
+use super::{Outcome, World, WorldTraffic};
 use crate::check::Verdict;
 use crate::digest::hex;
 
@@ -41,10 +41,10 @@ impl World {
 
     /// What was sent: messages by kind, and datagrams with bits per second.
     #[must_use]
-    pub fn traffic(&self) -> Traffic {
+    pub fn traffic(&self) -> WorldTraffic {
         let ends = (self.master.channel(), self.slave.channel());
         let repeated = self.slave.counts().repeated;
-        Traffic::of(ends, repeated, self.sent(), self.now.as_secs_f64())
+        WorldTraffic::of(ends, repeated, self.sent(), self.now.as_secs_f64())
     }
 
     /// Datagrams sent up and down, as long as their payload.

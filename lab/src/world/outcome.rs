@@ -34,7 +34,7 @@ pub struct Outcome {
 
 /// The three packet rates of a world, as sent.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Traffic {
+pub struct WorldTraffic {
     /// Messages by kind.
     pub messages: UpDown<MessagesReport>,
     /// Repeats of updates, by the cause of what they repeat.
@@ -43,7 +43,7 @@ pub struct Traffic {
     pub wire: UpDown<WireReport>,
 }
 
-impl Traffic {
+impl WorldTraffic {
     /// Of both ends' channels, master and slave, the slave's repeats and the datagrams of both directions. Every
     /// message is a datagram of its own here; its headers are those of IPv4, UDP and QUIC, whose own packets a world
     /// does not have.

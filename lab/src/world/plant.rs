@@ -11,9 +11,8 @@ impl World {
         self.slave.plant_command()
     }
 
-    /// Takes in what that plant measured.
-    pub fn answer_of_plant(&mut self, answer: &PlantAnswer) {
-        let now = self.slave_clock.at(self.now);
-        self.slave.handle_plant(now, answer);
+    /// What that plant measured, for the next tick of the slave.
+    pub fn answer_of_plant(&mut self, answer: PlantAnswer) {
+        self.answer = Some(answer);
     }
 }

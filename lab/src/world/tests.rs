@@ -266,7 +266,7 @@ mod scenes;
 mod sight;
 
 #[test]
-fn what_the_master_refuses_the_slaves_confirmed_shadow_never_takes_and_both_sides_count() {
+fn what_the_master_refuses_the_slaves_confirmed_shadow_never_takes_and_both_sides_count_it() {
     let config = over(WAN, 1);
     let mut world = World::try_new(&config).unwrap();
     // a device so stiff in damping that no estimate of the box is stable for it
@@ -289,6 +289,9 @@ fn what_the_master_refuses_the_slaves_confirmed_shadow_never_takes_and_both_side
     let drops = world.master.update_drops();
     assert!(sent > 5, "{sent} updates sent");
     assert!(drops.rejected > 5, "{drops:?}");
+    let half = world.slave_end().half(6.0);
+    let refused = half.session.drops["updates_unacknowledged"];
+    assert!(refused > 5, "the slave counts {refused}");
     let newest = world.master.counts().newest_applied;
     assert!(u64::from(newest) < sent, "the last was refused");
     let shadow = world.slave().shadow();

@@ -11,8 +11,8 @@ impl Probability {
     pub const ONE: Self = Self(1_000_000_000);
 
     /// The probability of `parts` in a billion; `None` above one billion.
-    #[must_use]
-    pub fn from_parts_per_billion(parts: u32) -> Option<Self> {
+    #[cfg(test)]
+    pub(crate) fn from_parts_per_billion(parts: u32) -> Option<Self> {
         (parts <= Self::ONE.0).then_some(Self(parts))
     }
 

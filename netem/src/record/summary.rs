@@ -2,13 +2,12 @@
 
 use std::collections::BTreeMap;
 
-use mmt_shared::stats::values::{mean, nearest_rank, standard_deviation};
+use mmt_shared::stats::values::{mean, quantile, standard_deviation};
 use serde::Serialize;
 
 use super::entry::{End, Entry};
 use crate::counters::Tally;
 use crate::direction::Direction;
-use crate::packet::DropCause;
 
 /// Beyond this p99.9 of release lateness the emulation is degraded: more than 0.1 % of its packets left later
 /// than one tick of the loops.
@@ -134,8 +133,8 @@ impl Summary {
         self.sd_ms = standard_deviation(&delays_ms).unwrap_or_default();
         delays_ms.sort_unstable_by(f64::total_cmp);
         late_us.sort_unstable_by(f64::total_cmp);
-        let late = |share| nearest_rank(&late_us, share).unwrap_or_default();
-        self.p99_ms = nearest_rank(&delays_ms, 0.99).unwrap_or_default();
+        let late = |share| quantile(&late_us, share).unwrap_or_default();
+        self.p99_ms = quantile(&delays_ms, 0.99).unwrap_or_default();
         self.lateness_us = [0.5, 0.99, 1.0].map(late);
         self.degraded = late(0.999) > P999_DEGRADED_US;
         self.delay_histogram = histogram(&delays_ms);
@@ -149,12 +148,6 @@ impl Summary {
         let lost = originals.map(|entry| matches!(entry.end, End::Dropped(_)));
         self.loss_bursts = runs(lost);
         self.burst_packets = mean_run(&self.loss_bursts);
-    }
-
-    /// The count of one drop cause.
-    #[must_use]
-    pub fn dropped_by(&self, cause: DropCause) -> u64 {
-        self.dropped.get(cause.name()).copied().unwrap_or(0)
     }
 }
 

@@ -129,7 +129,7 @@ fn a_summary_finds_what_was_configured() {
         .iter()
         .map(|(length, n)| length * n)
         .sum();
-    assert_eq!(in_runs, summary.dropped_by(DropCause::Loss));
+    assert_eq!(in_runs, summary.dropped[DropCause::Loss.name()]);
     assert!(
         summary
             .queue

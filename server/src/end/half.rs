@@ -55,13 +55,14 @@ fn tool(slave: &Slave) -> ToolReport {
     }
 }
 
-fn drops(slave: &Slave) -> [(&'static str, u64); 11] {
+fn drops(slave: &Slave) -> [(&'static str, u64); 12] {
     let playout = slave.playout().counts();
     [
         ("samples_late", playout.late),
         ("samples_duplicate", playout.duplicate),
         ("samples_overflow", playout.overflow),
         ("samples_implausible", playout.implausible),
+        ("updates_unacknowledged", slave.shadow().unacknowledged()),
         ("images_dropped", slave.images_dropped()),
         ("images_too_old", slave.images_too_old()),
         ("estimates_refused", slave.refused_estimates()),

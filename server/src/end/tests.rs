@@ -167,8 +167,9 @@ fn a_port_counts_in_the_newest_command_only_and_where_the_hello_has_spoken_of_on
     let mut master = DatagramChannel::new(Side::Master, Time::ZERO);
     let first = command(&mut master, 1, 1..=1, 0, port(0.1));
     let second = command(&mut master, 2, 2..=2, 0, port(0.2));
-    let feels =
-        |end: &mut SlaveEnd| (3..60).any(|ms| end.tick(AT(ms)).is_some() && end.tool.is_some());
+    let feels = |end: &mut SlaveEnd| {
+        (3..60).any(|ms| end.tick(AT(ms), &SlaveGiven::default()).is_some() && end.tool.is_some())
+    };
     let mut late = end("none", Architecture::Tdpa, 0);
     late.handle_datagram(AT(3), &command(&mut master, 3, 1..=1, 0, None));
     late.handle_datagram(AT(3), &first);
@@ -192,7 +193,7 @@ fn the_tools_state_goes_out_every_tick_and_stands_for_the_heartbeat() {
     end.handle_datagram(AT(1), &bytes);
     let mut tools = 0;
     for ms in 1..=30 {
-        end.tick(AT(ms));
+        end.tick(AT(ms), &SlaveGiven::default());
         for matter in sent(&mut end, &mut master, AT(ms)) {
             tools += u32::from(matches!(matter, Message::Tool(_)));
         }
@@ -215,7 +216,7 @@ fn scenes_are_due_as_often_as_somebody_wants_to_see_them() {
     let bytes = command(&mut master, 51, 1..=10, 0, None);
     end.handle_datagram(AT(51), &bytes);
     for ms in 52..100 {
-        end.tick(AT(ms));
+        end.tick(AT(ms), &SlaveGiven::default());
     }
     assert_eq!(end.scene_due(), Some(AT(100)));
     let scene = sent(&mut end, &mut master, AT(100));
@@ -240,7 +241,10 @@ fn each_update_that_a_tick_made_is_sent_superseded_or_unsent() {
             let bytes = command(&mut master, ms, ms - 9..=ms, 0, None);
             end.handle_datagram(AT(ms), &bytes);
         }
-        made += u64::from(end.tick(AT(ms)).is_some_and(|tick| tick.update.is_some()));
+        made += u64::from(
+            end.tick(AT(ms), &SlaveGiven::default())
+                .is_some_and(|tick| tick.update.is_some()),
+        );
         if ms % 7 == 0 && ms <= 350 {
             sent(&mut end, &mut master, AT(ms));
         }

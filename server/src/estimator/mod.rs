@@ -18,6 +18,7 @@ mod kalman;
 mod limits;
 mod measured;
 mod obstacle;
+mod off_centre;
 mod paper;
 mod quadratic;
 mod quasi_static;
@@ -26,7 +27,6 @@ mod recursive;
 mod surface;
 #[cfg(test)]
 mod tests;
-mod turning;
 mod windowed;
 
 pub use direction::DirectionConfig;

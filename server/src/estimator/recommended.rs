@@ -16,9 +16,9 @@ use super::filter::{Row, StateVariableFilter, stage_weight};
 use super::gate::{Gate, GateConfig, GateState};
 use super::measured::{Measured, Seen};
 use super::obstacle::{Friction, MotionState, Obstacle};
+use super::off_centre;
 use super::recursive::{RecursiveConfig, RecursiveLeastSquares, Verdict};
 use super::surface::{Surface, SurfaceMotion};
-use super::turning;
 
 /// Rows between two copies of the regression. On an obstacle the older copy returns: what was learned while
 /// the object ran up against it is no friction.
@@ -202,8 +202,10 @@ impl RecommendedEstimator {
     fn row(&self, motion: &SurfaceMotion, normal: Vec2, seen: Option<&Seen>) -> Row {
         let speed = self.estimate.speed;
         match seen {
-            Some(seen) if self.gate.slides(speed) => turning::shared(motion, normal, speed, seen),
-            Some(seen) => turning::creeping(motion, normal, seen),
+            Some(seen) if self.gate.slides(speed) => {
+                off_centre::shared(motion, normal, speed, seen)
+            }
+            Some(seen) => off_centre::creeping(motion, normal, seen),
             // the smoothed speed is far from zero, so its sign is v's; creeping is forwards
             None if self.gate.slides(speed) => motion.row.with_sign(speed),
             None => motion.row.with_sign(1.0),

@@ -16,15 +16,15 @@ fn made(sequence: u32) -> Update {
     update(sequence, cause, 7, square_at_rest(0.7, 3.0, 2.0, 0.4))
 }
 
-fn look(session: u64, updates: impl IntoIterator<Item = u32>) -> Look {
-    let mut look = Look {
+fn view(session: u64, updates: impl IntoIterator<Item = u32>) -> ObserverView {
+    let mut view = ObserverView {
         session,
-        ..Look::default()
+        ..ObserverView::default()
     };
     for sequence in updates {
-        look.updates.push(made(sequence));
+        view.updates.push(made(sequence));
     }
-    look
+    view
 }
 
 fn scene(answers_ms: u64) -> Scene {
@@ -66,13 +66,13 @@ fn updates(heard: Vec<Message>) -> Vec<Update<RawState>> {
 #[test]
 fn an_observer_gets_each_update_once_in_order_and_from_then_on_the_newest_once_a_second() {
     let mut observer = Observer::new();
-    let mut feed = Feed::new(AT(0), 0, &look(1, []));
+    let mut feed = Feed::new(AT(0), 0, &view(1, []));
     let heard = updates(observer.hear(AT(1), &mut feed));
     assert_eq!(heard, []);
-    feed.show(&look(1, 1..=3));
+    feed.show(&view(1, 1..=3));
     let heard = updates(observer.hear(AT(2), &mut feed));
     assert_eq!(heard, [1, 2, 3].map(|n| (&made(n)).into()));
-    feed.show(&look(1, 1..=3));
+    feed.show(&view(1, 1..=3));
     let all: Vec<_> = (3..=4003)
         .flat_map(|ms| updates(observer.hear(AT(ms), &mut feed)))
         .collect();
@@ -82,7 +82,7 @@ fn an_observer_gets_each_update_once_in_order_and_from_then_on_the_newest_once_a
 #[test]
 fn who_comes_late_begins_with_the_newest_and_who_misses_more_than_a_look_holds_goes_on_with_the_oldest_of_it()
  {
-    let mut feed = Feed::new(AT(0), 0, &look(1, 1..=40));
+    let mut feed = Feed::new(AT(0), 0, &view(1, 1..=40));
     let mut observer = Observer::new();
     let bodies = |heard: Vec<Update<RawState>>| -> Vec<(u32, Cause)> {
         let of = |update: Update<RawState>| (update.sequence, update.cause);
@@ -90,7 +90,7 @@ fn who_comes_late_begins_with_the_newest_and_who_misses_more_than_a_look_holds_g
     };
     let first = bodies(updates(observer.hear(AT(1), &mut feed)));
     assert_eq!(first, [(1, made(40).cause)]);
-    feed.show(&look(1, 1..=60));
+    feed.show(&view(1, 1..=60));
     let after = bodies(updates(observer.hear(AT(2), &mut feed)));
     let kept = (53..=60).map(|n| made(n).cause);
     assert_eq!(after, (2..=9).zip(kept).collect::<Vec<_>>());
@@ -98,14 +98,14 @@ fn who_comes_late_begins_with_the_newest_and_who_misses_more_than_a_look_holds_g
 
 #[test]
 fn the_next_operators_updates_go_on_with_the_observers_own_numbers() {
-    let mut feed = Feed::new(AT(0), 0, &look(1, [1, 2]));
+    let mut feed = Feed::new(AT(0), 0, &view(1, [1, 2]));
     let mut observer = Observer::new();
-    feed.show(&look(2, []));
+    feed.show(&view(2, []));
     assert_eq!(updates(observer.hear(AT(1), &mut feed)), []);
-    feed.show(&look(2, [1]));
+    feed.show(&view(2, [1]));
     let heard = updates(observer.hear(AT(2), &mut feed));
     assert_eq!(heard.len(), 1);
-    feed.show(&look(3, [1, 2]));
+    feed.show(&view(3, [1, 2]));
     let heard = updates(observer.hear(AT(3), &mut feed));
     let numbers: Vec<_> = heard.iter().map(|update| update.sequence).collect();
     assert_eq!(numbers, [2, 3]);
@@ -114,14 +114,14 @@ fn the_next_operators_updates_go_on_with_the_observers_own_numbers() {
 #[test]
 fn scenes_come_at_the_rate_that_was_asked_for_and_none_twice() {
     for (scene_hz, expected) in [(0, 0), (20, 20), (60, 60)] {
-        let mut feed = Feed::new(AT(0), scene_hz, &look(1, []));
+        let mut feed = Feed::new(AT(0), scene_hz, &view(1, []));
         let mut observer = Observer::new();
         let mut scenes = 0;
         for ms in 0..1000 {
             let scene = Some(scene(ms));
-            feed.show(&Look {
+            feed.show(&ObserverView {
                 scene,
-                ..look(1, [])
+                ..view(1, [])
             });
             let heard = observer.hear(AT(ms), &mut feed);
             scenes += heard
@@ -140,7 +140,7 @@ fn scenes_come_at_the_rate_that_was_asked_for_and_none_twice() {
 
 #[test]
 fn while_nothing_happens_heartbeats_go_twenty_times_a_second_and_carry_the_stop() {
-    let mut feed = Feed::new(AT(0), 20, &look(0, []));
+    let mut feed = Feed::new(AT(0), 20, &view(0, []));
     let mut observer = Observer::new();
     for ms in 1..=1000 {
         assert!(feed.poll_timeout() > AT(ms - 1));
@@ -148,9 +148,9 @@ fn while_nothing_happens_heartbeats_go_twenty_times_a_second_and_carry_the_stop(
     }
     assert_eq!(observer.0.counts().received.heartbeats, 20);
     assert_eq!(observer.0.stopped_by(), None);
-    feed.show(&Look {
+    feed.show(&ObserverView {
         stopped: true,
-        ..look(0, [])
+        ..view(0, [])
     });
     observer.hear(AT(1050), &mut feed);
     assert_eq!(observer.0.stopped_by(), Some(Side::Slave));
@@ -158,7 +158,7 @@ fn while_nothing_happens_heartbeats_go_twenty_times_a_second_and_carry_the_stop(
 
 #[test]
 fn a_command_of_an_observer_is_counted_and_changes_nothing_that_is_sent() {
-    let mut feed = Feed::new(AT(0), 20, &look(1, [1]));
+    let mut feed = Feed::new(AT(0), 20, &view(1, [1]));
     let mut samples = SampleBlock::default();
     samples.push(HipSample::default()).unwrap();
     let command = Command {

@@ -85,7 +85,7 @@ pub(super) async fn serve(observers: &Observers, observer: Observer, tokens: &To
     let began = observers.clock().now();
     let mut sight = Sight {
         observers,
-        feed: Feed::new(began, hello.scene_hz, &observers.look_now()),
+        feed: Feed::new(began, hello.scene_hz, &observers.view_now()),
         connection: &connection,
         read: 0,
     };
@@ -157,10 +157,10 @@ impl Sight<'_> {
         F: Future<Output = ObserversFarewell>,
     {
         let clock = self.observers.clock();
-        let mut looks = self.observers.looks();
+        let mut looks = self.observers.views();
         let mut ending = pin!(self.observers.ending());
         loop {
-            self.feed.show(&self.observers.look_now());
+            self.feed.show(&self.observers.view_now());
             if let Err(spent) = self.send(clock.now()) {
                 return End::Numbers(spent);
             }

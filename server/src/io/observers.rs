@@ -17,7 +17,7 @@ use mmt_shared::wire::{Refusal, Welcome};
 use tokio::sync::{OwnedSemaphorePermit, Semaphore, watch};
 use tokio::time::timeout;
 
-use crate::feed::Look;
+use crate::feed::ObserverView;
 
 /// How long the observers' farewells may take together when the host ends.
 const END_WAIT: Duration = Duration::from_secs(2);
@@ -33,13 +33,13 @@ pub(super) struct Observers {
     emergency: EmergencyStop,
     /// As the newest session began.
     welcome: Mutex<Welcome>,
-    look: watch::Sender<Look>,
+    view: watch::Sender<ObserverView>,
     ending: watch::Sender<Wish>,
     commands_refused: AtomicU64,
 }
 
 impl Observers {
-    /// Places for `most` observers, who are welcomed with this until a session begins.
+    /// Slots for `most` observers, who are welcomed with this until a session begins.
     pub(super) fn new(most: u8, clock: Clock, emergency: EmergencyStop, welcome: Welcome) -> Self {
         Self {
             clock,
@@ -47,7 +47,7 @@ impl Observers {
             places: Arc::new(Semaphore::new(most.into())),
             emergency,
             welcome: Mutex::new(welcome),
-            look: watch::Sender::default(),
+            view: watch::Sender::default(),
             ending: watch::Sender::default(),
             commands_refused: AtomicU64::new(0),
         }
@@ -71,19 +71,19 @@ impl Observers {
     /// A session begins with this welcome to its operator.
     pub(super) fn session_begins(&self, welcome: &Welcome) {
         *self.welcome.lock().unwrap_or_else(PoisonError::into_inner) = *welcome;
-        self.look.send_modify(|look| {
-            *look = Look {
-                session: look.session + 1,
-                ..Look::default()
+        self.view.send_modify(|view| {
+            *view = ObserverView {
+                session: view.session + 1,
+                ..ObserverView::default()
             };
         });
     }
 
     /// Shows what there is to be seen of the session now.
-    pub(super) fn show(&self, seen: &Look) {
-        self.look.send_modify(|look| {
-            *look = Look {
-                session: look.session,
+    pub(super) fn show(&self, seen: &ObserverView) {
+        self.view.send_modify(|view| {
+            *view = ObserverView {
+                session: view.session,
                 ..*seen
             };
         });
@@ -91,11 +91,11 @@ impl Observers {
 
     /// Nobody operates any more: the newest update stays.
     pub(super) fn session_over(&self) {
-        self.look.send_modify(|look| {
-            *look = Look {
+        self.view.send_modify(|view| {
+            *view = ObserverView {
                 scene: None,
                 stopped: false,
-                ..*look
+                ..*view
             };
         });
     }
@@ -119,8 +119,8 @@ impl Observers {
     }
 
     /// Reports each change of what is to be seen.
-    pub(super) fn looks(&self) -> watch::Receiver<Look> {
-        self.look.subscribe()
+    pub(super) fn views(&self) -> watch::Receiver<ObserverView> {
+        self.view.subscribe()
     }
 
     /// Returns once all observers are to end, and why.
@@ -147,11 +147,11 @@ impl Observers {
     }
 
     /// What there is to be seen at this moment: the slave's own emergency stop outlives sessions.
-    pub(super) fn look_now(&self) -> Look {
-        let look = *self.look.borrow();
-        Look {
-            stopped: look.stopped || self.emergency.is_set(),
-            ..look
+    pub(super) fn view_now(&self) -> ObserverView {
+        let view = *self.view.borrow();
+        ObserverView {
+            stopped: view.stopped || self.emergency.is_set(),
+            ..view
         }
     }
 }

@@ -287,7 +287,7 @@ impl Session<'_> {
             unsent: self.task.unsent(),
             ..snapshot.live
         });
-        self.context.observers.show(&snapshot.look);
+        self.context.observers.show(&snapshot.view);
         if snapshot.plant_silent != self.plant_silent {
             self.plant_silent = snapshot.plant_silent;
             if self.plant_silent {

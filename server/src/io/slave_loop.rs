@@ -15,7 +15,7 @@ use super::SlaveLive;
 use super::plant_link::PlantPort;
 use super::record::{self, SlaveSink};
 use crate::end::{SlaveEnd, SlaveGiven};
-use crate::feed::{Look, RecentUpdates};
+use crate::feed::{ObserverView, RecentUpdates};
 use crate::slave::SlaveTick;
 
 /// A snapshot for the network task every so many ticks: 62 a second.
@@ -26,7 +26,7 @@ const SNAPSHOT_TICKS: u64 = 16;
 pub(super) struct Snapshot {
     pub(super) live: SlaveLive,
     /// What observers see; the session's number is not the loop's to know.
-    pub(super) look: Look,
+    pub(super) view: ObserverView,
     /// When a datagram of the master last arrived; none before the loop's first snapshot.
     pub(super) last_arrival: Option<Time>,
     /// The plant that is plugged in is silent: the tool stands.
@@ -119,7 +119,7 @@ impl SlaveLoop {
     ) {
         self.receive(side);
         let given = self.given(tick.deadline);
-        let done = self.end.tick(tick.deadline);
+        let done = self.end.tick(tick.deadline, &given);
         if let (Some(plant), Some(command)) = (&mut self.plant, self.end.plant_command()) {
             plant.send(&command);
         }
@@ -156,19 +156,16 @@ impl SlaveLoop {
         });
     }
 
-    /// Gives the end what a tick at `now` begins with: a silent plant stops the tool as an emergency stop does.
+    /// What the tick at `now` is given: a silent plant stops the tool as an emergency stop does.
     fn given(&mut self, now: Time) -> SlaveGiven {
         let plant = self.plant.as_mut().and_then(|plant| plant.receive(now));
-        if let Some(answer) = &plant {
-            self.end.handle_plant(now, answer);
-        }
-        let silent = self
-            .plant
-            .as_ref()
-            .is_some_and(|plant| plant.is_silent(now));
-        let stops = silent || self.emergency.is_set();
-        self.end.stop(stops);
+        let stops = self.plant_is_silent(now) || self.emergency.is_set();
         SlaveGiven { stops, plant }
+    }
+
+    fn plant_is_silent(&self, now: Time) -> bool {
+        let plant = self.plant.as_ref();
+        plant.is_some_and(|plant| plant.is_silent(now))
     }
 
     fn show(&mut self, now: Time, side: &mut LoopSide<Snapshot>) {
@@ -222,17 +219,14 @@ impl SlaveLoop {
         }
         Snapshot {
             live,
-            look: Look {
+            view: ObserverView {
                 session: 0,
                 updates: self.updates,
                 scene: self.newest.as_ref().map(|tick| slave.scene(tick)),
                 stopped: end.stopped_by().is_some(),
             },
             last_arrival: Some(channel.last_arrival()),
-            plant_silent: self
-                .plant
-                .as_ref()
-                .is_some_and(|plant| plant.is_silent(now)),
+            plant_silent: self.plant_is_silent(now),
             numbers_spent: self.numbers_spent,
             disengaged: end.is_disengaged(),
         }

@@ -96,8 +96,8 @@ async fn a_session_goes_from_the_welcome_to_a_report_that_agrees_with_the_master
     assert_eq!(welcome.scheme.as_str(), scheme);
     master.push(100).await;
     master.listen(1).await;
-    let look = *host.live.borrow();
-    assert!(look.connected && look.elapsed_s > 0.0 && look.rtt_ms.is_some());
+    let view = *host.live.borrow();
+    assert!(view.connected && view.elapsed_s > 0.0 && view.rtt_ms.is_some());
     let mut sequences: Vec<_> = master.updates.iter().map(|u| u.sequence).collect();
     assert!(sequences.is_sorted(), "{sequences:?}");
     let all = sequences.len() as u64;

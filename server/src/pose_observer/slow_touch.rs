@@ -4,8 +4,8 @@ use mmt_shared::model::geometry::{Face, Twist, Vec2, rotate};
 use mmt_shared::time::TICK_S;
 
 use super::PoseObserver;
+use super::contact_force::ContactForce;
 use super::contact_frame::ContactFrame;
-use super::felt::Felt;
 use super::track::Track;
 use super::tracker::Tracker;
 
@@ -24,15 +24,15 @@ impl PoseObserver {
     }
 
     /// One tick of touch.
-    pub(super) fn touch_slowly(&mut self, tool: Vec2, felt: &Felt) {
+    pub(super) fn touch_slowly(&mut self, tool: Vec2, contact: &ContactForce) {
         self.faces.touched();
         let face = match self.contact {
             Some(contact) => contact.face,
-            None => self.begin_slowly(tool, felt.steady),
+            None => self.begin_slowly(tool, contact.steady),
         };
-        self.follow_force(face, felt);
+        self.follow_force(face, contact);
         let inward = -rotate(self.motion.pose.angle, face.outward());
-        self.penetration.follow(felt.force.dot(&inward));
+        self.penetration.follow(contact.force.dot(&inward));
         let surface = tool - inward * self.penetration.depth;
         let before = self.motion.pose.position;
         self.motion.pose.position = surface + inward * self.faces.footprint.offset(face);
@@ -49,14 +49,14 @@ impl PoseObserver {
         });
     }
 
-    fn follow_force(&mut self, face: Face, felt: &Felt) {
+    fn follow_force(&mut self, face: Face, contact: &ContactForce) {
         if let Tracker::Slow(slow) = &mut self.tracker
             && slow.touch()
         {
             self.motion.twist.angular = 0.0;
             self.angle = Track::of_any_normal();
         }
-        self.follow_angle(face, felt, TURN_RAD_PER_S2);
+        self.follow_angle(face, contact, TURN_RAD_PER_S2);
     }
 
     /// The first tick of a contact under this force (N): the face that has to turn least.

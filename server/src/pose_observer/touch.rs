@@ -6,11 +6,11 @@ use mmt_shared::model::params::ModelParams;
 use mmt_shared::time::TICK_S;
 
 use super::PoseObserver;
+use super::contact_force::ContactForce;
 use super::contact_frame::ContactFrame;
-use super::felt::Felt;
+use super::ground_moment::Push;
 use super::track::Track;
 use super::tracker::Tracker;
-use super::turning::Push;
 
 /// Force below which its direction is only noise, N: fifteen times the default sensor noise.
 const FORCE_MIN_N: f64 = 0.15;
@@ -27,15 +27,15 @@ const JUMP_RAD: f64 = 0.2;
 
 impl PoseObserver {
     /// One tick of touch.
-    pub(super) fn touch(&mut self, tool: Vec2, felt: &Felt, params: &ModelParams) {
+    pub(super) fn touch(&mut self, tool: Vec2, contact: &ContactForce, params: &ModelParams) {
         self.faces.touched();
-        let force = felt.force;
+        let force = contact.force;
         let face = match self.contact {
             Some(contact) => contact.face,
-            None => self.begin_contact(tool, felt.steady),
+            None => self.begin_contact(tool, contact.steady),
         };
         let unknown = self.turn(force, params);
-        self.follow_angle(face, felt, unknown);
+        self.follow_angle(face, contact, unknown);
         let inward = -rotate(self.motion.pose.angle, face.outward());
         self.penetration.follow(force.dot(&inward));
         let surface = tool - inward * self.penetration.depth;
@@ -124,11 +124,11 @@ impl PoseObserver {
     }
 
     /// theta by the direction of the force.
-    pub(super) fn follow_angle(&mut self, face: Face, felt: &Felt, acceleration: f64) {
+    pub(super) fn follow_angle(&mut self, face: Face, contact: &ContactForce, acceleration: f64) {
         self.motion.pose.angle += self.motion.twist.angular * TICK_S;
         self.angle.predict(acceleration);
-        let (force, size) = (felt.force, felt.force.norm());
-        if size < FORCE_MIN_N.max(DEVIATIONS * felt.noise_n) {
+        let (force, size) = (contact.force, contact.force.norm());
+        if size < FORCE_MIN_N.max(DEVIATIONS * contact.noise_n) {
             return;
         }
         let direction = libm::atan2(-force.y, -force.x) - face.outward_angle();
@@ -137,7 +137,7 @@ impl PoseObserver {
         if tangent && !self.tracker.is_settling() && innovation.abs() > JUMP_RAD {
             self.begin_tangent();
         }
-        let spread = self.config.force_noise_n.max(felt.noise_n) / size;
+        let spread = self.config.force_noise_n.max(contact.noise_n) / size;
         let variance = spread * spread + self.tracker.direction_floor_rad().powi(2);
         let (angle, rate) = self.angle.measure(variance);
         self.motion.pose.angle += angle * innovation;

@@ -1,9 +1,9 @@
 //! How the object is followed: as a box with faces; once vision has shown that it is none, by its tangent; pushed slowly,
 //! by the force alone.
 
+use super::ground_moment::Turning;
 use super::slow::{DIRECTION_RAD, SlowTracker};
 use super::tangent_tracker::TangentTracker;
-use super::turning::Turning;
 
 /// Disagreement about theta that no box causes, rad; six standard deviations of vision's noise if that is more.
 const DISAGREEMENT_RAD: f64 = 0.05;

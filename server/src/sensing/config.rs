@@ -129,9 +129,9 @@ pub enum SensingError {
 }
 
 impl SensingConfig {
-    /// Sensors without noise and without vision: the truth, for tests and reference runs.
-    #[must_use]
-    pub fn ideal() -> Self {
+    /// Sensors without noise and without vision: the truth.
+    #[cfg(test)]
+    pub(super) fn ideal() -> Self {
         Self {
             position_noise_m: 0.0,
             force_noise_n: 0.0,

@@ -78,11 +78,23 @@ fn an_update_that_is_not_acknowledged_in_time_is_taken_back() {
     shadow.send(&update(2, 200, 4.0));
     // the loop takes 50 ms, and 100 more are waited
     assert_eq!(play(&mut shadow, 201..=350), 0);
+    assert_eq!((shadow.lost(), shadow.unacknowledged()), (0, 1));
     assert_eq!(masses(&shadow), [2.0, 4.0]);
     assert_eq!(play(&mut shadow, 351..=351), 1);
     assert_eq!((shadow.lost(), masses(&shadow)), (1, [2.0, 2.0]));
     assert_eq!(play(&mut shadow, 352..=900), 0, "once");
     assert!(shadow.nothing_in_flight());
+    assert_eq!(shadow.unacknowledged(), 1);
+}
+
+#[test]
+fn updates_that_are_never_acknowledged_are_counted_however_many_there_are() {
+    let mut shadow = shadow();
+    play(&mut shadow, 1..=100);
+    for sequence in 1..=5000 {
+        shadow.send(&update(sequence, 100, 2.0));
+    }
+    assert_eq!(shadow.unacknowledged(), 5000);
 }
 
 #[test]

@@ -1,6 +1,7 @@
 //! What a slave is made of, and why it could not be.
 
 use mmt_shared::channel::rate_control::StretchMax;
+use mmt_shared::model::architecture::Architecture;
 use mmt_shared::model::contact::Coupling;
 use mmt_shared::model::params::ParamsError;
 use mmt_shared::model::settings::Mode;
@@ -131,6 +132,16 @@ impl SlaveConfig {
 const SOFTEST: f64 = 0.25;
 
 impl SlaveConfig {
+    /// The same for a master that sends so many new samples in a command, and whose hand feels this: play-out waits as long
+    /// as that needs ([`PlayoutConfig::for_session`]).
+    #[must_use]
+    pub fn for_session(&self, samples_per_command: u8, architecture: Architecture) -> Self {
+        Self {
+            playout: self.playout.for_session(samples_per_command, architecture),
+            ..self.clone()
+        }
+    }
+
     /// What conditions the measured force of a tool with this coupling.
     #[must_use]
     pub fn conditioner(&self, coupling: &Coupling) -> Conditioner {

@@ -16,7 +16,7 @@ use super::config::{SlaveConfig, SlaveError};
 use crate::contact::Contact;
 use crate::environment::SIDE_M;
 use crate::estimator::{Estimate, Estimator, EstimatorConfig, Measured, OBSTACLE_N, Seen};
-use crate::pose_observer::{Felt, ObserverConfig, PoseObserver};
+use crate::pose_observer::{ContactForce, ObserverConfig, PoseObserver};
 
 /// The pose observer and the estimator, which need each other.
 pub(super) struct ObjectEstimate {
@@ -175,7 +175,7 @@ impl ObjectEstimate {
         observer.step(
             now,
             contact.tool,
-            Felt {
+            ContactForce {
                 force: contact.force,
                 steady: contact.steady,
                 noise_n: contact.noise_n,

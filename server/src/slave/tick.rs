@@ -1,5 +1,7 @@
-//! One tick of the slave: its stages in their order, and those that somebody outside decides in their place.
+//! What the slave does with a HIP sample: takes it in, and in a tick plays it, its stages in their order; and those that
+//! somebody outside decides in their place.
 
+use mmt_shared::model::sample::HipSample;
 use mmt_shared::model::update::{Cause, Update};
 use mmt_shared::time::Time;
 
@@ -27,6 +29,13 @@ pub struct Substitutes<'a> {
 }
 
 impl Slave {
+    /// Takes in a HIP sample that arrived at `now`, and the newest update that the master had when it
+    /// sent the sample.
+    pub fn handle_sample(&mut self, now: Time, sample: &HipSample, newest_update: u32) {
+        self.playout.push(now, sample);
+        self.shadow.acknowledge(sample, newest_update);
+    }
+
     /// One sample period. None before the first HIP sample is due.
     pub fn tick(&mut self, now: Time) -> Option<SlaveTick> {
         self.tick_with(now, Substitutes::default())

@@ -140,11 +140,11 @@ impl Peer {
     /// Takes note of a datagram that arrived at `now`.
     pub fn handle(&mut self, now: Time, envelope: &Envelope) -> Arrival {
         let arrival = match self.window.note(envelope.number) {
-            window::Place::Ahead => Arrival::Newest,
-            window::Place::Gap => Arrival::Reordered,
-            window::Place::Taken => Arrival::Duplicate,
-            window::Place::Behind => Arrival::TooOld,
-            window::Place::Implausible => Arrival::Implausible,
+            window::WindowPosition::Ahead => Arrival::Newest,
+            window::WindowPosition::Gap => Arrival::Reordered,
+            window::WindowPosition::Taken => Arrival::Duplicate,
+            window::WindowPosition::Behind => Arrival::TooOld,
+            window::WindowPosition::Implausible => Arrival::Implausible,
         };
         if matches!(arrival, Arrival::Newest | Arrival::Reordered) {
             self.received = self.received.saturating_add(1);

@@ -35,13 +35,13 @@ pub(super) struct Words<'a> {
     line: &'a str,
     /// Bytes of `line` that have been read.
     read: usize,
-    /// Place of the last word taken.
-    place: Place<'a>,
+    /// Location of the last word taken.
+    place: Location<'a>,
     line_number: usize,
 }
 
 #[derive(Clone, Copy)]
-struct Place<'a> {
+struct Location<'a> {
     line: usize,
     column: usize,
     word: &'a str,
@@ -53,7 +53,7 @@ impl<'a> Words<'a> {
             lines: text.lines().enumerate(),
             line: "",
             read: 0,
-            place: Place {
+            place: Location {
                 line: 1,
                 column: 1,
                 word: "",
@@ -70,7 +70,7 @@ impl<'a> Words<'a> {
             if let Some(word) = rest.split_whitespace().next() {
                 self.read = start + word.len();
                 let before = self.line.get(..start).unwrap_or("");
-                self.place = Place {
+                self.place = Location {
                     line: self.line_number,
                     column: before.chars().count() + 1,
                     word,
@@ -78,7 +78,7 @@ impl<'a> Words<'a> {
                 return Some(word);
             }
             let Some((index, line)) = self.lines.next() else {
-                self.place = Place {
+                self.place = Location {
                     line: self.line_number,
                     column: self.line.chars().count() + 1,
                     word: "",
@@ -91,7 +91,7 @@ impl<'a> Words<'a> {
 
     /// An error at the last word taken.
     fn error(&self, what: &'static str, expected: String) -> ParseError {
-        let Place { line, column, word } = self.place;
+        let Location { line, column, word } = self.place;
         let found = if word.is_empty() {
             "the end of the text".to_owned()
         } else {

@@ -40,16 +40,10 @@ pub fn median(values: impl IntoIterator<Item = f64>) -> Option<f64> {
     Some(f64::midpoint(lower, upper))
 }
 
-/// The least of rising values that a share (0 to 1) of all lies below; of all of them the largest. None without values.
+/// The quantile by nearest rank: the least of rising values that a share (0 to 1) of all does not exceed; of none of them
+/// the least. None without values.
 #[must_use]
 pub fn quantile<T: Copy>(sorted: &[T], share: f64) -> Option<T> {
-    let place = (share * sorted.len() as f64) as usize;
-    sorted.get(place.min(sorted.len().checked_sub(1)?)).copied()
-}
-
-/// The least of rising values that a share (0 to 1) of all does not exceed; of none of them the least. None without values.
-#[must_use]
-pub fn nearest_rank<T: Copy>(sorted: &[T], share: f64) -> Option<T> {
     let rank = (share * sorted.len() as f64).ceil() as usize;
     sorted.get(rank.clamp(1, sorted.len().max(1)) - 1).copied()
 }
@@ -63,7 +57,6 @@ mod tests {
         assert_eq!((mean([]), median([]), rms([])), (None, None, None));
         assert_eq!((mean_of_sum(1.0, 0), standard_deviation(&[])), (None, None));
         assert_eq!(quantile::<f64>(&[], 0.5), None);
-        assert_eq!(nearest_rank::<f64>(&[], 0.5), None);
     }
 
     #[test]
@@ -90,32 +83,21 @@ mod tests {
     }
 
     #[test]
-    fn a_quantile_is_one_of_the_values_with_that_share_below_it() {
-        let hundred: Vec<f64> = (0..100).map(f64::from).collect();
-        let of = |share| quantile(&hundred, share);
-        assert_eq!(
-            (of(0.0), of(0.05), of(0.95), of(1.0)),
-            (Some(0.0), Some(5.0), Some(95.0), Some(99.0))
-        );
-        assert_eq!(quantile(&[7.0], 0.99), Some(7.0));
-    }
-
-    #[test]
-    fn the_nearest_rank_is_the_least_value_that_the_share_does_not_exceed() {
+    fn a_quantile_is_the_least_value_that_the_share_does_not_exceed() {
         let hundred: Vec<u32> = (1..=100).collect();
-        let of = |share| nearest_rank(&hundred, share);
+        let of = |share| quantile(&hundred, share);
         assert_eq!(
             (of(0.0), of(0.5), of(0.99), of(1.0)),
             (Some(1), Some(50), Some(99), Some(100))
         );
-        assert_eq!(nearest_rank(&[7, 8, 9], 0.5), Some(8));
+        assert_eq!(quantile(&[7, 8, 9], 0.5), Some(8));
         // by whole numbers: no share is rounded over a value
         for n in 1..2000_usize {
             let ranks: Vec<usize> = (1..=n).collect();
             for percent in [50, 99] {
                 let share = percent as f64 / 100.0;
                 let rank = (n * percent).div_ceil(100);
-                assert_eq!(nearest_rank(&ranks, share), Some(rank), "{percent} of {n}");
+                assert_eq!(quantile(&ranks, share), Some(rank), "{percent} of {n}");
             }
         }
     }

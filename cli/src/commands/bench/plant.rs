@@ -73,7 +73,7 @@ pub(super) fn run(arguments: &PlantBenchArguments) -> Result<(), Failure> {
     for _ in 0..ticks {
         if let (Some(plant), Some(command)) = (&mut plant, world.plant_command()) {
             let answer = plant.exchange(&command).map_err(Failure::failed)?;
-            world.answer_of_plant(&answer);
+            world.answer_of_plant(answer);
         }
         world.step();
         if stop.asked() {

@@ -14,7 +14,7 @@ use super::round::{LOOK, Round};
 use super::setting::Setting;
 use super::study::{Answer, Condition, Participant, Study};
 use crate::args::DemoArguments;
-use crate::commands::console::Desk;
+use crate::commands::console::SessionConsole;
 use crate::commands::device::Device;
 use crate::commands::netem::wrap::Emulation;
 use crate::commands::record::Record;
@@ -65,23 +65,24 @@ pub(super) fn run(
 ) -> Result<(), Failure> {
     let mut comparison = Comparison::new(arguments, files.map(PathBuf::as_path))?;
     let stop = Stop::on_signals()?;
-    let Some(mut desk) = Desk::start(&arguments.console, true, stop.emergency())? else {
+    let Some(mut console) = SessionConsole::start(&arguments.console, true, stop.emergency())?
+    else {
         return Err(Failure::usage("a blind comparison needs its console"));
     };
-    desk.blindfold();
+    console.blindfold();
     // messages of the hosts name schemes and networks
     messages.keep();
     note(format_args!("study: {}", arguments.study.display()));
-    comparison.show(&mut desk, None);
+    comparison.show(&mut console, None);
     while !stop.asked() {
-        match desk.next_order() {
+        match console.next_order() {
             Some(Order::Study(StudyWish::Begin)) if comparison.stage == Stage::Ready => {
-                let ended = comparison.part(&mut desk, messages, &stop)?;
-                comparison.show(&mut desk, ended);
+                let ended = comparison.part(&mut console, messages, &stop)?;
+                comparison.show(&mut console, ended);
             }
             Some(Order::Study(wish)) => {
                 comparison.step(wish)?;
-                comparison.show(&mut desk, None);
+                comparison.show(&mut console, None);
             }
             Some(_) => {}
             None => std::thread::sleep(LOOK),
@@ -193,7 +194,7 @@ impl<'a> Comparison<'a> {
     /// The person feels the next configuration; what they read if it broke and has to be done again.
     fn part(
         &mut self,
-        desk: &mut Desk,
+        console: &mut SessionConsole,
         messages: &Messages,
         stop: &Stop,
     ) -> Result<Option<&'static str>, Failure> {
@@ -203,7 +204,7 @@ impl<'a> Comparison<'a> {
         };
         let path = self.study.record(who);
         let record = Record::start(Some(&path))?;
-        desk.show_about([("study", self.stage_shown("part"))]);
+        console.show_about([("study", self.stage_shown("part"))]);
         let [a, b] = &mut self.settings;
         let setting = match condition {
             Condition::A => a,
@@ -219,7 +220,7 @@ impl<'a> Comparison<'a> {
             stop,
             dashboard: false,
             viewer: &mut Viewer::new(Caption::default(), false, messages, stop),
-            desk: Some(desk),
+            console: Some(console),
             blind: true,
             again: None,
         };
@@ -234,14 +235,14 @@ impl<'a> Comparison<'a> {
     }
 
     /// Shows the page where the participant stands.
-    fn show(&self, desk: &mut Desk, trouble: Option<&str>) {
+    fn show(&self, console: &mut SessionConsole, trouble: Option<&str>) {
         let stage = match self.stage {
             Stage::Consent => "consent",
             Stage::Ready => "ready",
             Stage::Asked(_) => "question",
             Stage::Done => "done",
         };
-        desk.show_about([
+        console.show_about([
             ("state", json!("waiting")),
             ("note", json!(trouble)),
             ("study", self.stage_shown(stage)),

@@ -23,7 +23,7 @@ use tokio::sync::watch;
 
 use super::setting::{Setting, caption};
 use crate::args::DemoArguments;
-use crate::commands::console::{self, Desk};
+use crate::commands::console::{self, SessionConsole};
 use crate::commands::device::Device;
 use crate::commands::netem::wrap::Emulation;
 use crate::commands::record::Record;
@@ -48,7 +48,7 @@ pub(super) struct Round<'a> {
     pub(super) stop: &'a Stop,
     pub(super) dashboard: bool,
     pub(super) viewer: &'a mut Viewer,
-    pub(super) desk: Option<&'a mut Desk>,
+    pub(super) console: Option<&'a mut SessionConsole>,
     /// Whether this is a part of a blind comparison: the hand is the person's, the duration holds, nothing is shown.
     pub(super) blind: bool,
     /// The session that a viewer asked for next.
@@ -87,8 +87,8 @@ impl Round<'_> {
         options.record = self.record.recorder();
         options.emergency = self.stop.emergency().clone();
         options.scene_hz = Viewer::scene_hz(self.dashboard);
-        if let Some(desk) = &self.desk {
-            operated_at(desk, &mut options, self.blind);
+        if let Some(console) = &self.console {
+            operated_at(console, &mut options, self.blind);
         }
         self.device.give(&mut options);
         let (master, master_live) = master::start(options, stop.receiver())?;
@@ -121,8 +121,8 @@ impl Round<'_> {
         }
         let report = RunReport::of_both(master?, slave?);
         let end = master_live.borrow().ended;
-        if let Some(desk) = &mut self.desk {
-            desk.show_end(&end.map(|end| end.to_string()).unwrap_or_default());
+        if let Some(console) = &mut self.console {
+            console.show_end(&end.map(|end| end.to_string()).unwrap_or_default());
         }
         Ok(Some((report, end)))
     }
@@ -134,14 +134,14 @@ impl Round<'_> {
         slave: &Arc<watch::Sender<SlaveLive>>,
         master: &watch::Receiver<MasterLive>,
     ) {
-        if let Some(desk) = &mut self.desk {
+        if let Some(console) = &mut self.console {
             let (slave, master) = (Arc::clone(slave), master.clone());
             let connected = move || Some(*slave.borrow()).filter(|slave| slave.connected);
-            desk.show(&caption, move || *master.borrow(), connected);
+            console.show(&caption, move || *master.borrow(), connected);
             if !self.blind {
-                desk.show_about(self.setting.shown());
+                console.show_about(self.setting.shown());
             }
-            caption.setting = format!("{}  {}", desk.address(), caption.setting);
+            caption.setting = format!("{}  {}", console.address(), caption.setting);
         }
         self.viewer.caption(caption);
     }
@@ -159,19 +159,23 @@ impl Round<'_> {
     /// With a console the loop has no duration of its own: nobody's hand is taken away.
     fn finish_unwatched(&self, master: &MasterLive) {
         let duration_s = self.setting.arguments.duration.as_secs_f64();
-        if let Some(desk) = &self.desk
+        if let Some(console) = &self.console
             && !self.blind
             && master.elapsed_s >= duration_s
-            && !desk.is_watched()
+            && !console.is_watched()
         {
-            desk.finish();
+            console.finish();
         }
     }
 
     /// After a session: as long as somebody looks on, they may want another.
     pub(super) fn wait(&mut self) {
         while self.again.is_none() && !self.stop.asked() {
-            if !self.desk.as_ref().is_some_and(|desk| desk.is_watched()) {
+            if !self
+                .console
+                .as_ref()
+                .is_some_and(|console| console.is_watched())
+            {
                 return;
             }
             self.viewer.look(None, None);
@@ -181,10 +185,10 @@ impl Round<'_> {
 
     /// Does what viewers ask for.
     fn attend(&mut self, stop: &Stop) {
-        let Some(desk) = &mut self.desk else {
+        let Some(console) = &mut self.console else {
             return;
         };
-        while let Some(order) = desk.next_order() {
+        while let Some(order) = console.next_order() {
             match order {
                 Order::Study(_) => {}
                 // a participant steers nothing
@@ -192,14 +196,14 @@ impl Round<'_> {
                 Order::End => stop.end(),
                 Order::Network(wish) => {
                     match self.setting.networks() {
-                        Ok(ways) => desk.change_networks(&wish, self.emulation, ways.map(Some)),
-                        Err(what) => desk.show_about([("note", what.to_string().into())]),
+                        Ok(ways) => console.change_networks(&wish, self.emulation, ways.map(Some)),
+                        Err(what) => console.show_about([("note", what.to_string().into())]),
                     }
-                    desk.show_about(self.setting.shown());
+                    console.show_about(self.setting.shown());
                 }
                 Order::Restart(wish) => match self.setting.wished(&wish) {
                     Ok(setting) => self.again = Some(setting),
-                    Err(what) => desk.show_about([("note", what.into())]),
+                    Err(what) => console.show_about([("note", what.into())]),
                 },
             }
         }
@@ -207,9 +211,9 @@ impl Round<'_> {
 }
 
 /// A person may take the hand of the scripted operator.
-pub(super) fn operated_at(desk: &Desk, options: &mut MasterOptions, blind: bool) {
+pub(super) fn operated_at(console: &SessionConsole, options: &mut MasterOptions, blind: bool) {
     options.scene_hz = console::SCENE_HZ;
-    options.events = std::sync::Mutex::new(Some(desk.events()));
+    options.events = std::sync::Mutex::new(Some(console.events()));
     let driver = if blind {
         Driver::Pointer
     } else {

@@ -46,7 +46,7 @@ fn session(
             }
             !arrives
         });
-        let tick = end.tick(AT(ms), Vec2::new(-0.3, 0.0));
+        let tick = end.tick(AT(ms), &MasterGiven::held_at(Vec2::new(-0.3, 0.0)));
         while let Some(length) = end.poll_transmit(AT(ms), &mut out).unwrap() {
             ups.extend(way(true, ms).map(|takes| (ms + takes, out[..length].to_vec())));
         }

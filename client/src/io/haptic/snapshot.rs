@@ -19,7 +19,7 @@ impl HapticLoop {
         MasterLive {
             elapsed_s: self.elapsed.as_secs_f64(),
             hip: done.sample.hip.metres(),
-            f_m: done.felt,
+            f_m: done.displayed,
             hand_force: done.hand_force,
             model: state.pose,
             footprint: Some(state.footprint),

@@ -5,6 +5,7 @@ use crate::operator::trace::Trace;
 use std::ops::ControlFlow;
 
 use mmt_shared::channel::datagram_channel::DatagramChannel;
+use mmt_shared::fixtures::COUPLING;
 use mmt_shared::io::emergency::EmergencyStop;
 use mmt_shared::io::loop_thread::{self, ARRIVALS_PER_TICK, LoopHandle, LoopSide};
 use mmt_shared::io::record::{RecordError, Recorder, read};
@@ -27,11 +28,6 @@ use crate::io::record;
 use crate::limiter::{ForceLimiter, RAMP_TICKS};
 use crate::master::Master;
 use crate::operator::pointer::{HandEvent, PointerSample};
-
-const COUPLING: Coupling = Coupling {
-    stiffness_n_per_m: 1000.0,
-    damping_ns_per_m: 10.0,
-};
 
 /// A loop, its network task's side, and a slave.
 struct Ticked {

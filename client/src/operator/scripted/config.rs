@@ -9,7 +9,7 @@ use crate::operator::route::CLOSE_M;
 /// What the scripted operator sees.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Picture {
+pub enum VisualFeedback {
     /// The local model: where the box is felt.
     #[default]
     Model,
@@ -60,7 +60,7 @@ pub struct ScriptedConfig {
     /// Beyond this distance from where it began the box is pushed back, m. Default 1 (a choice).
     pub home_radius_m: f64,
     /// What it sees. Default the model.
-    pub view: Picture,
+    pub view: VisualFeedback,
     /// The hand.
     pub hand: HandConfig,
 }
@@ -86,7 +86,7 @@ impl Default for ScriptedConfig {
             acceleration_m_per_s2: 1.5,
             press_max_n: 8.0,
             home_radius_m: 1.0,
-            view: Picture::Model,
+            view: VisualFeedback::Model,
             hand: HandConfig::default(),
         }
     }

@@ -107,7 +107,7 @@ impl SlaveChecks {
     ) {
         let (now, way) = (tick.now, done.tool - self.tool);
         let stands = way.norm() <= HAIR_M
-            || self.felt.dot(&way) < 0.0
+            || self.f_s.dot(&way) < 0.0
             || self.about.config.tool_compliance.is_some();
         let playout = &self.about.config.playout;
         let period = elapsed.max(TICK).as_secs_f64();

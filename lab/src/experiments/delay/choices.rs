@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use mmt_server::trigger::Scheme;
 
-use crate::architecture::Architecture;
+use crate::architecture::ComparedArchitecture;
 use crate::baselines::{Baseline, Tuning};
 use crate::experiment::findings::ExperimentError;
 use crate::experiments::delay::grid_point::GridPoint;
@@ -22,22 +22,26 @@ pub(super) struct Number {
 }
 
 /// The number of an architecture.
-pub(super) const fn number(architecture: Architecture) -> Number {
+pub(super) const fn number(architecture: ComparedArchitecture) -> Number {
     let (name, values) = match architecture {
-        Architecture::Bilateral(Baseline::PositionForce) => {
+        ComparedArchitecture::Bilateral(Baseline::PositionForce) => {
             ("force gain", [0.2, 0.4, 0.6, 0.8, 0.9, 1.0])
         }
-        Architecture::Bilateral(Baseline::DampedPositionForce) => {
+        ComparedArchitecture::Bilateral(Baseline::DampedPositionForce) => {
             ("damping, N s/m", [1.0, 2.0, 5.0, 10.0, 20.0, 40.0])
         }
-        Architecture::Bilateral(Baseline::DeadbandForce | Baseline::TdpaDeadband) => {
+        ComparedArchitecture::Bilateral(Baseline::DeadbandForce | Baseline::TdpaDeadband) => {
             ("Delta", [0.02, 0.05, 0.10, 0.15, 0.20, 0.30])
         }
-        Architecture::Bilateral(Baseline::Tdpa) => {
+        ComparedArchitecture::Bilateral(Baseline::Tdpa) => {
             ("repayment, N s/m", [1.0, 2.0, 5.0, 10.0, 20.0, 40.0])
         }
-        Architecture::Bilateral(Baseline::Waves) => ("b, N s/m", [1.0, 2.0, 5.0, 10.0, 20.0, 40.0]),
-        Architecture::Mediated(_) => ("T_update, ms", [20.0, 50.0, 100.0, 150.0, 300.0, 1000.0]),
+        ComparedArchitecture::Bilateral(Baseline::Waves) => {
+            ("b, N s/m", [1.0, 2.0, 5.0, 10.0, 20.0, 40.0])
+        }
+        ComparedArchitecture::Mediated(_) => {
+            ("T_update, ms", [20.0, 50.0, 100.0, 150.0, 300.0, 1000.0])
+        }
     };
     Number { name, values }
 }
@@ -66,8 +70,10 @@ impl Choice {
     pub(super) fn setting(&self) -> Result<(Tuning, WorldConfig), ExperimentError> {
         let (mut tuning, mut world) = (Tuning::default(), self.point.world()?);
         match self.point.architecture {
-            Architecture::Bilateral(baseline) => *of_baseline(&mut tuning, baseline) = self.value,
-            Architecture::Mediated(_) => {
+            ComparedArchitecture::Bilateral(baseline) => {
+                *of_baseline(&mut tuning, baseline) = self.value
+            }
+            ComparedArchitecture::Mediated(_) => {
                 if let Scheme::Useful { t_update, .. } = &mut world.slave.trigger.scheme {
                     *t_update = Duration::from_secs_f64(1e-3 * self.value);
                 }
@@ -94,7 +100,7 @@ mod tests {
     /// Else a value would be tried that is no other, or the comparison with the default would be of something else.
     #[test]
     fn every_value_changes_its_run_and_one_of_them_is_the_default() {
-        for architecture in Architecture::ALL {
+        for architecture in ComparedArchitecture::ALL {
             let choices: Vec<Choice> = Choice::at(GridPoint::plain(architecture, 50)).collect();
             let settings: Vec<_> = choices.iter().map(|c| c.setting().unwrap()).collect();
             for (k, setting) in settings.iter().enumerate() {

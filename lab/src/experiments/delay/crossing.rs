@@ -4,7 +4,7 @@
 //! crossing is read off these runs and must never be written down from elsewhere.
 
 use super::grid_point::{GridPoint, Group, sweep};
-use crate::architecture::{Architecture, DelayRow};
+use crate::architecture::{ComparedArchitecture, DelayRow};
 use crate::experiment::prelude::*;
 
 /// One-way delays, ms.
@@ -16,7 +16,7 @@ const STIFFNESSES: [u64; 2] = [1000, 3000];
 pub(super) fn points() -> Vec<GridPoint> {
     let mut points = Vec::new();
     for k_p in STIFFNESSES {
-        for architecture in [Architecture::TDPA, Architecture::REPLAY] {
+        for architecture in [ComparedArchitecture::TDPA, ComparedArchitecture::REPLAY] {
             points.extend(NEAR_MS.map(|one_way_ms| GridPoint {
                 k_p,
                 ..GridPoint::plain(architecture, one_way_ms)
@@ -79,7 +79,10 @@ fn crossings(groups: &[Group]) -> Vec<Crossing> {
         Crossing {
             k_p,
             by,
-            crossing_ms: crossing(&curve(Architecture::TDPA), &curve(Architecture::REPLAY)),
+            crossing_ms: crossing(
+                &curve(ComparedArchitecture::TDPA),
+                &curve(ComparedArchitecture::REPLAY),
+            ),
         }
     };
     let all = STIFFNESSES.into_iter();

@@ -5,7 +5,7 @@
 use mmt_shared::model::settings::PoseCorrection;
 
 use super::grid_point::{Group, sweep};
-use crate::architecture::{Architecture, DelayRow};
+use crate::architecture::{ComparedArchitecture, DelayRow};
 use crate::baselines::Baseline;
 use crate::experiment::prelude::*;
 
@@ -20,7 +20,7 @@ pub(super) fn figure(groups: &[Group]) -> Figure {
         ("packets from slave to master", |row| Some(row.packet_rate_hz), Axis::log("packets per second")),
     ];
     let panels = measures.into_iter().map(|(title, of, y)| {
-        let series = Architecture::ALL.into_iter().map(|architecture| {
+        let series = ComparedArchitecture::ALL.into_iter().map(|architecture| {
             let dots = sweep(groups, architecture, 1000).filter_map(|group| {
                 let one_way_ms = group.case.one_way_ms as f64;
                 Some(Dot::at(one_way_ms.max(0.5), group.median(of)?))
@@ -34,29 +34,33 @@ pub(super) fn figure(groups: &[Group]) -> Figure {
 }
 
 /// An architecture's curve: a force on the wire is dashed, a model solid.
-pub(super) fn line(architecture: Architecture, dots: Vec<Dot>) -> Series {
+pub(super) fn line(architecture: ComparedArchitecture, dots: Vec<Dot>) -> Series {
     let (colour, width) = colour_and_width(architecture);
     let line = Series::line(architecture.name(), colour, dots);
     match architecture {
-        Architecture::Bilateral(Baseline::DampedPositionForce) => {
+        ComparedArchitecture::Bilateral(Baseline::DampedPositionForce) => {
             line.marked(Mark::Triangle).stroked(Stroke::Dashed, width)
         }
-        Architecture::Bilateral(_) => line.marked(Mark::Square).stroked(Stroke::Dashed, width),
-        Architecture::Mediated(_) => line.marked(Mark::Circle).stroked(Stroke::Solid, width),
+        ComparedArchitecture::Bilateral(_) => {
+            line.marked(Mark::Square).stroked(Stroke::Dashed, width)
+        }
+        ComparedArchitecture::Mediated(_) => {
+            line.marked(Mark::Circle).stroked(Stroke::Solid, width)
+        }
     }
 }
 
 /// The default is thick.
-fn colour_and_width(architecture: Architecture) -> (Colour, u32) {
+fn colour_and_width(architecture: ComparedArchitecture) -> (Colour, u32) {
     match architecture {
-        Architecture::Bilateral(Baseline::PositionForce) => (Colour::BLUE, 1),
-        Architecture::Bilateral(Baseline::DampedPositionForce) => (Colour::BLUE, 1),
-        Architecture::Bilateral(Baseline::DeadbandForce) => (Colour::VERMILION, 1),
-        Architecture::Bilateral(Baseline::Tdpa) => (Colour::GREEN, 1),
-        Architecture::Bilateral(Baseline::TdpaDeadband) => (Colour::PURPLE, 1),
-        Architecture::Bilateral(Baseline::Waves) => (Colour::ORANGE, 1),
-        Architecture::Mediated(PoseCorrection::Snap) => (Colour::SKY, 1),
-        Architecture::Mediated(PoseCorrection::MatchedStamps) => (Colour::GREY, 1),
-        Architecture::Mediated(PoseCorrection::Replay) => (Colour::BLACK, 3),
+        ComparedArchitecture::Bilateral(Baseline::PositionForce) => (Colour::BLUE, 1),
+        ComparedArchitecture::Bilateral(Baseline::DampedPositionForce) => (Colour::BLUE, 1),
+        ComparedArchitecture::Bilateral(Baseline::DeadbandForce) => (Colour::VERMILION, 1),
+        ComparedArchitecture::Bilateral(Baseline::Tdpa) => (Colour::GREEN, 1),
+        ComparedArchitecture::Bilateral(Baseline::TdpaDeadband) => (Colour::PURPLE, 1),
+        ComparedArchitecture::Bilateral(Baseline::Waves) => (Colour::ORANGE, 1),
+        ComparedArchitecture::Mediated(PoseCorrection::Snap) => (Colour::SKY, 1),
+        ComparedArchitecture::Mediated(PoseCorrection::MatchedStamps) => (Colour::GREY, 1),
+        ComparedArchitecture::Mediated(PoseCorrection::Replay) => (Colour::BLACK, 3),
     }
 }

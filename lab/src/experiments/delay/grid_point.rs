@@ -2,11 +2,11 @@
 //!
 //! Only what is run; never what came of it.
 
-use mmt_client::operator::scripted::Picture;
+use mmt_client::operator::scripted::VisualFeedback;
 use mmt_server::repeats::Repeats;
 use mmt_shared::channel::rate_control::StretchMax;
 
-use crate::architecture::{Architecture, DelayRow};
+use crate::architecture::{ComparedArchitecture, DelayRow};
 use crate::experiment::findings::ExperimentError;
 use crate::experiment::grid;
 use crate::experiments::loss::{Loss, link};
@@ -53,24 +53,24 @@ pub(super) type Group = grid::Group<GridPoint, DelayRow>;
 /// Where in the grid a run stands.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct GridPoint {
-    pub(super) architecture: Architecture,
+    pub(super) architecture: ComparedArchitecture,
     pub(super) one_way_ms: u64,
     pub(super) jitter_ms: u64,
     pub(super) loss: Loss,
     pub(super) k_p: u64,
-    pub(super) picture: Picture,
+    pub(super) visual_feedback: VisualFeedback,
     pub(super) size: Size,
 }
 
 impl GridPoint {
-    pub(super) const fn plain(architecture: Architecture, one_way_ms: u64) -> Self {
+    pub(super) const fn plain(architecture: ComparedArchitecture, one_way_ms: u64) -> Self {
         Self {
             architecture,
             one_way_ms,
             jitter_ms: 0,
             loss: Loss::NONE,
             k_p: 1000,
-            picture: Picture::Model,
+            visual_feedback: VisualFeedback::Model,
             size: Size::Unknown,
         }
     }
@@ -84,7 +84,7 @@ impl GridPoint {
         let link = link(&words, self.loss)?;
         let mut config = WorldConfig::over(link);
         config.stiffness_n_per_m = Some(self.k_p as f64);
-        config.operator.view = self.picture;
+        config.operator.view = self.visual_feedback;
         match self.size {
             Size::Unknown => {}
             // a round trip, and a second to see what it did
@@ -100,7 +100,7 @@ impl GridPoint {
 /// What an architecture did over the delay at a stiffness, without jitter and loss.
 pub(super) fn sweep(
     groups: &[Group],
-    architecture: Architecture,
+    architecture: ComparedArchitecture,
     k_p: u64,
 ) -> impl Iterator<Item = &Group> {
     groups.iter().filter(move |group| {
@@ -113,7 +113,7 @@ pub(super) fn sweep(
 /// The default grid.
 pub(super) fn some_points() -> Vec<GridPoint> {
     let mut points = Vec::new();
-    for architecture in Architecture::ALL {
+    for architecture in ComparedArchitecture::ALL {
         points.extend(DELAYS_MS.map(|ms| GridPoint::plain(architecture, ms)));
         for k_p in STIFFNESSES.into_iter().filter(|k_p| *k_p != 1000) {
             points.extend(STIFF_MS.map(|ms| GridPoint {
@@ -143,7 +143,7 @@ pub(super) fn some_points() -> Vec<GridPoint> {
 /// The whole grid: every delay, jitter, loss and stiffness.
 pub(super) fn all_points() -> Vec<GridPoint> {
     let mut points = Vec::new();
-    for architecture in Architecture::ALL {
+    for architecture in ComparedArchitecture::ALL {
         for k_p in STIFFNESSES {
             for jitter_ms in JITTERS_MS {
                 for loss in Loss::ALL {
@@ -162,18 +162,18 @@ pub(super) fn all_points() -> Vec<GridPoint> {
 
 /// Replay, with the operator looking at the local model or at the delayed picture; and what the object's size does.
 pub(super) fn picture_points() -> Vec<GridPoint> {
-    let of = |(picture, size)| {
+    let of = |(visual_feedback, size)| {
         PICTURE_MS.map(|ms| GridPoint {
-            picture,
+            visual_feedback,
             size,
-            ..GridPoint::plain(Architecture::REPLAY, ms)
+            ..GridPoint::plain(ComparedArchitecture::REPLAY, ms)
         })
     };
     [
-        (Picture::Model, Size::Unknown),
-        (Picture::Model, Size::Nudged),
-        (Picture::Model, Size::Known),
-        (Picture::Delayed, Size::Unknown),
+        (VisualFeedback::Model, Size::Unknown),
+        (VisualFeedback::Model, Size::Nudged),
+        (VisualFeedback::Model, Size::Known),
+        (VisualFeedback::Delayed, Size::Unknown),
     ]
     .map(of)
     .concat()

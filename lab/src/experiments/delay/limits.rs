@@ -3,7 +3,7 @@
 //! The rule by which an architecture is no longer usable stands here and nowhere else.
 
 use super::grid_point::{Group, STIFFNESSES, sweep};
-use crate::architecture::Architecture;
+use crate::architecture::ComparedArchitecture;
 use crate::experiment::prelude::*;
 
 /// More breaks of contact per push than this are no contact.
@@ -28,14 +28,14 @@ fn failing(group: &Group, peak_at_zero: f64) -> Option<&'static str> {
 
 /// How far one architecture is usable at one stiffness.
 struct Limit {
-    architecture: Architecture,
+    architecture: ComparedArchitecture,
     k_p: u64,
     usable_to_ms: Option<u64>,
     failed: Option<(u64, &'static str)>,
 }
 
 impl Limit {
-    fn of(groups: &[Group], architecture: Architecture, k_p: u64) -> Self {
+    fn of(groups: &[Group], architecture: ComparedArchitecture, k_p: u64) -> Self {
         let sweep = || sweep(groups, architecture, k_p);
         let at_zero = sweep().find(|group| group.case.one_way_ms == 0);
         let peak = at_zero.and_then(|group| group.median(|row| row.force_peak_n));
@@ -57,7 +57,7 @@ impl Limit {
 /// The greatest delay at which each architecture is usable, and the first at which it is not.
 #[rustfmt::skip]
 pub(super) fn table(groups: &[Group]) -> Table {
-    let limits = Architecture::ALL
+    let limits = ComparedArchitecture::ALL
         .into_iter()
         .flat_map(|of| STIFFNESSES.map(|k_p| Limit::of(groups, of, k_p)));
     Table::of(

@@ -1,9 +1,9 @@
 //! What the runs of the delay experiment came to: a row a run, replay's own numbers, the operator's picture.
 
-use mmt_client::operator::scripted::Picture;
+use mmt_client::operator::scripted::VisualFeedback;
 
 use super::grid_point::Group;
-use crate::architecture::Architecture;
+use crate::architecture::ComparedArchitecture;
 use crate::experiment::prelude::*;
 
 /// A row a run.
@@ -43,7 +43,7 @@ pub(super) fn replayed(groups: &[Group]) -> Table {
     let groups = groups.iter();
     Table::of(
         "MMT with replay: mean over the seeds; peak and energy the largest, observer the least",
-        groups.filter(|group| group.case.architecture == Architecture::REPLAY),
+        groups.filter(|group| group.case.architecture == ComparedArchitecture::REPLAY),
         &[
             column("one_way_ms", "ms", 0, |group| group.case.one_way_ms),
             column("jitter_ms", "ms", 0, |group| group.case.jitter_ms),
@@ -69,9 +69,9 @@ pub(super) fn views(groups: &[Group]) -> Table {
         "What the operator looks at and knows of the size (MMT with replay): mean over the seeds",
         groups,
         &[
-            column("view", "", 0, |group| match group.case.picture {
-                Picture::Model => "model",
-                Picture::Delayed => "delayed",
+            column("view", "", 0, |group| match group.case.visual_feedback {
+                VisualFeedback::Model => "model",
+                VisualFeedback::Delayed => "delayed",
             }),
             column("size", "", 0, |group| group.case.size.name()),
             column("one_way_ms", "ms", 0, |group| group.case.one_way_ms),

@@ -7,7 +7,7 @@ mod tables;
 use super::choices::Choice;
 use super::grid_point::GridPoint;
 use super::tuning::{Tried, best};
-use crate::architecture::{Architecture, run_tuned};
+use crate::architecture::{ComparedArchitecture, run_tuned};
 use crate::experiment::prelude::*;
 use crate::trial::TrialError;
 pub(super) use judged::Judged;
@@ -91,5 +91,5 @@ fn run(runner: &Runner, request: &Request) -> Result<Findings, ExperimentError> 
 /// Every architecture at every delay.
 fn points() -> Vec<GridPoint> {
     let at = |of| DELAYS_MS.map(|ms| GridPoint::plain(of, ms));
-    Architecture::ALL.into_iter().flat_map(at).collect()
+    ComparedArchitecture::ALL.into_iter().flat_map(at).collect()
 }

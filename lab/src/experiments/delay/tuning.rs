@@ -40,13 +40,18 @@ mod tests {
     use std::time::Duration;
 
     use super::*;
-    use crate::architecture::{self, Architecture};
+    use crate::architecture::{self, ComparedArchitecture};
 
     #[test]
     fn the_least_error_is_chosen_among_the_values_that_keep_contact() {
-        let point = GridPoint::plain(Architecture::TDPA, 0);
+        let point = GridPoint::plain(ComparedArchitecture::TDPA, 0);
         let world = point.world().unwrap();
-        let row = architecture::run(Architecture::TDPA, &world, Duration::from_millis(10)).unwrap();
+        let row = architecture::run(
+            ComparedArchitecture::TDPA,
+            &world,
+            Duration::from_millis(10),
+        )
+        .unwrap();
         let tried = |value: f64, error: Option<f64>, breaks: Option<f64>| Tried {
             case: Choice { point, value },
             runs: vec![DelayRow {
@@ -65,7 +70,7 @@ mod tests {
         };
         assert_eq!(value(&[&broken, &worse, &kept, &untouched]), 2.0);
         assert_eq!(value(&[&untouched, &broken]), 1.0);
-        let elsewhere = GridPoint::plain(Architecture::TDPA, 5);
+        let elsewhere = GridPoint::plain(ComparedArchitecture::TDPA, 5);
         assert_eq!(best(&[kept], elsewhere), None);
     }
 }

@@ -67,7 +67,7 @@ pub(super) fn drive(
             let elapsed = slave.stamp.saturating_since(Time::ZERO + TICK);
             let t_s = elapsed.as_secs_f64();
             watch(t_s, &tick);
-            world.answer_of_plant(&answer(course, t_s, hand.at(elapsed)));
+            world.answer_of_plant(answer(course, t_s, hand.at(elapsed)));
         }
     }
 }

@@ -2,7 +2,7 @@
 //! worlds that are drawn at random.
 
 use super::*;
-use mmt_client::operator::scripted::Picture;
+use mmt_client::operator::scripted::VisualFeedback;
 use mmt_server::repeats::Repeats;
 use mmt_server::shadow::TriggerReference;
 use mmt_shared::model::local_model::LocalModel;
@@ -122,7 +122,10 @@ fn an_operator_who_looks_at_the_delayed_picture_gets_less_done() {
             };
             (1..=3).map(pushes).sum()
         };
-        let (model, delayed) = (pushes(Picture::Model), pushes(Picture::Delayed));
+        let (model, delayed) = (
+            pushes(VisualFeedback::Model),
+            pushes(VisualFeedback::Delayed),
+        );
         println!("{one_way_ms} ms: {model} pushes on the model, {delayed} on the delayed picture");
         assert!(one_way_ms < 1000 || delayed < model);
     }

@@ -2,16 +2,16 @@
 
 use super::*;
 
-/// Four seconds of commands of a HIP that is at `hand` (x, m; at each ms) or sends nothing. Before each tick `also` is done
-/// with both ends; returns the slave's.
+/// Four seconds of commands of a HIP that is at `hand` (x, m; at each ms) or sends nothing. What `given` returns is what
+/// the slave's tick is given; returns the slave's end.
 fn four_seconds(
     hand: impl Fn(u64) -> Option<f64>,
-    mut also: impl FnMut(u64, &mut SlaveEnd, &mut DatagramChannel),
+    mut given: impl FnMut(u64, &mut SlaveEnd, &mut DatagramChannel) -> SlaveGiven,
 ) -> SlaveEnd {
     let mut end = end("none", Architecture::Mmt, 0);
     let mut master = DatagramChannel::new(Side::Master, Time::ZERO);
     for ms in 1..=4000 {
-        also(ms, &mut end, &mut master);
+        let given = given(ms, &mut end, &mut master);
         if let Some(x) = hand(ms) {
             let mut samples = SampleBlock::default();
             let sample = HipSample {
@@ -29,7 +29,7 @@ fn four_seconds(
             let length = master.encode(AT(ms), command, &mut bytes).unwrap().unwrap();
             end.handle_datagram(AT(ms), &bytes[..length]);
         }
-        end.tick(AT(ms));
+        end.tick(AT(ms), &given);
     }
     end
 }
@@ -42,7 +42,7 @@ fn going_on(ms: u64) -> f64 {
 /// The tool's place (m) after commands of a HIP that goes on and stop at 1 s for `gap` (ms).
 fn place_after_gap(gap: u64) -> (f64, SlaveEnd) {
     let hand = |ms| (!(1001..=1000 + gap).contains(&ms)).then(|| going_on(ms));
-    let end = four_seconds(hand, |_, _, _| {});
+    let end = four_seconds(hand, |_, _, _| SlaveGiven::default());
     (end.slave().tool_at().x, end)
 }
 
@@ -53,16 +53,17 @@ fn while_either_sides_emergency_stop_is_set_the_tool_stands() {
         let hand = |ms| Some(going_on(ms));
         let end = four_seconds(hand, |ms, slave, master| {
             let stops = (1000..3000).contains(&ms);
-            match side {
-                Side::Slave => slave.stop(stops),
-                Side::Master => master.stop(stops),
-            }
+            master.stop(stops && side == Side::Master);
             if (1002..3000).contains(&ms) {
                 assert_eq!(slave.stopped_by(), Some(side));
             }
             // it brakes from 0.1 m/s
             if (1007..3000).contains(&ms) {
                 stood.push(slave.slave().tool_at().x);
+            }
+            SlaveGiven {
+                stops: stops && side == Side::Slave,
+                plant: None,
             }
         });
         let first = stood[0];
@@ -80,9 +81,12 @@ fn after_an_emergency_stop_the_tool_follows_a_hand_that_comes_for_it() {
     let hand = |ms| Some(back(ms) + if ms < 3800 { 0.0 } else { 0.05 });
     let mut waited = 0.0;
     let end = four_seconds(hand, |ms, slave, _| {
-        slave.stop((1000..3000).contains(&ms));
         if ms == 3400 {
             waited = slave.slave().tool_at().x;
+        }
+        SlaveGiven {
+            stops: (1000..3000).contains(&ms),
+            plant: None,
         }
     });
     assert!(
@@ -112,6 +116,7 @@ fn a_stamp_of_hours_ahead_does_not_disengage_a_tool_whose_samples_go_on() {
             let stamps = 3_600_000..=3_600_000;
             slave.handle_datagram(AT(ms), &command(master, ms, stamps, 0, None));
         }
+        SlaveGiven::default()
     };
     let end = four_seconds(|ms| Some(going_on(ms)), ahead);
     assert_eq!(end.slave().playout().counts().implausible, 1);
@@ -130,6 +135,7 @@ fn a_hip_that_jumped_away_before_a_silence_moves_a_disengaged_tool_nowhere() {
             let x = slave.slave().tool_at().x;
             assert_eq!(*disengaged_at.get_or_insert(x), x, "it goes on");
         }
+        SlaveGiven::default()
     });
     assert!(end.is_disengaged() && disengaged_at.is_some());
 }
@@ -138,7 +144,7 @@ fn a_hip_that_jumped_away_before_a_silence_moves_a_disengaged_tool_nowhere() {
 fn before_the_first_sample_nothing_is_disengaged() {
     let mut end = end("none", Architecture::Mmt, 0);
     (1..=4000).for_each(|ms| {
-        end.tick(AT(ms));
+        end.tick(AT(ms), &SlaveGiven::default());
     });
     assert!(!end.is_disengaged());
 }
@@ -161,7 +167,7 @@ fn a_slave_without_samples_shows_hold_after_100_ms_and_disengaged_after_2_s() {
     end.handle_datagram(AT(10), &bytes);
     let mut shown = Vec::new();
     for ms in 11..=2200 {
-        end.tick(AT(ms));
+        end.tick(AT(ms), &SlaveGiven::default());
         sent(&mut end, &mut master, AT(ms));
         let state = master.other().tool;
         if shown.last().is_none_or(|(_, last)| *last != state) {
@@ -183,7 +189,7 @@ fn a_slave_without_samples_shows_hold_after_100_ms_and_disengaged_after_2_s() {
         let bytes = command(&mut master, from + 10, from + 1..=from + 10, 0, None);
         end.handle_datagram(AT(from + 10), &bytes);
         for ms in from + 11..=until {
-            end.tick(AT(ms));
+            end.tick(AT(ms), &SlaveGiven::default());
             sent(&mut end, &mut master, AT(ms));
             if ms == 290 {
                 assert_eq!(master.other().tool, ToolState::Hold);

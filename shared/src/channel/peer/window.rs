@@ -8,7 +8,7 @@ const WORDS: usize = (WINDOW / WORD) as usize;
 
 /// Where a number lies.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Place {
+pub(super) enum WindowPosition {
     /// Beyond the newest.
     Ahead,
     /// Below the newest, never seen.
@@ -53,20 +53,20 @@ impl Window {
     }
 
     /// Where `number` lies; from now on it has been seen, unless it is implausible.
-    pub(super) fn note(&mut self, number: u32) -> Place {
+    pub(super) fn note(&mut self, number: u32) -> WindowPosition {
         let place = match number.checked_sub(self.newest) {
-            Some(0) => Place::Taken,
+            Some(0) => WindowPosition::Taken,
             Some(ahead) if ahead < WINDOW || self.is_second(number) && number != self.far => {
                 self.go_on(number);
-                return Place::Ahead;
+                return WindowPosition::Ahead;
             }
             Some(_) => {
                 self.far = number;
-                return Place::Implausible;
+                return WindowPosition::Implausible;
             }
-            None if self.newest - number >= WINDOW => return Place::Behind,
-            None if self.bit(number) => Place::Taken,
-            None => Place::Gap,
+            None if self.newest - number >= WINDOW => return WindowPosition::Behind,
+            None if self.bit(number) => WindowPosition::Taken,
+            None => WindowPosition::Gap,
         };
         self.set(number, true);
         place
@@ -152,7 +152,7 @@ impl SequenceWindow {
             return Freshness::Implausible;
         }
         match window.note(sequence) {
-            Place::Taken => {
+            WindowPosition::Taken => {
                 self.duplicate += 1;
                 Freshness::Duplicate
             }
@@ -221,14 +221,14 @@ mod tests {
     #[test]
     fn a_window_forgets_exactly_after_its_length() {
         let mut window = Window::default();
-        assert_eq!(window.note(2), Place::Ahead);
-        assert_eq!(window.note(4), Place::Ahead);
-        assert_eq!(window.note(1 + WINDOW), Place::Ahead);
-        assert_eq!(window.note(2), Place::Taken, "{} back", WINDOW - 1);
-        assert_eq!(window.note(1), Place::Behind, "{WINDOW} back");
-        assert_eq!(window.note(3), Place::Gap);
-        assert_eq!(window.note(2 + WINDOW), Place::Ahead);
-        assert_eq!(window.note(2), Place::Behind);
+        assert_eq!(window.note(2), WindowPosition::Ahead);
+        assert_eq!(window.note(4), WindowPosition::Ahead);
+        assert_eq!(window.note(1 + WINDOW), WindowPosition::Ahead);
+        assert_eq!(window.note(2), WindowPosition::Taken, "{} back", WINDOW - 1);
+        assert_eq!(window.note(1), WindowPosition::Behind, "{WINDOW} back");
+        assert_eq!(window.note(3), WindowPosition::Gap);
+        assert_eq!(window.note(2 + WINDOW), WindowPosition::Ahead);
+        assert_eq!(window.note(2), WindowPosition::Behind);
     }
 
     #[test]
@@ -309,16 +309,16 @@ mod tests {
                 let second = number != far && number.abs_diff(far) < WINDOW;
                 let expected = if number > newest && number - newest >= WINDOW && !second {
                     far = number;
-                    prop_assert_eq!(place, Place::Implausible, "{}", number);
+                    prop_assert_eq!(place, WindowPosition::Implausible, "{}", number);
                     continue;
                 } else if number > newest {
-                    Place::Ahead
+                    WindowPosition::Ahead
                 } else if newest - number >= WINDOW {
-                    Place::Behind
+                    WindowPosition::Behind
                 } else if all.contains(&number) {
-                    Place::Taken
+                    WindowPosition::Taken
                 } else {
-                    Place::Gap
+                    WindowPosition::Gap
                 };
                 prop_assert_eq!(place, expected, "{}", number);
                 all.insert(number);

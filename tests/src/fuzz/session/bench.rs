@@ -171,20 +171,15 @@ impl Bench {
             master_checks: checks,
             ..
         } = &mut self.ends;
-        if self.releasing {
-            master.release();
-        }
         let [stops, _] = self.stops;
-        master.stop(stops);
-        master.hold(self.engaged);
-        let done = master.tick(now, self.reading);
-        judge.ticked(&done, master);
         let given = MasterGiven {
             reading: self.reading,
             engaged: self.engaged,
             releases: self.releasing,
             stops,
         };
+        let done = master.tick(now, &given);
+        judge.ticked(&done, master);
         checks.ticked(&MasterTicked {
             now,
             polled: now,
@@ -215,13 +210,12 @@ impl Bench {
             ..
         } = &mut self.ends;
         let [_, stops] = self.stops;
-        slave.stop(stops);
-        let done = slave.tick(now);
+        let given = SlaveGiven { stops, plant: None };
+        let done = slave.tick(now, &given);
         if let Some(done) = &done {
             judge.ticked(done);
             self.seen |= u64::from(done.in_contact) << 5 | u64::from(done.update.is_some()) << 6;
         }
-        let given = SlaveGiven { stops, plant: None };
         checks.ticked(&SlaveTicked {
             now,
             polled: now,

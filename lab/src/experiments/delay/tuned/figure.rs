@@ -1,7 +1,7 @@
 //! The figure of the tuned architectures over the delay.
 
 use super::judged::Judged;
-use crate::architecture::Architecture;
+use crate::architecture::ComparedArchitecture;
 use crate::experiment::prelude::*;
 use crate::experiments::delay::figure::line;
 use crate::experiments::delay::tuning::Tried;
@@ -18,7 +18,7 @@ pub(super) fn figure(judged: &[Judged<'_>]) -> Figure {
         ("tuned, apparent mass", |judged| judged.tuned.interval(|row| row.apparent_mass_ratio), Axis::linear("felt mass over the object's")),
     ];
     let panels = measures.into_iter().map(|(title, of, y)| {
-        let series = Architecture::ALL.into_iter().map(|architecture| {
+        let series = ComparedArchitecture::ALL.into_iter().map(|architecture| {
             let own = judged
                 .iter()
                 .filter(|judged| judged.point().architecture == architecture);

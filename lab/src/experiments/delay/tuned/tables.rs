@@ -1,7 +1,7 @@
 //! What the tuned architectures came to: each beside itself untuned, and which is the nearest to the object at each delay.
 
 use super::judged::Judged;
-use crate::architecture::{Architecture, DelayRow};
+use crate::architecture::{ComparedArchitecture, DelayRow};
 use crate::experiment::prelude::*;
 use crate::experiments::delay::choices::number;
 use crate::experiments::delay::tuning::{Tried, error, keeps_contact};
@@ -133,7 +133,8 @@ fn of_delay<'a>(judged: &[Judged<'a>], one_way_ms: u64, measure: Measure) -> Opt
             .iter()
             .filter(move |judged| judged.point().one_way_ms == one_way_ms)
     };
-    let replay = here().find(|judged| judged.point().architecture == Architecture::REPLAY)?;
+    let replay =
+        here().find(|judged| judged.point().architecture == ComparedArchitecture::REPLAY)?;
     let kept = here().filter(|judged| keeps_contact(judged.tuned));
     let measured = kept.filter_map(|judged| Some((judged.tuned, judged.tuned.mean(measure.1)?)));
     let (nearest, _) = measured.min_by(|(_, a), (_, b)| a.total_cmp(b))?;

@@ -3,8 +3,8 @@
 use mmt_client::again::MasterSetting;
 use mmt_client::commands::CommandConfig;
 use mmt_client::device::DeviceProfile;
-use mmt_client::end::MasterEnd;
-use mmt_server::end::SlaveEnd;
+use mmt_client::end::{MasterEnd, MasterGiven};
+use mmt_server::end::{SlaveEnd, SlaveGiven};
 use mmt_server::slave::SlaveConfig;
 use mmt_shared::model::architecture::Architecture;
 use mmt_shared::model::geometry::Vec2;
@@ -108,9 +108,8 @@ impl Master {
             kept.put("/master/arrivals", &arrival);
         }
         let reading = self.from + Vec2::new(1e-4 * tick as f64, 0.0);
-        self.end.stop(false);
-        self.end.hold(true);
-        let done = self.end.tick(now, reading);
+        let given = MasterGiven::held_at(reading);
+        let done = self.end.tick(now, &given);
         self.digest.tick(&done);
         let hip = done.sample.hip.metres();
         let ticked = MasterTick {
@@ -128,8 +127,8 @@ impl Master {
             sent_ns: now.as_nanos(),
             hip_x_m: hip.x,
             hip_y_m: hip.y,
-            f_m_x_n: done.felt.x,
-            f_m_y_n: done.felt.y,
+            f_m_x_n: done.displayed.x,
+            f_m_y_n: done.displayed.y,
             hand_x_n: done.hand_force.x,
             hand_y_n: done.hand_force.y,
             in_contact: false,
@@ -165,8 +164,7 @@ impl Slave {
             let arrival = arrival(&mut self.index, now, datagram);
             kept.put("/slave/arrivals", &arrival);
         }
-        self.end.stop(false);
-        let done = self.end.tick(now);
+        let done = self.end.tick(now, &SlaveGiven::default());
         self.digest.tick(&done);
         let tool = done.map(|done| done.tool);
         let ticked = slave_tick(self.index, now, tool, self.digest.value());

@@ -4,7 +4,7 @@ use mmt_shared::model::geometry::Vec2;
 
 /// The force that the observer takes in a tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Felt {
+pub struct ContactForce {
     /// As measured, N.
     pub force: Vec2,
     /// The mean of the newest few where they are noisy, N.
@@ -13,7 +13,7 @@ pub struct Felt {
     pub noise_n: f64,
 }
 
-impl From<Vec2> for Felt {
+impl From<Vec2> for ContactForce {
     fn from(force: Vec2) -> Self {
         Self {
             force,

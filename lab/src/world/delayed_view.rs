@@ -8,13 +8,13 @@ use mmt_shared::time::Time;
 
 /// The scenes under way, and the one that is seen.
 #[derive(Debug)]
-pub(crate) struct DelayedPicture {
+pub(crate) struct DelayedView {
     under_way: VecDeque<(Time, View)>,
     seen: View,
 }
 
-impl DelayedPicture {
-    /// A picture of which `first` is seen from the start.
+impl DelayedView {
+    /// A view of which `first` is seen from the start.
     pub(crate) fn new(first: View) -> Self {
         Self {
             under_way: VecDeque::new(),
