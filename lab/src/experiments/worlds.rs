@@ -2,6 +2,7 @@
 //!
 //! What the hand can move is judged by force, the rest by pose, sign and energy.
 
+mod ideal;
 mod row;
 mod run;
 mod tables;
@@ -24,6 +25,11 @@ pub(super) const EXPERIMENT: Experiment = Experiment {
             help: "With a tool that does not give",
             number: None,
         },
+        Argument {
+            name: "ideal",
+            help: "The same worlds with one thing at a time ideal",
+            number: None,
+        },
     ],
     duration: Duration::from_secs(20),
     ..Experiment::new(
@@ -34,19 +40,22 @@ pub(super) const EXPERIMENT: Experiment = Experiment {
     )
 };
 
-/// Keeps `worlds.csv` and `worlds.svg`.
+/// Keeps `worlds.csv` and `worlds.svg`, or `worlds-ideal.csv`.
 fn run(runner: &Runner, request: &Request) -> Result<Findings, ExperimentError> {
     let extent = request.extent;
     let one = request.number("world").filter(|number| *number >= 1.0);
     let (seeds, first) = one.map_or((extent.seeds, runner.first_seed()), |number| {
         (1, number as u64)
     });
+    if request.flag("ideal") {
+        return ideal::compare(runner, extent, first);
+    }
     let groups = runner.grid_from(first, "worlds", seeds, vec![()], |(), number| {
         let mut world = RandomWorld::new(number);
         if request.flag("stiff-tool") {
             world.config.slave.tool_compliance = None;
         }
-        let reached = reach(&world.config, extent.duration)?;
+        let reached = reach(&world.config, None, extent.duration)?;
         Ok(Row { world, reached })
     })?;
     let rows: Vec<Row> = groups.into_iter().flat_map(|group| group.runs).collect();

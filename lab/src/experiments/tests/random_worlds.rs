@@ -23,3 +23,26 @@ fn each_random_world_is_a_row_keeps_the_promises_and_is_the_same_by_its_number()
     let stiff = Done::given(&worlds::EXPERIMENT, 1000, 5000, stiff);
     assert_ne!(stiff.findings.digest, again.findings.digest);
 }
+
+#[test]
+fn with_one_thing_ideal_the_worlds_are_the_same_ones_and_the_truth_in_every_tick_is_best() {
+    let given = BTreeMap::from([("ideal", 0.0)]);
+    let done = Done::given(&worlds::EXPERIMENT, 8, 8000, given);
+    let rows = done.rows("worlds-ideal.csv", &[]);
+    let errors: Vec<f64> = rows.iter().map(|row| number(row, "median")).collect();
+    let drawn = Done::of_seeds(&worlds::EXPERIMENT, 8, 8000);
+    let drawn = drawn.rows("worlds.csv", &[]);
+    let mut errors_drawn: Vec<f64> = drawn
+        .iter()
+        .filter(|row| number(row, "friction_n") < 8.0)
+        .filter_map(|row| row["relative_error_true"].parse().ok())
+        .collect();
+    errors_drawn.sort_by(f64::total_cmp);
+    assert_eq!(errors_drawn.len() as f64, number(&rows[0], "worlds"));
+    assert_eq!(errors[0], errors_drawn[(errors_drawn.len() - 1) / 2]);
+    let best = errors.last().unwrap();
+    assert!(
+        errors[..errors.len() - 1].iter().all(|error| error > best),
+        "{errors:?}"
+    );
+}

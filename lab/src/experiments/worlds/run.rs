@@ -2,13 +2,14 @@
 
 use std::time::Duration;
 
+use mmt_server::slave::Substitutes;
 use mmt_shared::model::geometry::Vec2;
 use mmt_shared::time::TICK_S;
 
 use crate::experiment::findings::ExperimentError;
 use crate::trial::TrialError;
 use crate::two_ports::{TwoPorts, WORKING_S};
-use crate::world::{World, WorldConfig, WorldTick};
+use crate::world::{Given, World, WorldConfig, WorldTick};
 
 /// Beyond the hand's way in a round trip the pose is off by no more than this, m.
 const POSE_M: f64 = 0.1;
@@ -46,8 +47,12 @@ pub(super) struct Measured {
     pub(super) digest: String,
 }
 
-/// Runs a world.
-pub(super) fn reach(config: &WorldConfig, duration: Duration) -> Result<Measured, ExperimentError> {
+/// Runs a world, where `params` is given with that as m (kg), b (N s/m) and c (N) in the place of the slave's estimate.
+pub(super) fn reach(
+    config: &WorldConfig,
+    params: Option<[f64; 3]>,
+    duration: Duration,
+) -> Result<Measured, ExperimentError> {
     let mut world = World::try_new(config).map_err(TrialError::from)?.judged();
     let path_s = (config.up.delay.middle() + config.down.delay.middle()).as_secs_f64();
     let slow_s = (config.up.delay.quantile(0.99) + config.down.delay.quantile(0.99)).as_secs_f64();
@@ -55,7 +60,14 @@ pub(super) fn reach(config: &WorldConfig, duration: Duration) -> Result<Measured
     let body = TouchedBody::new(first, slow_s + WORKING_S);
     let mut seen = Seen::new(TwoPorts::new(path_s), body);
     for _ in 0..duration.as_millis() {
-        let tick = world.step();
+        let mut known = |_, _: &_| params;
+        let tick = world.step_given(Given {
+            slave: Substitutes {
+                estimator: Some(&mut known),
+                scheme: None,
+            },
+            ..Given::default()
+        });
         seen.take(&world, &tick);
     }
     let (outcome, truth) = (world.outcome(), world.slave().true_force());

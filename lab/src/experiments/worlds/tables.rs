@@ -114,6 +114,12 @@ pub(super) fn distribution(rows: &[Row], first: u64, extent: Extent) -> Table {
     Table::of(title, &parts, &columns)
 }
 
+/// The share of rising values above `most`; none without values.
+pub(super) fn share_above(sorted: &[f64], most: f64) -> Option<f64> {
+    let above = sorted.len() - sorted.partition_point(|value| *value <= most);
+    (!sorted.is_empty()).then(|| above as f64 / sorted.len() as f64)
+}
+
 /// A target and what was reached.
 struct Target {
     target: &'static str,
@@ -127,9 +133,7 @@ pub(super) fn targets(rows: &[Row]) -> Table {
     let error: fn(&Row) -> Option<f64> = |row| row.reached.relative_error;
     let all: fn(&Row) -> bool = |_| true;
     let share = |chosen: fn(&Row) -> bool, of: fn(&Row) -> Option<f64>, most: f64| {
-        let values = sorted(rows, chosen, of);
-        let above = values.iter().filter(|value| **value > most).count();
-        (!values.is_empty()).then(|| above as f64 / values.len() as f64)
+        share_above(&sorted(rows, chosen, of), most)
     };
     let median = |chosen| quantile(&sorted(rows, chosen, error), 0.5);
     let broken: fn(&Row) -> Option<f64> =
