@@ -209,11 +209,8 @@ fn a_hand_at_a_device_of_its_own_protocol_pushes_the_box_over_the_emulated_netwo
             let record = place.path().join("hand.mcap");
             let record = record.to_str().unwrap();
             let network = ["--netem", "delay 20ms loss 1%"];
-            let slave = ["slave", "--listen", "127.0.0.1:0", "--once", "--json"];
-            let identity = ["--identity", identity.to_str().unwrap()];
-            let mut slave = Running::mmt(&[&slave[..], &identity, &network].concat()).unwrap();
-            let pairing = slave.wait_for_line(GENEROUS, |line| line.starts_with("mmt://"));
-            let pairing = pairing.unwrap();
+            let own = ["--once", "--identity", identity.to_str().unwrap()];
+            let (slave, pairing) = Running::slave(&[&own[..], &network].concat()).unwrap();
             let options = ["--json", "--duration", "8s", "--record", record];
             let at = [
                 "--device",

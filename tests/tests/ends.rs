@@ -26,13 +26,7 @@ const PROMPTLY: (Duration, Duration) = (Duration::from_secs(1), Duration::from_s
 
 /// A slave on a port of the system's choice, and its pairing string.
 fn slave(options: &[&str]) -> (Running, String) {
-    let arguments = [&["slave", "--listen", "127.0.0.1:0", "--json"], options].concat();
-    listening(Running::mmt(&arguments).unwrap())
-}
-
-fn listening(mut slave: Running) -> (Running, String) {
-    let pairing = slave.wait_for_line(SOON, |line| line.starts_with("mmt://"));
-    (slave, pairing.unwrap())
+    Running::slave(options).unwrap()
 }
 
 /// A master whose session has begun.
@@ -237,7 +231,8 @@ fn a_slave_whose_tick_hangs_ends_with_exit_code_6_and_its_master_with_1() {
         command.env("LD_PRELOAD", shim);
         command.env("HANG_THREAD", "mmt-slave");
         command.env("HANG_WHEN", &when);
-        let (slave, pairing) = listening(Running::start(command).unwrap());
+        let mut slave = Running::start(command).unwrap();
+        let pairing = slave.pairing().unwrap();
         let master = master(&pairing, &["--duration", "60s"]);
         std::thread::sleep(Duration::from_secs(1));
         std::fs::write(&when, "").unwrap();

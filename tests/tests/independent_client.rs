@@ -30,11 +30,7 @@ fn ok<T>(result: Result<T, ProcessError>) -> T {
 fn slave(place: &Path) -> (Running, String) {
     let identity = place.join("identity");
     let identity = identity.to_str().unwrap();
-    let listen = ["--listen", "127.0.0.1:0", "--identity", identity];
-    let arguments = [&["slave"], &listen[..], &["--once", "--json"]].concat();
-    let mut slave = ok(Running::mmt(&arguments));
-    let pairing = ok(slave.wait_for_line(GENEROUS, |line| line.starts_with("mmt://")));
-    (slave, pairing)
+    ok(Running::slave(&["--once", "--identity", identity]))
 }
 
 fn client(python: &str, pairing: &str, options: &[&str]) -> Ended {

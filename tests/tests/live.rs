@@ -19,10 +19,7 @@ fn ok<T>(result: Result<T, ProcessError>) -> T {
 
 /// A slave on a port of the system's choice, and its pairing string.
 fn slave(options: &[&str]) -> (Running, String) {
-    let arguments = [&["slave", "--listen", "127.0.0.1:0", "--json"], options].concat();
-    let mut slave = ok(Running::mmt(&arguments));
-    let pairing = ok(slave.wait_for_line(SOON, |line| line.starts_with("mmt://")));
-    (slave, pairing)
+    ok(Running::slave(options))
 }
 
 fn master(pairing: &str, duration: &str) -> Running {
@@ -301,7 +298,7 @@ fn a_master_that_was_killed_is_back_at_once_and_another_operator_has_to_ask() {
         let (here, elsewhere) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
         let arguments = ["slave", "--listen", "127.0.0.1:0", "--json", "--once"];
         let mut slave = of_operator(here.path(), &arguments);
-        let pairing = ok(slave.wait_for_line(SOON, |line| line.starts_with("mmt://")));
+        let pairing = ok(slave.pairing());
         let master = |state, options: &[&str]| {
             let arguments = [&["master", &pairing, "--json", "--duration"], options].concat();
             of_operator(state, &arguments)

@@ -44,11 +44,8 @@ fn announced(program: &mut Running, words: &str) -> String {
 /// A slave for one session, and its pairing string.
 fn slave(place: &Path, options: &[&str]) -> (Running, String) {
     let identity = place.join("identity");
-    let listen = ["slave", "--listen", "127.0.0.1:0", "--once", "--json"];
-    let identity = ["--identity", identity.to_str().unwrap()];
-    let mut slave = Running::mmt(&[&listen[..], &identity, options].concat()).unwrap();
-    let pairing = slave.wait_for_line(GENEROUS, |line| line.starts_with("mmt://"));
-    (slave, pairing.unwrap())
+    let own = ["--once", "--identity", identity.to_str().unwrap()];
+    Running::slave(&[&own[..], options].concat()).unwrap()
 }
 
 fn document(ended: &Ended, skip: usize) -> Value {
@@ -237,9 +234,7 @@ fn a_plant_that_dies_stops_the_tool_and_is_reported_to_the_master_and_its_return
         let mut slave = Running::mmt(&[&options[..], &kept].concat()).unwrap();
         let address = announced(&mut slave, "plant: ");
         let plant = contrib(&python, "plant.py", &address, &[]);
-        let pairing = slave
-            .wait_for_line(GENEROUS, |line| line.starts_with("mmt://"))
-            .unwrap();
+        let pairing = slave.pairing().unwrap();
         let mut master = Running::mmt(&["master", &pairing, "--json"]).unwrap();
         master
             .wait_for_line(GENEROUS, |line| line.contains("the session begins"))
@@ -320,8 +315,7 @@ fn a_hand_and_a_plant_in_cpp_meet_over_the_emulated_network() {
         let mut slave = Running::mmt(&[&slave[..], &identity, &network].concat()).unwrap();
         let address = announced(&mut slave, "plant: ");
         let _plant = start(&plant, &address, "100");
-        let pairing = slave.wait_for_line(GENEROUS, |line| line.starts_with("mmt://"));
-        let pairing = pairing.unwrap();
+        let pairing = slave.pairing().unwrap();
         let master = ["master", &pairing, "--device", "link", "--json"];
         let mut master = Running::mmt(&[&master[..], &network].concat()).unwrap();
         let address = announced(&mut master, "device: ");

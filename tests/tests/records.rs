@@ -235,11 +235,8 @@ fn each_host_of_two_keeps_a_record_that_runs_again_by_itself() {
         let folder = tempfile::tempdir().unwrap();
         let place = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
         let (identity, of_slave, of_master) = (place("identity"), place("s.mcap"), place("m.mcap"));
-        let listen = ["slave", "--listen", "127.0.0.1:0", "--identity", &identity];
-        let arguments = [&listen[..], &["--once", "--record", &of_slave]].concat();
-        let mut slave = Running::mmt(&arguments).unwrap();
-        let pairing = slave.wait_for_line(GENEROUS, |line| line.starts_with("mmt://"));
-        let pairing = pairing.unwrap();
+        let own = ["--once", "--identity", &identity, "--record", &of_slave];
+        let (slave, pairing) = Running::slave(&own).unwrap();
         done(&[
             "master",
             &pairing,

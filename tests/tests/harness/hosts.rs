@@ -156,7 +156,7 @@ impl Hosts {
             "--json",
         ];
         let mut slave = self.mmt("slave", &slave)?;
-        let pairing = slave.wait_for_line(SOON, |line| line.starts_with("mmt://"))?;
+        let pairing = slave.pairing()?;
         // this host has no route to the world: the slave names the address of its cable
         if !pairing.contains(&listen) {
             let what = format!("{pairing} does not name {listen}");

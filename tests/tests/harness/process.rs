@@ -60,6 +60,8 @@ pub(crate) enum ProcessError {
 
 /// The program `mmt`, as it was built with this test.
 pub(crate) const PROGRAM: &str = env!("CARGO_BIN_EXE_mmt-under-test");
+/// A slave listens by then, however busy the host is.
+const LISTENS: Duration = Duration::from_secs(120);
 
 /// A running process whose output is collected; killed when dropped. What it recorded of its sessions is judged then.
 #[derive(Debug)]
@@ -157,6 +159,25 @@ impl Running {
         let mut command = Command::new(PROGRAM);
         command.args(arguments);
         Self::start(command)
+    }
+
+    /// Starts a slave on a port of the system's choice, with a report in JSON; returns it and its pairing string.
+    ///
+    /// # Errors
+    /// As [`Running::mmt`], and it does not listen in time.
+    pub(crate) fn slave(options: &[&str]) -> Result<(Self, String), ProcessError> {
+        let listen = ["slave", "--listen", "127.0.0.1:0", "--json"];
+        let mut slave = Self::mmt(&[&listen[..], options].concat())?;
+        let pairing = slave.pairing()?;
+        Ok((slave, pairing))
+    }
+
+    /// Waits for the pairing string of a slave, and returns it.
+    ///
+    /// # Errors
+    /// It does not listen in time.
+    pub(crate) fn pairing(&mut self) -> Result<String, ProcessError> {
+        self.wait_for_line(LISTENS, |line| line.starts_with("mmt://"))
     }
 
     /// Waits for a line on standard output or error that `wanted` accepts, and returns it.
