@@ -104,14 +104,14 @@ fn soak(
     stop: &Stop,
     tally: &mut Tally,
 ) -> Result<(), Failure> {
-    let lasting = RoundFolders::make(out, "lasting")?;
+    let lasting = Folders::make(out, "lasting")?;
     let seed = arguments.seed;
     let mut rig = Rig::start(&lasting.folder, &lasting.state, Recording::Off, seed)?;
     let longest_s = arguments.hours * 3600.0 / CYCLES_MIN;
     let mut lengths = Substream::new(seed, "soak/length", 0);
     while tally.hours() < arguments.hours && !stop.asked() {
         let number = tally.cycles + 1;
-        let place = RoundFolders::make(out, &format!("cycle-{number}"))?;
+        let place = Folders::make(out, &format!("cycle-{number}"))?;
         tally.next_cycle(place.folder.clone());
         let length_s = lengths.uniform_in(CYCLE_S.0, CYCLE_S.1).min(longest_s);
         let length = Duration::from_secs_f64(length_s);
@@ -138,7 +138,7 @@ fn soak(
 
 /// A cycle with a slave of its own.
 fn own_slave(
-    place: &RoundFolders,
+    place: &Folders,
     tally: &mut Tally,
     stop: &Stop,
     seed: u64,
@@ -168,14 +168,14 @@ fn end(rig: Rig, tally: &mut Tally) {
 }
 
 /// Where processes keep things.
-struct RoundFolders {
+struct Folders {
     /// Logs and records.
     folder: PathBuf,
     /// What they keep for themselves, secrets among it.
     state: PathBuf,
 }
 
-impl RoundFolders {
+impl Folders {
     fn make(out: &Path, name: &str) -> Result<Self, Failure> {
         let (folder, state) = (out.join(name), out.join("state").join(name));
         // what an earlier soak left there

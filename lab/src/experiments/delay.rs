@@ -18,7 +18,7 @@ use crate::experiment::prelude::*;
 use crate::trial::TrialError;
 pub(super) use tuned::TUNED;
 
-use grid_point::{GridPoint, Group, all_points, picture_points, some_points};
+use grid_point::{GridPoint, Group, all_points, some_points, view_points};
 
 /// The architectures over the delay; pushes come later with it.
 pub(super) const DELAY: Experiment = Experiment {
@@ -49,7 +49,7 @@ fn run(runner: &Runner, request: &Request) -> Result<Findings, ExperimentError> 
     runner.keep_table("delay-limits.csv", &limits)?;
     runner.keep_figure("delay.svg", &figure::figure(&groups))?;
 
-    let runs = measure(runner, request, "delay-view", picture_points())?;
+    let runs = measure(runner, request, "delay-view", view_points())?;
     let views = tables::views(&runs);
     runner.keep_table("delay-view.csv", &views)?;
 

@@ -152,6 +152,18 @@ mod tests {
     use super::*;
 
     #[test]
+    fn a_world_waits_in_play_out_as_long_as_a_live_session_of_its_packing() {
+        for samples_per_command in [1, 5, 10, 20] {
+            let config = WorldConfig {
+                samples_per_command,
+                ..WorldConfig::default()
+            };
+            let delay_ms = config.slave().playout.delay_ms;
+            assert_eq!(delay_ms, 6.0 + f64::from(samples_per_command));
+        }
+    }
+
+    #[test]
     fn a_delay_of_play_out_that_was_configured_stays_whatever_the_hand_feels() {
         for architecture in Architecture::ALL {
             let mut config = WorldConfig {

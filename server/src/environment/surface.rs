@@ -27,7 +27,8 @@ pub(super) enum Surface {
     Notched(Skin),
 }
 
-/// A round surface: the proxy slides freely to the point nearest to the HIP.
+/// A round surface: the proxy slides freely to the point nearest to the HIP. Of a circle that is one line; parry has no
+/// normal for a HIP at the very centre.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Disc {
     radius: f64,

@@ -24,7 +24,7 @@ use tokio::sync::{OwnedSemaphorePermit, mpsc, watch};
 use tokio::task::{JoinError, JoinSet};
 use tokio::time::timeout;
 
-use super::crowd::{Crowd, Slot};
+use super::crowd::{Crowd, Place};
 use super::lease::{Lease, Leases};
 use super::observer_session::{self, Observer};
 use super::observers::Observers;
@@ -145,7 +145,7 @@ impl Acceptor {
     pub(super) async fn run_with<J>(
         self,
         listener: Arc<Listener>,
-        judge: impl Fn(Self, Handshake, Slot) -> J,
+        judge: impl Fn(Self, Handshake, Place) -> J,
     ) where
         J: Future<Output = ()> + Send + 'static,
     {
@@ -170,7 +170,7 @@ impl Acceptor {
         }
     }
 
-    pub(super) async fn judge(self, handshake: Handshake, place: Slot) {
+    pub(super) async fn judge(self, handshake: Handshake, place: Place) {
         let address = handshake.address();
         let finished = tokio::select! {
             finished = handshake.finish() => finished,
@@ -239,7 +239,7 @@ impl Acceptor {
 
     async fn answer(
         self,
-        place: Slot,
+        place: Place,
         connection: Connection,
         send: SendStream,
         receive: RecvStream,

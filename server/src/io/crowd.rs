@@ -10,16 +10,16 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use mmt_shared::network::Network;
 use tokio::sync::Notify;
 
-/// Slots. A master takes one when its address has proven itself, and has shown its token a round trip later: with this many
+/// Places. A master takes one when its address has proven itself, and has shown its token a round trip later: with this many
 /// places, a crowd of 50 a second leaves it 2.5 s.
-const SLOTS: usize = 128;
+const PLACES: usize = 128;
 
 /// Those who are being judged. Clones are the same.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Crowd(Arc<Mutex<Slots>>);
+pub(super) struct Crowd(Arc<Mutex<Places>>);
 
 #[derive(Debug, Default)]
-struct Slots {
+struct Places {
     came: u64,
     /// By the order in which they came.
     taken: BTreeMap<u64, (Network, Arc<Notify>)>,
@@ -27,7 +27,7 @@ struct Slots {
 
 /// A place among them; dropping it frees it.
 #[derive(Debug)]
-pub(super) struct Slot {
+pub(super) struct Place {
     crowd: Crowd,
     number: u64,
     leave: Arc<Notify>,
@@ -35,9 +35,9 @@ pub(super) struct Slot {
 
 impl Crowd {
     /// A place for whoever comes from `address`; if all are taken, another one is asked to leave.
-    pub(super) fn enter(&self, address: &SocketAddr) -> Slot {
+    pub(super) fn enter(&self, address: &SocketAddr) -> Place {
         let mut places = self.lock();
-        if places.taken.len() >= SLOTS {
+        if places.taken.len() >= PLACES {
             let leaves = places.leaves();
             if let Some((_, leave)) = leaves.and_then(|number| places.taken.remove(&number)) {
                 leave.notify_one();
@@ -47,7 +47,7 @@ impl Crowd {
         places.came += 1;
         let place = (Network::of(address.ip()), Arc::clone(&leave));
         places.taken.insert(number, place);
-        Slot {
+        Place {
             crowd: self.clone(),
             number,
             leave,
@@ -56,15 +56,15 @@ impl Crowd {
 
     /// Whether half of the places are taken: time to be stricter.
     pub(super) fn is_dense(&self) -> bool {
-        self.lock().taken.len() >= SLOTS / 2
+        self.lock().taken.len() >= PLACES / 2
     }
 
-    fn lock(&self) -> MutexGuard<'_, Slots> {
+    fn lock(&self) -> MutexGuard<'_, Places> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
-impl Slots {
+impl Places {
     /// Who leaves: of the networks with the most places the one that came first.
     fn leaves(&self) -> Option<u64> {
         let mut of_network: BTreeMap<Network, usize> = BTreeMap::new();
@@ -78,14 +78,14 @@ impl Slots {
     }
 }
 
-impl Slot {
+impl Place {
     /// Waits until its holder is asked to leave. Cancel-safe.
     pub(super) async fn lost(&self) {
         self.leave.notified().await;
     }
 }
 
-impl Drop for Slot {
+impl Drop for Place {
     fn drop(&mut self) {
         self.crowd.lock().taken.remove(&self.number);
     }
@@ -99,7 +99,7 @@ mod tests {
 
     use super::*;
 
-    fn lost(place: &Slot) -> bool {
+    fn lost(place: &Place) -> bool {
         let poll = pin!(place.lost()).poll(&mut Context::from_waker(Waker::noop()));
         poll == Poll::Ready(())
     }
@@ -112,7 +112,7 @@ mod tests {
     fn of_the_network_with_the_most_places_the_first_one_leaves() {
         let crowd = Crowd::default();
         let owner = crowd.enter(&from(1));
-        let others: Vec<Slot> = (1..SLOTS).map(|_| crowd.enter(&from(2))).collect();
+        let others: Vec<Place> = (1..PLACES).map(|_| crowd.enter(&from(2))).collect();
         let _one_more = crowd.enter(&from(3));
         assert!(!lost(&owner));
         let left: Vec<bool> = others.iter().map(lost).collect();
@@ -123,7 +123,7 @@ mod tests {
     #[test]
     fn where_each_has_one_the_first_one_leaves_and_a_place_that_was_freed_is_free() {
         let crowd = Crowd::default();
-        let places: Vec<Slot> = (0..SLOTS as u8).map(|n| crowd.enter(&from(n))).collect();
+        let places: Vec<Place> = (0..PLACES as u8).map(|n| crowd.enter(&from(n))).collect();
         assert!(crowd.is_dense());
         let more = crowd.enter(&from(200));
         assert!(lost(places.first().unwrap()) && !lost(places.get(1).unwrap()));

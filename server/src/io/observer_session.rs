@@ -157,7 +157,7 @@ impl Sight<'_> {
         F: Future<Output = ObserversFarewell>,
     {
         let clock = self.observers.clock();
-        let mut looks = self.observers.views();
+        let mut views = self.observers.views();
         let mut ending = pin!(self.observers.ending());
         loop {
             self.feed.show(&self.observers.view_now());
@@ -180,7 +180,7 @@ impl Sight<'_> {
                 },
                 () = revoked.as_mut() => return End::Revoked,
                 // its sender is this host's own
-                _ = looks.changed() => {}
+                _ = views.changed() => {}
                 () = sleep(rest) => {}
                 datagram = self.connection.read_datagram() => match datagram {
                     Ok(bytes) => self.take(&bytes),

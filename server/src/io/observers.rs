@@ -39,7 +39,7 @@ pub(super) struct Observers {
 }
 
 impl Observers {
-    /// Slots for `most` observers, who are welcomed with this until a session begins.
+    /// Places for `most` observers, who are welcomed with this until a session begins.
     pub(super) fn new(most: u8, clock: Clock, emergency: EmergencyStop, welcome: Welcome) -> Self {
         Self {
             clock,

@@ -161,7 +161,7 @@ pub(super) fn all_points() -> Vec<GridPoint> {
 }
 
 /// Replay, with the operator looking at the local model or at the delayed picture; and what the object's size does.
-pub(super) fn picture_points() -> Vec<GridPoint> {
+pub(super) fn view_points() -> Vec<GridPoint> {
     let of = |(visual_feedback, size)| {
         PICTURE_MS.map(|ms| GridPoint {
             visual_feedback,
