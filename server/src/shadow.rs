@@ -112,6 +112,12 @@ impl Shadow {
         self.lost
     }
 
+    /// The newest update that was given up as lost, after which something is sent in its place; 0: none was.
+    #[must_use]
+    pub fn newest_given_up(&self) -> u32 {
+        self.given_up
+    }
+
     /// Updates that the master has not acknowledged: those that are lost, and those that it may still acknowledge.
     #[must_use]
     pub fn unacknowledged(&self) -> u64 {

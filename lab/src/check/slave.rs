@@ -102,8 +102,8 @@ pub struct SlaveChecks {
     unconfirmed: Vec<(u32, Duration, Cause)>,
     /// All that has been ticked.
     lived: Duration,
-    /// Updates that the slave counts as lost, and the newest that was acknowledged to it.
-    losses: (u64, u32),
+    /// The newest update that the slave has given up as lost.
+    given_up: u32,
     /// When the trigger last sent something, or began.
     updated: Option<Time>,
     /// Whether the slave's own trigger decides.
@@ -140,7 +140,7 @@ impl SlaveChecks {
             arrived: 0,
             updates: 0,
             acknowledged: BTreeSet::from([0]),
-            losses: (0, 0),
+            given_up: 0,
             updated: None,
             is_own_scheme: true,
             unconfirmed: Vec::new(),

@@ -27,11 +27,9 @@ impl SlaveChecks {
 
     pub(super) fn judge_trigger(&mut self, tick: &SlaveTicked<'_>, done: &SlaveTick) {
         let (now, slave) = (tick.now, tick.end.slave());
-        let known = (slave.shadow().lost(), slave.shadow().newest_confirmed());
-        // what is found to be lost is sent again in the same tick, whatever the scheme
-        let (lost, confirmed) = replace(&mut self.losses, known);
-        // an acknowledgement that leaves one out is a loss, or an overtaking
-        let repeats = known.0 != lost || known.1 > confirmed.saturating_add(1);
+        // what is given up as lost is sent again in the same tick, whatever the scheme
+        let given_up = slave.shadow().newest_given_up();
+        let repeats = replace(&mut self.given_up, given_up) != given_up;
         let since = now.saturating_since(*self.updated.get_or_insert(now));
         let cause = done.update.map(|update| update.cause);
         if cause.is_some() {
