@@ -184,6 +184,9 @@ class Measured:
     def tool(self) -> _Pair:
         """m."""
     @property
+    def back(self) -> _Pair:
+        """How far the tool stands back from there by a spring of its own, m."""
+    @property
     def force(self) -> _Pair:
         """f_s on the object, N."""
     @property

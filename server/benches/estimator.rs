@@ -35,6 +35,7 @@ fn push() -> Vec<Measured> {
         };
         let force = 0.7 * a + 3.0 * v + 2.06;
         measured.push(Measured {
+            back: Vec2::zeros(),
             force_noise_n: 0.0,
             tool: Vec2::new(position + force / 1000.0, 0.0),
             force: Vec2::new(force, 0.0),
@@ -49,8 +50,12 @@ fn estimators(criterion: &mut Criterion) {
     let ticks = push();
     for (name, mode) in [("paper", Mode::Paper), ("recommended", Mode::Recommended)] {
         let coupling = Coupling::for_stiffness(1000.0);
-        let mut estimator =
-            Estimator::new(&EstimatorConfig::of_mode(mode, coupling), coupling, 8.0);
+        let mut estimator = Estimator::new(
+            &EstimatorConfig::of_mode(mode, coupling),
+            coupling,
+            8.0,
+            false,
+        );
         let mut next = ticks.iter().cycle();
         criterion.bench_function(&format!("estimator/{name}"), |bencher| {
             bencher.iter(|| next.next().map(|tick| estimator.step(black_box(tick))));

@@ -15,6 +15,8 @@ use crate::sensing::{Sensing, VisionSample};
 pub struct Contact {
     /// Position of the tool as measured, m, world frame.
     pub tool: Vec2,
+    /// How far it stands back by a spring of its own, m.
+    pub back: Vec2,
     /// f_s as measured, less its bias where that is tared, N, world frame, on the object.
     pub force: Vec2,
     /// The mean of the newest few of these where they are noisy, else the newest, N.
@@ -105,6 +107,7 @@ impl ContactStage {
         let conditioned = self.conditioner.step(sensed.force, sensed.tool);
         Contact {
             tool: sensed.tool,
+            back: Vec2::zeros(),
             force: conditioned.force,
             steady: conditioned.steady,
             noise_n: conditioned.noise_n,

@@ -255,7 +255,7 @@ fn a_tick_that_a_pointer_feeds_never_allocates() {
 
 /// The slave's parts, fed beside a slave with what that slave met.
 struct Parts {
-    estimators: [Estimator; 2],
+    estimators: [Estimator; 3],
     trigger: Trigger,
     shadow: Shadow,
     playout: PlayoutBuffer,
@@ -266,10 +266,20 @@ struct Parts {
 impl Parts {
     fn of(slave: &Slave) -> Self {
         let coupling = slave.settings().coupling;
-        let estimator =
-            |mode| Estimator::new(&EstimatorConfig::of_mode(mode, coupling), coupling, 8.0);
+        let estimator = |mode, gives| {
+            Estimator::new(
+                &EstimatorConfig::of_mode(mode, coupling),
+                coupling,
+                8.0,
+                gives,
+            )
+        };
         Self {
-            estimators: [estimator(Mode::Paper), estimator(Mode::Recommended)],
+            estimators: [
+                estimator(Mode::Paper, false),
+                estimator(Mode::Recommended, true),
+                estimator(Mode::Recommended, false),
+            ],
             trigger: Trigger::new(TriggerConfig::of_mode(Mode::Recommended)),
             shadow: Shadow::new(*slave.settings(), *slave.state()),
             playout: PlayoutBuffer::try_new(PlayoutConfig::default()).unwrap(),
@@ -292,7 +302,7 @@ impl Parts {
 
     fn step(&mut self, now: Time, met: &SlaveTick, measured: &Measured) -> Option<usize> {
         self.playout.advance(now).unwrap();
-        let [_, estimate] = self.estimators.each_mut().map(|e| e.step(measured));
+        let [.., estimate] = self.estimators.each_mut().map(|e| e.step(measured));
         self.shadow.step(met.stamp, met.stamp, |_| Some(met.tool));
         let rendered = *self.shadow.rendered();
         let input = TriggerInput {
@@ -348,6 +358,7 @@ fn the_slaves_own_parts_never_allocate() {
             let measured = Measured {
                 tool: met.tool,
                 force: met.f_s,
+                back: Vec2::zeros(),
                 force_noise_n: 0.0,
                 normal: observer.contact().map(|t| t.inward),
                 seen: Some(seen),

@@ -91,14 +91,16 @@ impl TriggerInput {
 
 /// What the slave measured in one sample, for an estimator.
 ///
-/// time: stamp of the HIP sample, s. tool: (x, y), m. force: f_s on the object, (x, y), N. force_noise_n: its noise per axis where
-/// it is more than the default sensor's, else 0, N. normal: inward unit normal of the touched face, (x, y), or None without
-/// contact. centre: of the object as it is seen, (x, y), m, or None. side: of the object as the model has it, m, or None.
-/// turning: rate of the touched face, rad/s, or None.
+/// time: stamp of the HIP sample, s. tool: (x, y), m. back: how far the tool stands back from there by a spring of its own,
+/// (x, y), m. force: f_s on the object, (x, y), N. force_noise_n: its noise per axis where it is more than the default
+/// sensor's, else 0, N. normal: inward unit normal of the touched face, (x, y), or None without contact. centre: of the object
+/// as it is seen, (x, y), m, or None. side: of the object as the model has it, m, or None. turning: rate of the touched face,
+/// rad/s, or None.
 #[pyclass(frozen, get_all, module = "mmt")]
 pub(crate) struct Measured {
     time: f64,
     tool: Pair,
+    back: Pair,
     force: Pair,
     force_noise_n: f64,
     normal: Option<Pair>,
@@ -112,6 +114,7 @@ impl Measured {
         Self {
             time: stamp.as_secs_f64(),
             tool: pair(measured.tool),
+            back: pair(measured.back),
             force: pair(measured.force),
             force_noise_n: measured.force_noise_n,
             normal: measured.normal.map(pair),

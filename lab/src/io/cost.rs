@@ -14,7 +14,12 @@ const TICKS: u32 = 100_000;
 #[must_use]
 pub fn estimator_tick_ms(mode: Mode) -> f64 {
     let coupling = Coupling::for_stiffness(1000.0);
-    let mut estimator = Estimator::new(&EstimatorConfig::of_mode(mode, coupling), coupling, 8.0);
+    let mut estimator = Estimator::new(
+        &EstimatorConfig::of_mode(mode, coupling),
+        coupling,
+        8.0,
+        false,
+    );
     let began = thread_cpu_time();
     for k in 0..TICKS {
         let t = f64::from(k) * TICK_S;
@@ -27,6 +32,7 @@ pub fn estimator_tick_ms(mode: Mode) -> f64 {
             side: 0.36,
         };
         estimator.step(&Measured {
+            back: Vec2::zeros(),
             force_noise_n: 0.0,
             tool: Vec2::new(0.16 * t + 0.0125 * (1.0 - libm::cos(4.0 * t)), 0.0),
             force: Vec2::new(0.7 * 0.2 * libm::cos(4.0 * t) + 3.0 * v + 2.06, 0.0),

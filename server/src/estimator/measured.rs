@@ -12,8 +12,10 @@ const FORCE_LIMIT: f64 = 1e4;
 /// What the slave measured in one tick: tool and force of the same instant.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Measured {
-    /// Tool position, world frame, m.
+    /// Where the tool is, or would be if it did not give, world frame, m.
     pub tool: Vec2,
+    /// How far it stands back from there by a spring of its own, m; zero where it does not give.
+    pub back: Vec2,
     /// f_s, contact force on the object, world frame, N; positive when the tool pushes the object.
     pub force: Vec2,
     /// Noise of the force per axis, N, where it is more than the settings are made for; else 0.
@@ -30,6 +32,7 @@ impl Measured {
         // written so that NaN fails
         let within = |v: &Vec2, limit: f64| v.x.abs() <= limit && v.y.abs() <= limit;
         within(&self.tool, POSITION_LIMIT)
+            && within(&self.back, POSITION_LIMIT)
             && within(&self.force, FORCE_LIMIT)
             && self.normal.is_none_or(|normal| within(&normal, 1.0))
             && self.seen.is_none_or(|seen| seen.is_usable())

@@ -17,6 +17,7 @@ mod gate;
 mod kalman;
 mod limits;
 mod measured;
+mod multiple_model;
 mod obstacle;
 mod off_centre;
 mod paper;
@@ -41,6 +42,7 @@ pub use windowed::Rows;
 
 pub use estimate::{Estimate, STICK_SPEED};
 pub use measured::{Measured, Seen};
+use multiple_model::MultipleModel;
 use paper::PaperEstimator;
 use quasi_static::QuasiStaticEstimator;
 use recommended::RecommendedEstimator;
@@ -93,18 +95,28 @@ enum Kind {
     Paper(PaperEstimator),
     /// Along the normal, filtered alike, recursive.
     Recommended(RecommendedEstimator),
+    /// The same behind a contact of unknown stiffness.
+    MultipleModel(MultipleModel),
     /// Friction alone.
     QuasiStatic(QuasiStaticEstimator),
 }
 
 impl Estimator {
     /// An estimator at its prior, of an object touched through `coupling` by a hand that presses with no more than
-    /// `hand_force_max_n`, N. Settings from outside pass
+    /// `hand_force_max_n`, N, with a tool that `gives` by a spring of its own or not. Settings from outside pass
     /// [`EstimatorConfig::check`] first.
     #[must_use]
-    pub fn new(config: &EstimatorConfig, coupling: Coupling, hand_force_max_n: f64) -> Self {
+    pub fn new(
+        config: &EstimatorConfig,
+        coupling: Coupling,
+        hand_force_max_n: f64,
+        gives: bool,
+    ) -> Self {
         Self(match config {
             EstimatorConfig::Paper(config) => Kind::Paper(PaperEstimator::new(config, coupling)),
+            EstimatorConfig::Recommended(config) if gives => {
+                Kind::MultipleModel(MultipleModel::new(config, hand_force_max_n))
+            }
             EstimatorConfig::Recommended(config) => {
                 Kind::Recommended(RecommendedEstimator::new(config, hand_force_max_n))
             }
@@ -119,6 +131,7 @@ impl Estimator {
         match &mut self.0 {
             Kind::Paper(estimator) => estimator.step(measured),
             Kind::Recommended(estimator) => estimator.step(measured),
+            Kind::MultipleModel(estimator) => estimator.step(measured),
             Kind::QuasiStatic(estimator) => estimator.step(measured),
         }
         *self.estimate()
@@ -130,6 +143,7 @@ impl Estimator {
         match &self.0 {
             Kind::Paper(estimator) => &estimator.estimate,
             Kind::Recommended(estimator) => &estimator.estimate,
+            Kind::MultipleModel(estimator) => estimator.estimate(),
             Kind::QuasiStatic(estimator) => &estimator.estimate,
         }
     }

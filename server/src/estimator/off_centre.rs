@@ -128,6 +128,7 @@ mod tests {
             self.pose.position += self.twist.linear * TICK_S;
             self.pose.angle += self.twist.angular * TICK_S;
             Measured {
+                back: Vec2::zeros(),
                 force_noise_n: 0.0,
                 tool,
                 force: push,
@@ -141,7 +142,8 @@ mod tests {
     fn worst_error(aside: f64, is_seen: bool) -> f64 {
         let mut config = RecommendedConfig::new(COUPLING);
         config.position_noise_m = 0.0;
-        let mut estimator = Estimator::new(&EstimatorConfig::Recommended(config), COUPLING, 8.0);
+        let mut estimator =
+            Estimator::new(&EstimatorConfig::Recommended(config), COUPLING, 8.0, false);
         let mut pushed = Box::at_rest();
         let (mut tool, mut turned) = (Vec2::new(-SIDE / 2.0, aside), 0.0_f64);
         for k in 0..2000 {

@@ -120,6 +120,7 @@ mod tests {
         Measured {
             tool: Vec2::new(x, 0.0),
             force: Vec2::new(force, 0.0),
+            back: Vec2::zeros(),
             force_noise_n: 0.0,
             normal: Some(Vec2::new(1.0, 0.0)),
             seen: None,

@@ -122,6 +122,20 @@ impl RecommendedEstimator {
         }
     }
 
+    /// The same that doubts a row only if it is off by more than so many root mean squares of what it usually leaves.
+    #[must_use]
+    pub(super) fn doubting_from(mut self, deviations: f64) -> Self {
+        self.recursive = self.recursive.doubting_from(deviations);
+        self.copies = [self.recursive; 2];
+        self
+    }
+
+    /// Mean square of the force that the estimate leaves unexplained, N²; none before anything counted.
+    #[must_use]
+    pub(super) fn misfit(&self) -> Option<f64> {
+        self.recursive.misfit()
+    }
+
     /// Takes one tick; a tick with numbers that no sensor gives ends the contact for the regression.
     pub(super) fn step(&mut self, measured: &Measured) {
         let usable = measured.is_usable();

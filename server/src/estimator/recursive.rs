@@ -105,6 +105,10 @@ pub(super) struct RecursiveLeastSquares {
     moment: Vector3<f64>,
     weight: f64,
     squares: f64,
+    /// Sum of the squares of the rows' forces in memory, N²: what [`RecursiveLeastSquares::misfit`] is taken of.
+    force_squares: f64,
+    /// From how many root mean squares of the misfit on a row is doubted; 0: whatever the misfit is.
+    doubt_deviations: f64,
     off_ticks: u32,
     settled: bool,
     founded: bool,
@@ -135,6 +139,8 @@ impl RecursiveLeastSquares {
             moment: Vector3::zeros(),
             weight: 0.0,
             squares: 0.0,
+            force_squares: 0.0,
+            doubt_deviations: 0.0,
             off_ticks: 0,
             settled: false,
             founded: false,
@@ -145,6 +151,22 @@ impl RecursiveLeastSquares {
             excited: false,
             samples: 0,
         }
+    }
+
+    /// The same that doubts a row only if it is off by more than so many root mean squares of the misfit.
+    #[must_use]
+    pub(super) fn doubting_from(mut self, deviations: f64) -> Self {
+        self.doubt_deviations = deviations;
+        self
+    }
+
+    /// Mean square of what the estimate leaves of the rows in memory, N²; none before there are any.
+    #[must_use]
+    pub(super) fn misfit(&self) -> Option<f64> {
+        let explained = self
+            .estimate
+            .dot(&(self.moment * 2.0 - self.gram * self.estimate));
+        (self.weight > 0.0).then(|| (self.force_squares - explained).max(0.0) / self.weight)
     }
 
     /// Takes one filtered row.
@@ -171,7 +193,9 @@ impl RecursiveLeastSquares {
             return Verdict::Taken;
         };
         // 0.3 N: below, ten per cent would be force noise
-        let off = error.abs() > change.error_share * force.abs().max(0.3);
+        let share = change.error_share * force.abs().max(0.3);
+        let usual = self.doubt_deviations * self.misfit().unwrap_or_default().sqrt();
+        let off = error.abs() > share.max(usual);
         if !off || !self.settled {
             self.settled |= !off && self.excited;
             self.off_ticks = 0;
@@ -191,6 +215,7 @@ impl RecursiveLeastSquares {
         self.moment = self.moment * keep + row.regressor * row.force;
         self.weight = self.weight * keep + 1.0;
         self.squares = self.squares * keep + error * error;
+        self.force_squares = self.force_squares * keep + row.force * row.force;
         self.samples = self.samples.saturating_add(1);
         self.solve(row);
     }
@@ -203,6 +228,7 @@ impl RecursiveLeastSquares {
         let with_c = self.gram.column(2).into_owned();
         if with_c.z > 0.0 {
             let share = with_c / with_c.z;
+            self.force_squares -= self.moment.z * self.moment.z / with_c.z;
             self.moment -= share * self.moment.z;
             self.gram -= share * with_c.transpose();
         }
@@ -210,6 +236,7 @@ impl RecursiveLeastSquares {
         self.moment *= trust;
         self.weight *= trust;
         self.squares *= trust;
+        self.force_squares *= trust;
     }
 
     fn solve(&mut self, row: &Row) {

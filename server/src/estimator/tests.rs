@@ -34,13 +34,13 @@ fn values(estimate: &Estimate) -> [f64; 3] {
 fn recommended(change: impl FnOnce(&mut RecommendedConfig)) -> Estimator {
     let mut config = RecommendedConfig::new(COUPLING);
     change(&mut config);
-    Estimator::new(&EstimatorConfig::Recommended(config), COUPLING, 8.0)
+    Estimator::new(&EstimatorConfig::Recommended(config), COUPLING, 8.0, false)
 }
 
 fn paper(change: impl FnOnce(&mut PaperConfig)) -> Estimator {
     let mut config = PaperConfig::default();
     change(&mut config);
-    Estimator::new(&EstimatorConfig::Paper(config), COUPLING, 8.0)
+    Estimator::new(&EstimatorConfig::Paper(config), COUPLING, 8.0, false)
 }
 
 /// One push and the way to the next face; `see` gets each tick of the push.
@@ -444,9 +444,12 @@ proptest! {
     fn no_input_poisons_an_estimator(
         ticks in prop::collection::vec((hostile(), hostile(), hostile(), hostile(), any::<bool>()), 1..200),
     ) {
-        for mut estimator in [recommended(|_| {}), paper(|config| config.window_s = 0.05)] {
+        let config = EstimatorConfig::Recommended(RecommendedConfig::new(COUPLING));
+        let giving = Estimator::new(&config, COUPLING, 8.0, true);
+        for mut estimator in [recommended(|_| {}), paper(|config| config.window_s = 0.05), giving] {
             for &(x, y, fx, fy, touching) in &ticks {
                 let measured = Measured {
+                    back: Vec2::new(fy, x),
                     force_noise_n: 0.0,
                     tool: Vec2::new(x, y),
                     force: Vec2::new(fx, fy),

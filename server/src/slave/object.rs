@@ -33,6 +33,8 @@ pub(super) struct ObjectEstimate {
     coupling: Coupling,
     /// No hand presses with more, N.
     hand_force_max_n: f64,
+    /// Whether the tool gives by a spring of its own.
+    tool_gives: bool,
     observer_config: ObserverConfig,
     estimator_config: EstimatorConfig,
     /// Number of the body.
@@ -86,6 +88,7 @@ impl ObjectEstimate {
         in_range("start model: side", "m", start.side_m, SIDE_M)?;
         estimator.check()?;
         let hand_force_max_n = config.tool_energy.hand_force_max_n;
+        let tool_gives = config.tool_compliance.is_some();
         let footprint = (seen.first().copied()).unwrap_or(BoxFootprint::square(start.side_m));
         let params = ModelParams::of_square(m, b, c, footprint.mean_side(), &coupling)?;
         let start = Found {
@@ -95,7 +98,7 @@ impl ObjectEstimate {
         };
         Ok(Self {
             observer: PoseObserver::new(observer, pose, footprint),
-            estimator: Estimator::new(&estimator, coupling, hand_force_max_n),
+            estimator: Estimator::new(&estimator, coupling, hand_force_max_n, tool_gives),
             params,
             refused: 0,
             images_too_old: 0,
@@ -103,6 +106,7 @@ impl ObjectEstimate {
             raises_mass: matches!(estimator, EstimatorConfig::Recommended(_)),
             coupling,
             hand_force_max_n,
+            tool_gives,
             observer_config: observer,
             estimator_config: estimator,
             body: 0,
@@ -164,7 +168,12 @@ impl ObjectEstimate {
         self.params =
             ModelParams::try_new(m, b, c, inertia, e, &self.coupling).unwrap_or(self.start_params);
         let estimator = self.estimator_config.starting_at(found.mbc);
-        self.estimator = Estimator::new(&estimator, self.coupling, self.hand_force_max_n);
+        self.estimator = Estimator::new(
+            &estimator,
+            self.coupling,
+            self.hand_force_max_n,
+            self.tool_gives,
+        );
         self.observer = PoseObserver::new(self.observer_config, pose, found.footprint);
     }
 
@@ -191,6 +200,7 @@ impl ObjectEstimate {
         let side = observer.footprint().mean_side();
         let measured = Measured {
             tool: contact.tool,
+            back: contact.back,
             force: contact.force,
             force_noise_n: contact.noise_n,
             normal: observer.contact().map(|frame| frame.inward),

@@ -77,7 +77,11 @@ impl ForceReference {
                 && estimate.holding.is_none_or(|c| model.params.c() > 0.5 * c),
             speed: estimate.speed,
             acceleration: estimate.acceleration,
-            force_deviation: estimate.force_deviation(),
+            force_deviation: match estimate.holding {
+                // what is known is the force that the object stood, and that is as noisy as a sample
+                Some(_) if contact.noise_n > 0.0 => contact.noise_n,
+                _ => estimate.force_deviation(),
+            },
             params: object.params,
             shift: pose.position - model.pose.position,
             shift_deviation: object.observer.deviation(),

@@ -53,6 +53,7 @@ impl Slave {
         let mut contact = self.contact.step(now, tool, played.velocity - rate);
         // the spring of the tool is part of the contact that the model renders
         contact.tool += back;
+        contact.back = back;
         self.tool.measured(tool, contact.force, contact.in_contact);
         let held_back = self.tool.is_held_back();
         if self.object.follow_body(&contact) {

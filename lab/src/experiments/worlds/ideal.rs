@@ -9,7 +9,7 @@ use mmt_server::trigger::Scheme;
 use mmt_shared::stats::values::quantile;
 
 use super::row::Row;
-use super::run::reach;
+use super::run::{Truth, reach};
 use super::tables::share_above;
 use crate::experiment::findings::Extent;
 use crate::experiment::grid::Group;
@@ -20,19 +20,22 @@ use crate::worlds::RandomWorld;
 struct Ideal {
     name: &'static str,
     make: fn(&mut RandomWorld),
-    /// Whether the slave's estimator is given the true m, b and c in every tick.
-    truth: bool,
+    /// From how much contact on the slave's estimator is given the true m, b and c.
+    truth: Option<Duration>,
 }
 
 const fn ideal(name: &'static str, make: fn(&mut RandomWorld)) -> Ideal {
     Ideal {
         name,
         make,
-        truth: false,
+        truth: None,
     }
 }
 
-const IDEALS: [Ideal; 11] = [
+/// In this time of contact anybody could have found m, b and c.
+const FOUND: Duration = Duration::from_millis(400);
+
+const IDEALS: [Ideal; 12] = [
     ideal("nothing", |_| {}),
     ideal("the force sensor", |world| {
         let sensing = &mut world.config.slave.sensing;
@@ -66,15 +69,19 @@ const IDEALS: [Ideal; 11] = [
     }),
     ideal("the first model: m, b and c", known),
     Ideal {
-        truth: true,
+        truth: Some(FOUND),
+        ..ideal("each update after 0.4 s of contact", |_| {})
+    },
+    Ideal {
+        truth: Some(Duration::ZERO),
         ..ideal("each update: m, b and c", |_| {})
     },
     Ideal {
-        truth: true,
+        truth: Some(Duration::ZERO),
         ..ideal("first model and each update", known)
     },
     Ideal {
-        truth: true,
+        truth: Some(Duration::ZERO),
         ..ideal("both, and an update in every tick", |world| {
             known(world);
             world.config.slave.trigger.scheme = Scheme::EverySample;
@@ -118,7 +125,10 @@ pub(super) fn compare(
     let groups = runner.grid_from(first, "worlds", extent.seeds, cases, |ideal: &&Ideal, n| {
         let mut world = RandomWorld::new(n);
         (ideal.make)(&mut world);
-        let truth = ideal.truth.then(|| params(&world));
+        let truth = ideal.truth.map(|from| Truth {
+            params: params(&world),
+            from,
+        });
         let reached = reach(&world.config, truth, extent.duration)?;
         Ok(Row { world, reached })
     })?;

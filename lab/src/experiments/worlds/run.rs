@@ -2,9 +2,10 @@
 
 use std::time::Duration;
 
+use mmt_server::estimator::Measured as Sensed;
 use mmt_server::slave::Substitutes;
 use mmt_shared::model::geometry::Vec2;
-use mmt_shared::time::TICK_S;
+use mmt_shared::time::{TICK, TICK_S};
 
 use crate::experiment::findings::ExperimentError;
 use crate::trial::TrialError;
@@ -47,10 +48,19 @@ pub(super) struct Measured {
     pub(super) digest: String,
 }
 
-/// Runs a world, where `params` is given with that as m (kg), b (N s/m) and c (N) in the place of the slave's estimate.
+/// What stands in the place of the slave's estimate.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Truth {
+    /// m (kg), b (N s/m) and c (N).
+    pub(super) params: [f64; 3],
+    /// From so much contact on.
+    pub(super) from: Duration,
+}
+
+/// Runs a world, with the estimates of its slave or with the `truth`.
 pub(super) fn reach(
     config: &WorldConfig,
-    params: Option<[f64; 3]>,
+    truth: Option<Truth>,
     duration: Duration,
 ) -> Result<Measured, ExperimentError> {
     let mut world = World::try_new(config).map_err(TrialError::from)?.judged();
@@ -59,8 +69,16 @@ pub(super) fn reach(
     let first = world.master().model().state().pose.position;
     let body = TouchedBody::new(first, slow_s + WORKING_S);
     let mut seen = Seen::new(TwoPorts::new(path_s), body);
+    let mut contact = Duration::ZERO;
     for _ in 0..duration.as_millis() {
-        let mut known = |_, _: &_| params;
+        let mut known = |_, sensed: &Sensed| {
+            if sensed.normal.is_some() {
+                contact += TICK;
+            }
+            truth
+                .filter(|truth| contact >= truth.from)
+                .map(|truth| truth.params)
+        };
         let tick = world.step_given(Given {
             slave: Substitutes {
                 estimator: Some(&mut known),

@@ -5,6 +5,8 @@
 
 use super::super::*;
 use mmt_server::playout::PlayoutConfig;
+use mmt_server::tool::compliance::spring_for;
+use mmt_shared::model::contact::Coupling;
 use mmt_shared::model::params::ModelParams;
 use mmt_shared::model::settings::{Mode, ModelSettings, PoseCorrection};
 use mmt_shared::stats::values::{mean, median};
@@ -238,4 +240,43 @@ fn a_box_that_turns_more_easily_than_a_square_is_so_in_the_model() {
     let pmse = mean(pmse).unwrap();
     println!("no rotational damping: PMSE {pmse:.4}");
     assert!(pmse <= 0.025);
+}
+
+#[test]
+fn behind_a_contact_of_unknown_stiffness_a_hand_that_trembles_does_not_make_the_mass_lighter() {
+    let coupling = DeviceProfile::default().coupling();
+    for (seed, times) in [(1, 1.3), (2, 3.0), (3, 9.0)] {
+        let mut config = experiment(seed);
+        config.operator.hand.tremor_m = 3e-4;
+        let slave = &mut config.slave;
+        slave.environment.mass_kg = 2.5;
+        slave.environment.friction_coefficient = 0.06;
+        slave.environment.contact = Some(Coupling {
+            stiffness_n_per_m: times * coupling.stiffness_n_per_m,
+            ..coupling
+        });
+        slave.tool_compliance = Some(spring_for(coupling));
+        slave.sensing.force_noise_n = 0.05;
+        slave.sensing.force_lag_ms = 3.0;
+        let mut world = World::try_new(&config).unwrap();
+        world.run(Duration::from_secs(15), |_| {});
+        let [m, _, c] = errors(&world);
+        println!("{times} times k_p: m {m:.3} c {c:.3}");
+        assert!(m < 0.1 && c < 0.1, "{times} times k_p: m {m} c {c}");
+    }
+}
+
+#[test]
+fn a_noisy_sensor_does_not_keep_back_that_an_object_stands() {
+    let mut config = experiment(1);
+    config.slave.environment.mass_kg = 2.0;
+    config.slave.environment.friction_coefficient = 0.3;
+    config.slave.sensing.force_noise_n = 0.08;
+    let mut world = World::try_new(&config).unwrap();
+    let told = (0..5000).find_map(|_| {
+        let update = world.step().slave?.update?;
+        (update.state.params().c() > 2.0).then(|| world.slave().environment().twist())
+    });
+    let speed = told.expect("it is told").linear.norm();
+    assert!(speed < 0.002, "it slides with {speed} m/s already");
 }

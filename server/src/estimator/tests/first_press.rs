@@ -13,6 +13,7 @@ fn the_give_of_a_soft_contact_is_no_motion_of_an_object_that_nobody_has_moved() 
         let measured = Measured {
             tool: Vec2::new(depth, 0.0),
             force,
+            back: Vec2::zeros(),
             force_noise_n: 0.0,
             normal: Some(Vec2::new(1.0, 0.0)),
             seen: None,

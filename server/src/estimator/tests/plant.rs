@@ -137,6 +137,7 @@ impl Plant {
         let ahead = rotate(self.heading, Vec2::new(1.0, 0.0));
         let tool = rotate(self.heading, Vec2::new(self.tool, self.side));
         Measured {
+            back: Vec2::zeros(),
             force_noise_n: 0.0,
             tool: tool + Vec2::new(px, py) * self.noise.0,
             force: ahead * force + Vec2::new(fx, fy) * self.noise.1,

@@ -1,0 +1,179 @@
+//! Multiple-model estimation (Magill 1965) behind a contact whose stiffness nobody knows: an estimator for each of five
+//! stiffnesses, and the one that leaves least of the force unexplained is believed.
+//!
+//! For a tool that gives by a spring of its own, which is meant for contacts of one to ten times k_p. The tool knows how far
+//! it gives; how far the contact gives under the same force is what the five differ in. With a wrong one the surface seems to
+//! shake with the hand, and an object that seems to shake is taken to be lighter than it is.
+
+use mmt_shared::model::contact::Coupling;
+
+use super::estimate::Estimate;
+use super::measured::Measured;
+use super::recommended::{RecommendedConfig, RecommendedEstimator};
+
+/// Stiffnesses of the contact over k_p, equal ratios apart: 10^0.1 to 10^0.9.
+const TIMES: [f64; 5] = [1.259, 1.995, 3.162, 5.012, 7.943];
+/// The one that is believed before anything was seen.
+const FIRST: usize = 2;
+/// Rows before an estimator is compared with others.
+const ROWS_MIN: u64 = 15;
+/// Share of the believed one's misfit that another must be below.
+const BETTER: f64 = 0.97;
+/// What a wrong stiffness leaves of the force is no change of friction: a row is doubted from so many root mean squares of it on.
+const DOUBT_DEVIATIONS: f64 = 3.0;
+
+/// The five.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct MultipleModel {
+    estimators: [RecommendedEstimator; TIMES.len()],
+    believed: usize,
+}
+
+impl MultipleModel {
+    /// At the prior. `config` has k_p; no hand presses with more than `hand_force_max_n`, N.
+    #[must_use]
+    pub(super) fn new(config: &RecommendedConfig, hand_force_max_n: f64) -> Self {
+        let of = |times: f64| {
+            let coupling = Coupling {
+                stiffness_n_per_m: times * config.coupling.stiffness_n_per_m,
+                ..config.coupling
+            };
+            let config = RecommendedConfig {
+                coupling,
+                ..*config
+            };
+            RecommendedEstimator::new(&config, hand_force_max_n).doubting_from(DOUBT_DEVIATIONS)
+        };
+        Self {
+            estimators: TIMES.map(of),
+            believed: FIRST,
+        }
+    }
+
+    /// Takes one tick.
+    pub(super) fn step(&mut self, measured: &Measured) {
+        let at_the_contact = Measured {
+            tool: measured.tool - measured.back,
+            ..*measured
+        };
+        for estimator in &mut self.estimators {
+            estimator.step(&at_the_contact);
+        }
+        self.believe();
+    }
+
+    fn believe(&mut self) {
+        let misfit = |of: &RecommendedEstimator| {
+            let compared = of.estimate.samples >= ROWS_MIN;
+            of.misfit().filter(|_| compared)
+        };
+        let Some(now) = misfit(self.believed()) else {
+            return;
+        };
+        let all = self.estimators.iter().enumerate();
+        let best = all
+            .filter_map(|(index, of)| Some((index, misfit(of)?)))
+            .min_by(|(_, one), (_, other)| one.total_cmp(other));
+        if let Some((index, _)) = best.filter(|(_, least)| *least < BETTER * now) {
+            self.believed = index;
+        }
+    }
+
+    fn believed(&self) -> &RecommendedEstimator {
+        let [first, ..] = &self.estimators;
+        self.estimators.get(self.believed).unwrap_or(first)
+    }
+
+    /// The believed one's.
+    #[must_use]
+    pub(super) fn estimate(&self) -> &Estimate {
+        &self.believed().estimate
+    }
+
+    /// Stiffness of the contact over k_p that is believed.
+    #[cfg(test)]
+    fn times(&self) -> f64 {
+        TIMES[self.believed]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use mmt_shared::fixtures::COUPLING;
+    use mmt_shared::model::geometry::Vec2;
+    use mmt_shared::rng::Substream;
+    use mmt_shared::time::TICK_S;
+    use std::f64::consts::TAU;
+
+    use crate::estimator::{Estimator, EstimatorConfig};
+    use crate::tool::compliance::{Compliance, spring_for};
+
+    const TRUTH: [f64; 3] = [2.0, 3.0, 1.0];
+
+    /// A hand that pushes with a tremor of 0.2 mm at 10 Hz through a spring, on a contact of so many times k_p; what is
+    /// measured in 4 s.
+    fn push(seed: u64, times: f64) -> Vec<Measured> {
+        let [m, b, c] = TRUTH;
+        let contact = Coupling {
+            stiffness_n_per_m: times * COUPLING.stiffness_n_per_m,
+            ..COUPLING
+        };
+        let mut random = Substream::new(seed, "multiple model", 0);
+        let mut spring = Compliance::try_new(Some(spring_for(COUPLING))).unwrap();
+        let (mut position, mut velocity, mut force, mut depth) = (0.0, 0.0_f64, 0.0, 0.0);
+        let mut tick = |k: u32| {
+            let t = f64::from(k) * TICK_S;
+            let speed = 0.12 + 0.06 * libm::sin(TAU * 0.6 * t);
+            let hip = 0.12 * t
+                + 0.06 * (1.0 - libm::cos(TAU * 0.6 * t)) / (TAU * 0.6)
+                + 2e-4 * libm::sin(TAU * 10.0 * t);
+            debug_assert!(speed > 0.0);
+            let (back, _) = spring.step(Vec2::new(force, 0.0));
+            let before = depth;
+            depth = hip - back.x - position;
+            force = contact.force(depth, (depth - before) / TICK_S);
+            let free = m * velocity + TICK_S * force;
+            let left = (free.abs() - TICK_S * c).max(0.0);
+            velocity = left.copysign(free) / (m + TICK_S * b);
+            position += TICK_S * velocity;
+            let ((tool, _), (noise, _)) = (random.normal_pair(), random.normal_pair());
+            Measured {
+                tool: Vec2::new(hip + 10e-6 * tool, 0.0),
+                back,
+                force: Vec2::new(force + 0.03 * noise, 0.0),
+                force_noise_n: 0.03,
+                normal: (depth > 0.0).then_some(Vec2::new(1.0, 0.0)),
+                seen: None,
+            }
+        };
+        (1..4000).map(&mut tick).collect()
+    }
+
+    #[test]
+    fn a_mass_behind_a_contact_of_unknown_stiffness_is_found_although_the_hand_trembles() {
+        for (seed, times) in [(1, 1.2), (2, 2.5), (3, 5.0), (4, 9.0)] {
+            let measured = push(seed, times);
+            let config = RecommendedConfig::new(COUPLING);
+            let mut many = MultipleModel::new(&config, 8.0);
+            let mut single =
+                Estimator::new(&EstimatorConfig::Recommended(config), COUPLING, 8.0, false);
+            for tick in &measured {
+                many.step(tick);
+                single.step(tick);
+            }
+            let found = many.estimate();
+            let (m, alone) = (found.m / TRUTH[0], single.estimate().m / TRUTH[0]);
+            println!("{times}: {} times, {m} against {alone}", many.times());
+            // 2.5 lies in the middle between two of them
+            assert!((0.8..1.1).contains(&m), "{times}: {m}");
+            assert!((found.c - TRUTH[2]).abs() < 0.15, "{times}: {found:?}");
+            let ratio = many.times() / times;
+            assert!((0.6..1.7).contains(&ratio), "{times}: {}", many.times());
+            assert!(
+                (alone - 1.0).abs() > 2.0 * (m - 1.0).abs(),
+                "{times}: {alone}"
+            );
+        }
+    }
+}
