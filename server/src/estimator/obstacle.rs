@@ -100,7 +100,7 @@ impl Obstacle {
         let hard =
             motion == MotionState::SlidesOn && beyond(force - needed, PUSH_NEEDS, friction.c);
         self.hard_ticks = if hard { self.hard_ticks + 1 } else { 0 };
-        self.holding = (self.hard_ticks >= IMPACT_TICKS).then_some(force.min(OBSTACLE_N));
+        self.holding = self.is_hit().then_some(force.min(OBSTACLE_N));
         false
     }
 
@@ -117,6 +117,12 @@ impl Obstacle {
     #[must_use]
     pub(super) fn holding(&self) -> Option<f64> {
         self.holding
+    }
+
+    /// Whether the object slides on against something.
+    #[must_use]
+    pub(super) fn is_hit(&self) -> bool {
+        self.hard_ticks >= IMPACT_TICKS
     }
 
     /// Contact was lost.

@@ -87,6 +87,8 @@ pub(super) struct RecommendedEstimator {
     /// The regression as it was, newest last.
     copies: [RecursiveLeastSquares; 2],
     obstacle: Obstacle,
+    /// The regression as it was before the object ran against something in this contact; it returns when contact ends.
+    before_hit: Option<RecursiveLeastSquares>,
     /// Where this contact began.
     began: Option<Vec2>,
     pub(super) estimate: Estimate,
@@ -117,6 +119,7 @@ impl RecommendedEstimator {
             recursive,
             copies: [recursive; 2],
             obstacle: Obstacle::new(hand_force_max_n),
+            before_hit: None,
             began: None,
             estimate,
         }
@@ -203,6 +206,9 @@ impl RecommendedEstimator {
             self.recursive = older;
             self.copies = [older; 2];
         }
+        if self.obstacle.is_hit() {
+            self.before_hit.get_or_insert(older);
+        }
         self.estimate.holding = self.obstacle.holding();
     }
 
@@ -254,6 +260,11 @@ impl RecommendedEstimator {
         self.gate.close();
         self.creep.reset();
         self.obstacle.clear();
+        // what it ran against is no friction
+        if let Some(before) = self.before_hit.take() {
+            self.recursive = before;
+            self.copies = [before; 2];
+        }
         self.began = None;
         self.recursive.hold();
         self.estimate.release();

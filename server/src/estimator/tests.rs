@@ -280,6 +280,32 @@ fn a_change_of_mass_in_mid_push_is_followed() {
 }
 
 #[test]
+fn what_an_object_ran_against_is_forgotten_with_the_contact() {
+    let (mut estimator, mut plant) = learned(1);
+    let before = values(estimator.estimate());
+    let motion = Motion::of_operator(1, 2);
+    let mut in_contact = 0.0;
+    push(&mut estimator, &mut plant, &motion, |k, plant, estimate| {
+        if k == 1000 {
+            // a wall along which it slides on
+            plant.params[2] = 12.0;
+        }
+        in_contact = estimate.c;
+    });
+    let after = values(estimator.estimate());
+    println!(
+        "c {} N, at the wall {in_contact} N, then {} N",
+        before[2], after[2]
+    );
+    assert!(in_contact > 10.0);
+    let moved = errors(after, before);
+    assert!(
+        moved[0] < 0.05 && moved[2] < 0.05,
+        "{before:?} to {after:?}"
+    );
+}
+
+#[test]
 fn constant_speed_shows_nothing_so_the_values_are_held_and_that_is_reported() {
     for seed in 0..5 {
         let (mut estimator, mut plant) = learned(seed);

@@ -5,6 +5,8 @@ use mmt_client::operator::scripted::Phase;
 use mmt_server::environment::Wall;
 use mmt_shared::model::geometry::Pose;
 
+use crate::worlds::{Obstacle, RandomWorld};
+
 /// How far the real object turns within a round trip of 2 s, rad: the most of a run.
 #[derive(Default)]
 struct Turned {
@@ -281,6 +283,23 @@ fn after_an_outage_of_60_ms_the_limits_of_speed_and_acceleration_keep_the_force_
         // what a touch that nobody foresaw may cost, at whatever speed a configuration allows
         assert!(free <= 15.0, "{free} N");
     }
+}
+
+#[test]
+fn a_box_that_slid_along_a_wall_can_be_pushed_elsewhere() {
+    // what the wall bears is no friction: a model with that stands under all that a hand gives, and the hand never finds out
+    let random = RandomWorld::new(20_011);
+    assert_eq!(random.obstacle, Obstacle::Wall);
+    let mut world = World::try_new(&random.config).unwrap();
+    let mut at_the_wall = 0.0_f64;
+    for _ in 0..20_000 {
+        world.step();
+        at_the_wall = at_the_wall.max(world.slave().estimate().c);
+    }
+    let (found, error) = (world.slave().estimate().c, relative_error(&world));
+    println!("c {found} N, at the wall {at_the_wall} N; relative error {error}");
+    assert!(at_the_wall > 4.0 && found < 1.5 * random.friction_n);
+    assert!(error < 1.0, "{error}");
 }
 
 #[test]
