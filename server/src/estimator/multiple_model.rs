@@ -23,9 +23,10 @@ const BETTER: f64 = 0.97;
 const DOUBT_DEVIATIONS: f64 = 3.0;
 
 /// The five.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct MultipleModel {
-    estimators: [RecommendedEstimator; TIMES.len()],
+    // on the heap: a slave is moved about on stacks of 2 MB
+    estimators: Box<[RecommendedEstimator; TIMES.len()]>,
     believed: usize,
 }
 
@@ -45,7 +46,7 @@ impl MultipleModel {
             RecommendedEstimator::new(&config, hand_force_max_n).doubting_from(DOUBT_DEVIATIONS)
         };
         Self {
-            estimators: TIMES.map(of),
+            estimators: Box::new(TIMES.map(of)),
             believed: FIRST,
         }
     }
@@ -56,7 +57,7 @@ impl MultipleModel {
             tool: measured.tool - measured.back,
             ..*measured
         };
-        for estimator in &mut self.estimators {
+        for estimator in self.estimators.iter_mut() {
             estimator.step(&at_the_contact);
         }
         self.believe();
@@ -80,7 +81,7 @@ impl MultipleModel {
     }
 
     fn believed(&self) -> &RecommendedEstimator {
-        let [first, ..] = &self.estimators;
+        let [first, ..] = &*self.estimators;
         self.estimators.get(self.believed).unwrap_or(first)
     }
 
