@@ -81,14 +81,14 @@ impl EstimatorConfig {
     }
 }
 
-/// The slave's estimator of m, b and c.
+/// The slave's estimator of m, b and c. On the heap: a slave is moved about on stacks of 2 MB.
 #[derive(Clone, Debug)]
-pub struct Estimator(Kind);
+pub struct Estimator(Box<Kind>);
 
 #[derive(Clone, Debug)]
 #[allow(
     clippy::large_enum_variant,
-    reason = "there is one, and it never moves"
+    reason = "there is one, and it stands on the heap"
 )]
 enum Kind {
     /// Section II-A as printed.
@@ -112,7 +112,7 @@ impl Estimator {
         hand_force_max_n: f64,
         gives: bool,
     ) -> Self {
-        Self(match config {
+        Self(Box::new(match config {
             EstimatorConfig::Paper(config) => Kind::Paper(PaperEstimator::new(config, coupling)),
             EstimatorConfig::Recommended(config) if gives => {
                 Kind::MultipleModel(MultipleModel::new(config, hand_force_max_n))
@@ -123,12 +123,12 @@ impl Estimator {
             EstimatorConfig::QuasiStatic(config) => {
                 Kind::QuasiStatic(QuasiStaticEstimator::new(config))
             }
-        })
+        }))
     }
 
     /// Takes one tick and returns the estimate. Allocates nothing.
     pub fn step(&mut self, measured: &Measured) -> Estimate {
-        match &mut self.0 {
+        match &mut *self.0 {
             Kind::Paper(estimator) => estimator.step(measured),
             Kind::Recommended(estimator) => estimator.step(measured),
             Kind::MultipleModel(estimator) => estimator.step(measured),
@@ -140,7 +140,7 @@ impl Estimator {
     /// The estimate after the last tick.
     #[must_use]
     pub fn estimate(&self) -> &Estimate {
-        match &self.0 {
+        match &*self.0 {
             Kind::Paper(estimator) => &estimator.estimate,
             Kind::Recommended(estimator) => &estimator.estimate,
             Kind::MultipleModel(estimator) => estimator.estimate(),

@@ -23,10 +23,9 @@ const BETTER: f64 = 0.97;
 const DOUBT_DEVIATIONS: f64 = 3.0;
 
 /// The five.
-#[derive(Clone, Debug)]
+#[derive(Clone, Copy, Debug)]
 pub(super) struct MultipleModel {
-    // on the heap: a slave is moved about on stacks of 2 MB
-    estimators: Box<[RecommendedEstimator; TIMES.len()]>,
+    estimators: [RecommendedEstimator; TIMES.len()],
     believed: usize,
 }
 
@@ -46,7 +45,7 @@ impl MultipleModel {
             RecommendedEstimator::new(&config, hand_force_max_n).doubting_from(DOUBT_DEVIATIONS)
         };
         Self {
-            estimators: Box::new(TIMES.map(of)),
+            estimators: TIMES.map(of),
             believed: FIRST,
         }
     }
@@ -57,7 +56,7 @@ impl MultipleModel {
             tool: measured.tool - measured.back,
             ..*measured
         };
-        for estimator in self.estimators.iter_mut() {
+        for estimator in &mut self.estimators {
             estimator.step(&at_the_contact);
         }
         self.believe();
@@ -81,7 +80,7 @@ impl MultipleModel {
     }
 
     fn believed(&self) -> &RecommendedEstimator {
-        let [first, ..] = &*self.estimators;
+        let [first, ..] = &self.estimators;
         self.estimators.get(self.believed).unwrap_or(first)
     }
 

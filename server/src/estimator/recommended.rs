@@ -203,13 +203,18 @@ impl RecommendedEstimator {
             seen: self.recursive.samples > 0,
         };
         if self.obstacle.step(force, needed, motion, friction) && known {
-            self.recursive = older;
-            self.copies = [older; 2];
+            self.go_back_to(older);
         }
         if self.obstacle.is_hit() {
             self.before_hit.get_or_insert(older);
         }
         self.estimate.holding = self.obstacle.holding();
+    }
+
+    /// Forgets what was learned since `copy` was the regression.
+    fn go_back_to(&mut self, copy: RecursiveLeastSquares) {
+        self.recursive = copy;
+        self.copies = [copy; 2];
     }
 
     /// Whether a way (m) of the surface of an object that nobody has seen slide may be the give of the contact alone.
@@ -262,8 +267,7 @@ impl RecommendedEstimator {
         self.obstacle.clear();
         // what it ran against is no friction
         if let Some(before) = self.before_hit.take() {
-            self.recursive = before;
-            self.copies = [before; 2];
+            self.go_back_to(before);
         }
         self.began = None;
         self.recursive.hold();
