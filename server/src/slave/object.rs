@@ -6,7 +6,9 @@ use std::collections::BTreeMap;
 
 use mmt_shared::model::contact::Coupling;
 use mmt_shared::model::geometry::{BoxFootprint, Pose};
-use mmt_shared::model::params::{ModelParams, inertia_of_square, least_stable_mass};
+use mmt_shared::model::params::{
+    DAMPING_NS_PER_M, MASS_KG, ModelParams, inertia_of_square, least_stable_mass,
+};
 use mmt_shared::model::settings::Mode;
 use mmt_shared::range::in_range;
 use mmt_shared::time::Time;
@@ -28,8 +30,8 @@ pub(super) struct ObjectEstimate {
     pub(super) refused: u64,
     /// Images that are older than what the observer remembers.
     pub(super) images_too_old: u64,
-    /// Whether a mass too light for the coupling is brought to the least that is accepted.
-    raises_mass: bool,
+    /// Whether friction is taken although the mass or damping beside it is not accepted.
+    keeps_friction: bool,
     coupling: Coupling,
     /// No hand presses with more, N.
     hand_force_max_n: f64,
@@ -103,7 +105,7 @@ impl ObjectEstimate {
             refused: 0,
             images_too_old: 0,
             // the paper's block fit may give anything, and what is out of range is no estimate
-            raises_mass: matches!(estimator, EstimatorConfig::Recommended(_)),
+            keeps_friction: matches!(estimator, EstimatorConfig::Recommended(_)),
             coupling,
             hand_force_max_n,
             tool_gives,
@@ -231,13 +233,18 @@ impl ObjectEstimate {
 
     /// The parameters of an estimate; none if they are not accepted.
     fn accept(&self, estimate: &Estimate, side: f64, held_back: bool) -> Option<ModelParams> {
-        let Estimate { m, b, .. } = *estimate;
-        // where nothing shows the mass, it may come out as next to none; the friction beside it is good all the same
-        let m = if self.raises_mass {
-            m.max(least_stable_mass(b, &self.coupling))
-        } else {
-            m
-        };
+        let Estimate { mut m, mut b, .. } = *estimate;
+        // where nothing shows them, mass and damping may come out as next to none or as no object has them; the friction beside
+        // them is good all the same
+        if self.keeps_friction {
+            if !within(b, DAMPING_NS_PER_M) {
+                b = self.params.b();
+            }
+            if m > MASS_KG.1 {
+                m = self.params.m();
+            }
+            m = m.max(least_stable_mass(b, &self.coupling));
+        }
         let c = match estimate.holding {
             // a tool that may press no harder does not find out how hard the object is held
             Some(_) if estimate.sticking && held_back => OBSTACLE_N,
@@ -253,19 +260,24 @@ impl ObjectEstimate {
     }
 }
 
+fn within(value: f64, (least, most): (f64, f64)) -> bool {
+    (least..=most).contains(&value)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::slave::StartModel;
 
-    /// What becomes of an estimate of the least mass and 5 N of friction.
-    fn accepted(mode: Mode, k_p: f64) -> Option<ModelParams> {
+    /// What becomes of an estimate of m (kg), b (N s/m) and 5 N of friction.
+    fn accepted(mode: Mode, k_p: f64, m: f64, b: f64) -> Option<ModelParams> {
         let coupling = Coupling::for_stiffness(k_p);
         let config = SlaveConfig::of_mode(mode);
         let object =
             ObjectEstimate::try_new(&config, coupling, Pose::default(), Vec::new()).unwrap();
         let estimate = Estimate {
-            m: 0.05,
-            b: 0.0,
+            m,
+            b,
             c: 5.0,
             ..*object.estimator.estimate()
         };
@@ -275,10 +287,26 @@ mod tests {
     #[test]
     fn friction_is_not_withheld_because_the_mass_came_out_too_light_for_the_coupling() {
         for k_p in [300.0, 1000.0, 3000.0] {
-            let params = accepted(Mode::Recommended, k_p).unwrap();
+            let params = accepted(Mode::Recommended, k_p, 0.05, 0.0).unwrap();
             assert_eq!(params.c(), 5.0, "{k_p} N/m");
             assert!(params.m() >= 0.05);
         }
-        assert_eq!(accepted(Mode::Paper, 3000.0), None);
+        assert_eq!(accepted(Mode::Paper, 3000.0, 0.05, 0.0), None);
+    }
+
+    #[test]
+    fn friction_is_not_withheld_because_mass_or_damping_came_out_as_no_object_has_them() {
+        let last = StartModel::default();
+        for (m, b) in [(113.6, 3.0), (0.7, 300.0), (0.7, -1.0)] {
+            let params = accepted(Mode::Recommended, 1000.0, m, b).unwrap();
+            assert_eq!(params.c(), 5.0, "{m} kg, {b} N s/m");
+            let expected = if m > 50.0 {
+                (last.mass_kg, b)
+            } else {
+                (m, last.damping_ns_per_m)
+            };
+            assert_eq!((params.m(), params.b()), expected);
+        }
+        assert_eq!(accepted(Mode::Paper, 1000.0, 113.6, 3.0), None);
     }
 }
