@@ -24,10 +24,10 @@ pub(super) struct Row {
 }
 
 impl Row {
-    /// This row with the sign of `speed` for s: friction opposes the push alone.
+    /// This row with s = 1: friction opposes the push alone.
     #[must_use]
-    pub(super) fn with_sign(mut self, speed: f64) -> Self {
-        self.regressor.z = 1.0_f64.copysign(speed);
+    pub(super) fn pushed(mut self) -> Self {
+        self.regressor.z = 1.0;
         self
     }
 }

@@ -47,40 +47,27 @@ pub(super) enum GateState {
 pub(super) struct Gate {
     config: GateConfig,
     age: u32,
-    backwards: bool,
 }
 
 impl Gate {
     /// A closed gate.
     #[must_use]
     pub(super) fn new(config: GateConfig) -> Self {
-        Self {
-            config,
-            age: 0,
-            backwards: false,
-        }
+        Self { config, age: 0 }
     }
 
     /// Takes force (N) and smoothed speed (m/s) along the normal, and the noise of the force where that is more than the
     /// settings are made for (N).
     ///
-    /// A slow object slides if it is known to creep. A speed that changes sign begins anew: it has been
-    /// through zero, where the object may stick.
+    /// A slow object slides if it is known to creep.
     pub(super) fn step(&mut self, force: f64, speed: f64, creeps: bool, noise: f64) -> GateState {
         let slides = self.slides(speed) || creeps;
-        let speed = if creeps { speed.abs() } else { speed };
         let enough = force > self.config.force_min_n.max(DEVIATIONS * noise) && slides;
-        let turned = self.age > 0 && self.backwards != (speed < 0.0);
-        self.backwards = speed < 0.0;
         if !enough {
             self.age = 0;
             return GateState::Closed;
         }
-        self.age = if turned {
-            1
-        } else {
-            self.age.saturating_add(1)
-        };
+        self.age = self.age.saturating_add(1);
         match self.age {
             1 => GateState::Begins,
             age if age > self.config.ticks => GateState::Open,
@@ -88,10 +75,11 @@ impl Gate {
         }
     }
 
-    /// Whether a smoothed speed (m/s) is fast enough to be known as sliding by itself.
+    /// Whether a smoothed speed (m/s) is fast enough to be known as sliding by itself. Nothing slides against a push: a surface
+    /// that seems to come back while the force rises is that of a contact which is stiffer than believed.
     #[must_use]
     pub(super) fn slides(&self, speed: f64) -> bool {
-        speed.abs() > self.config.speed_min_m_per_s
+        speed > self.config.speed_min_m_per_s
     }
 
     /// Closes: contact was lost.
@@ -127,6 +115,6 @@ mod tests {
             assert_eq!(gate.step(force, speed, false, 0.0), GateState::Closed);
             assert_eq!(gate.step(2.0, 0.1, false, 0.0), GateState::Begins);
         }
-        assert_eq!(pushed(100).step(2.0, -0.1, false, 0.0), GateState::Begins);
+        assert_eq!(pushed(100).step(2.0, -0.1, false, 0.0), GateState::Closed);
     }
 }

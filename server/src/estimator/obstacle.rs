@@ -4,10 +4,15 @@
 //! is let go for free; one that has run ahead can be brought back only as far as its tank pays. It must never
 //! take ordinary static friction, which gives way at once, for an obstacle, and never outlast the contact.
 
+use mmt_shared::model::geometry::Vec2;
+
 /// Force that static friction alone may hold: this share of c, and this much more, N.
 const FRICTION_HOLDS: (f64, f64) = (1.25, 0.3);
 /// How long a force beyond that must be held, ticks: a press rises through static friction sooner.
 const HOLD_TICKS: u32 = 20;
+/// A surface that is pressed beyond that and has gone no farther than so many m in so many ticks stands, however it trembles:
+/// friction would have let 5 kg go farther.
+const STAYS: (f64, u32) = (1.25e-3, 250);
 /// An object that slides has hit something when the force exceeds what its motion needs by this share of c, and this
 /// much more, N.
 const PUSH_NEEDS: (f64, f64) = (3.0, 1.0);
@@ -46,12 +51,34 @@ pub(super) struct Friction {
     pub(super) seen: bool,
 }
 
+/// How long the surface has stayed where it is.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Stays {
+    from: Option<Vec2>,
+    ticks: u32,
+}
+
+impl Stays {
+    /// Takes the surface point (m) of a tick, and the inward normal; for how many ticks it has stayed there.
+    pub(super) fn step(&mut self, point: Vec2, normal: Vec2) -> u32 {
+        let (farthest, _) = STAYS;
+        let stays = (self.from).is_some_and(|from| normal.dot(&(point - from)).abs() <= farthest);
+        (self.from, self.ticks) = if stays {
+            (self.from, self.ticks.saturating_add(1))
+        } else {
+            (Some(point), 0)
+        };
+        self.ticks
+    }
+}
+
 /// Watches for an obstacle.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Obstacle {
     /// An object that this force does not move is held by something that the hand does not move, N.
     hand_force_max_n: f64,
     held_ticks: u32,
+    pressed_ticks: u32,
     hard_ticks: u32,
     stands: bool,
     holding: Option<f64>,
@@ -63,30 +90,35 @@ impl Obstacle {
         Self {
             hand_force_max_n,
             held_ticks: 0,
+            pressed_ticks: 0,
             hard_ticks: 0,
             stands: false,
             holding: None,
         }
     }
 
-    /// Takes the force (N), the share m a + b v of it that is `needed` to move the object so (N), how it moves, and the
-    /// friction as it was estimated before. True in the tick in which the object is found to stand against an obstacle.
+    /// Takes the force (N), the share m a + b v of it that is `needed` to move the object so (N), how it moves, for how many
+    /// ticks it `stayed` where it is ([`Stays`]), and the friction as it was estimated before. True in the tick in which the object is found to stand against an obstacle.
     pub(super) fn step(
         &mut self,
         force: f64,
         needed: f64,
         motion: MotionState,
+        stayed: u32,
         friction: Friction,
     ) -> bool {
+        let (_, long) = STAYS;
         let slides = matches!(motion, MotionState::Slides | MotionState::SlidesOn);
-        if self.stands && !slides {
+        if self.stands && (!slides || stayed >= long) {
             self.stand(force, friction.known);
             return false;
         }
         self.stands = false;
-        let held = motion == MotionState::Sticks && beyond(force, FRICTION_HOLDS, friction.c);
+        let pressed = beyond(force, FRICTION_HOLDS, friction.c);
+        let held = pressed && motion == MotionState::Sticks;
         self.held_ticks = if held { self.held_ticks + 1 } else { 0 };
-        if self.held_ticks >= HOLD_TICKS {
+        self.pressed_ticks = if pressed { self.pressed_ticks + 1 } else { 0 };
+        if self.held_ticks >= HOLD_TICKS || self.pressed_ticks.min(stayed) >= long {
             self.stands = true;
             self.holding = None;
             self.stand(force, friction.known);
@@ -156,7 +188,13 @@ mod tests {
         let mut obstacle = Obstacle::new(HAND_N);
         let rise = (most / rate) as u32;
         for n in 0..rise + 100 {
-            obstacle.step((rate * f64::from(n)).min(most), 0.0, MotionState::Sticks, C);
+            obstacle.step(
+                (rate * f64::from(n)).min(most),
+                0.0,
+                MotionState::Sticks,
+                0,
+                C,
+            );
         }
         obstacle
     }
@@ -174,7 +212,7 @@ mod tests {
         let mut obstacle = Obstacle::new(HAND_N);
         let mut press = |force, motion, friction| {
             (0..20).for_each(|_| {
-                obstacle.step(force, 0.0, motion, friction);
+                obstacle.step(force, 0.0, motion, 0, friction);
             });
             obstacle.holding()
         };
@@ -193,22 +231,62 @@ mod tests {
     }
 
     #[test]
+    fn what_is_pressed_and_has_not_gone_on_for_250_ms_stands_however_it_trembles_until_it_goes_on()
+    {
+        let mut obstacle = Obstacle::new(HAND_N);
+        let trembles = |n: u32| match n % 10 {
+            0..5 => MotionState::Sticks,
+            _ => MotionState::Slides,
+        };
+        for n in 0..250 {
+            obstacle.step(5.0, 0.0, trembles(n), n, C);
+            assert_eq!(obstacle.holding(), None, "{n}");
+        }
+        for n in 250..300 {
+            obstacle.step(5.0, 0.0, trembles(n), n, C);
+            assert!(obstacle.holding().is_some(), "{n}");
+        }
+        obstacle.step(5.0, 0.0, MotionState::Slides, 0, C);
+        assert_eq!(obstacle.holding(), None);
+        // one that friction holds may tremble as long as it likes
+        for n in 0..1000 {
+            obstacle.step(1.25 * C.c, 0.0, trembles(n), n, C);
+            assert_eq!(obstacle.holding(), None);
+        }
+    }
+
+    #[test]
+    fn a_surface_stays_where_it_is_until_it_has_gone_1_25_mm_along_the_normal() {
+        let mut stays = Stays::default();
+        let normal = Vec2::new(1.0, 0.0);
+        let mut at = |x: f64, y: f64| stays.step(Vec2::new(x, y), normal);
+        assert_eq!(at(0.0, 0.0), 0);
+        for n in 1..=100 {
+            let x = 1.2e-3 * libm::sin(f64::from(n));
+            assert_eq!(at(x, 1e-3 * f64::from(n)), n);
+        }
+        assert_eq!(at(1.3e-3, 0.1), 0);
+        assert_eq!(at(0.1e-3, 0.1), 1);
+        assert_eq!(at(0.0, 0.1), 0);
+    }
+
+    #[test]
     fn static_friction_that_gives_way_within_20_ms_is_no_obstacle() {
         let mut obstacle = Obstacle::new(HAND_N);
         for _ in 0..19 {
-            assert!(!obstacle.step(1.5 * C.c, 0.0, MotionState::Sticks, C));
+            assert!(!obstacle.step(1.5 * C.c, 0.0, MotionState::Sticks, 0, C));
         }
-        obstacle.step(1.5 * C.c, 0.0, MotionState::Slides, C);
-        assert!(!obstacle.step(1.5 * C.c, 0.0, MotionState::Sticks, C));
+        obstacle.step(1.5 * C.c, 0.0, MotionState::Slides, 0, C);
+        assert!(!obstacle.step(1.5 * C.c, 0.0, MotionState::Sticks, 0, C));
         assert_eq!(obstacle.holding(), None);
     }
 
     #[test]
     fn a_noisy_speed_does_not_end_it_and_sliding_does() {
         let mut obstacle = press(0.02, 5.0);
-        obstacle.step(5.0, 0.0, MotionState::Slowly, C);
+        obstacle.step(5.0, 0.0, MotionState::Slowly, 0, C);
         assert!(obstacle.holding().is_some());
-        obstacle.step(5.0, 0.0, MotionState::Slides, C);
+        obstacle.step(5.0, 0.0, MotionState::Slides, 0, C);
         assert_eq!(obstacle.holding(), None);
     }
 
@@ -217,15 +295,15 @@ mod tests {
         let mut obstacle = Obstacle::new(HAND_N);
         for (force, sent) in [(3.0 * C.c + 1.0, None), (10.0, Some(10.0))] {
             for _ in 0..5 {
-                assert!(!obstacle.step(force, 0.0, MotionState::SlidesOn, C));
+                assert!(!obstacle.step(force, 0.0, MotionState::SlidesOn, 0, C));
             }
             assert_eq!(obstacle.holding(), sent);
         }
-        obstacle.step(2.0, 0.0, MotionState::SlidesOn, C);
+        obstacle.step(2.0, 0.0, MotionState::SlidesOn, 0, C);
         assert_eq!(obstacle.holding(), None);
         for _ in 0..5 {
-            obstacle.step(10.0, 5.0, MotionState::SlidesOn, C);
-            obstacle.step(10.0, 0.0, MotionState::Slides, C);
+            obstacle.step(10.0, 5.0, MotionState::SlidesOn, 0, C);
+            obstacle.step(10.0, 0.0, MotionState::Slides, 0, C);
         }
         assert_eq!(obstacle.holding(), None, "a quick hand is no obstacle");
     }

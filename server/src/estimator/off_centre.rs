@@ -199,9 +199,9 @@ mod tests {
         };
         let (x, raw) = (Vec2::new(1.0, 0.0), motion(Vec2::new(0.1, 0.05)));
         for row in [shared(&raw, x, 0.1, &seen), creeping(&raw, x, &seen)] {
-            assert_eq!(row, raw.row.with_sign(1.0));
+            assert_eq!(row, raw.row.pushed());
         }
-        assert_eq!(shared(&raw, x, -0.1, &seen), raw.row.with_sign(-1.0));
+        assert_eq!(shared(&raw, x, -0.1, &seen).regressor.z, -1.0);
     }
 
     #[test]

@@ -15,7 +15,7 @@ use super::estimate::{Estimate, STICK_SPEED};
 use super::filter::{Row, StateVariableFilter, stage_weight};
 use super::gate::{Gate, GateConfig, GateState};
 use super::measured::{Measured, Seen};
-use super::obstacle::{Friction, MotionState, Obstacle};
+use super::obstacle::{Friction, MotionState, Obstacle, Stays};
 use super::off_centre;
 use super::recursive::{RecursiveConfig, RecursiveLeastSquares, Verdict};
 use super::surface::{Surface, SurfaceMotion};
@@ -87,6 +87,7 @@ pub(super) struct RecommendedEstimator {
     /// The regression as it was, newest last.
     copies: [RecursiveLeastSquares; 2],
     obstacle: Obstacle,
+    stays: Stays,
     /// The regression as it was before the object ran against something in this contact; it returns when contact ends.
     before_hit: Option<RecursiveLeastSquares>,
     /// Where this contact began.
@@ -119,6 +120,7 @@ impl RecommendedEstimator {
             recursive,
             copies: [recursive; 2],
             obstacle: Obstacle::new(hand_force_max_n),
+            stays: Stays::default(),
             before_hit: None,
             began: None,
             estimate,
@@ -176,12 +178,13 @@ impl RecommendedEstimator {
         self.slide(gate, &self.row(&motion, normal, measured.seen.as_ref()));
         let began = *self.began.get_or_insert(motion.point);
         let way = normal.dot(&(motion.point - began));
-        self.stand(motion.row.force, gate == GateState::Open, way);
+        let stayed = self.stays.step(motion.point, normal);
+        self.stand(motion.row.force, gate == GateState::Open, way, stayed);
     }
 
     /// Whether something beyond friction holds the object against this force, N.
-    /// `way` (m) is how far its surface seems to have gone in this contact.
-    fn stand(&mut self, force: f64, slides_on: bool, way: f64) {
+    /// `way` (m) is how far its surface seems to have gone in this contact, `stayed` for how many ticks it has stayed where it is.
+    fn stand(&mut self, force: f64, slides_on: bool, way: f64, stayed: u32) {
         let [older, _] = self.copies;
         let known = older.samples > 0;
         let slides = self.gate.slides(self.estimate.speed);
@@ -202,7 +205,7 @@ impl RecommendedEstimator {
             known,
             seen: self.recursive.samples > 0,
         };
-        if self.obstacle.step(force, needed, motion, friction) && known {
+        if self.obstacle.step(force, needed, motion, stayed, friction) && known {
             self.go_back_to(older);
         }
         if self.obstacle.is_hit() {
@@ -231,9 +234,7 @@ impl RecommendedEstimator {
                 off_centre::shared(motion, normal, speed, seen)
             }
             Some(seen) => off_centre::creeping(motion, normal, seen),
-            // the smoothed speed is far from zero, so its sign is v's; creeping is forwards
-            None if self.gate.slides(speed) => motion.row.with_sign(speed),
-            None => motion.row.with_sign(1.0),
+            None => motion.row.pushed(),
         }
     }
 
@@ -265,6 +266,7 @@ impl RecommendedEstimator {
         self.gate.close();
         self.creep.reset();
         self.obstacle.clear();
+        self.stays = Stays::default();
         // what it ran against is no friction
         if let Some(before) = self.before_hit.take() {
             self.go_back_to(before);

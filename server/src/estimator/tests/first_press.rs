@@ -2,24 +2,61 @@
 
 use super::*;
 
+/// A tick of a press on an object that does not move, through a contact of so many times the stiffness that is believed.
+fn pressed(force_n: f64, times: f64) -> Measured {
+    Measured {
+        tool: Vec2::new(force_n / (times * COUPLING.stiffness_n_per_m), 0.0),
+        force: Vec2::new(force_n, 0.0),
+        back: Vec2::zeros(),
+        force_noise_n: 0.0,
+        normal: Some(Vec2::new(1.0, 0.0)),
+        seen: None,
+    }
+}
+
 #[test]
 fn the_give_of_a_soft_contact_is_no_motion_of_an_object_that_nobody_has_moved() {
     let mut estimator = recommended(|_| ());
     let mut holding = None;
     for k in 0..100 {
-        let depth = 4e-5 * f64::from(k);
         // the contact is softer than the device: the surface seems to give way, at 11 mm/s
-        let force = Vec2::new(COUPLING.stiffness_n_per_m * depth / 1.4, 0.0);
-        let measured = Measured {
-            tool: Vec2::new(depth, 0.0),
-            force,
-            back: Vec2::zeros(),
-            force_noise_n: 0.0,
-            normal: Some(Vec2::new(1.0, 0.0)),
-            seen: None,
-        };
-        holding = estimator.step(&measured).holding;
+        let depth = 4e-5 * f64::from(k);
+        let force = COUPLING.stiffness_n_per_m * depth / 1.4;
+        holding = estimator.step(&pressed(force, 1.0 / 1.4)).holding;
     }
     let most = COUPLING.stiffness_n_per_m * 4e-3 / 1.4;
     assert!(holding.is_some_and(|c| c > 0.8 * most), "{holding:?}");
+}
+
+#[test]
+fn a_surface_that_seems_to_come_back_as_the_force_rises_is_that_of_a_stiffer_contact_and_teaches_nothing()
+ {
+    let mut estimator = recommended(|_| ());
+    // at 40 mm/s, and the hand trembles
+    for k in 0..1500 {
+        let tremor = 0.3 * libm::sin(0.06 * f64::from(k));
+        let force = (0.048 * f64::from(k)).min(14.4) + tremor;
+        estimator.step(&pressed(force.max(0.0), 8.0));
+    }
+    let found = estimator.estimate();
+    assert_eq!(found.samples, 0, "{found:?}");
+    assert_eq!(found.holding, Some(OBSTACLE_N));
+}
+
+#[test]
+fn an_object_that_stands_under_a_trembling_press_stands_although_it_was_seen_to_slide() {
+    let (mut estimator, _) = learned(1);
+    let known = values(estimator.estimate());
+    // the tremor is too quick to stick for 20 ms
+    let mut held = 0;
+    for k in 0..1500 {
+        let tremor = 0.4 * libm::sin(0.15 * f64::from(k));
+        let force = (0.048 * f64::from(k)).min(12.0) + tremor;
+        estimator.step(&pressed(force.max(0.0), 0.5));
+        held += u32::from(estimator.estimate().holding.is_some());
+    }
+    assert!(held > 900, "{held}");
+    // what was learned last returns to a copy of before
+    let moved = errors(values(estimator.estimate()), known);
+    assert!(moved.iter().all(|moved| *moved < 0.01), "{moved:?}");
 }
