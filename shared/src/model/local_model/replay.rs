@@ -7,7 +7,8 @@
 
 use super::body::{Body, BodyState};
 use crate::model::contact::GodObject;
-use crate::model::geometry::Pose;
+use crate::model::correction::ROOM_M;
+use crate::model::geometry::{Pose, Vec2};
 use crate::model::history::History;
 use crate::model::params::ModelState;
 use crate::model::settings::ModelSettings;
@@ -58,6 +59,11 @@ impl Replay {
     /// Whether its pose is that at the newest sample.
     pub(super) fn is_live(&self) -> bool {
         matches!(self.progress, Progress::Live(_))
+    }
+
+    /// Whether the box as it should be is clear of a HIP (m, world).
+    pub(super) fn is_clear_of(&self, hip: Vec2) -> bool {
+        self.body.touch(hip).is_none() && self.body.gap(hip).1 > ROOM_M
     }
 
     /// Gives up what it replays.

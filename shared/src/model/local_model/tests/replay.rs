@@ -169,3 +169,42 @@ fn while_an_answer_is_replayed_the_face_does_not_leave_a_resting_hand() {
     );
     assert!((model.state().footprint.west - 0.18).abs() < 1e-12);
 }
+
+/// A push is told that the box has gone so far, m: how far off the box is in the next tick and 50 ticks on, m, and what is felt then.
+fn after_going(x: f64, y: f64) -> (LocalModel, [f64; 2], Rendered) {
+    let mut model = replayed();
+    push(&mut model, 1..=400);
+    let gone = with(answer(&model, 400), |of| {
+        of.pose.position += Vec2::new(x, y);
+        of.twist = Twist::default();
+    });
+    let wanted = gone.state.pose().position;
+    model.apply(&gone);
+    let off = |model: &LocalModel| (model.state().pose.position - wanted).norm();
+    push(&mut model, 401..=401);
+    let at_once = off(&model);
+    let felt = push(&mut model, 402..=450);
+    let later = off(&model);
+    (model, [at_once, later], felt)
+}
+
+#[test]
+fn what_has_slipped_from_the_hand_is_no_longer_felt_and_the_hand_does_not_hold_it_up() {
+    // to the side, clear of the HIP; and back past the HIP
+    for (x, y) in [(0.0, 0.25), (-0.45, 0.0), (0.05, -0.3)] {
+        let (model, [at_once, _], felt) = after_going(x, y);
+        assert!(at_once < 1e-9, "{x}, {y}: {at_once}");
+        assert!(!felt.in_contact(), "{x}, {y}");
+        assert_eq!(model.energy_injected_j(), 0.0);
+    }
+    // nearer than that, ahead of the push, or with the HIP in it
+    for (x, y) in [(0.0, 0.09), (0.15, 0.0), (0.0, 0.12)] {
+        let (model, [at_once, later], _) = after_going(x, y);
+        let way = Vec2::new(x, y).norm();
+        assert!(
+            at_once > 0.9 * way && later > 0.5 * way,
+            "{x}, {y}: {at_once}, {later}"
+        );
+        assert_eq!(model.energy_injected_j(), 0.0);
+    }
+}
