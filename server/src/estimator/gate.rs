@@ -75,11 +75,17 @@ impl Gate {
         }
     }
 
-    /// Whether a smoothed speed (m/s) is fast enough to be known as sliding by itself. Nothing slides against a push: a surface
-    /// that seems to come back while the force rises is that of a contact which is stiffer than believed.
+    /// Whether a smoothed speed (m/s) is that of sliding by itself. Nothing slides against a push: a surface that seems to come
+    /// back while the force rises is that of a contact which is stiffer than believed.
     #[must_use]
     pub(super) fn slides(&self, speed: f64) -> bool {
-        speed > self.config.speed_min_m_per_s
+        speed > 0.0 && self.moves(speed)
+    }
+
+    /// Whether a smoothed speed (m/s) is fast enough to be known by itself.
+    #[must_use]
+    pub(super) fn moves(&self, speed: f64) -> bool {
+        speed.abs() > self.config.speed_min_m_per_s
     }
 
     /// Closes: contact was lost.

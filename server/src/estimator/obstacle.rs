@@ -98,7 +98,8 @@ impl Obstacle {
     }
 
     /// Takes the force (N), the share m a + b v of it that is `needed` to move the object so (N), how it moves, for how many
-    /// ticks it `stayed` where it is ([`Stays`]), and the friction as it was estimated before. True in the tick in which the object is found to stand against an obstacle.
+    /// ticks it `stayed` where it is ([`Stays`]), and the friction as it was estimated before. True in the tick in which the
+    /// object is found to stand against an obstacle.
     pub(super) fn step(
         &mut self,
         force: f64,

@@ -183,12 +183,13 @@ impl RecommendedEstimator {
     }
 
     /// Whether something beyond friction holds the object against this force, N.
-    /// `way` (m) is how far its surface seems to have gone in this contact, `stayed` for how many ticks it has stayed where it is.
+    /// `way` (m) is how far its surface seems to have gone in this contact, `stayed` for how many ticks it has stayed where
+    /// it is.
     fn stand(&mut self, force: f64, slides_on: bool, way: f64, stayed: u32) {
         let [older, _] = self.copies;
         let known = older.samples > 0;
-        let slides = self.gate.slides(self.estimate.speed);
-        let motion = match (slides, self.estimate.sticking) {
+        let moves = self.gate.moves(self.estimate.speed);
+        let motion = match (moves, self.estimate.sticking) {
             (true, _) if slides_on => MotionState::SlidesOn,
             (true, _) => MotionState::Slides,
             (false, true) => MotionState::Sticks,

@@ -30,7 +30,7 @@ pub(super) struct ObjectEstimate {
     pub(super) refused: u64,
     /// Images that are older than what the observer remembers.
     pub(super) images_too_old: u64,
-    /// Whether friction is taken although the mass or damping beside it is not accepted.
+    /// Whether friction is taken although the mass beside it is too light, and what holds the object whatever m and b are.
     keeps_friction: bool,
     coupling: Coupling,
     /// No hand presses with more, N.
@@ -234,15 +234,17 @@ impl ObjectEstimate {
     /// The parameters of an estimate; none if they are not accepted.
     fn accept(&self, estimate: &Estimate, side: f64, held_back: bool) -> Option<ModelParams> {
         let Estimate { mut m, mut b, .. } = *estimate;
-        // where nothing shows them, mass and damping may come out as next to none or as no object has them; the friction beside
-        // them is good all the same
-        if self.keeps_friction {
+        // a mass or damping that no object has says nothing about what holds this one
+        if self.keeps_friction && estimate.holding.is_some() {
             if !within(b, DAMPING_NS_PER_M) {
                 b = self.params.b();
             }
             if m > MASS_KG.1 {
                 m = self.params.m();
             }
+        }
+        // where nothing shows the mass, it may come out as next to none; the friction beside it is good all the same
+        if self.keeps_friction {
             m = m.max(least_stable_mass(b, &self.coupling));
         }
         let c = match estimate.holding {
@@ -269,8 +271,13 @@ mod tests {
     use super::*;
     use crate::slave::StartModel;
 
-    /// What becomes of an estimate of m (kg), b (N s/m) and 5 N of friction.
-    fn accepted(mode: Mode, k_p: f64, m: f64, b: f64) -> Option<ModelParams> {
+    /// What becomes of an estimate of m (kg), b (N s/m) and 5 N of friction, of an object that is held by `holding` N.
+    fn accepted(
+        mode: Mode,
+        k_p: f64,
+        [m, b]: [f64; 2],
+        holding: Option<f64>,
+    ) -> Option<ModelParams> {
         let coupling = Coupling::for_stiffness(k_p);
         let config = SlaveConfig::of_mode(mode);
         let object =
@@ -279,6 +286,7 @@ mod tests {
             m,
             b,
             c: 5.0,
+            holding,
             ..*object.estimator.estimate()
         };
         object.accept(&estimate, 0.36, false)
@@ -287,26 +295,27 @@ mod tests {
     #[test]
     fn friction_is_not_withheld_because_the_mass_came_out_too_light_for_the_coupling() {
         for k_p in [300.0, 1000.0, 3000.0] {
-            let params = accepted(Mode::Recommended, k_p, 0.05, 0.0).unwrap();
+            let params = accepted(Mode::Recommended, k_p, [0.05, 0.0], None).unwrap();
             assert_eq!(params.c(), 5.0, "{k_p} N/m");
             assert!(params.m() >= 0.05);
         }
-        assert_eq!(accepted(Mode::Paper, 3000.0, 0.05, 0.0), None);
+        assert_eq!(accepted(Mode::Paper, 3000.0, [0.05, 0.0], None), None);
     }
 
     #[test]
-    fn friction_is_not_withheld_because_mass_or_damping_came_out_as_no_object_has_them() {
+    fn what_holds_an_object_is_told_although_mass_or_damping_came_out_as_no_object_has_them() {
         let last = StartModel::default();
         for (m, b) in [(113.6, 3.0), (0.7, 300.0), (0.7, -1.0)] {
-            let params = accepted(Mode::Recommended, 1000.0, m, b).unwrap();
-            assert_eq!(params.c(), 5.0, "{m} kg, {b} N s/m");
+            let held = accepted(Mode::Recommended, 1000.0, [m, b], Some(150.0)).unwrap();
+            assert_eq!(held.c(), 150.0, "{m} kg, {b} N s/m");
             let expected = if m > 50.0 {
                 (last.mass_kg, b)
             } else {
                 (m, last.damping_ns_per_m)
             };
-            assert_eq!((params.m(), params.b()), expected);
+            assert_eq!((held.m(), held.b()), expected);
+            assert_eq!(accepted(Mode::Recommended, 1000.0, [m, b], None), None);
+            assert_eq!(accepted(Mode::Paper, 1000.0, [m, b], None), None);
         }
-        assert_eq!(accepted(Mode::Paper, 1000.0, 113.6, 3.0), None);
     }
 }
