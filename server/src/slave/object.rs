@@ -6,9 +6,7 @@ use std::collections::BTreeMap;
 
 use mmt_shared::model::contact::Coupling;
 use mmt_shared::model::geometry::{BoxFootprint, Pose};
-use mmt_shared::model::params::{
-    DAMPING_NS_PER_M, MASS_KG, ModelParams, inertia_of_square, least_stable_mass,
-};
+use mmt_shared::model::params::{ModelParams, inertia_of_square, least_stable_mass};
 use mmt_shared::model::settings::Mode;
 use mmt_shared::range::in_range;
 use mmt_shared::time::Time;
@@ -30,8 +28,8 @@ pub(super) struct ObjectEstimate {
     pub(super) refused: u64,
     /// Images that are older than what the observer remembers.
     pub(super) images_too_old: u64,
-    /// Whether friction is taken although the mass beside it is too light, and what holds the object whatever m and b are.
-    keeps_friction: bool,
+    /// Whether a mass too light for the coupling is brought to the least that is accepted.
+    raises_mass: bool,
     coupling: Coupling,
     /// No hand presses with more, N.
     hand_force_max_n: f64,
@@ -105,7 +103,7 @@ impl ObjectEstimate {
             refused: 0,
             images_too_old: 0,
             // the paper's block fit may give anything, and what is out of range is no estimate
-            keeps_friction: matches!(estimator, EstimatorConfig::Recommended(_)),
+            raises_mass: matches!(estimator, EstimatorConfig::Recommended(_)),
             coupling,
             hand_force_max_n,
             tool_gives,
@@ -233,27 +231,23 @@ impl ObjectEstimate {
 
     /// The parameters of an estimate; none if they are not accepted.
     fn accept(&self, estimate: &Estimate, side: f64, held_back: bool) -> Option<ModelParams> {
-        let Estimate { mut m, mut b, .. } = *estimate;
-        // a mass or damping that no object has says nothing about what holds this one
-        if self.keeps_friction && estimate.holding.is_some() {
-            if !within(b, DAMPING_NS_PER_M) {
-                b = self.params.b();
-            }
-            if m > MASS_KG.1 {
-                m = self.params.m();
-            }
-        }
+        let Estimate { m, b, .. } = *estimate;
         // where nothing shows the mass, it may come out as next to none; the friction beside it is good all the same
-        if self.keeps_friction {
-            m = m.max(least_stable_mass(b, &self.coupling));
-        }
+        let m = if self.raises_mass {
+            m.max(least_stable_mass(b, &self.coupling))
+        } else {
+            m
+        };
         let c = match estimate.holding {
             // a tool that may press no harder does not find out how hard the object is held
             Some(_) if estimate.sticking && held_back => OBSTACLE_N,
             Some(holding) => holding,
             None => estimate.c,
         };
-        self.params_of(m, b, c, side)
+        let accepted = self.params_of(m, b, c, side);
+        // an object that is held is held whatever m and b come out as
+        let held = estimate.holding.and(Some(&self.params));
+        accepted.or_else(|| self.params_of(held?.m(), held?.b(), c, side))
     }
 
     fn params_of(&self, m: f64, b: f64, c: f64, side: f64) -> Option<ModelParams> {
@@ -262,16 +256,12 @@ impl ObjectEstimate {
     }
 }
 
-fn within(value: f64, (least, most): (f64, f64)) -> bool {
-    (least..=most).contains(&value)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::slave::StartModel;
 
-    /// What becomes of an estimate of m (kg), b (N s/m) and 5 N of friction, of an object that is held by `holding` N.
+    /// What becomes of an estimate of m (kg), b (N s/m) and 5 N of friction, or of `holding` N that hold the object.
     fn accepted(
         mode: Mode,
         k_p: f64,
@@ -294,28 +284,24 @@ mod tests {
 
     #[test]
     fn friction_is_not_withheld_because_the_mass_came_out_too_light_for_the_coupling() {
+        let light = [0.05, 0.0];
         for k_p in [300.0, 1000.0, 3000.0] {
-            let params = accepted(Mode::Recommended, k_p, [0.05, 0.0], None).unwrap();
+            let params = accepted(Mode::Recommended, k_p, light, None).unwrap();
             assert_eq!(params.c(), 5.0, "{k_p} N/m");
             assert!(params.m() >= 0.05);
         }
-        assert_eq!(accepted(Mode::Paper, 3000.0, [0.05, 0.0], None), None);
+        assert_eq!(accepted(Mode::Paper, 3000.0, light, None), None);
     }
 
     #[test]
     fn what_holds_an_object_is_told_although_mass_or_damping_came_out_as_no_object_has_them() {
         let last = StartModel::default();
-        for (m, b) in [(113.6, 3.0), (0.7, 300.0), (0.7, -1.0)] {
-            let held = accepted(Mode::Recommended, 1000.0, [m, b], Some(150.0)).unwrap();
-            assert_eq!(held.c(), 150.0, "{m} kg, {b} N s/m");
-            let expected = if m > 50.0 {
-                (last.mass_kg, b)
-            } else {
-                (m, last.damping_ns_per_m)
-            };
-            assert_eq!((held.m(), held.b()), expected);
-            assert_eq!(accepted(Mode::Recommended, 1000.0, [m, b], None), None);
-            assert_eq!(accepted(Mode::Paper, 1000.0, [m, b], None), None);
+        for found in [[113.6, 3.0], [0.7, 300.0], [0.7, -1.0]] {
+            let held = accepted(Mode::Recommended, 1000.0, found, Some(150.0)).unwrap();
+            assert_eq!(held.c(), 150.0, "{found:?}");
+            let others = [held.m(), held.b()];
+            assert_eq!(others, [last.mass_kg, last.damping_ns_per_m], "{found:?}");
+            assert_eq!(accepted(Mode::Recommended, 1000.0, found, None), None);
         }
     }
 }
