@@ -1,9 +1,9 @@
 //! How the local model's pose is brought to the received one, without a jolt and without free energy.
 //!
-//! A received pose is never set: the difference is bled in at bounded rates. Turning about the contact
-//! point and shifting along the face do no work on a frictionless contact and are free, so is motion away
-//! from the HIP; motion towards it stores energy in the coupling and is paid from a tank that holds what
-//! the model has dissipated on the ground. What the tank cannot pay is not done.
+//! A received pose is not set, but for that of another body or where a phantom is felt: the difference is bled in at
+//! bounded rates. Turning about the contact point and shifting along the face do no work on a frictionless contact and are
+//! free, so is motion away from the HIP; motion towards it stores energy in the coupling and is paid from a tank that holds
+//! what the model has dissipated on the ground. What the tank cannot pay is not done.
 
 mod carry;
 

@@ -11,7 +11,7 @@ mod replay;
 
 use crate::model::correction::{Correction, IN_CONTACT, IN_CONTACT_REPLAYED, Tank};
 use crate::model::dynamics::Motion;
-use crate::model::geometry::{Twist, Vec2, rotate};
+use crate::model::geometry::{Twist, Vec2};
 use crate::model::history::{HISTORY_TICKS, History, Moment};
 use crate::model::params::{ModelParams, ModelState};
 use crate::model::settings::{ModelSettings, PoseCorrection, Smoothing};
@@ -23,7 +23,7 @@ pub use body::{Body, BodyState, Rendered};
 pub use replay::REPLAYED_PER_TICK;
 use replay::Replay;
 
-/// A box that is this far from its place, m, with the HIP clear of that place, is a phantom.
+/// A box that is touched this far from its place, m, with the HIP clear of that place, is a phantom.
 const PHANTOM_M: f64 = 0.1;
 /// A place within 60° of the push lies ahead: the cosine of that.
 const AHEAD: f64 = 0.5;
@@ -281,16 +281,19 @@ impl LocalModel {
         });
     }
 
-    /// A place that the HIP is clear of and that is [`PHANTOM_M`] and more away is taken at once. What is felt until then is a
-    /// phantom, and the HIP may stand in the way. It costs nothing: what the coupling holds is lost. A box whose place is
-    /// ahead of the push is no phantom: it recedes by the bleed, so that the hand does not let go and catch it again.
+    /// A box that is touched goes at once to a place that is [`PHANTOM_M`] and more away and that the HIP is clear of: what is
+    /// felt is a phantom, and the HIP may stand in its way. It costs nothing, as what the coupling holds is lost. A box
+    /// whose place is ahead of the push is no phantom: it recedes by the bleed, so that the hand does not let go and catch it
+    /// again.
     fn leave_phantom(&mut self) {
         let Some((_, hip)) = self.previous else {
             return;
         };
+        let Some(touch) = self.body.touch(hip) else {
+            return;
+        };
         let way = self.correction.remaining.shift;
-        let inward = -rotate(self.body.state.pose.angle, self.body.face(hip).outward());
-        let is_ahead = inward.dot(&way) > AHEAD * way.norm();
+        let is_ahead = touch.inward.dot(&way) > AHEAD * way.norm();
         if way.norm() < PHANTOM_M || is_ahead || !self.replay.is_clear_of(hip) {
             return;
         }

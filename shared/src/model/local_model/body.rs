@@ -86,12 +86,6 @@ impl Body {
             .touch_at(&self.state.footprint, &self.state.pose, hip)
     }
 
-    /// The face that a HIP touches, or is in front of.
-    pub(super) fn face(&self, hip: Vec2) -> Face {
-        let touched = self.touch(hip).map(|touch| touch.face);
-        touched.unwrap_or_else(|| self.gap(hip).0)
-    }
-
     /// ½ k_p pen² + ½ m |v|² + ½ I omega², J: all that the hand could get back.
     pub(super) fn energy_j(&self, coupling: &Coupling, hip: Option<Vec2>) -> f64 {
         let touch = hip.and_then(|hip| self.touch(hip));

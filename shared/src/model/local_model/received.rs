@@ -76,7 +76,8 @@ impl LocalModel {
             return Vec2::zeros();
         };
         // the box may have moved from under the HIP since the sample: what it touched then it may be beside now
-        let face = self.body.face(hip);
+        let touched = self.body.touch(hip).map(|touch| touch.face);
+        let face = touched.unwrap_or_else(|| self.body.gap(hip).0);
         let state = &mut self.body.state;
         let growth = received.offset(face) - state.footprint.offset(face);
         state.footprint = received;

@@ -63,7 +63,7 @@ impl Replay {
 
     /// Whether the box as it should be is clear of a HIP (m, world).
     pub(super) fn is_clear_of(&self, hip: Vec2) -> bool {
-        self.body.touch(hip).is_none() && self.body.gap(hip).1 > ROOM_M
+        self.body.gap(hip).1 > ROOM_M
     }
 
     /// Gives up what it replays.

@@ -170,7 +170,8 @@ fn while_an_answer_is_replayed_the_face_does_not_leave_a_resting_hand() {
     assert!((model.state().footprint.west - 0.18).abs() < 1e-12);
 }
 
-/// A push is told that the box has gone so far, m: how far off the box is in the next tick and 50 ticks on, m, and what is felt then.
+/// Pushes a model, then sends it an update in which the box has gone so far, m. Returns the model, how far off it is in the next
+/// tick and 50 ticks on (m), and what it renders then.
 fn after_going(x: f64, y: f64) -> (LocalModel, [f64; 2], Rendered) {
     let mut model = replayed();
     push(&mut model, 1..=400);
