@@ -147,4 +147,13 @@ impl Estimator {
             Kind::QuasiStatic(estimator) => &estimator.estimate,
         }
     }
+
+    /// Stiffness of the contact, N/m, where it is estimated and something has shown it.
+    #[must_use]
+    pub fn contact_n_per_m(&self) -> Option<f64> {
+        match &*self.0 {
+            Kind::MultipleModel(estimator) => estimator.contact_n_per_m(),
+            _ => None,
+        }
+    }
 }

@@ -27,6 +27,8 @@ const DOUBT_DEVIATIONS: f64 = 3.0;
 pub(super) struct MultipleModel {
     estimators: [RecommendedEstimator; TIMES.len()],
     believed: usize,
+    /// k_p.
+    device_n_per_m: f64,
 }
 
 impl MultipleModel {
@@ -47,6 +49,7 @@ impl MultipleModel {
         Self {
             estimators: TIMES.map(of),
             believed: FIRST,
+            device_n_per_m: config.coupling.stiffness_n_per_m,
         }
     }
 
@@ -90,10 +93,11 @@ impl MultipleModel {
         &self.believed().estimate
     }
 
-    /// Stiffness of the contact over k_p that is believed.
-    #[cfg(test)]
-    fn times(&self) -> f64 {
-        TIMES[self.believed]
+    /// Stiffness of the contact that is believed, N/m; none before they were compared.
+    pub(super) fn contact_n_per_m(&self) -> Option<f64> {
+        let compared = self.believed().estimate.samples >= ROWS_MIN;
+        let times = TIMES.get(self.believed).filter(|_| compared)?;
+        Some(times * self.device_n_per_m)
     }
 }
 
@@ -164,12 +168,13 @@ mod tests {
             }
             let found = many.estimate();
             let (m, alone) = (found.m / TRUTH[0], single.estimate().m / TRUTH[0]);
-            println!("{times}: {} times, {m} against {alone}", many.times());
+            let believed = many.contact_n_per_m().unwrap() / COUPLING.stiffness_n_per_m;
+            println!("{times}: {believed} times, {m} against {alone}");
             // 2.5 lies in the middle between two of them
             assert!((0.8..1.1).contains(&m), "{times}: {m}");
             assert!((found.c - TRUTH[2]).abs() < 0.15, "{times}: {found:?}");
-            let ratio = many.times() / times;
-            assert!((0.6..1.7).contains(&ratio), "{times}: {}", many.times());
+            let ratio = believed / times;
+            assert!((0.6..1.7).contains(&ratio), "{times}: {believed}");
             assert!(
                 (alone - 1.0).abs() > 2.0 * (m - 1.0).abs(),
                 "{times}: {alone}"

@@ -70,8 +70,8 @@ pub struct SlaveConfig {
     pub tool_force_max_n: f64,
     /// The tool gives no more energy than the hand gave, and a budget.
     pub tool_energy: EnergyConfig,
-    /// A spring that the tool gives by under the measured force, for contacts that are stiffer than the rendered one.
-    /// Default: none.
+    /// A spring that the tool gives by under the measured force, for contacts that are stiffer than the rendered one. Recommended
+    /// mode changes its stiffness when it knows the contact. Default: none.
     pub tool_compliance: Option<Coupling>,
     /// The estimator of m, b and c; the mode's own if absent. It starts from `start` in any case.
     pub estimator: Option<EstimatorConfig>,

@@ -62,6 +62,10 @@ impl Slave {
         }
         let force_holds = self.tool.force_holds();
         let measured = self.object.step(now, &contact, force_holds);
+        if !contact.in_contact {
+            let believed = self.object.estimator.contact_n_per_m();
+            self.compliance.suit(believed, &self.settings.coupling);
+        }
         if self.object.observer.sees_clear() {
             self.contact.see_clear();
         }

@@ -14,7 +14,7 @@ const DAMPING_NS_PER_M: (f64, f64) = (5.0, 300.0);
 
 /// Stiffness of the spring over k_p: a stiff contact then feels about like the rendered one.
 const OVER_DEVICE: f64 = 1.2;
-/// Stiffest contact over k_p that [`spring_for`] is meant for.
+/// Stiffest contact over k_p that [`spring_for`] is meant for, and stiffest spring over k_p.
 const STIFFEST: f64 = 10.0;
 /// Least damping of such a spring, N s/m.
 const DAMPING_LEAST_NS_PER_M: f64 = 30.0;
@@ -43,6 +43,8 @@ pub fn spring_for(device: Coupling) -> Coupling {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Compliance {
     spring: Option<Coupling>,
+    /// The spring for contacts that nobody knows.
+    configured: Option<Coupling>,
     /// How far, m, world frame, and how fast it grows, m/s.
     back: (Vec2, Vec2),
 }
@@ -60,8 +62,20 @@ impl Compliance {
         }
         Ok(Self {
             spring,
+            configured: spring,
             back: (Vec2::zeros(), Vec2::zeros()),
         })
+    }
+
+    /// From now on the tool gives so that a contact of `contact_n_per_m` feels like the one that the master renders, with
+    /// `rendered`; as configured where nobody knows the contact. Not for a tool that touches something: it would jump.
+    pub(crate) fn suit(&mut self, contact_n_per_m: Option<f64>, rendered: &Coupling) {
+        self.spring = self.configured.map(|configured| Coupling {
+            stiffness_n_per_m: contact_n_per_m.map_or(configured.stiffness_n_per_m, |k_e| {
+                in_series(k_e, rendered.stiffness_n_per_m)
+            }),
+            ..configured
+        });
     }
 
     /// One tick under the force that was measured last (N, on the object): how far the tool stands back (m), and the
@@ -76,6 +90,13 @@ impl Compliance {
         }
         self.back
     }
+}
+
+/// Stiffness of the spring, N/m, that gives k_p together with a contact of k_e: 1/K = 1/k_p − 1/k_e. For a contact that is
+/// hardly stiffer, or softer, the stiffest.
+fn in_series(k_e: f64, k_p: f64) -> f64 {
+    let softness = (1.0 / k_p - 1.0 / k_e).max(1.0 / (STIFFEST * k_p));
+    (1.0 / softness).clamp(STIFFNESS_N_PER_M.0, STIFFNESS_N_PER_M.1)
 }
 
 #[cfg(test)]
@@ -102,6 +123,31 @@ mod tests {
         assert_eq!(stiff.step(force), (Vec2::zeros(), Vec2::zeros()));
     }
 
+    #[test]
+    fn where_the_contact_is_known_both_together_are_as_stiff_as_what_is_rendered() {
+        let device = Coupling::for_stiffness(1000.0);
+        let mut tool = Compliance::try_new(Some(spring_for(device))).unwrap();
+        let mut given_m = |k_e: Option<f64>| {
+            tool.suit(k_e, &device);
+            (0..1000)
+                .map(|_| tool.step(Vec2::new(3.0, 0.0)).0.x)
+                .last()
+                .unwrap()
+        };
+        for k_e in [1260.0, 2000.0, 8000.0] {
+            let both_m = given_m(Some(k_e)) + 3.0 / k_e;
+            assert!((both_m - 3e-3).abs() < 1e-9, "{k_e} N/m: {both_m} m");
+        }
+        // no spring makes a softer one stiffer
+        for k_e in [1000.0, 300.0] {
+            assert!((given_m(Some(k_e)) - 0.3e-3).abs() < 1e-9, "{k_e} N/m");
+        }
+        assert!((given_m(None) - 2.5e-3).abs() < 1e-9, "as configured");
+        let mut stiff = Compliance::try_new(None).unwrap();
+        stiff.suit(Some(2000.0), &device);
+        assert_eq!(stiff.step(Vec2::new(3.0, 0.0)).0, Vec2::zeros());
+    }
+
     /// The largest force on a contact that does not move, N, in the last of 1000 ticks after a blow of 1 N.
     fn left_n(spring: Coupling, contact: Coupling) -> f64 {
         let mut tool = Compliance::try_new(Some(spring)).unwrap();
@@ -119,14 +165,26 @@ mod tests {
             let device = Coupling::for_stiffness(k_p);
             let spring = spring_for(device);
             assert!(Compliance::try_new(Some(spring)).is_ok());
-            for times in [1.0, 3.0, 10.0] {
-                let stiffness_n_per_m = times * k_p;
-                let contact = Coupling {
-                    stiffness_n_per_m,
-                    ..device
+            // as it is, or suited to another contact than the one that it meets
+            for suited in [None, Some(1.26), Some(3.0), Some(8.0)] {
+                let spring = Coupling {
+                    stiffness_n_per_m: suited.map_or(spring.stiffness_n_per_m, |times| {
+                        in_series(times * k_p, k_p)
+                    }),
+                    ..spring
                 };
-                let left = left_n(spring, contact);
-                assert!(left < 1e-6, "{k_p} N/m, {times} times: {left} N");
+                for times in [1.0, 3.0, 10.0] {
+                    let stiffness_n_per_m = times * k_p;
+                    let contact = Coupling {
+                        stiffness_n_per_m,
+                        ..device
+                    };
+                    let left = left_n(spring, contact);
+                    assert!(
+                        left < 1e-6,
+                        "{k_p} N/m, {suited:?}, {times} times: {left} N"
+                    );
+                }
             }
         }
         let advised = spring_for(Coupling::for_stiffness(1000.0));

@@ -267,6 +267,31 @@ fn behind_a_contact_of_unknown_stiffness_a_hand_that_trembles_does_not_make_the_
 }
 
 #[test]
+fn a_tool_that_gives_learns_how_far_a_contact_gives_by_itself() {
+    let coupling = DeviceProfile::default().coupling();
+    // mean |f_m − true force| from the third push on, N
+    let error = |seed, spring| {
+        let mut config = experiment(seed);
+        config.slave.tool_compliance = spring;
+        let mut world = World::try_new(&config).unwrap();
+        world.run(Duration::from_secs(8), |_| {});
+        let mut errors = Vec::new();
+        world.run(Duration::from_secs(12), |tick| {
+            let slave = tick.slave.as_ref();
+            let pair = slave.and_then(|slave| Some((slave.true_force, slave.f_m?)));
+            errors.extend(pair.map(|(true_force, f_m)| (true_force - f_m).norm()));
+        });
+        mean(errors).unwrap()
+    };
+    let ratios = (1..=4).map(|seed| error(seed, Some(spring_for(coupling))) / error(seed, None));
+    let ratio = mean(ratios.collect::<Vec<_>>()).unwrap();
+    println!(
+        "the contact is as stiff as the device: {ratio} times the error of a tool that does not give"
+    );
+    assert!(ratio < 2.0, "{ratio}");
+}
+
+#[test]
 fn a_noisy_sensor_does_not_keep_back_that_an_object_stands() {
     let mut config = experiment(1);
     config.slave.environment.mass_kg = 2.0;
