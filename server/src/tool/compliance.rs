@@ -42,9 +42,10 @@ pub fn spring_for(device: Coupling) -> Coupling {
 /// How far the tool stands back.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Compliance {
+    /// As configured.
     spring: Option<Coupling>,
-    /// The spring for contacts that nobody knows.
-    configured: Option<Coupling>,
+    /// Stiffness in place of the configured one, N/m, where the contact is known.
+    suited_n_per_m: Option<f64>,
     /// How far, m, world frame, and how fast it grows, m/s.
     back: (Vec2, Vec2),
 }
@@ -62,7 +63,7 @@ impl Compliance {
         }
         Ok(Self {
             spring,
-            configured: spring,
+            suited_n_per_m: None,
             back: (Vec2::zeros(), Vec2::zeros()),
         })
     }
@@ -70,19 +71,15 @@ impl Compliance {
     /// From now on the tool gives so that a contact of `contact_n_per_m` feels like the one that the master renders, with
     /// `rendered`; as configured where nobody knows the contact. Not for a tool that touches something: it would jump.
     pub(crate) fn suit(&mut self, contact_n_per_m: Option<f64>, rendered: &Coupling) {
-        self.spring = self.configured.map(|configured| Coupling {
-            stiffness_n_per_m: contact_n_per_m.map_or(configured.stiffness_n_per_m, |k_e| {
-                in_series(k_e, rendered.stiffness_n_per_m)
-            }),
-            ..configured
-        });
+        self.suited_n_per_m = contact_n_per_m.map(|k_e| in_series(k_e, rendered.stiffness_n_per_m));
     }
 
     /// One tick under the force that was measured last (N, on the object): how far the tool stands back (m), and the
     /// rate of that (m/s).
     pub(crate) fn step(&mut self, force: Vec2) -> (Vec2, Vec2) {
         if let Some(spring) = self.spring {
-            let (k, d) = (spring.stiffness_n_per_m, spring.damping_ns_per_m);
+            let k = self.suited_n_per_m.unwrap_or(spring.stiffness_n_per_m);
+            let d = spring.damping_ns_per_m;
             let (before, _) = self.back;
             // K y + D dy/dt = f, implicit
             let back = (before * d + force * TICK_S) / (d + k * TICK_S);
