@@ -37,6 +37,21 @@ pub struct Contact {
     pub body: usize,
 }
 
+impl Contact {
+    /// The same with what is measured in every tick by this `share` on its way to what it was `before`, and no image.
+    #[must_use]
+    pub(crate) fn towards(&self, before: &Self, share: f64) -> Self {
+        Self {
+            tool: self.tool.lerp(&before.tool, share),
+            back: self.back.lerp(&before.back, share),
+            force: self.force.lerp(&before.force, share),
+            steady: self.steady.lerp(&before.steady, share),
+            vision: None,
+            ..*self
+        }
+    }
+}
+
 /// What the tool meets, and what is made of the measured force.
 pub struct ContactStage {
     plant: Plant,
@@ -99,9 +114,9 @@ impl ContactStage {
         self.conditioner.noise_n()
     }
 
-    /// One tick with the tool at `tool` (m), moving at `velocity` (m/s).
-    pub fn step(&mut self, now: Time, tool: Vec2, velocity: Vec2) -> Contact {
-        let met = self.plant.meet(now, tool, velocity, self.body);
+    /// So many ticks, after which the tool is at `tool` (m) and has moved at `velocity` (m/s); what is known of the contact then.
+    pub fn step(&mut self, now: Time, ticks: u32, tool: Vec2, velocity: Vec2) -> Contact {
+        let met = self.plant.meet(now, ticks, tool, velocity, self.body);
         self.body = met.body;
         let sensed = met.sensed;
         let conditioned = self.conditioner.step(sensed.force, sensed.tool);

@@ -12,7 +12,7 @@ mod tests;
 use mmt_shared::model::contact::Coupling;
 use mmt_shared::model::geometry::{Pose, Vec2};
 use mmt_shared::range::{OutOfRange, in_range};
-use mmt_shared::time::Time;
+use mmt_shared::time::{TICK_S, Time};
 use serde::{Deserialize, Serialize};
 
 use crate::environment::Environment;
@@ -85,13 +85,25 @@ pub(crate) enum Plant {
 }
 
 impl Plant {
-    /// One tick with the tool at `tool` (m), moving at `velocity` (m/s). `body` was touched last.
-    pub(crate) fn meet(&mut self, now: Time, tool: Vec2, velocity: Vec2, body: usize) -> Met {
+    /// So many ticks, after which the tool is at `tool` (m) and has moved at `velocity` (m/s); what is measured then. `body` was
+    /// touched last.
+    pub(crate) fn meet(
+        &mut self,
+        now: Time,
+        ticks: u32,
+        tool: Vec2,
+        velocity: Vec2,
+        body: usize,
+    ) -> Met {
         match self {
             Self::World {
                 environment,
                 sensing,
             } => {
+                // the world waits for no slave that misses ticks
+                for missed in (1..ticks).rev() {
+                    environment.step(tool - velocity * (f64::from(missed) * TICK_S), velocity);
+                }
                 let met = environment.step(tool, velocity);
                 if met.body != body {
                     sensing.drop_images();

@@ -137,7 +137,7 @@ impl BilateralSlave {
         let (way, wave) = self.way(&played);
         self.tool += way;
         self.put_out_j += self.port.moved(way);
-        let contact = self.contact.step(now, self.tool, way / TICK_S);
+        let contact = self.contact.step(now, 1, self.tool, way / TICK_S);
         if let Some(f_m) = played.force {
             self.force.push(contact.force, f_m);
         }

@@ -133,7 +133,7 @@ mod tests {
                 + 0.06 * (1.0 - libm::cos(TAU * 0.6 * t)) / (TAU * 0.6)
                 + 2e-4 * libm::sin(TAU * 10.0 * t);
             debug_assert!(speed > 0.0);
-            let (back, _) = spring.step(Vec2::new(force, 0.0));
+            let (back, _) = spring.step(Vec2::new(force, 0.0), TICK_S);
             let before = depth;
             depth = hip - back.x - position;
             force = contact.force(depth, (depth - before) / TICK_S);

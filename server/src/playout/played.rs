@@ -2,7 +2,7 @@
 
 use crate::tool::energy::HandSample;
 use mmt_shared::model::geometry::Vec2;
-use mmt_shared::time::Time;
+use mmt_shared::time::{TICK_S, Time};
 use serde::{Deserialize, Serialize};
 
 /// Where a played HIP comes from.
@@ -42,6 +42,14 @@ pub struct Played {
     pub limited: bool,
     /// Whether the tool has to stand, or to stop: it is held, or there are no samples and the ramp to a stop is over.
     pub stands: bool,
+}
+
+impl Played {
+    /// How many periods the tick took: 1, and as many more as ticks were missed before it.
+    #[must_use]
+    pub fn ticks(&self) -> u32 {
+        (self.period_s / TICK_S).round().max(1.0) as u32
+    }
 }
 
 /// What happened to samples that were not played, and how often play-out was not nominal.

@@ -9,7 +9,7 @@ use mmt_shared::model::geometry::{BoxFootprint, Pose};
 use mmt_shared::model::params::{ModelParams, inertia_of_square, least_stable_mass};
 use mmt_shared::model::settings::Mode;
 use mmt_shared::range::in_range;
-use mmt_shared::time::Time;
+use mmt_shared::time::{TICK, Time};
 use serde::{Deserialize, Serialize};
 
 use super::config::{SlaveConfig, SlaveError};
@@ -37,6 +37,8 @@ pub(super) struct ObjectEstimate {
     tool_gives: bool,
     observer_config: ObserverConfig,
     estimator_config: EstimatorConfig,
+    /// What was met in the last tick.
+    met: Option<Contact>,
     /// Number of the body.
     body: usize,
     /// What was found of other bodies, by their numbers.
@@ -109,6 +111,7 @@ impl ObjectEstimate {
             tool_gives,
             observer_config: observer,
             estimator_config: estimator,
+            met: None,
             body: 0,
             found: BTreeMap::new(),
             start,
@@ -177,9 +180,26 @@ impl ObjectEstimate {
         self.observer = PoseObserver::new(self.observer_config, pose, found.footprint);
     }
 
-    /// One tick; what the estimator was given. `held_back`: whether the limit of the tool's force keeps the tool from
-    /// the HIP.
-    pub(super) fn step(&mut self, now: Time, contact: &Contact, held_back: bool) -> Measured {
+    /// So many ticks, of which all but the last were missed; what the estimator was given. In those the tool and its force are
+    /// taken to have gone straight on to what they are now. `held_back`: whether the limit of the tool's force keeps the tool
+    /// from the HIP.
+    pub(super) fn step(
+        &mut self,
+        now: Time,
+        ticks: u32,
+        contact: &Contact,
+        held_back: bool,
+    ) -> Measured {
+        let before = self.met.replace(*contact).unwrap_or(*contact);
+        for missed in (1..ticks).rev() {
+            let then = now - TICK * missed;
+            let share = f64::from(missed) / f64::from(ticks);
+            self.take_in(then, &contact.towards(&before, share), held_back);
+        }
+        self.take_in(now, contact, held_back)
+    }
+
+    fn take_in(&mut self, now: Time, contact: &Contact, held_back: bool) -> Measured {
         let observer = &mut self.observer;
         observer.step(
             now,

@@ -8,6 +8,7 @@ use mmt_shared::model::geometry::Face;
 use mmt_shared::model::sample::HipCounts;
 use mmt_shared::model::sample::HipSample;
 use mmt_shared::model::settings::Mode;
+use mmt_shared::rng::Substream;
 use mmt_shared::time::TICK;
 
 use super::*;
@@ -135,6 +136,43 @@ fn the_trigger_knows_whether_the_hip_stands() {
     assert!(moves.len() > 100 && moves.iter().all(|stands| !stands));
     let rests = along(300, 0.0, -0.33);
     assert!(rests.len() > 100 && rests.iter().all(|stands| *stands));
+}
+
+/// m (kg), b (N s/m) and c (N) after 6 s in which a hand pushes a cube with a changing speed, and the slave misses this share of
+/// its ticks.
+fn found_with_missed_ticks(share: f64) -> [f64; 3] {
+    let mut config = SlaveConfig::of_mode(Mode::Recommended);
+    config.tool_energy.bounded = false;
+    config.scene.bodies = vec![cube(0.0, 0.7, false)];
+    let mut slave = Slave::try_new(&config, Coupling::for_stiffness(1000.0)).unwrap();
+    let hip_at = |t: f64| Vec2::new(-0.3 + 0.15 * t + 0.015 * (1.0 - libm::cos(6.0 * t)), 0.0);
+    slave.start_at(hip_at(0.0));
+    let mut random = Substream::new(1, "missed ticks", 0);
+    for ms in 1..6000 {
+        let now = Time::from_millis(ms);
+        let sample = HipSample {
+            stamp: now,
+            hip: HipCounts::nearest(hip_at(now.as_secs_f64())),
+            ..HipSample::default()
+        };
+        slave.handle_sample(now, &sample, 0);
+        if random.uniform() >= share {
+            slave.tick(now);
+        }
+    }
+    let Estimate { m, b, c, .. } = *slave.estimate();
+    [m, b, c]
+}
+
+#[test]
+fn ticks_that_were_missed_leave_the_estimate_as_it_is() {
+    let [m, b, c] = found_with_missed_ticks(0.0);
+    for share in [0.01, 0.05, 0.2] {
+        let found = found_with_missed_ticks(share);
+        println!("{share}: {found:?} instead of {:?}", [m, b, c]);
+        assert!((found[0] / m - 1.0).abs() < 0.1, "{share}: {found:?}");
+        assert!((found[2] / c - 1.0).abs() < 0.05, "{share}: {found:?}");
+    }
 }
 
 fn cube(y: f64, mass_kg: f64, fixed: bool) -> BodyConfig {

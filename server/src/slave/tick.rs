@@ -48,9 +48,11 @@ impl Slave {
         let hip_stands = self.playout.played_hip() == before;
         let played = self.tool.step(before, played);
         self.tool_at = played.hip;
-        let (back, rate) = self.compliance.step(self.tool.port().held());
+        let ticks = played.ticks();
+        let force = self.tool.port().held();
+        let (back, rate) = self.compliance.step(force, played.period_s);
         let tool = played.hip - back;
-        let mut contact = self.contact.step(now, tool, played.velocity - rate);
+        let mut contact = (self.contact).step(now, ticks, tool, played.velocity - rate);
         // the spring of the tool is part of the contact that the model renders
         contact.tool += back;
         contact.back = back;
@@ -61,7 +63,7 @@ impl Slave {
             self.trigger.repeat(Cause::SlaveOnlyContact);
         }
         let force_holds = self.tool.force_holds();
-        let measured = self.object.step(now, &contact, force_holds);
+        let measured = self.object.step(now, ticks, &contact, force_holds);
         if !contact.in_contact {
             let believed = self.object.estimator.contact_n_per_m();
             self.compliance.suit(believed, &self.settings.coupling);

@@ -75,15 +75,15 @@ impl Compliance {
     }
 
     /// One tick under the force that was measured last (N, on the object): how far the tool stands back (m), and the
-    /// rate of that (m/s).
-    pub(crate) fn step(&mut self, force: Vec2) -> (Vec2, Vec2) {
+    /// rate of that (m/s) over the `period_s` (s) since the last tick. In a tick that was missed the tool does not give.
+    pub(crate) fn step(&mut self, force: Vec2, period_s: f64) -> (Vec2, Vec2) {
         if let Some(spring) = self.spring {
             let k = self.suited_n_per_m.unwrap_or(spring.stiffness_n_per_m);
             let d = spring.damping_ns_per_m;
             let (before, _) = self.back;
             // K y + D dy/dt = f, implicit
             let back = (before * d + force * TICK_S) / (d + k * TICK_S);
-            self.back = (back, (back - before) / TICK_S);
+            self.back = (back, (back - before) / period_s);
         }
         self.back
     }
@@ -111,13 +111,13 @@ mod tests {
     fn it_gives_by_the_force_over_its_stiffness_with_its_time_constant() {
         let mut tool = Compliance::try_new(spring(1200.0, 30.0)).unwrap();
         let force = Vec2::new(2.4, -1.2);
-        let given: Vec<Vec2> = (0..1000).map(|_| tool.step(force).0).collect();
+        let given: Vec<Vec2> = (0..1000).map(|_| tool.step(force, TICK_S).0).collect();
         assert!((given[999] - force / 1200.0).norm() < 1e-12);
         // 30/1200 s: 1 − 1/e within what a step of 1 ms leaves
         let share = given[24].x / 2e-3;
         assert!((share - 0.632).abs() < 0.01, "{share}");
         let mut stiff = Compliance::try_new(None).unwrap();
-        assert_eq!(stiff.step(force), (Vec2::zeros(), Vec2::zeros()));
+        assert_eq!(stiff.step(force, TICK_S), (Vec2::zeros(), Vec2::zeros()));
     }
 
     #[test]
@@ -127,7 +127,7 @@ mod tests {
         let mut given_m = |k_e: Option<f64>| {
             tool.suit(k_e, &device);
             (0..1000)
-                .map(|_| tool.step(Vec2::new(3.0, 0.0)).0.x)
+                .map(|_| tool.step(Vec2::new(3.0, 0.0), TICK_S).0.x)
                 .last()
                 .unwrap()
         };
@@ -142,7 +142,7 @@ mod tests {
         assert!((given_m(None) - 2.5e-3).abs() < 1e-9, "as configured");
         let mut stiff = Compliance::try_new(None).unwrap();
         stiff.suit(Some(2000.0), &device);
-        assert_eq!(stiff.step(Vec2::new(3.0, 0.0)).0, Vec2::zeros());
+        assert_eq!(stiff.step(Vec2::new(3.0, 0.0), TICK_S).0, Vec2::zeros());
     }
 
     /// The largest force on a contact that does not move, N, in the last of 1000 ticks after a blow of 1 N.
@@ -150,7 +150,7 @@ mod tests {
         let mut tool = Compliance::try_new(Some(spring)).unwrap();
         let mut force = Vec2::new(1.0, 0.0);
         for _ in 0..1000 {
-            let (back, rate) = tool.step(force);
+            let (back, rate) = tool.step(force, TICK_S);
             force = -(back * contact.stiffness_n_per_m + rate * contact.damping_ns_per_m);
         }
         force.norm()
