@@ -2,6 +2,7 @@
 
 use crate::environment::{BodyConfig, Shape};
 use crate::estimator::Measured;
+use crate::tool::compliance::spring_for;
 use crate::tool::force::TOOL_FORCE_MAX_N;
 use crate::trigger::TriggerInput;
 use mmt_shared::model::geometry::Face;
@@ -173,6 +174,38 @@ fn ticks_that_were_missed_leave_the_estimate_as_it_is() {
         assert!((found[0] / m - 1.0).abs() < 0.1, "{share}: {found:?}");
         assert!((found[2] / c - 1.0).abs() < 0.05, "{share}: {found:?}");
     }
+}
+
+#[test]
+fn a_tick_that_comes_in_the_same_moment_again_is_a_tick_for_a_tool_that_gives() {
+    let coupling = Coupling::for_stiffness(1000.0);
+    let mut config = SlaveConfig::of_mode(Mode::Recommended);
+    config.tool_compliance = Some(spring_for(coupling));
+    config.scene.bodies = vec![cube(0.0, 0.7, true)];
+    config.tool_energy.bounded = false;
+    let mut slave = Slave::try_new(&config, coupling).unwrap();
+    slave.start_at(Vec2::new(-0.3, 0.0));
+    let mut pressed_n = 0.0_f64;
+    for ms in 1..2000 {
+        let now = Time::from_millis(ms);
+        let hip = Vec2::new(-0.3 + 0.15e-3 * (ms as f64).min(850.0), 0.0);
+        let sample = HipSample {
+            stamp: now,
+            hip: HipCounts::nearest(hip),
+            ..HipSample::default()
+        };
+        slave.handle_sample(now, &sample, 0);
+        for _ in 0..1 + u32::from(ms % 100 == 0) {
+            let Some(tick) = slave.tick(now) else {
+                continue;
+            };
+            assert!(tick.true_force.norm().is_finite() && tick.tool.norm().is_finite());
+            pressed_n = pressed_n.max(tick.true_force.norm());
+        }
+    }
+    assert!(pressed_n > 1.0, "{pressed_n} N");
+    let refused = slave.environment().refused();
+    assert_eq!(refused, 0, "every velocity of the tool is a number");
 }
 
 fn cube(y: f64, mass_kg: f64, fixed: bool) -> BodyConfig {

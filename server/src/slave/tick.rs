@@ -3,7 +3,7 @@
 
 use mmt_shared::model::sample::HipSample;
 use mmt_shared::model::update::{Cause, Update};
-use mmt_shared::time::Time;
+use mmt_shared::time::{TICK_S, Time};
 
 use super::{Slave, SlaveTick};
 use crate::contact::Contact;
@@ -50,7 +50,7 @@ impl Slave {
         self.tool_at = played.hip;
         let ticks = played.ticks();
         let force = self.tool.port().held();
-        let (back, rate) = self.compliance.step(force, played.period_s);
+        let (back, rate) = self.compliance.step(force, f64::from(ticks) * TICK_S);
         let tool = played.hip - back;
         let mut contact = (self.contact).step(now, ticks, tool, played.velocity - rate);
         // the spring of the tool is part of the contact that the model renders
