@@ -2,17 +2,17 @@
 
 use crate::environment::{BodyConfig, Shape};
 use crate::estimator::Measured;
-use crate::tool::compliance::spring_for;
 use crate::tool::force::TOOL_FORCE_MAX_N;
 use crate::trigger::TriggerInput;
 use mmt_shared::model::geometry::Face;
 use mmt_shared::model::sample::HipCounts;
 use mmt_shared::model::sample::HipSample;
 use mmt_shared::model::settings::Mode;
-use mmt_shared::rng::Substream;
 use mmt_shared::time::TICK;
 
 use super::*;
+
+mod missed_ticks;
 
 /// The updates of 2 s in which the object, at the edge of the workspace, flies away at 0.5 m/s.
 fn updates_of_an_object_that_leaves() -> (Vec<Update>, u64) {
@@ -87,22 +87,31 @@ impl Driven {
         let way = Vec2::new(to.0, to.1) - self.hip;
         let ticks = (way.norm() / 0.15e-3).ceil().max(1.0);
         for _ in 0..ticks as u32 {
-            self.now += TICK;
-            self.hip += way / ticks;
-            let newest = self.updates.last().map_or(0, |update| update.sequence);
-            let sample = HipSample {
-                stamp: self.now,
-                hip: HipCounts::nearest(self.hip),
-                ..HipSample::default()
-            };
-            self.slave.handle_sample(self.now, &sample, newest);
-            let Some(tick) = self.slave.tick(self.now) else {
-                continue;
-            };
-            assert!(tick.truth.is_finite() && tick.f_shadow.norm().is_finite());
-            self.peak_n = self.peak_n.max(tick.true_force.norm());
-            self.updates.extend(tick.update);
+            self.take(self.hip + way / ticks);
+            self.tick();
         }
+    }
+
+    /// A millisecond later the slave takes in that the hand is at `hip` (m).
+    fn take(&mut self, hip: Vec2) {
+        self.now += TICK;
+        self.hip = hip;
+        let newest = self.updates.last().map_or(0, |update| update.sequence);
+        let sample = HipSample {
+            stamp: self.now,
+            hip: HipCounts::nearest(hip),
+            ..HipSample::default()
+        };
+        self.slave.handle_sample(self.now, &sample, newest);
+    }
+
+    fn tick(&mut self) {
+        let Some(tick) = self.slave.tick(self.now) else {
+            return;
+        };
+        assert!(tick.truth.is_finite() && tick.f_shadow.norm().is_finite());
+        self.peak_n = self.peak_n.max(tick.true_force.norm());
+        self.updates.extend(tick.update);
     }
 }
 
@@ -137,75 +146,6 @@ fn the_trigger_knows_whether_the_hip_stands() {
     assert!(moves.len() > 100 && moves.iter().all(|stands| !stands));
     let rests = along(300, 0.0, -0.33);
     assert!(rests.len() > 100 && rests.iter().all(|stands| *stands));
-}
-
-/// m (kg), b (N s/m) and c (N) after 6 s in which a hand pushes a cube with a changing speed, and the slave misses this share of
-/// its ticks.
-fn found_with_missed_ticks(share: f64) -> [f64; 3] {
-    let mut config = SlaveConfig::of_mode(Mode::Recommended);
-    config.tool_energy.bounded = false;
-    config.scene.bodies = vec![cube(0.0, 0.7, false)];
-    let mut slave = Slave::try_new(&config, Coupling::for_stiffness(1000.0)).unwrap();
-    let hip_at = |t: f64| Vec2::new(-0.3 + 0.15 * t + 0.015 * (1.0 - libm::cos(6.0 * t)), 0.0);
-    slave.start_at(hip_at(0.0));
-    let mut random = Substream::new(1, "missed ticks", 0);
-    for ms in 1..6000 {
-        let now = Time::from_millis(ms);
-        let sample = HipSample {
-            stamp: now,
-            hip: HipCounts::nearest(hip_at(now.as_secs_f64())),
-            ..HipSample::default()
-        };
-        slave.handle_sample(now, &sample, 0);
-        if random.uniform() >= share {
-            slave.tick(now);
-        }
-    }
-    let Estimate { m, b, c, .. } = *slave.estimate();
-    [m, b, c]
-}
-
-#[test]
-fn ticks_that_were_missed_leave_the_estimate_as_it_is() {
-    let [m, b, c] = found_with_missed_ticks(0.0);
-    for share in [0.01, 0.05, 0.2] {
-        let found = found_with_missed_ticks(share);
-        println!("{share}: {found:?} instead of {:?}", [m, b, c]);
-        assert!((found[0] / m - 1.0).abs() < 0.1, "{share}: {found:?}");
-        assert!((found[2] / c - 1.0).abs() < 0.05, "{share}: {found:?}");
-    }
-}
-
-#[test]
-fn a_tick_that_comes_in_the_same_moment_again_is_a_tick_for_a_tool_that_gives() {
-    let coupling = Coupling::for_stiffness(1000.0);
-    let mut config = SlaveConfig::of_mode(Mode::Recommended);
-    config.tool_compliance = Some(spring_for(coupling));
-    config.scene.bodies = vec![cube(0.0, 0.7, true)];
-    config.tool_energy.bounded = false;
-    let mut slave = Slave::try_new(&config, coupling).unwrap();
-    slave.start_at(Vec2::new(-0.3, 0.0));
-    let mut pressed_n = 0.0_f64;
-    for ms in 1..2000 {
-        let now = Time::from_millis(ms);
-        let hip = Vec2::new(-0.3 + 0.15e-3 * (ms as f64).min(850.0), 0.0);
-        let sample = HipSample {
-            stamp: now,
-            hip: HipCounts::nearest(hip),
-            ..HipSample::default()
-        };
-        slave.handle_sample(now, &sample, 0);
-        for _ in 0..1 + u32::from(ms % 100 == 0) {
-            let Some(tick) = slave.tick(now) else {
-                continue;
-            };
-            assert!(tick.true_force.norm().is_finite() && tick.tool.norm().is_finite());
-            pressed_n = pressed_n.max(tick.true_force.norm());
-        }
-    }
-    assert!(pressed_n > 1.0, "{pressed_n} N");
-    let refused = slave.environment().refused();
-    assert_eq!(refused, 0, "every velocity of the tool is a number");
 }
 
 fn cube(y: f64, mass_kg: f64, fixed: bool) -> BodyConfig {
