@@ -174,6 +174,9 @@ class TriggerInput:
     @property
     def turn(self) -> float:
         """The same, rad."""
+    @property
+    def turn_deviation(self) -> float:
+        """Of the turn, rad."""
 
 @final
 class Measured:

@@ -84,6 +84,7 @@ fn trigger(criterion: &mut Criterion) {
         shift: Vec2::zeros(),
         shift_deviation: 0.0,
         turn: 0.001,
+        turn_deviation: 0.0,
     };
     for text in ["hybrid 10% 150ms", "useful 10% 150ms"] {
         let Ok(scheme) = text.parse() else { continue };

@@ -174,6 +174,12 @@ impl PoseObserver {
         }
     }
 
+    /// Standard deviation of the angle, rad.
+    #[must_use]
+    pub fn angle_deviation(&self) -> f64 {
+        self.angle.variance().sqrt()
+    }
+
     /// What the tool touches; none without contact.
     #[must_use]
     pub fn contact(&self) -> Option<ContactFrame> {

@@ -320,6 +320,7 @@ impl Parts {
             shift: Vec2::zeros(),
             shift_deviation: 0.0,
             turn: 0.0,
+            turn_deviation: 0.0,
         };
         self.decided += u64::from(self.trigger.step(now, &input).is_some());
         let update = met.update?;

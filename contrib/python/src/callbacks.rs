@@ -46,7 +46,7 @@ pub(crate) fn vector(given: &Bound<'_, PyAny>, what: &str) -> PyResult<Vec2> {
 /// acceleration: of the object along the push, m/s and m/s^2. force_deviation: standard deviation of the force that
 /// the estimate predicts, N. parameters: (m, b, c) that an update would carry, kg, N s/m, N. shift: by how much it
 /// would move the master's object, (x, y), m. shift_deviation: its standard deviation per axis while nobody touches
-/// the object, else 0, m. turn: by how much it would turn the object, rad.
+/// the object, else 0, m. turn: by how much it would turn the object, rad. turn_deviation: its standard deviation, rad.
 #[pyclass(frozen, get_all, module = "mmt")]
 pub(crate) struct TriggerInput {
     time: f64,
@@ -64,6 +64,7 @@ pub(crate) struct TriggerInput {
     shift: Pair,
     shift_deviation: f64,
     turn: f64,
+    turn_deviation: f64,
 }
 
 impl TriggerInput {
@@ -85,6 +86,7 @@ impl TriggerInput {
             shift: pair(input.shift),
             shift_deviation: input.shift_deviation,
             turn: input.turn,
+            turn_deviation: input.turn_deviation,
         }
     }
 }

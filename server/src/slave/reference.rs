@@ -79,13 +79,14 @@ impl ForceReference {
             acceleration: estimate.acceleration,
             force_deviation: match estimate.holding {
                 // what is known is the force that the object stood, and that is as noisy as a sample
-                Some(_) if contact.noise_n > 0.0 => contact.noise_n,
+                Some(_) => contact.noise_n,
                 _ => estimate.force_deviation(),
             },
             params: object.params,
             shift: pose.position - model.pose.position,
             shift_deviation: object.observer.deviation(),
             turn: wrap_angle(pose.angle - model.pose.angle),
+            turn_deviation: object.observer.angle_deviation(),
         }
     }
 

@@ -34,6 +34,8 @@ pub struct TriggerInput {
     pub shift_deviation: f64,
     /// By how much it would turn the shadow, rad.
     pub turn: f64,
+    /// Standard deviation of that, rad.
+    pub turn_deviation: f64,
 }
 
 impl TriggerInput {

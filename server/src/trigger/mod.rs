@@ -36,13 +36,15 @@ const USEFUL_FLOOR_N: f64 = 0.3;
 const USEFUL_TURN_RAD: f64 = 0.010;
 
 /// An error of fewer standard deviations of the force per axis may be noise.
-const NOISE_DEVIATIONS: f64 = 3.5;
+const NOISE_DEVIATIONS: f64 = 4.5;
 
-/// With a noisy sensor a change of fewer standard deviations of the predicted force may be its noise: the rows of the
-/// estimator share a filter, so that the deviation is too small by a factor of five.
-const ESTIMATE_DEVIATIONS: f64 = 5.0;
-/// And so may a turn of fewer standard deviations of the force's direction.
-const TURN_DEVIATIONS: f64 = 2.0;
+/// A change of fewer standard deviations of the predicted force may be the estimate's own error: the rows of the estimator
+/// share a filter, so that the deviation is too small by a factor of five.
+const ESTIMATE_DEVIATIONS: f64 = 10.0;
+/// The same where (12) shows that the force is wrong, with a quiet and with a noisy sensor: it need not be all that is wrong.
+const WRONG_DEVIATIONS: (f64, f64) = (2.0, 5.0);
+/// A turn of fewer standard deviations of the angle may be the error of that.
+const TURN_DEVIATIONS: f64 = 3.0;
 
 /// A place that is off by fewer standard deviations may be the noise of the images.
 const PLACE_DEVIATIONS: f64 = 3.0;
@@ -225,21 +227,29 @@ impl Trigger {
             }
             Scheme::Adaptive { delta, horizon } => {
                 let due = self.accumulated_error > delta * horizon.as_secs_f64();
-                let timed = due.then_some(Cause::Timer);
-                self.violated(input, delta)
-                    .or(timed)
-                    .filter(|_| self.is_perceptible(now, input, delta))
+                self.felt(now, input, delta, due.then_some(Cause::Timer))
             }
             Scheme::Useful { delta, t_update } => {
-                let timed = || {
-                    self.timed(now, t_update)
-                        .filter(|_| input.both_in_contact())
-                };
-                self.violated(input, delta)
-                    .or_else(timed)
-                    .filter(|_| self.is_perceptible(now, input, delta))
+                let timed = self.timed(now, t_update);
+                self.felt(now, input, delta, timed.filter(|_| input.both_in_contact()))
             }
         }
+    }
+
+    /// (12), or what is `timed`, if the hand would feel what an update corrects.
+    fn felt(
+        &self,
+        now: Time,
+        input: &TriggerInput,
+        delta: f64,
+        timed: Option<Cause>,
+    ) -> Option<Cause> {
+        let (quiet, noisy) = WRONG_DEVIATIONS;
+        let wrong = if input.noise_n > 0.0 { noisy } else { quiet };
+        let felt = |deviations| self.is_perceptible(now, input, delta, deviations);
+        self.violated(input, delta)
+            .filter(|_| felt(wrong))
+            .or_else(|| timed.filter(|_| felt(ESTIMATE_DEVIATIONS)))
     }
 
     /// Whether the forces can be compared at all.
@@ -290,8 +300,9 @@ impl Trigger {
     }
 
     /// Whether the hand would feel what an update corrects: by the force that the changed parameters would
-    /// give in the present motion, by the direction of the face, or by its place while the object is held.
-    fn is_perceptible(&self, now: Time, input: &TriggerInput, delta: f64) -> bool {
+    /// give in the present motion if that changes by so many standard `deviations` of it, by the direction of the face, or by
+    /// its place while the object is held.
+    fn is_perceptible(&self, now: Time, input: &TriggerInput, delta: f64, deviations: f64) -> bool {
         let Some((time, sent)) = self.last else {
             return true;
         };
@@ -299,12 +310,9 @@ impl Trigger {
             return false;
         }
         let change = force_change(input, &sent);
-        let mut felt_n = USEFUL_SHARE * input.f_s.norm().max(USEFUL_FLOOR_N);
-        let mut felt_rad = USEFUL_TURN_RAD;
-        if input.noise_n > 0.0 {
-            felt_n = felt_n.max(ESTIMATE_DEVIATIONS * input.force_deviation);
-            felt_rad = felt_rad.max(TURN_DEVIATIONS * input.noise_n / input.f_s.norm());
-        }
+        let felt_n = (USEFUL_SHARE * input.f_s.norm().max(USEFUL_FLOOR_N))
+            .max(deviations * input.force_deviation);
+        let felt_rad = USEFUL_TURN_RAD.max(TURN_DEVIATIONS * input.turn_deviation);
         change > felt_n || input.turn.abs() > felt_rad || self.is_held_wrongly(input, delta)
     }
 

@@ -30,6 +30,7 @@ fn input(f_s: f64, f_m: f64) -> TriggerInput {
         shift: Vec2::zeros(),
         shift_deviation: 0.0,
         turn: 0.0,
+        turn_deviation: 0.0,
     }
 }
 
@@ -359,6 +360,41 @@ fn adaptive_does_not_send_what_the_estimate_does_not_know() {
     for n in 1..5000 {
         assert_eq!(trigger.step(Time::from_millis(n), &unsure), None);
     }
+}
+
+#[test]
+fn useful_sends_a_change_of_so_many_deviations_and_of_fewer_where_the_force_is_wrong() {
+    let sends = |f_m: f64, deviations: f64, noise_n: f64| {
+        let mut trigger = trigger("useful 10% 150ms", Mode::Recommended);
+        assert!(trigger.step(Time::ZERO, &input(2.0, 3.0)).is_some());
+        let changed = TriggerInput {
+            noise_n,
+            params: params(0.7, 2.06 + 0.1 * deviations),
+            force_deviation: 0.1,
+            ..input(2.0, f_m)
+        };
+        (1..1000).any(|n| trigger.step(Time::from_millis(n), &changed).is_some())
+    };
+    for (f_m, noise_n, least) in [(2.0, 0.0, 10.0), (3.0, 0.0, 2.0), (3.0, 0.01, 5.0)] {
+        assert!(!sends(f_m, 0.9 * least, noise_n), "{f_m} N, {noise_n} N");
+        assert!(sends(f_m, 1.1 * least, noise_n), "{f_m} N, {noise_n} N");
+    }
+}
+
+#[test]
+fn useful_sends_a_turn_that_is_more_than_what_is_known_of_the_angle() {
+    let sends = |turn: f64, turn_deviation: f64| {
+        let mut trigger = trigger("useful 10% 150ms", Mode::Recommended);
+        assert!(trigger.step(Time::ZERO, &input(2.0, 3.0)).is_some());
+        let turned = TriggerInput {
+            turn,
+            turn_deviation,
+            ..input(2.0, 2.0)
+        };
+        (1..1000).any(|n| trigger.step(Time::from_millis(n), &turned).is_some())
+    };
+    assert!(sends(0.011, 0.003) && !sends(0.009, 0.003));
+    assert!(sends(0.031, 0.010) && !sends(0.029, 0.010));
 }
 
 #[test]
