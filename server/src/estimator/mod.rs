@@ -6,6 +6,7 @@
 //! a tick, and never poison themselves with a number that is not finite.
 
 use mmt_shared::model::contact::Coupling;
+use mmt_shared::model::geometry::Vec2;
 use mmt_shared::model::settings::Mode;
 use serde::{Deserialize, Serialize};
 
@@ -145,6 +146,16 @@ impl Estimator {
             Kind::Recommended(estimator) => &estimator.estimate,
             Kind::MultipleModel(estimator) => estimator.estimate(),
             Kind::QuasiStatic(estimator) => &estimator.estimate,
+        }
+    }
+
+    /// How much farther a tool that gives by `back` (m) is behind the surface than a contact of k_p would let it under this
+    /// force (N), m; 0 where the contact is taken for one of k_p.
+    #[must_use]
+    pub fn beyond_m(&self, back: Vec2, force: Vec2) -> f64 {
+        match &*self.0 {
+            Kind::MultipleModel(estimator) => estimator.beyond_m(back, force),
+            _ => 0.0,
         }
     }
 

@@ -21,6 +21,9 @@ const IMPACT_TICKS: u32 = 5;
 /// Friction that is sent for an object that stands, as a multiple of the force, where friction is known: as an obstacle it
 /// gives way to nothing. Where friction is not known, it is at least the force.
 const MARGIN: f64 = 2.0;
+/// For so many ticks an object has slid before that is seen: it has to become as fast as the gate demands, and the speed is
+/// filtered.
+const UNSEEN_TICKS: usize = 20;
 /// Share of the friction sent that the force may come to before more is sent.
 const ENOUGH: f64 = 0.8;
 /// Friction that is sent for an object that the hand does not move, N: how hard it is held cannot be seen, and a hand that
@@ -49,6 +52,8 @@ pub(super) struct Friction {
     pub(super) known: bool,
     /// Whether any of it was seen.
     pub(super) seen: bool,
+    /// Share of c that a slow push meets where the object is pushed.
+    pub(super) share: f64,
 }
 
 /// How long the surface has stayed where it is.
@@ -72,6 +77,22 @@ impl Stays {
     }
 }
 
+/// The newest forces of a contact, N.
+#[derive(Clone, Copy, Debug, Default)]
+struct Forces {
+    ring: [f64; UNSEEN_TICKS],
+    next: usize,
+}
+
+impl Forces {
+    /// Takes the force of a tick; that of [`UNSEEN_TICKS`] before, 0 before the contact.
+    fn push(&mut self, force: f64) -> f64 {
+        let slot = self.ring.get_mut(self.next);
+        self.next = (self.next + 1) % UNSEEN_TICKS;
+        slot.map_or(0.0, |slot| std::mem::replace(slot, force))
+    }
+}
+
 /// Watches for an obstacle.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Obstacle {
@@ -82,6 +103,9 @@ pub(super) struct Obstacle {
     hard_ticks: u32,
     stands: bool,
     holding: Option<f64>,
+    forces: Forces,
+    /// The most that the object stood before the newest [`UNSEEN_TICKS`], N.
+    stood_n: f64,
 }
 
 impl Obstacle {
@@ -94,6 +118,8 @@ impl Obstacle {
             hard_ticks: 0,
             stands: false,
             holding: None,
+            forces: Forces::default(),
+            stood_n: 0.0,
         }
     }
 
@@ -110,9 +136,17 @@ impl Obstacle {
     ) -> bool {
         let (_, long) = STAYS;
         let slides = matches!(motion, MotionState::Slides | MotionState::SlidesOn);
+        let before = self.forces.push(force);
+        let stood_n = if self.stands { self.stood_n } else { 0.0 };
+        self.stood_n = stood_n.max(before);
         if self.stands && (!slides || stayed >= long) {
             self.stand(force, friction.known);
             return false;
+        }
+        if self.stands && !friction.known {
+            // it broke away while nobody saw it, and no force since then says what friction is
+            let most = self.stood_n / friction.share;
+            self.holding = self.holding.map(|holding| holding.min(most));
         }
         self.stands = false;
         let pressed = beyond(force, FRICTION_HOLDS, friction.c);
@@ -176,12 +210,14 @@ mod tests {
         c: 2.0,
         known: true,
         seen: true,
+        share: 1.0,
     };
     const HAND_N: f64 = 8.0;
     const UNKNOWN: Friction = Friction {
         c: 1.0,
         known: false,
         seen: false,
+        share: 1.0,
     };
 
     /// Presses from 0 to `most` N at a rate in N/ms, then holds it for 100 ticks.
@@ -229,6 +265,24 @@ mod tests {
         };
         assert_eq!(press(4.0, MotionState::Slides, seen), None);
         assert_eq!(press(9.0, MotionState::Sticks, seen), Some(OBSTACLE_N));
+    }
+
+    #[test]
+    fn what_broke_away_was_held_by_no_more_than_the_force_before_that_could_be_seen() {
+        let mut obstacle = Obstacle::new(HAND_N);
+        let mut press = |n: u32, motion| {
+            obstacle.step(0.1 * f64::from(n), 0.0, motion, 0, UNKNOWN);
+            obstacle.holding()
+        };
+        for n in 0..60 {
+            press(n, MotionState::Sticks);
+        }
+        assert_eq!(press(60, MotionState::Slowly), Some(6.0));
+        let unseen = UNSEEN_TICKS as u32;
+        for n in 61..100 {
+            let held = press(n, MotionState::Slides);
+            assert_eq!(held, Some(0.1 * f64::from(61 - unseen)));
+        }
     }
 
     #[test]

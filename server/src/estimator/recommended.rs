@@ -28,6 +28,34 @@ const COPY_ROWS: u64 = 250;
 /// stiffness of the contact is known that badly.
 const SEEMS: (f64, f64) = (0.3e-3, 0.5);
 
+/// The way of the surface along the normal since a contact began.
+#[derive(Clone, Copy, Debug)]
+struct Way {
+    began: Vec2,
+    /// Low-passed, m.
+    smooth: f64,
+    /// The most of that, in or out, m.
+    farthest: f64,
+}
+
+impl Way {
+    fn new(began: Vec2) -> Self {
+        Self {
+            began,
+            smooth: 0.0,
+            farthest: 0.0,
+        }
+    }
+
+    /// Takes the surface point (m) of a tick, the inward normal, and the weight of a tick in the low-pass; the way, m.
+    fn step(&mut self, point: Vec2, normal: Vec2, weight: f64) -> f64 {
+        let way = normal.dot(&(point - self.began));
+        self.smooth += (way - self.smooth) * weight;
+        self.farthest = self.farthest.max(self.smooth.abs());
+        way
+    }
+}
+
 /// Settings of `RecommendedEstimator`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RecommendedConfig {
@@ -90,8 +118,8 @@ pub(super) struct RecommendedEstimator {
     stays: Stays,
     /// The regression as it was before the object ran against something in this contact; it returns when contact ends.
     before_hit: Option<RecursiveLeastSquares>,
-    /// Where this contact began.
-    began: Option<Vec2>,
+    /// The way of the surface in this contact.
+    way: Option<Way>,
     pub(super) estimate: Estimate,
 }
 
@@ -122,7 +150,7 @@ impl RecommendedEstimator {
             obstacle: Obstacle::new(hand_force_max_n),
             stays: Stays::default(),
             before_hit: None,
-            began: None,
+            way: None,
             estimate,
         }
     }
@@ -139,6 +167,12 @@ impl RecommendedEstimator {
     #[must_use]
     pub(super) fn misfit(&self) -> Option<f64> {
         self.recursive.misfit()
+    }
+
+    /// How far the surface has been from where this contact began, m; none without contact.
+    #[must_use]
+    pub(super) fn strayed(&self) -> Option<f64> {
+        self.way.map(|way| way.farthest)
     }
 
     /// Takes one tick; a tick with numbers that no sensor gives ends the contact for the regression.
@@ -176,16 +210,21 @@ impl RecommendedEstimator {
             measured.force_noise_n,
         );
         self.slide(gate, &self.row(&motion, normal, measured.seen.as_ref()));
-        let began = *self.began.get_or_insert(motion.point);
-        let way = normal.dot(&(motion.point - began));
+        let way = self.way.get_or_insert(Way::new(motion.point));
+        let way = way.step(motion.point, normal, self.speed_weight);
         let stayed = self.stays.step(motion.point, normal);
-        self.stand(motion.row.force, gate == GateState::Open, way, stayed);
+        let seen = measured.seen.as_ref();
+        let share = seen.map_or(1.0, |seen| {
+            off_centre::slow_share(motion.point, normal, seen)
+        });
+        let slides_on = gate == GateState::Open;
+        self.stand(motion.row.force, slides_on, way, (stayed, share));
     }
 
     /// Whether something beyond friction holds the object against this force, N.
     /// `way` (m) is how far its surface seems to have gone in this contact, `stayed` for how many ticks it has stayed where
-    /// it is.
-    fn stand(&mut self, force: f64, slides_on: bool, way: f64, stayed: u32) {
+    /// it is, `share` that of c which a slow push meets there.
+    fn stand(&mut self, force: f64, slides_on: bool, way: f64, (stayed, share): (u32, f64)) {
         let [older, _] = self.copies;
         let known = older.samples > 0;
         let moves = self.gate.moves(self.estimate.speed);
@@ -205,6 +244,7 @@ impl RecommendedEstimator {
             c: found.z,
             known,
             seen: self.recursive.samples > 0,
+            share,
         };
         if self.obstacle.step(force, needed, motion, stayed, friction) && known {
             self.go_back_to(older);
@@ -272,7 +312,7 @@ impl RecommendedEstimator {
         if let Some(before) = self.before_hit.take() {
             self.go_back_to(before);
         }
-        self.began = None;
+        self.way = None;
         self.recursive.hold();
         self.estimate.release();
     }

@@ -11,6 +11,9 @@ pub struct ContactForce {
     pub steady: Vec2,
     /// Noise per axis as measured, N, where it is more than the default sensor's; else 0.
     pub noise_n: f64,
+    /// How much farther the tool is behind the surface than a contact of k_p would let it under this force, m: a tool that gives
+    /// on a contact that gives, until its spring is suited to that.
+    pub beyond_m: f64,
 }
 
 impl From<Vec2> for ContactForce {
@@ -19,6 +22,7 @@ impl From<Vec2> for ContactForce {
             force,
             steady: force,
             noise_n: 0.0,
+            beyond_m: 0.0,
         }
     }
 }

@@ -9,6 +9,8 @@ pub struct ContactFrame {
     pub face: Face,
     /// Inward unit normal, world.
     pub inward: Vec2,
-    /// Point of the object's surface under the tool, world, m.
+    /// Point of the object's surface under the tool, world, m: where a contact of k_p would have it.
     pub surface: Vec2,
+    /// How far before that the surface itself lies, m: [`ContactForce::beyond_m`](super::ContactForce).
+    pub beyond_m: f64,
 }

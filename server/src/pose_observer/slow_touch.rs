@@ -46,6 +46,7 @@ impl PoseObserver {
             face,
             inward,
             surface,
+            beyond_m: contact.beyond_m,
         });
     }
 

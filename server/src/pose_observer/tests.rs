@@ -29,14 +29,24 @@ fn params() -> ModelParams {
 
 /// Pushes the real box at 0.1 m/s for so many ticks; vision looks every 33 ms. Returns its true pose.
 fn push(observer: &mut PoseObserver, ticks: u32, angle: f64) -> Pose {
+    push_beyond(observer, ticks, angle, 0.0)
+}
+
+/// The same with a tool and a contact that give so much farther (m) than a contact of k_p would, which is known.
+fn push_beyond(observer: &mut PoseObserver, ticks: u32, angle: f64, beyond_m: f64) -> Pose {
     let force = rotate(angle, Vec2::new(2.36, 0.0));
+    let farther = rotate(angle, Vec2::new(beyond_m, 0.0));
+    let contact = ContactForce {
+        beyond_m,
+        ..force.into()
+    };
     let mut truth = Pose::new(0.0, 0.0, angle);
     for n in 1..=ticks {
         truth.position = rotate(angle, Vec2::new(1e-4 * f64::from(n), 0.0));
         let surface = truth.point_to_world(Vec2::new(-HALF, 0.0));
-        let tool = surface + force / COUPLING.stiffness_n_per_m;
+        let tool = surface + force / COUPLING.stiffness_n_per_m + farther;
         let now = Time::ZERO + TICK * n;
-        observer.step(now, tool, force, true, &params());
+        observer.step(now, tool, contact, true, &params());
         if n % 33 == 0 {
             observer.see(&VisionSample {
                 taken: now,
@@ -59,6 +69,19 @@ fn touch_and_vision_teach_the_offset_of_a_face_and_the_others_guess_by_it() {
     );
     assert!((observer.pose().position - truth.position).norm() < 3e-4);
     assert!((observer.twist().linear.x - 0.1).abs() < 0.01);
+}
+
+#[test]
+fn a_tool_that_gives_farther_than_the_model_renders_teaches_the_offset_as_it_is() {
+    for beyond_m in [2e-3, -1e-3] {
+        let mut observer = observer(true);
+        let truth = push_beyond(&mut observer, 1000, 0.0, beyond_m);
+        let offset = observer.footprint().west;
+        assert!((offset - HALF).abs() < 1e-4, "{offset} m");
+        // the model's spring pushes as hard only if its face is so much farther
+        let ahead = observer.pose().position.x - truth.position.x;
+        assert!((ahead - beyond_m).abs() < 2e-4, "{ahead} m");
+    }
 }
 
 /// Lets the tool run into a box at rest at 0.1 m/s; returns the offset of the face after the first tick of contact.

@@ -46,7 +46,7 @@ impl PoseObserver {
         } else {
             if self.contact.is_none() && self.config.learn {
                 // a body that stood still stands where it was last seen, so its face is where it is felt
-                let offset = inward.dot(&(self.motion.pose.position - surface));
+                let offset = inward.dot(&(self.motion.pose.position - surface)) + contact.beyond_m;
                 self.faces
                     .learn(&mut self.tracker, face, offset, self.centre.variance());
             }
@@ -61,6 +61,7 @@ impl PoseObserver {
             face,
             inward,
             surface,
+            beyond_m: contact.beyond_m,
         });
     }
 

@@ -90,7 +90,7 @@ impl PoseObserver {
         let along = error - is.inward * is.inward.dot(&error);
         self.motion.pose.position += along * gain;
         let known = self.faces.footprint.offset(is.face);
-        let seen = was.inward.dot(&(vision.pose.position - was.surface));
+        let seen = was.inward.dot(&(vision.pose.position - was.surface)) + was.beyond_m;
         self.faces
             .learn(&mut self.tracker, was.face, seen, variance);
         // the face stays where it is touched: that the centre lies elsewhere is no motion

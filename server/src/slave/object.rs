@@ -200,6 +200,7 @@ impl ObjectEstimate {
     }
 
     fn take_in(&mut self, now: Time, contact: &Contact, held_back: bool) -> Measured {
+        let beyond_m = self.estimator.beyond_m(contact.back, contact.force);
         let observer = &mut self.observer;
         observer.step(
             now,
@@ -208,6 +209,7 @@ impl ObjectEstimate {
                 force: contact.force,
                 steady: contact.steady,
                 noise_n: contact.noise_n,
+                beyond_m,
             },
             contact.in_contact,
             &self.params,

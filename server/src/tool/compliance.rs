@@ -17,7 +17,7 @@ const OVER_DEVICE: f64 = 1.2;
 /// Stiffest contact over k_p that [`spring_for`] is meant for, and stiffest spring over k_p.
 const STIFFEST: f64 = 10.0;
 /// Least damping of such a spring, N s/m.
-const DAMPING_LEAST_NS_PER_M: f64 = 30.0;
+const DAMPING_LEAST_NS_PER_M: f64 = 20.0;
 /// Damping over what just keeps the stiffest contact steady.
 const DAMPING_SHARE: f64 = 1.5;
 
@@ -185,9 +185,13 @@ mod tests {
             }
         }
         let advised = spring_for(Coupling::for_stiffness(1000.0));
-        assert_eq!(
-            (advised.stiffness_n_per_m, advised.damping_ns_per_m),
-            (1200.0, 30.0)
+        let Coupling {
+            stiffness_n_per_m: k,
+            damping_ns_per_m: d,
+        } = advised;
+        assert!(
+            (k - 1200.0).abs() < 1e-9 && (d - 21.6).abs() < 1e-9,
+            "{advised:?}"
         );
     }
 

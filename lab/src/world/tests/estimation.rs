@@ -292,6 +292,31 @@ fn a_tool_that_gives_learns_how_far_a_contact_gives_by_itself() {
 }
 
 #[test]
+fn behind_a_tool_that_gives_the_force_is_rendered_about_as_well_whatever_the_contacts_stiffness() {
+    let coupling = DeviceProfile::default().coupling();
+    let pmse = |times: f64, spring| {
+        let runs = (1..=6).map(|seed| {
+            let mut config = experiment(seed);
+            config.slave.environment.contact = Some(Coupling {
+                stiffness_n_per_m: times * coupling.stiffness_n_per_m,
+                ..coupling
+            });
+            config.slave.tool_compliance = spring;
+            let mut world = World::try_new(&config).unwrap();
+            world.run(Duration::from_secs(30), |_| {});
+            world.slave().true_force().pmse_true.get().unwrap()
+        });
+        mean(runs.collect::<Vec<_>>()).unwrap()
+    };
+    let equal = pmse(1.0, None);
+    for times in [1.0, 1.5, 3.0, 10.0] {
+        let ratio = pmse(times, Some(spring_for(coupling))) / equal;
+        println!("{times} times k_p: {ratio} times the PMSE of equal stiffness");
+        assert!(ratio < 1.6, "{times} times k_p: {ratio}");
+    }
+}
+
+#[test]
 fn a_noisy_sensor_does_not_keep_back_that_an_object_stands() {
     let mut config = experiment(1);
     config.slave.environment.mass_kg = 2.0;
