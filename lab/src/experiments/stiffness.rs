@@ -169,5 +169,5 @@ fn figure(groups: &[Group]) -> Figure {
         Axis::log("PMSE against the true force"),
         series,
     );
-    Figure::of_alike([panel], Legend::LowerRight, 1, (560, 420))
+    Figure::of_alike([panel], Legend::UpperLeft, 1, (560, 420))
 }
