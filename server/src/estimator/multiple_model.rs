@@ -76,11 +76,7 @@ impl MultipleModel {
 
     /// Under this force, N.
     fn believe(&mut self, force: f64) {
-        let misfit = |of: &RecommendedEstimator| {
-            let compared = of.estimate.samples >= ROWS_MIN;
-            of.misfit().filter(|_| compared)
-        };
-        let Some(now) = misfit(self.believed()) else {
+        let Some(now) = compared(self.believed()) else {
             if force > PRESSED_N {
                 self.believe_what_stands();
             }
@@ -88,7 +84,7 @@ impl MultipleModel {
         };
         let all = self.estimators.iter().enumerate();
         let best = all
-            .filter_map(|(index, of)| Some((index, misfit(of)?)))
+            .filter_map(|(index, of)| Some((index, compared(of)?)))
             .min_by(|(_, one), (_, other)| one.total_cmp(other));
         if let Some((index, _)) = best.filter(|(_, least)| *least < BETTER * now) {
             self.believed = index;
@@ -122,8 +118,7 @@ impl MultipleModel {
 
     /// Stiffness of the contact that is believed, N/m; none before they were compared.
     pub(super) fn contact_n_per_m(&self) -> Option<f64> {
-        let compared = self.believed().estimate.samples >= ROWS_MIN;
-        compared.then(|| self.believed_n_per_m())
+        compared(self.believed()).map(|_| self.believed_n_per_m())
     }
 
     /// Between two of them by the parabola through the misfits of three: they are equal ratios apart.
@@ -137,10 +132,7 @@ impl MultipleModel {
     /// How many of their steps the least misfit lies above the believed one, at most a half; none before they were compared.
     fn off_by(&self) -> Option<f64> {
         let middle = self.believed.clamp(1, TIMES.len() - 2);
-        let of = |index: usize| {
-            let of = self.estimators.get(index)?;
-            of.misfit().filter(|_| of.estimate.samples >= ROWS_MIN)
-        };
+        let of = |index: usize| self.estimators.get(index).and_then(compared);
         let (below, at, above) = (of(middle - 1)?, of(middle)?, of(middle + 1)?);
         let bend = below - 2.0 * at + above;
         let least = (bend > 0.0).then(|| 0.5 * (below - above) / bend)?;
@@ -157,6 +149,11 @@ impl MultipleModel {
         let contact = size / self.believed_n_per_m() - size / self.device_n_per_m;
         back.dot(&force) / size + contact
     }
+}
+
+/// Misfit of an estimator, N², once it has enough rows to be compared by it.
+fn compared(of: &RecommendedEstimator) -> Option<f64> {
+    of.misfit().filter(|_| of.estimate.samples >= ROWS_MIN)
 }
 
 #[cfg(test)]

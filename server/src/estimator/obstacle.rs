@@ -144,7 +144,7 @@ impl Obstacle {
             return false;
         }
         if self.stands && !friction.known {
-            // it broke away while nobody saw it, and no force since then says what friction is
+            // it slid before that was seen: the force since then is no measure of friction
             let most = self.stood_n / friction.share;
             self.holding = self.holding.map(|holding| holding.min(most));
         }

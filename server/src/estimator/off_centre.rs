@@ -45,20 +45,25 @@ pub(super) fn shared(motion: &SurfaceMotion, normal: Vec2, speed: f64, seen: &Se
     }
 }
 
+/// Lever about the centre of a push along `normal` at `point` (m), over the side.
+fn lever_over_side(point: Vec2, normal: Vec2, seen: &Seen) -> f64 {
+    cross(point - seen.centre, normal) / seen.side
+}
+
 /// Share of c that a slow push along `normal` at `point` (m) meets.
 ///
 /// Without inertia the moment and the force on a square lie on its limit surface, so that f = c s with
 /// `s = 1/sqrt(1 + (d/(0.30 l))²)`: 0.3 % off the square's for levers up to 0.14 l.
 #[must_use]
 pub(super) fn slow_share(point: Vec2, normal: Vec2, seen: &Seen) -> f64 {
-    let d = cross(point - seen.centre, normal) / seen.side;
+    let d = lever_over_side(point, normal, seen);
     1.0 / (1.0 + d * d / (CREEP_RADIUS * CREEP_RADIUS)).sqrt()
 }
 
-/// The same where the object moves too slowly for omega to be known: turning is what the lever makes it.
+/// The row of [`shared`] where the object moves too slowly for omega to be known: turning is what the lever makes it.
 #[must_use]
 pub(super) fn creeping(motion: &SurfaceMotion, normal: Vec2, seen: &Seen) -> Row {
-    let d = cross(motion.point - seen.centre, normal) / seen.side;
+    let d = lever_over_side(motion.point, normal, seen);
     let share = 1.0 / (1.0 + 6.0 * d * d);
     let raw = motion.row.regressor;
     let s = slow_share(motion.point, normal, seen);

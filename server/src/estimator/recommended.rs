@@ -218,13 +218,13 @@ impl RecommendedEstimator {
             off_centre::slow_share(motion.point, normal, seen)
         });
         let slides_on = gate == GateState::Open;
-        self.stand(motion.row.force, slides_on, way, (stayed, share));
+        self.stand(motion.row.force, slides_on, way, stayed, share);
     }
 
     /// Whether something beyond friction holds the object against this force, N.
     /// `way` (m) is how far its surface seems to have gone in this contact, `stayed` for how many ticks it has stayed where
     /// it is, `share` that of c which a slow push meets there.
-    fn stand(&mut self, force: f64, slides_on: bool, way: f64, (stayed, share): (u32, f64)) {
+    fn stand(&mut self, force: f64, slides_on: bool, way: f64, stayed: u32, share: f64) {
         let [older, _] = self.copies;
         let known = older.samples > 0;
         let moves = self.gate.moves(self.estimate.speed);
