@@ -137,8 +137,10 @@ async fn session_beside<T: Send + 'static>(
         patiently(master.push(10)).await;
     }
     let made = work.join().unwrap();
-    // what was on its way has come
-    patiently(master.listen(3)).await;
+    // what was on its way has come; the slave sends what its tool does while that stands, and no heartbeat then
+    for _ in 0..10 {
+        patiently(master.read()).await;
+    }
     // every one holds a command, and what this host could not send at all is not among them
     let left = master.connection.stats().frame_tx.datagram;
     let (ending, totals) = patiently(master.farewell()).await;
