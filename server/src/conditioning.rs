@@ -3,6 +3,7 @@
 //! The default sensor's noise and a bias that nobody feels leave every force and every threshold as they are. Pure, of
 //! the measured force and the tool alone; it must never see the true force.
 
+mod bias;
 mod noise;
 mod withdrawal;
 
@@ -10,28 +11,19 @@ use std::collections::VecDeque;
 
 use mmt_shared::model::geometry::Vec2;
 use mmt_shared::model::settings::Mode;
-use mmt_shared::time::TICK_S;
 use serde::{Deserialize, Serialize};
 
 use crate::trigger::{ContactConfig, ContactDetector};
+use bias::Bias;
 use noise::{CONTACT_MAX, Noise};
 use withdrawal::Withdrawal;
 
-use noise::FIRST_SAMPLES;
 pub use noise::JUDGED_MAX;
 
 /// An averaged force of so many of its standard deviations is no noise.
 const DEVIATIONS: f64 = 5.0;
-/// A bias below this is left, N: half of F_min.
-const BIAS_LEFT_N: f64 = 0.02;
-/// No bias of an untouched tool is more, N: more is contact.
-const BIAS_MAX_N: f64 = 0.5;
-/// Time constant by which the bias is followed in free space, s.
-const FOLLOW_S: f64 = 0.25;
 /// A tool that reads no force may still touch where a drifting bias hides it: it is clear after this way, m.
 const CLEAR_M: f64 = 3e-3;
-/// A bias may have drifted by so much since it was last measured, N/s: three times a good sensor's 0.01.
-const DRIFT_N_PER_S: f64 = 0.03;
 
 /// Whether the force is conditioned.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -156,7 +148,9 @@ impl Conditioner {
             let clear = self.left.is_none_or(|left| (tool - left).norm() > CLEAR_M);
             if self.bias.first || (clear && steady.norm() < doubt) {
                 self.left = None;
-                self.bias.follow(measured);
+                self.bias.follow(measured, self.noise.per_axis());
+            } else {
+                self.bias.go_on();
             }
             return;
         }
@@ -164,13 +158,12 @@ impl Conditioner {
         if self.bias.first {
             self.bias.begin();
         }
-        self.bias.age_s += TICK_S;
-        let drifted =
-            self.detector.config().on_n + 3.0 * deviation + DRIFT_N_PER_S * self.bias.age_s;
+        self.bias.touch();
+        let drifted = self.detector.config().on_n + 3.0 * deviation + self.bias.drifted_n();
         let stays = self.withdrawal.step(steady, tool, 3.0 * deviation);
         let seen = std::mem::take(&mut self.seen_clear).then_some(steady);
         if let Some(stays) = seen.or(stays).filter(|force| force.norm() < drifted) {
-            self.bias.set(self.bias.known() + stays);
+            self.bias.find(stays, self.noise.per_axis());
             self.detector.release();
             self.in_contact = false;
         }
@@ -180,7 +173,7 @@ impl Conditioner {
     /// so many, the others count as none.
     fn is_bias(&self) -> bool {
         let sum: Vec2 = self.recent.iter().sum();
-        sum.norm() < BIAS_MAX_N * CONTACT_MAX as f64
+        sum.norm() < bias::MAX_N * CONTACT_MAX as f64
     }
 
     /// The mean of the newest `n` measured forces, N.
@@ -195,65 +188,6 @@ impl Conditioner {
         let newest = self.recent.iter().rev().take(n);
         let all = newest.len() as f64;
         newest.fold(Vec2::zeros(), |sum, force| sum + force) / all
-    }
-}
-
-/// The bias of the force.
-#[derive(Clone, Copy, Debug)]
-struct Bias {
-    value: Vec2,
-    samples: u32,
-    /// Whether it is still being measured for the first time.
-    first: bool,
-    /// Whether it is large enough to be tared.
-    tared: bool,
-    /// Time since it was last measured, s.
-    age_s: f64,
-}
-
-impl Default for Bias {
-    fn default() -> Self {
-        Self {
-            value: Vec2::zeros(),
-            samples: 0,
-            first: true,
-            tared: false,
-            age_s: 0.0,
-        }
-    }
-}
-
-impl Bias {
-    /// What is to be taken off the measured force, N.
-    fn known(&self) -> Vec2 {
-        if self.tared && !self.first {
-            self.value
-        } else {
-            Vec2::zeros()
-        }
-    }
-
-    /// Nothing is known of it, and the tool may touch.
-    fn begin(&mut self) {
-        *self = Self {
-            samples: FIRST_SAMPLES,
-            first: false,
-            age_s: BIAS_MAX_N / DRIFT_N_PER_S,
-            ..Self::default()
-        };
-    }
-
-    fn follow(&mut self, measured: Vec2) {
-        self.samples = self.samples.saturating_add(1);
-        let weight = (1.0 / f64::from(self.samples)).max(TICK_S / FOLLOW_S);
-        self.first &= self.samples < FIRST_SAMPLES;
-        self.set(self.value + (measured - self.value) * weight);
-    }
-
-    fn set(&mut self, value: Vec2) {
-        self.value = value;
-        self.age_s = 0.0;
-        self.tared |= value.norm() > BIAS_LEFT_N && !self.first;
     }
 }
 

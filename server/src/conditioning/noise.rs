@@ -70,6 +70,11 @@ impl Noise {
         (wanted.min(CONTACT_MAX), wanted.min(JUDGED_MAX))
     }
 
+    /// The noise as measured, N.
+    pub(super) fn per_axis(&self) -> f64 {
+        self.noise_n
+    }
+
     /// The noise where it is more than thresholds are made for, N; else 0.
     pub(super) fn beyond(&self) -> f64 {
         if self.noise_n > NOISE_N {

@@ -1,6 +1,7 @@
 //! Promises of the conditioner, on a tool that presses on something that does not move.
 
 use mmt_shared::rng::Substream;
+use mmt_shared::time::TICK_S;
 
 use super::*;
 
@@ -94,8 +95,45 @@ fn a_bias_is_tared_and_its_drift_followed() {
     assert_eq!(press.stay(FREE, 10_000), 0);
     let left = (0..1000).map(|_| press.tick(FREE).force);
     let mean = left.fold(Vec2::zeros(), |sum, force| sum + force) / 1000.0;
-    // a follower of 0.25 s is 0.02 N/s * 0.25 s behind
-    assert!(mean.norm() < 0.007, "{mean}");
+    // a follower of 0.25 s would be 5 mN behind
+    assert!(mean.norm() < 0.002, "{mean}");
+}
+
+#[test]
+fn a_bias_goes_on_drifting_while_the_tool_touches_as_it_has_drifted_before() {
+    for noise_n in [0.01, 0.1] {
+        let drift = Vec2::new(0.006, 0.008);
+        let mut press = Press::new(noise_n, Vec2::new(0.0, 0.2), drift);
+        let mut off = Vec2::zeros();
+        for n in 0..20 {
+            press.stay(FREE, 1000);
+            press.go(FREE, 2e-3);
+            press.stay(2e-3, 2000);
+            if n >= 10 {
+                off += press.conditioner.bias.known() - press.bias;
+            }
+            press.go(2e-3, FREE);
+        }
+        // in the time of a contact the bias goes on by 20 mN
+        let mean = off.norm() / 10.0;
+        assert!(mean < 0.004, "noise {noise_n} N: {mean} N");
+    }
+}
+
+#[test]
+fn a_bias_whose_drift_ends_in_a_long_contact_is_found_after_it() {
+    let mut press = Press::new(0.01, Vec2::new(0.0, 0.2), Vec2::new(0.01, 0.0));
+    press.stay(FREE, 10_000);
+    press.go(FREE, 2e-3);
+    press.drift = Vec2::zeros();
+    assert!(press.stay(2e-3, 60_000) > 59_000, "a minute, 0.6 N");
+    press.go(2e-3, FREE);
+    press.stay(FREE, 1000);
+    assert_eq!(press.stay(FREE, 1000), 0);
+    press.go(FREE, 2e-3);
+    press.stay(2e-3, 1000);
+    let off = (press.conditioner.bias.known() - press.bias).norm();
+    assert!(off < 0.01, "{off}");
 }
 
 #[test]
