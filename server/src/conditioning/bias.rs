@@ -17,8 +17,11 @@ const DRIFT_N_PER_S: f64 = 0.01;
 /// A bias may have drifted by so much since it was last measured, N/s: three times a good sensor's.
 pub(super) const DRIFT_MAX_N_PER_S: f64 = 3.0 * DRIFT_N_PER_S;
 /// Standard deviations by which a bias strays in a second from a steady drift, N, and the drift from what it was, N/s.
-const STRAYS: Vector2<f64> = Vector2::new(1e-3, 1e-3);
+const STRAYS: Vector2<f64> = Vector2::new(3e-3, 1e-3);
 
+/// A sample shows the bias no better than one with this noise per axis, N: a real sensor's noise is not white, and 20 mN with a time
+/// constant of 50 ms would else be a drift.
+const SLOW_NOISE_N: f64 = 0.1;
 /// A drift of fewer of its standard deviations is none while nothing is seen of the bias.
 const KNOWN_DEVIATIONS: f64 = 3.0;
 
@@ -86,6 +89,7 @@ impl Bias {
         self.age_s = 0.0;
         if self.tared {
             self.predict(self.drift);
+            let noise_n = noise_n.max(SLOW_NOISE_N);
             self.correct(measured, noise_n * noise_n);
             return;
         }
@@ -123,7 +127,8 @@ impl Bias {
     pub(super) fn go_on(&mut self) {
         if self.tared {
             let least = KNOWN_DEVIATIONS * self.covariance.m22.sqrt();
-            let known = self.drift.norm() > least;
+            let size = self.drift.norm();
+            let known = size > least && size < DRIFT_MAX_N_PER_S;
             self.predict(if known { self.drift } else { Vec2::zeros() });
         }
     }

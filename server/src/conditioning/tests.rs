@@ -121,6 +121,27 @@ fn a_bias_goes_on_drifting_while_the_tool_touches_as_it_has_drifted_before() {
 }
 
 #[test]
+fn slow_noise_is_no_drift() {
+    let mut press = Press::new(0.0, Vec2::zeros(), Vec2::zeros());
+    let mut noise = Substream::new(2, "test/noise", 0);
+    let mut slow = Vec2::zeros();
+    let mut farthest = 0.0_f64;
+    for n in 0..20_000 {
+        // 20 mN with a time constant of 50 ms
+        let (a, b) = noise.normal_pair();
+        slow += (Vec2::new(a, b) * 0.2 - slow) * 0.02;
+        press.bias = Vec2::new(0.0, 0.2) + slow;
+        // a second in free space, a second in contact
+        press.tick(if n % 2000 < 1000 { FREE } else { 2e-3 });
+        if n > 2000 {
+            let off = press.conditioner.bias.known() - Vec2::new(0.0, 0.2);
+            farthest = farthest.max(off.norm());
+        }
+    }
+    assert!(farthest < 0.03, "{farthest}");
+}
+
+#[test]
 fn a_bias_whose_drift_ends_in_a_long_contact_is_found_after_it() {
     let mut press = Press::new(0.01, Vec2::new(0.0, 0.2), Vec2::new(0.01, 0.0));
     press.stay(FREE, 10_000);
