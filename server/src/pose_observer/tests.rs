@@ -1,5 +1,7 @@
 //! What the pose observer promises.
 
+mod faces;
+
 use super::*;
 use crate::sensing::VisionSample;
 use mmt_shared::fixtures::COUPLING;
@@ -57,65 +59,6 @@ fn push_beyond(observer: &mut PoseObserver, ticks: u32, angle: f64, beyond_m: f6
     truth
 }
 
-#[test]
-fn touch_and_vision_teach_the_offset_of_a_face_and_the_others_guess_by_it() {
-    let mut observer = observer(true);
-    let truth = push(&mut observer, 1000, 0.0);
-    let footprint = observer.footprint();
-    assert!((footprint.west - HALF).abs() < 1e-4, "{footprint:?}");
-    assert_eq!(
-        footprint.north, footprint.west,
-        "the first face is the best guess for the others"
-    );
-    assert!((observer.pose().position - truth.position).norm() < 3e-4);
-    assert!((observer.twist().linear.x - 0.1).abs() < 0.01);
-}
-
-#[test]
-fn a_tool_that_gives_farther_than_the_model_renders_teaches_the_offset_as_it_is() {
-    for beyond_m in [2e-3, -1e-3] {
-        let mut observer = observer(true);
-        let truth = push_beyond(&mut observer, 1000, 0.0, beyond_m);
-        let offset = observer.footprint().west;
-        assert!((offset - HALF).abs() < 1e-4, "{offset} m");
-        // the model's spring pushes as hard only if its face is so much farther
-        let ahead = observer.pose().position.x - truth.position.x;
-        assert!((ahead - beyond_m).abs() < 2e-4, "{ahead} m");
-    }
-}
-
-/// Lets the tool run into a box at rest at 0.1 m/s; returns the offset of the face after the first tick of contact.
-fn offset_at_first_touch() -> f64 {
-    let mut observer = observer(true);
-    let Coupling {
-        stiffness_n_per_m,
-        damping_ns_per_m,
-    } = COUPLING;
-    for n in 0..20 {
-        // 0.05 mm into the face in tick 10
-        let depth = 1e-4 * (f64::from(n) - 9.5);
-        let tool = Vec2::new(-HALF + depth, 0.0);
-        let touching = depth > 0.0;
-        let force = if touching {
-            stiffness_n_per_m * depth + damping_ns_per_m * 0.1
-        } else {
-            0.0
-        };
-        let now = Time::ZERO + TICK * n;
-        observer.step(now, tool, Vec2::new(force, 0.0), touching, &params());
-        if touching {
-            break;
-        }
-    }
-    observer.footprint().west
-}
-
-#[test]
-fn the_first_touch_of_a_box_at_rest_teaches_the_offset_of_its_face() {
-    let offset = offset_at_first_touch();
-    assert!((offset - HALF).abs() < 2e-4, "{offset} m");
-}
-
 /// How far from the true centre a box is taken to be that is pushed off its middle, turns and is never seen, m.
 fn off_after_turning(learn: bool) -> f64 {
     let mut observer = observer(learn);
@@ -139,15 +82,6 @@ fn a_box_that_turns_slides_along_its_face_and_is_followed_unseen() {
     let (stiff, sliding) = (off_after_turning(false), off_after_turning(true));
     assert!(stiff > 3e-3, "{stiff} m");
     assert!(sliding < 0.2 * stiff, "{sliding} m of {stiff} m");
-}
-
-#[test]
-fn the_paper_keeps_its_side_and_finds_the_plane_of_the_face() {
-    let mut observer = observer(false);
-    let truth = push(&mut observer, 1000, 0.0);
-    assert_eq!(observer.footprint(), BoxFootprint::square(0.40));
-    // the plane of the face is right, so the centre is 2 cm too far
-    assert!((observer.pose().position.x - truth.position.x - 0.02).abs() < 2e-4);
 }
 
 #[test]
@@ -180,30 +114,6 @@ fn a_force_that_points_at_a_face_beyond_the_centre_does_not_move_the_box_there()
     );
     assert!(moved.norm() < 0.01, "{moved} m");
     assert!((east - footprint.east).abs() < 0.01, "{east} m");
-}
-
-#[test]
-fn an_unknown_face_is_retracted_in_growing_steps_and_a_known_one_stays() {
-    let mut unknown = observer(true);
-    let mut depths = Vec::new();
-    for _ in 0..3 {
-        let face = -unknown.footprint().west;
-        unknown.retract_face(Vec2::new(face + 1e-3, 0.0), Face::West);
-        depths.push(-face - unknown.footprint().west);
-    }
-    assert!((depths[0] - 2e-3).abs() < 1e-12 && depths[1] > depths[0] && depths[2] > depths[1]);
-    assert_eq!(unknown.pose(), Pose::default());
-
-    let mut known = observer(true);
-    let truth = push(&mut known, 1000, 0.0);
-    let footprint = known.footprint();
-    let inside = truth.position + Vec2::new(-HALF + 2e-3, 0.0);
-    known.retract_face(inside, Face::West);
-    assert_eq!(known.footprint(), footprint);
-    assert!(
-        known.pose().position.x > truth.position.x + 2e-3,
-        "the box is further away"
-    );
 }
 
 #[test]
@@ -365,25 +275,6 @@ fn a_box_stays_a_box_after_two_bad_images() {
     push(&mut observer, 1000, 0.0);
     assert_eq!(observer.pose_ahead(1.0, 0.3), observer.pose());
     assert_eq!(observer.body_rate(), observer.twist().angular);
-}
-
-#[test]
-fn a_box_at_rest_whose_face_is_learned_does_not_seem_to_move() {
-    let mut observer = observer(true);
-    let force = Vec2::new(1.0, 0.0);
-    let tool = Vec2::new(-HALF, 0.0) + force / COUPLING.stiffness_n_per_m;
-    let mut fastest = 0.0_f64;
-    for n in 1..=500 {
-        let now = Time::ZERO + TICK * n;
-        observer.step(now, tool, force, true, &params());
-        if n % 33 == 0 {
-            let (taken, pose) = (now, Pose::default());
-            observer.see(&VisionSample { taken, pose });
-        }
-        fastest = fastest.max(observer.twist().linear.norm());
-    }
-    assert!((observer.footprint().west - HALF).abs() < 1e-6, "learned");
-    assert!(fastest < 1e-6, "{fastest} m/s");
 }
 
 /// Lets go of a box that was pushed at 0.1 m/s and coasts against less friction than is believed; vision looks every
