@@ -9,6 +9,7 @@ mod body;
 mod received;
 mod replay;
 
+use crate::model::contact::Touch;
 use crate::model::correction::{Correction, IN_CONTACT, IN_CONTACT_REPLAYED, Tank};
 use crate::model::dynamics::Motion;
 use crate::model::geometry::{Twist, Vec2};
@@ -25,6 +26,8 @@ use replay::Replay;
 
 /// A box that is touched this far from its place, m, with the HIP clear of that place, is a phantom.
 const PHANTOM_M: f64 = 0.1;
+/// No object moves faster: the tool does not.
+const FASTEST_M_PER_S: f64 = 0.6;
 /// A place within 60° of the push lies ahead: the cosine of that.
 const AHEAD: f64 = 0.5;
 
@@ -43,6 +46,10 @@ pub struct LocalModel {
     /// The previous HIP and its stamp.
     previous: Option<(Time, Vec2)>,
     rendered: Rendered,
+    /// When and where the last update that was applied had the object, m.
+    told: Option<(Time, Vec2)>,
+    /// Whether the object that is told of is another one than the box that is felt.
+    is_another: bool,
     /// Sum of what updates added to the model's energy beyond what the tank paid, J.
     injected_j: f64,
     /// Times that a number of the box was none.
@@ -61,6 +68,8 @@ impl LocalModel {
             replay: Replay::new(start),
             previous: None,
             rendered: Rendered::default(),
+            told: None,
+            is_another: false,
             injected_j: 0.0,
             not_finite: 0,
         }
@@ -128,6 +137,7 @@ impl LocalModel {
             self.replay.wait(update);
             return;
         }
+        self.tell(update);
         let good = self.body;
         let before = self.energy_now();
         self.take_params(&update.state.params());
@@ -140,6 +150,16 @@ impl LocalModel {
         self.stay_finite(good);
     }
 
+    /// No object goes so far from one update to the next: the tool touches another one.
+    fn tell(&mut self, update: &Update) {
+        let place = update.state.pose().position;
+        if let Some((then, before)) = self.told {
+            let time = update.answers.saturating_since(then).as_secs_f64();
+            self.is_another |= (place - before).norm() > PHANTOM_M + FASTEST_M_PER_S * time;
+        }
+        self.told = Some((update.answers, place));
+    }
+
     /// Becomes what `other` is, but for the history, which stays: both took the same samples.
     pub fn take_over(&mut self, other: &Self) {
         self.body = other.body;
@@ -148,6 +168,8 @@ impl LocalModel {
         self.replay = other.replay;
         self.previous = other.previous;
         self.rendered = other.rendered;
+        self.told = other.told;
+        self.is_another = other.is_another;
         self.injected_j = other.injected_j;
     }
 
@@ -282,19 +304,30 @@ impl LocalModel {
     }
 
     /// A box that is touched goes at once to a place that is [`PHANTOM_M`] and more away and that the HIP is clear of: what is
-    /// felt is a phantom, and the HIP may stand in its way. It costs nothing, as what the coupling holds is lost. A box
+    /// felt is a phantom, and the HIP may stand in its way. It costs nothing, as what the coupling holds is lost. Another object
+    /// is felt at once where it is, if the HIP is no deeper in it than in the box: that costs nothing either. A box
     /// whose place is ahead of the push is no phantom: it recedes by the bleed, so that the hand does not let go and catch it
     /// again.
     fn leave_phantom(&mut self) {
+        let way = self.correction.remaining.shift;
+        if way.norm() < PHANTOM_M {
+            self.is_another = false;
+            return;
+        }
         let Some((_, hip)) = self.previous else {
             return;
         };
         let Some(touch) = self.body.touch(hip) else {
             return;
         };
-        let way = self.correction.remaining.shift;
         let is_ahead = touch.inward.dot(&way) > AHEAD * way.norm();
-        if way.norm() < PHANTOM_M || is_ahead || !self.replay.is_clear_of(hip) {
+        let goes = if self.is_another {
+            self.there(hip)
+                .is_none_or(|there| there.penetration <= touch.penetration)
+        } else {
+            !is_ahead && self.replay.is_clear_of(hip)
+        };
+        if !goes {
             return;
         }
         self.changing(hip, |body, correction, _| {
@@ -302,6 +335,16 @@ impl LocalModel {
             let state = &body.state;
             body.god.after_jump(&state.footprint, &state.pose, hip);
         });
+    }
+
+    /// What the HIP (m, world) touches of the box in its place.
+    fn there(&self, hip: Vec2) -> Option<Touch> {
+        let mut body = self.body;
+        let mut correction = self.correction;
+        correction.snap(&mut body.state.pose);
+        let state = &body.state;
+        body.god.after_jump(&state.footprint, &state.pose, hip);
+        body.touch(hip)
     }
 
     /// One tick of the replay. What remains to be corrected is the way from the box that is felt to the replayed one.
