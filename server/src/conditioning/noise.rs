@@ -70,7 +70,7 @@ impl Noise {
         (wanted.min(CONTACT_MAX), wanted.min(JUDGED_MAX))
     }
 
-    /// The noise as measured, N.
+    /// The noise per axis as measured, N.
     pub(super) fn per_axis(&self) -> f64 {
         self.noise_n
     }

@@ -142,6 +142,16 @@ fn slow_noise_is_no_drift() {
 }
 
 #[test]
+fn what_no_sensor_drifts_by_does_not_go_on_while_the_tool_touches() {
+    let mut press = Press::new(0.01, Vec2::new(0.0, 0.2), Vec2::new(0.05, 0.0));
+    press.stay(FREE, 10_000);
+    press.go(FREE, 2e-3);
+    let before = press.conditioner.bias.known();
+    assert!(press.stay(2e-3, 1000) > 990);
+    assert_eq!(press.conditioner.bias.known(), before);
+}
+
+#[test]
 fn a_bias_whose_drift_ends_in_a_long_contact_is_found_after_it() {
     let mut press = Press::new(0.01, Vec2::new(0.0, 0.2), Vec2::new(0.01, 0.0));
     press.stay(FREE, 10_000);

@@ -26,7 +26,7 @@ use replay::Replay;
 
 /// A box that is touched this far from its place, m, with the HIP clear of that place, is a phantom.
 const PHANTOM_M: f64 = 0.1;
-/// No object moves faster: the tool does not.
+/// No object moves faster, m/s: the tool does not, as slaves are configured by default.
 const FASTEST_M_PER_S: f64 = 0.6;
 /// A place within 60° of the push lies ahead: the cosine of that.
 const AHEAD: f64 = 0.5;
@@ -46,9 +46,9 @@ pub struct LocalModel {
     /// The previous HIP and its stamp.
     previous: Option<(Time, Vec2)>,
     rendered: Rendered,
-    /// When and where the last update that was applied had the object, m.
-    told: Option<(Time, Vec2)>,
-    /// Whether the object that is told of is another one than the box that is felt.
+    /// Stamp and place (m) of the object in the last update that was applied.
+    last_update: Option<(Time, Vec2)>,
+    /// Whether updates are of another object than the box that is felt.
     is_another: bool,
     /// Sum of what updates added to the model's energy beyond what the tank paid, J.
     injected_j: f64,
@@ -68,7 +68,7 @@ impl LocalModel {
             replay: Replay::new(start),
             previous: None,
             rendered: Rendered::default(),
-            told: None,
+            last_update: None,
             is_another: false,
             injected_j: 0.0,
             not_finite: 0,
@@ -137,7 +137,7 @@ impl LocalModel {
             self.replay.wait(update);
             return;
         }
-        self.tell(update);
+        self.compare_with_last(update);
         let good = self.body;
         let before = self.energy_now();
         self.take_params(&update.state.params());
@@ -150,14 +150,14 @@ impl LocalModel {
         self.stay_finite(good);
     }
 
-    /// No object goes so far from one update to the next: the tool touches another one.
-    fn tell(&mut self, update: &Update) {
+    /// An update whose place no object could have reached since the last one is of another object.
+    fn compare_with_last(&mut self, update: &Update) {
         let place = update.state.pose().position;
-        if let Some((then, before)) = self.told {
-            let time = update.answers.saturating_since(then).as_secs_f64();
-            self.is_another |= (place - before).norm() > PHANTOM_M + FASTEST_M_PER_S * time;
+        if let Some((then, before)) = self.last_update {
+            let time_s = update.answers.saturating_since(then).as_secs_f64();
+            self.is_another |= (place - before).norm() > PHANTOM_M + FASTEST_M_PER_S * time_s;
         }
-        self.told = Some((update.answers, place));
+        self.last_update = Some((update.answers, place));
     }
 
     /// Becomes what `other` is, but for the history, which stays: both took the same samples.
@@ -168,7 +168,7 @@ impl LocalModel {
         self.replay = other.replay;
         self.previous = other.previous;
         self.rendered = other.rendered;
-        self.told = other.told;
+        self.last_update = other.last_update;
         self.is_another = other.is_another;
         self.injected_j = other.injected_j;
     }
@@ -330,20 +330,13 @@ impl LocalModel {
         if !goes {
             return;
         }
-        self.changing(hip, |body, correction, _| {
-            correction.snap(&mut body.state.pose);
-            let state = &body.state;
-            body.god.after_jump(&state.footprint, &state.pose, hip);
-        });
+        self.changing(hip, |body, correction, _| arrive(body, correction, hip));
     }
 
     /// What the HIP (m, world) touches of the box in its place.
     fn there(&self, hip: Vec2) -> Option<Touch> {
-        let mut body = self.body;
-        let mut correction = self.correction;
-        correction.snap(&mut body.state.pose);
-        let state = &body.state;
-        body.god.after_jump(&state.footprint, &state.pose, hip);
+        let (mut body, mut correction) = (self.body, self.correction);
+        arrive(&mut body, &mut correction, hip);
         body.touch(hip)
     }
 
@@ -360,6 +353,13 @@ impl LocalModel {
             }
         }
     }
+}
+
+/// Sets the box to its place at once.
+fn arrive(body: &mut Body, correction: &mut Correction, hip: Vec2) {
+    correction.snap(&mut body.state.pose);
+    let state = &body.state;
+    body.god.after_jump(&state.footprint, &state.pose, hip);
 }
 
 fn paid(before: &Tank, after: &Tank) -> f64 {

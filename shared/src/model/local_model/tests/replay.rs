@@ -210,30 +210,30 @@ fn what_has_slipped_from_the_hand_is_no_longer_felt_and_the_hand_does_not_hold_i
     }
 }
 
-/// Pushes the west face, then sends an update of a box that has the HIP so deep (m) behind its east face, 20 ms after one of the box that
-/// was pushed, or of none. How far the box is from there in the next tick, m, and the model.
-fn after_another(deep: f64, told: bool) -> (f64, LocalModel) {
+/// Pushes the west face; sends an update of the box that is pushed at `last_ms`, if at all, and at 1220 ms one of a box that has the
+/// HIP so deep (m) behind its east face. How far the model is from there in the next tick, m, and the model.
+fn after_another(deep: f64, last_ms: Option<u64>) -> (f64, LocalModel) {
     let mut model = replayed();
-    push(&mut model, 1..=400);
-    if told {
-        model.apply(&answer(&model, 400));
+    push(&mut model, 1..=1200);
+    if let Some(ms) = last_ms {
+        model.apply(&answer(&model, ms));
     }
-    push(&mut model, 401..=420);
+    push(&mut model, 1201..=1220);
     let (_, hip) = model.previous.unwrap();
-    let another = with(answer(&model, 420), |of| {
+    let another = with(answer(&model, 1220), |of| {
         of.pose.position = Vec2::new(hip.x + deep - 0.2, 0.05);
         of.twist = Twist::default();
     });
     model.apply(&another);
-    push(&mut model, 421..=421);
+    push(&mut model, 1221..=1221);
     let off = (model.state().pose.position - another.state.pose().position).norm();
-    push(&mut model, 422..=422);
+    push(&mut model, 1222..=1222);
     (off, model)
 }
 
 #[test]
 fn another_object_is_felt_at_once_where_it_is_and_no_harder() {
-    let (off, model) = after_another(1e-3, true);
+    let (off, model) = after_another(1e-3, Some(1200));
     assert!(off < 1e-9, "{off}");
     let touch = model.rendered().touch.unwrap();
     assert!(
@@ -241,10 +241,10 @@ fn another_object_is_felt_at_once_where_it_is_and_no_harder() {
         "{touch:?}"
     );
     assert_eq!(model.energy_injected_j(), 0.0);
-    // harder than now, or no box was told of before
-    for (deep, told) in [(6e-3, true), (1e-3, false)] {
-        let (off, model) = after_another(deep, told);
-        assert!(off > 0.3, "{deep} m, {told}: {off}");
+    // harder than now; so long ago that the object may have gone there; and no update before
+    for (deep, last_ms) in [(6e-3, Some(1200)), (1e-3, Some(400)), (1e-3, None)] {
+        let (off, model) = after_another(deep, last_ms);
+        assert!(off > 0.3, "{deep} m, {last_ms:?}: {off}");
         assert_eq!(model.energy_injected_j(), 0.0);
     }
 }
