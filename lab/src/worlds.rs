@@ -5,7 +5,7 @@
 
 use std::f64::consts::{PI, TAU};
 
-use mmt_client::operator::scripted::ScriptedConfig;
+use mmt_client::operator::scripted::{START_M, ScriptedConfig};
 use mmt_netem::LinkConfig;
 use mmt_server::environment::{BodyConfig, EnvironmentConfig, SceneConfig, Wall};
 use mmt_server::sensing::{SensingConfig, VisionConfig};
@@ -20,6 +20,8 @@ use crate::world::WorldConfig;
 
 /// Error of the size that images show, m r.m.s. per face: that of the position in one image.
 const SIZE_NOISE_M: f64 = 1e-3;
+/// A second body is at least this far from where the hand begins, m.
+const HAND_ROOM_M: f64 = 0.02;
 /// The hand gives no more than this, N: what takes more does not move.
 pub const MOVABLE_N: f64 = 8.0;
 
@@ -171,6 +173,11 @@ fn object(draws: &Draws, k_p: f64) -> (EnvironmentConfig, f64) {
 }
 
 /// In a fifth of the worlds a wall or a second body, in the direction of one of the first pushes or anywhere.
+/// Where the hand begins, m: in front of the west face.
+fn hand_start(side_m: f64) -> Vec2 {
+    Vec2::new(-0.5 * side_m - START_M, 0.0)
+}
+
 fn in_the_way(
     draws: &Draws,
     environment: &EnvironmentConfig,
@@ -195,6 +202,10 @@ fn in_the_way(
     let other_m = draws.uniform("worlds/other side", 0.10, 0.40);
     let distance_m = reach_m + other_m * std::f64::consts::FRAC_1_SQRT_2 + gap_m;
     let (sin, cos) = libm::sincos(angle_rad);
+    let drawn = Vec2::new(distance_m * cos, distance_m * sin);
+    // no hand begins in a body
+    let covers_hand = (drawn - hand_start(side_m)).amax() < 0.5 * other_m + HAND_ROOM_M;
+    let other_at = if covers_hand { -drawn } else { drawn };
     let mass_kg = draws.log_uniform("worlds/other mass", 0.2, 2.0);
     let friction_n = draws.log_uniform("worlds/other friction", 0.3, 3.0);
     let first = BodyConfig {
@@ -208,7 +219,7 @@ fn in_the_way(
         side_m: other_m,
         mass_kg,
         friction_coefficient: friction_n / (mass_kg * GRAVITY),
-        pose: Pose::new(distance_m * cos, distance_m * sin, 0.0),
+        pose: Pose::new(other_at.x, other_at.y, 0.0),
         ..BodyConfig::default()
     };
     let scene = SceneConfig {
@@ -261,6 +272,18 @@ mod tests {
             }
         }
         assert!(most_m < 0.1, "{most_m} m");
+    }
+
+    #[test]
+    fn no_hand_begins_in_a_body() {
+        for number in 5001..=6000 {
+            let world = RandomWorld::new(number);
+            let start = World::try_new(&world.config).unwrap().operator().start();
+            for body in world.config.slave.scene.bodies {
+                let off = (body.pose.position - start).amax();
+                assert!(off > 0.5 * body.side_m, "world {number}: {off} m");
+            }
+        }
     }
 
     #[test]

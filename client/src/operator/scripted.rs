@@ -43,7 +43,7 @@ const STEER_MAX_M_PER_S: f64 = 0.15;
 /// Share of the acceleration limit that braking ahead of a goal counts on.
 const BRAKE_SHARE: f64 = 0.6;
 /// Where the HIP starts: in front of the first face, m.
-const START_M: f64 = 0.25;
+pub const START_M: f64 = 0.25;
 
 /// The scripted operator.
 #[derive(Clone, Debug)]

@@ -17,8 +17,10 @@ use carry::Carry;
 /// How fast a correction is bled in.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BleedRates {
-    /// Fastest shift, m/s.
+    /// Fastest shift, m/s: along the face's normal where the HIP touches one.
     pub shift_m_per_s: f64,
+    /// Fastest shift along the face that the HIP touches, m/s.
+    pub along_m_per_s: f64,
     /// Fastest turn, rad/s.
     pub turn_rad_per_s: f64,
     /// Time constant, s.
@@ -28,6 +30,7 @@ pub struct BleedRates {
 /// While the HIP touches the box: well below the speed of a push, so that the hand does not notice it.
 pub const IN_CONTACT: BleedRates = BleedRates {
     shift_m_per_s: 0.05,
+    along_m_per_s: 0.05,
     turn_rad_per_s: 1.0,
     tau_s: 0.3,
 };
@@ -35,11 +38,13 @@ pub const IN_CONTACT: BleedRates = BleedRates {
 /// times as quick.
 pub const IN_CONTACT_REPLAYED: BleedRates = BleedRates {
     tau_s: 0.1,
+    along_m_per_s: 0.5,
     ..IN_CONTACT
 };
 /// While the HIP touches nothing: no hand feels it, it only must not look like a jump.
 pub const IN_FREE_SPACE: BleedRates = BleedRates {
     shift_m_per_s: 0.5,
+    along_m_per_s: 0.5,
     turn_rad_per_s: 10.0,
     tau_s: 0.02,
 };
@@ -159,16 +164,16 @@ impl Correction {
         self.apply(pose, turned);
 
         let mut shift = self.remaining.shift * share;
-        let size = shift.norm();
         let most = rates.shift_m_per_s * TICK_S;
-        if size > most {
-            shift *= most / size;
-        }
         if let Some(touch) = touch {
             // the face as it lies after the turn about the proxy
             let inward = rotate(turn, touch.inward);
+            let normal = inward * inward.dot(&shift);
+            let along = at_most(shift - normal, rates.along_m_per_s * TICK_S);
             let penetration = touch.penetration * libm::cos(turn);
-            shift = self.affordable(shift, inward, penetration, coupling);
+            shift = along + self.affordable(at_most(normal, most), inward, penetration, coupling);
+        } else {
+            shift = at_most(shift, most);
         }
         self.apply(pose, PoseChange { shift, turn: 0.0 });
     }
@@ -217,6 +222,16 @@ impl Correction {
         self.remaining.turn -= change.turn;
         self.done.shift += change.shift;
         self.done.turn += change.turn;
+    }
+}
+
+/// A vector, no longer than `most`.
+fn at_most(vector: Vec2, most: f64) -> Vec2 {
+    let size = vector.norm();
+    if size > most {
+        vector * (most / size)
+    } else {
+        vector
     }
 }
 

@@ -4,6 +4,8 @@
 //! model was *then*. Entries are found by stamp, by search, never by index arithmetic, because ticks may
 //! have been skipped. It allocates once, when made.
 
+use std::time::Duration;
+
 use crate::model::contact::GodObject;
 use crate::model::dynamics::Motion;
 use crate::model::geometry::Vec2;
@@ -34,6 +36,8 @@ pub struct Moment {
     pub motion: Motion,
     /// The proxy's memory, before the step.
     pub god: GodObject,
+    /// For how long the HIP had touched the box before.
+    pub touched: Duration,
     /// Sum of all corrections applied up to this sample.
     pub corrected: PoseChange,
 }

@@ -9,8 +9,10 @@ mod body;
 mod received;
 mod replay;
 
+use std::time::Duration;
+
 use crate::model::contact::Touch;
-use crate::model::correction::{Correction, IN_CONTACT, IN_CONTACT_REPLAYED, Tank};
+use crate::model::correction::{Correction, IN_CONTACT, IN_CONTACT_REPLAYED, ROOM_M, Tank};
 use crate::model::dynamics::Motion;
 use crate::model::geometry::{Twist, Vec2};
 use crate::model::history::{HISTORY_TICKS, History, Moment};
@@ -46,8 +48,10 @@ pub struct LocalModel {
     /// The previous HIP and its stamp.
     previous: Option<(Time, Vec2)>,
     rendered: Rendered,
-    /// Stamp and place (m) of the object in the last update that was applied.
-    last_update: Option<(Time, Vec2)>,
+    /// For how long the HIP has touched the box.
+    touched: Duration,
+    /// The same at the sample that the last update answered, and the object's place in it (m); or at the start.
+    last_update: (Duration, Vec2),
     /// Whether updates are of another object than the box that is felt.
     is_another: bool,
     /// Sum of what updates added to the model's energy beyond what the tank paid, J.
@@ -68,7 +72,8 @@ impl LocalModel {
             replay: Replay::new(start),
             previous: None,
             rendered: Rendered::default(),
-            last_update: None,
+            touched: Duration::ZERO,
+            last_update: (Duration::ZERO, start.pose().position),
             is_another: false,
             injected_j: 0.0,
             not_finite: 0,
@@ -150,14 +155,19 @@ impl LocalModel {
         self.stay_finite(good);
     }
 
-    /// An update whose place no object could have reached since the last one is of another object.
+    /// An update whose place the object could not have reached since the last one, neither pushed nor by running on as the box
+    /// did, is of another object.
     fn compare_with_last(&mut self, update: &Update) {
+        let Some(then) = self.history.at(update.answers) else {
+            return;
+        };
         let place = update.state.pose().position;
-        if let Some((then, before)) = self.last_update {
-            let time_s = update.answers.saturating_since(then).as_secs_f64();
-            self.is_another |= (place - before).norm() > PHANTOM_M + FASTEST_M_PER_S * time_s;
-        }
-        self.last_update = Some((update.answers, place));
+        let (touched, before) = self.last_update;
+        let pushed = then.touched.saturating_sub(touched);
+        let way_m = PHANTOM_M + FASTEST_M_PER_S * pushed.as_secs_f64();
+        let ran_on = distance(place, then.motion.pose.position) < PHANTOM_M;
+        self.is_another |= distance(place, before) > way_m && !ran_on;
+        self.last_update = (then.touched, place);
     }
 
     /// Becomes what `other` is, but for the history, which stays: both took the same samples.
@@ -168,6 +178,7 @@ impl LocalModel {
         self.replay = other.replay;
         self.previous = other.previous;
         self.rendered = other.rendered;
+        self.touched = other.touched;
         self.last_update = other.last_update;
         self.is_another = other.is_another;
         self.injected_j = other.injected_j;
@@ -188,6 +199,9 @@ impl LocalModel {
         let (rendered, dissipated_w) = self.body.step(&self.settings, hip, hip_velocity);
         self.correction.tank.fill(dissipated_w * TICK_S);
         self.rendered = rendered;
+        if rendered.in_contact() {
+            self.touched += TICK;
+        }
         self.go_on_replaying();
         self.stay_finite(good);
         self.rendered
@@ -299,38 +313,53 @@ impl LocalModel {
                 twist: state.twist,
             },
             god: self.body.god,
+            touched: self.touched,
             corrected: self.correction.done,
         });
     }
 
-    /// A box that is touched goes at once to a place that is [`PHANTOM_M`] and more away and that the HIP is clear of: what is
-    /// felt is a phantom, and the HIP may stand in its way. It costs nothing, as what the coupling holds is lost. Another object
-    /// is felt at once where it is, if the HIP is no deeper in it than in the box: that costs nothing either. A box
-    /// whose place is ahead of the push is no phantom: it recedes by the bleed, so that the hand does not let go and catch it
-    /// again.
+    /// The box goes at once to a place that is [`PHANTOM_M`] and more away, where that costs nothing.
     fn leave_phantom(&mut self) {
-        let way = self.correction.remaining.shift;
-        if way.norm() < PHANTOM_M {
+        if self.correction.remaining.shift.norm() < PHANTOM_M {
             self.is_another = false;
             return;
         }
         let Some((_, hip)) = self.previous else {
             return;
         };
-        let Some(touch) = self.body.touch(hip) else {
-            return;
-        };
-        let is_ahead = touch.inward.dot(&way) > AHEAD * way.norm();
-        let goes = if self.is_another {
-            self.there(hip)
-                .is_none_or(|there| there.penetration <= touch.penetration)
-        } else {
-            !is_ahead && self.replay.is_clear_of(hip)
-        };
-        if !goes {
-            return;
+        let (touch, (_, gap)) = (self.body.touch(hip), self.body.gap(hip));
+        let goes = touch.map_or_else(
+            || self.is_another || self.is_stopped_by(hip, gap),
+            |touch| self.is_phantom(&touch, hip),
+        );
+        if goes {
+            self.changing(hip, |body, correction, _| {
+                arrive(body, correction, hip);
+                if touch.is_none() {
+                    body.keep_off(hip, gap, correction);
+                }
+            });
         }
-        self.changing(hip, |body, correction, _| arrive(body, correction, hip));
+    }
+
+    /// Whether what is felt is no more there: the HIP is clear of the place, and may stand in the way of the box. What the coupling
+    /// holds is lost. Another object is felt at once where it is, if the HIP is no deeper in it than in the box. A box
+    /// whose place is ahead of the push is no phantom: it recedes by the bleed, so that the hand does not let go and catch it
+    /// again.
+    fn is_phantom(&self, touch: &Touch, hip: Vec2) -> bool {
+        if self.is_another {
+            let there = self.there(hip);
+            return there.is_none_or(|there| there.penetration <= touch.penetration);
+        }
+        let way = self.correction.remaining.shift;
+        let is_ahead = touch.inward.dot(&way) > AHEAD * way.norm();
+        !is_ahead && self.replay.is_clear_of(hip)
+    }
+
+    /// Whether a HIP that touches nothing keeps the box, `gap` (m) away, from its place, which is on the other side of the HIP or
+    /// beside it.
+    fn is_stopped_by(&self, hip: Vec2, gap: f64) -> bool {
+        gap < 2.0 * ROOM_M && self.replay.is_entered_flat(hip)
     }
 
     /// What the HIP (m, world) touches of the box in its place.
@@ -360,6 +389,10 @@ fn arrive(body: &mut Body, correction: &mut Correction, hip: Vec2) {
     correction.snap(&mut body.state.pose);
     let state = &body.state;
     body.god.after_jump(&state.footprint, &state.pose, hip);
+}
+
+fn distance(a: Vec2, b: Vec2) -> f64 {
+    (a - b).norm()
 }
 
 fn paid(before: &Tank, after: &Tank) -> f64 {

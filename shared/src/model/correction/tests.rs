@@ -73,6 +73,18 @@ fn motion_towards_the_hip_is_refused_by_an_empty_tank_and_paid_by_a_full_one() {
 }
 
 #[test]
+fn along_the_face_a_replayed_correction_is_as_quick_as_an_object_that_slides() {
+    let (mut correction, mut pose) = (aimed(Vec2::new(0.0, 0.15), 0.0), Pose::default());
+    let depth = touch(&pose).unwrap().penetration;
+    for _ in 0..300 {
+        let touch = touch(&pose);
+        correction.bleed(&mut pose, touch.as_ref(), &COUPLING, IN_CONTACT_REPLAYED);
+    }
+    assert!(pose.position.y > 0.1, "{}", pose.position.y);
+    assert!((touch(&pose).unwrap().penetration - depth).abs() < 1e-12);
+}
+
+#[test]
 fn turning_about_the_contact_point_stores_no_energy() {
     let (mut correction, mut pose) = (aimed(Vec2::zeros(), 0.2), Pose::default());
     let start = touch(&pose).unwrap().penetration;

@@ -66,6 +66,11 @@ impl Replay {
         self.body.gap(hip).1 > ROOM_M
     }
 
+    /// Whether a HIP (m, world) is outside of the box as it should be, or hardly in it.
+    pub(super) fn is_entered_flat(&self, hip: Vec2) -> bool {
+        self.body.gap(hip).1 > -FLAT_M
+    }
+
     /// Gives up what it replays.
     pub(super) fn stop(&mut self) {
         (self.progress, self.waiting) = (Progress::Idle, None);
