@@ -165,8 +165,7 @@ impl LocalModel {
         let (touched, before) = self.last_update;
         let pushed = then.touched.saturating_sub(touched);
         let way_m = PHANTOM_M + FASTEST_M_PER_S * pushed.as_secs_f64();
-        let ran_on = distance(place, then.motion.pose.position) < PHANTOM_M;
-        self.is_another |= distance(place, before) > way_m && !ran_on;
+        self.is_another |= (place - before).norm() > way_m;
         self.last_update = (then.touched, place);
     }
 
@@ -389,10 +388,6 @@ fn arrive(body: &mut Body, correction: &mut Correction, hip: Vec2) {
     correction.snap(&mut body.state.pose);
     let state = &body.state;
     body.god.after_jump(&state.footprint, &state.pose, hip);
-}
-
-fn distance(a: Vec2, b: Vec2) -> f64 {
-    (a - b).norm()
 }
 
 fn paid(before: &Tank, after: &Tank) -> f64 {

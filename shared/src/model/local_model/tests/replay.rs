@@ -268,7 +268,7 @@ fn off_in_free_space(to_the_side: f64) -> f64 {
     model.apply(&elsewhere);
     stand(&mut model, 2001..=2001);
     assert_eq!(model.energy_injected_j(), 0.0);
-    distance(model.state().pose.position, elsewhere.state.pose().position)
+    (model.state().pose.position - elsewhere.state.pose().position).norm()
 }
 
 #[test]
