@@ -51,7 +51,7 @@ pub const IN_FREE_SPACE: BleedRates = BleedRates {
 /// A box that is brought up to the HIP stops this far from it, m: five times the amplitude of a hand's
 /// tremor, so that a hand at rest is not touched again and again.
 pub const ROOM_M: f64 = 5e-4;
-/// A pose that is farther away than this, m, is that of another body. No correction of one body is as large.
+/// In free space the box goes at once to a pose that is farther away than this, m: that of another body, most likely.
 pub const OTHER_BODY_M: f64 = 0.3;
 /// Most energy that the tank holds, J: the coupling at 1000 N/m stores this at a depth of 14 mm, deeper
 /// than any push at 8 N. What is dissipated beyond it is gone.
