@@ -155,8 +155,8 @@ impl LocalModel {
         self.stay_finite(good);
     }
 
-    /// An update whose place the object could not have reached since the last one, neither pushed nor by running on as the box
-    /// did, is of another object.
+    /// An update whose place the object could not have been pushed to since the last one is of another object, unless the box
+    /// has run on to there by itself: then it has no way to go.
     fn compare_with_last(&mut self, update: &Update) {
         let Some(then) = self.history.at(update.answers) else {
             return;
