@@ -172,12 +172,12 @@ fn object(draws: &Draws, k_p: f64) -> (EnvironmentConfig, f64) {
     (environment, friction_n)
 }
 
-/// In a fifth of the worlds a wall or a second body, in the direction of one of the first pushes or anywhere.
 /// Where the hand begins, m: in front of the west face.
 fn hand_start(side_m: f64) -> Vec2 {
     Vec2::new(-0.5 * side_m - START_M, 0.0)
 }
 
+/// In a fifth of the worlds a wall or a second body, in the direction of one of the first pushes or anywhere.
 fn in_the_way(
     draws: &Draws,
     environment: &EnvironmentConfig,

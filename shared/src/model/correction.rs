@@ -169,11 +169,12 @@ impl Correction {
             // the face as it lies after the turn about the proxy
             let inward = rotate(turn, touch.inward);
             let normal = inward * inward.dot(&shift);
-            let along = at_most(shift - normal, rates.along_m_per_s * TICK_S);
+            let along = (shift - normal).cap_magnitude(rates.along_m_per_s * TICK_S);
             let penetration = touch.penetration * libm::cos(turn);
-            shift = along + self.affordable(at_most(normal, most), inward, penetration, coupling);
+            shift =
+                along + self.affordable(normal.cap_magnitude(most), inward, penetration, coupling);
         } else {
-            shift = at_most(shift, most);
+            shift = shift.cap_magnitude(most);
         }
         self.apply(pose, PoseChange { shift, turn: 0.0 });
     }
@@ -222,16 +223,6 @@ impl Correction {
         self.remaining.turn -= change.turn;
         self.done.shift += change.shift;
         self.done.turn += change.turn;
-    }
-}
-
-/// A vector, no longer than `most`.
-fn at_most(vector: Vec2, most: f64) -> Vec2 {
-    let size = vector.norm();
-    if size > most {
-        vector * (most / size)
-    } else {
-        vector
     }
 }
 

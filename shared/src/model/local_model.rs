@@ -358,7 +358,7 @@ impl LocalModel {
     /// Whether a HIP that touches nothing keeps the box, `gap` (m) away, from its place, which is on the other side of the HIP or
     /// beside it.
     fn is_stopped_by(&self, hip: Vec2, gap: f64) -> bool {
-        gap < 2.0 * ROOM_M && self.replay.is_entered_flat(hip)
+        gap < 2.0 * ROOM_M && self.replay.is_hardly_entered(hip)
     }
 
     /// What the HIP (m, world) touches of the box in its place.

@@ -12,9 +12,13 @@ fn touch(pose: &Pose) -> Option<Touch> {
 }
 
 fn bleed(correction: &mut Correction, pose: &mut Pose, ticks: u32) {
+    bleed_at(IN_CONTACT, correction, pose, ticks);
+}
+
+fn bleed_at(rates: BleedRates, correction: &mut Correction, pose: &mut Pose, ticks: u32) {
     for _ in 0..ticks {
         let touch = touch(pose);
-        correction.bleed(pose, touch.as_ref(), &COUPLING, IN_CONTACT);
+        correction.bleed(pose, touch.as_ref(), &COUPLING, rates);
     }
 }
 
@@ -76,10 +80,7 @@ fn motion_towards_the_hip_is_refused_by_an_empty_tank_and_paid_by_a_full_one() {
 fn along_the_face_a_replayed_correction_is_as_quick_as_an_object_that_slides() {
     let (mut correction, mut pose) = (aimed(Vec2::new(0.0, 0.15), 0.0), Pose::default());
     let depth = touch(&pose).unwrap().penetration;
-    for _ in 0..300 {
-        let touch = touch(&pose);
-        correction.bleed(&mut pose, touch.as_ref(), &COUPLING, IN_CONTACT_REPLAYED);
-    }
+    bleed_at(IN_CONTACT_REPLAYED, &mut correction, &mut pose, 300);
     assert!(pose.position.y > 0.1, "{}", pose.position.y);
     assert!((touch(&pose).unwrap().penetration - depth).abs() < 1e-12);
 }

@@ -20,8 +20,9 @@ use crate::time::Time;
 /// Counted, not timed, so that both sides replay alike.
 pub const REPLAYED_PER_TICK: usize = 20;
 
-/// A box that is found this far from where it was, m, with the HIP no deeper in it than this, m, is met anew.
+/// A box that is found this far from where it was, m, with the HIP hardly in it, is met anew.
 const JUMP_M: f64 = 0.01;
+/// A HIP no deeper than this, m, is hardly in a box.
 const FLAT_M: f64 = 0.005;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -67,7 +68,7 @@ impl Replay {
     }
 
     /// Whether a HIP (m, world) is outside of the box as it should be, or hardly in it.
-    pub(super) fn is_entered_flat(&self, hip: Vec2) -> bool {
+    pub(super) fn is_hardly_entered(&self, hip: Vec2) -> bool {
         self.body.gap(hip).1 > -FLAT_M
     }
 
