@@ -39,7 +39,7 @@ impl MotionLimits {
         } else {
             Vec2::zeros()
         };
-        let velocity = shortened(goal.velocity + catch_up, self.speed_m_per_s * HAIR);
+        let velocity = (goal.velocity + catch_up).cap_magnitude(self.speed_m_per_s * HAIR);
         let velocity = self.towards(before, velocity, period_s);
         let way = velocity * period_s;
         // to the bit, if it gets there
@@ -52,11 +52,8 @@ impl MotionLimits {
 
     /// The velocity after a tick of `period_s` (s) in which the tool goes over from `before` to `wanted` (both m/s).
     pub(crate) fn towards(&self, before: Vec2, wanted: Vec2, period_s: f64) -> Vec2 {
-        before
-            + shortened(
-                wanted - before,
-                self.acceleration_m_per_s2 * period_s * HAIR,
-            )
+        let most = self.acceleration_m_per_s2 * period_s * HAIR;
+        before + (wanted - before).cap_magnitude(most)
     }
 
     /// The greatest speed (m/s) of a tick of `period_s` (s) after which the tool can still stop within `distance` (m) from where
@@ -69,16 +66,6 @@ impl MotionLimits {
         }
         let speed = a * ((period_s * period_s + 2.0 * distance / a).sqrt() - period_s);
         speed.max(in_one_tick)
-    }
-}
-
-/// `v`, made no longer than `most`.
-fn shortened(v: Vec2, most: f64) -> Vec2 {
-    let length = v.norm();
-    if length > most {
-        v * (most / length)
-    } else {
-        v
     }
 }
 

@@ -81,7 +81,7 @@ impl MotionLimiter {
 
     /// The place within reach that is nearest to `aim`, m.
     pub(super) fn within_reach(&self, aim: Vec2) -> Vec2 {
-        within(self.reach_m, aim)
+        aim.cap_magnitude(self.reach_m)
     }
 
     /// One tick of length `elapsed` towards `aim` (m), or to a stop where there is none. Once samples have run out a HIP that
@@ -132,7 +132,7 @@ impl MotionLimiter {
             return (aim, way);
         }
         let (reach, free) = (self.reach_m.max(from.norm()), from + way);
-        let hip = within(reach, free);
+        let hip = free.cap_magnitude(reach);
         let way = if hip == free { way } else { hip - from };
         (hip, way)
     }
@@ -164,15 +164,5 @@ impl MotionLimiter {
         }
         let velocity = (way - outwards * beyond) / period;
         limits.towards(before, velocity, period) * period
-    }
-}
-
-/// The place within `reach` (m) of the origin that is nearest to `place`, m.
-fn within(reach: f64, place: Vec2) -> Vec2 {
-    let far = place.norm();
-    if far > reach {
-        place * (reach / far)
-    } else {
-        place
     }
 }
