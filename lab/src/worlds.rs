@@ -275,6 +275,19 @@ mod tests {
     }
 
     #[test]
+    fn an_object_that_a_wall_stops_after_a_slide_without_friction_is_sent_as_standing() {
+        // a drag that is damping alone teaches a large radius e/c, and then a wall holds the object
+        let mut world = World::try_new(&RandomWorld::new(14_463).config).unwrap();
+        for _ in 0..10_000 {
+            world.step();
+        }
+        assert_eq!(world.slave().refused_estimates(), 0);
+        let stands = world.slave().environment().pose().position;
+        let felt = world.master().model().state().pose.position;
+        assert!((felt - stands).norm() < 0.05, "{felt} and {stands}");
+    }
+
+    #[test]
     fn no_hand_begins_in_a_body() {
         for number in 5001..=6000 {
             let world = RandomWorld::new(number);

@@ -6,7 +6,9 @@ use std::collections::BTreeMap;
 
 use mmt_shared::model::contact::Coupling;
 use mmt_shared::model::geometry::{BoxFootprint, Pose};
-use mmt_shared::model::params::{ModelParams, inertia_of_square, least_stable_mass};
+use mmt_shared::model::params::{
+    FRICTION_TORQUE_NM, ModelParams, inertia_of_square, least_stable_mass,
+};
 use mmt_shared::model::settings::Mode;
 use mmt_shared::range::in_range;
 use mmt_shared::time::{TICK, Time};
@@ -273,15 +275,30 @@ impl ObjectEstimate {
     }
 
     fn params_of(&self, m: f64, b: f64, c: f64, side: f64) -> Option<ModelParams> {
-        let e = c * self.observer.friction_radius();
+        let e = friction_torque(c, self.observer.friction_radius());
         ModelParams::try_new(m, b, c, inertia_of_square(m, side), e, &self.coupling).ok()
     }
+}
+
+/// Friction torque e (N m) of c (N) at the radius e/c (m), at most what is accepted. Damping resists turning too, so the radius of
+/// an object that slides with next to no friction is large; where it then stands against a wall, c is [`OBSTACLE_N`].
+fn friction_torque(c: f64, radius: f64) -> f64 {
+    let (least, most) = FRICTION_TORQUE_NM;
+    (c * radius).clamp(least, most)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::slave::StartModel;
+
+    #[test]
+    fn the_friction_torque_of_what_stands_is_accepted_however_large_the_radius_was_learned() {
+        assert_eq!(friction_torque(2.0, 0.15), 0.3);
+        let coupling = Coupling::for_stiffness(1000.0);
+        let e = friction_torque(OBSTACLE_N, 3.0);
+        assert!(ModelParams::try_new(1.0, 3.0, OBSTACLE_N, 0.02, e, &coupling).is_ok());
+    }
 
     /// What becomes of an estimate of m (kg), b (N s/m) and 5 N of friction, or of `holding` N that hold the object.
     fn accepted(
