@@ -14,7 +14,7 @@ use std::time::Duration;
 use crate::model::contact::Touch;
 use crate::model::correction::{Correction, IN_CONTACT, IN_CONTACT_REPLAYED, ROOM_M, Tank};
 use crate::model::dynamics::Motion;
-use crate::model::geometry::{Twist, Vec2};
+use crate::model::geometry::{Face, Twist, Vec2};
 use crate::model::history::{HISTORY_TICKS, History, Moment};
 use crate::model::params::{ModelParams, ModelState};
 use crate::model::settings::{ModelSettings, PoseCorrection, Smoothing};
@@ -28,6 +28,8 @@ use replay::Replay;
 
 /// A box that is touched this far from its place, m, with the HIP clear of that place, is a phantom.
 const PHANTOM_M: f64 = 0.1;
+/// A box this far from its place, m, with the HIP in front of another face than there, is beside its place.
+const BESIDE_M: f64 = 0.01;
 /// No object moves faster, m/s: the tool does not, as slaves are configured by default.
 const FASTEST_M_PER_S: f64 = 0.6;
 /// A place within 60° of the push lies ahead: the cosine of that.
@@ -317,19 +319,21 @@ impl LocalModel {
         });
     }
 
-    /// The box goes at once to a place that is [`PHANTOM_M`] and more away, where that costs nothing.
+    /// The box goes at once to a place that is [`PHANTOM_M`] and more away, or that the HIP keeps it from, where that costs
+    /// nothing.
     fn leave_phantom(&mut self) {
-        if self.correction.remaining.shift.norm() < PHANTOM_M {
-            self.is_another = false;
-            return;
-        }
+        let is_far = self.correction.remaining.shift.norm() >= PHANTOM_M;
+        self.is_another &= is_far;
         let Some((_, hip)) = self.previous else {
             return;
         };
-        let (touch, (_, gap)) = (self.body.touch(hip), self.body.gap(hip));
+        let (touch, (face, gap)) = (self.body.touch(hip), self.body.gap(hip));
         let goes = touch.map_or_else(
-            || self.is_another || self.is_stopped_by(hip, gap),
-            |touch| self.is_phantom(&touch, hip),
+            || {
+                self.is_another
+                    || ((is_far || self.is_beside(hip, face)) && self.is_stopped_by(hip, gap))
+            },
+            |touch| is_far && self.is_phantom(&touch, hip),
         );
         if goes {
             self.changing(hip, |body, correction, _| {
@@ -359,6 +363,12 @@ impl LocalModel {
     /// beside it.
     fn is_stopped_by(&self, hip: Vec2, gap: f64) -> bool {
         gap < 2.0 * ROOM_M && self.replay.is_hardly_entered(hip)
+    }
+
+    /// Whether a HIP in front of this face is in front of another one of the box in its place: on its way there the box would
+    /// have to come round the HIP.
+    fn is_beside(&self, hip: Vec2, face: Face) -> bool {
+        self.correction.remaining.shift.norm() > BESIDE_M && self.replay.face(hip) != face
     }
 
     /// What the HIP (m, world) touches of the box in its place.

@@ -8,7 +8,7 @@
 use super::body::{Body, BodyState};
 use crate::model::contact::GodObject;
 use crate::model::correction::ROOM_M;
-use crate::model::geometry::{Pose, Vec2};
+use crate::model::geometry::{Face, Pose, Vec2};
 use crate::model::history::History;
 use crate::model::params::ModelState;
 use crate::model::settings::ModelSettings;
@@ -70,6 +70,11 @@ impl Replay {
     /// Whether a HIP (m, world) is outside of the box as it should be, or hardly in it.
     pub(super) fn is_hardly_entered(&self, hip: Vec2) -> bool {
         self.body.gap(hip).1 > -FLAT_M
+    }
+
+    /// The face of the box as it should be that a HIP (m, world) is in front of.
+    pub(super) fn face(&self, hip: Vec2) -> Face {
+        self.body.gap(hip).0
     }
 
     /// Gives up what it replays.

@@ -314,3 +314,35 @@ fn a_hand_that_touches_nothing_does_not_keep_the_box_from_its_place_on_the_other
     let x = past_the_hip(-0.17);
     assert!(x > -0.01, "{x}");
 }
+
+/// A HIP stands just in front of the north face of a box of 0.2 m, near its west end. How far (m) the box is from its place, in
+/// which that HIP is `deep` (m) in the west face, half a second after it was told.
+fn beside_the_hip(deep: f64) -> f64 {
+    let mut model = replayed();
+    let at = |x: f64, y: f64| BodyState {
+        footprint: BoxFootprint::square(0.2),
+        pose: Pose::new(x, y, 0.0),
+        ..state(5.0, 3.0, 150.0).into()
+    };
+    let place = at(0.1 - deep, 0.06);
+    for n in 1..=1200 {
+        if n == 50 {
+            model.apply(&update(Cause::Deadband, 49, at(0.05, 0.0)));
+        }
+        if n == 700 {
+            model.apply(&update(Cause::Elsewhere, 699, place));
+        }
+        model.step(Time::from_millis(n), Vec2::new(0.0, 0.102));
+    }
+    assert!(model.energy_injected_j() < 1e-12);
+    (model.state().pose.position - place.pose.position).norm()
+}
+
+#[test]
+fn a_box_that_would_have_to_come_round_the_hip_goes_at_once() {
+    let off = beside_the_hip(1e-3);
+    assert!(off < 3e-3, "{off} m");
+    // where the HIP would be deep in it, the hand has run ahead of the box
+    let off = beside_the_hip(8e-3);
+    assert!(off > 0.05, "{off} m");
+}
