@@ -9,7 +9,7 @@
 )]
 
 use mmt_client::operator::trace::Trace;
-use mmt_lab::replay::{Law, ReplayConfig, ReplayReport, replay};
+use mmt_lab::replay::{Law, PipelineReport, ReplayConfig, ReplayReport, pipeline, replay};
 use mmt_shared::recording::Recording;
 use std::path::Path;
 
@@ -78,6 +78,36 @@ fn the_finger_ends_on_the_edge_of_the_block() {
 }
 
 #[test]
+fn the_touched_points_show_the_sides_of_the_block_to_half_a_millimetre() {
+    each(|name, _, text| {
+        let recording = Recording::parse(text).unwrap();
+        let mut offsets = [const { Vec::new() }; 3];
+        for push in &recording.pushes {
+            let touched = push.force.iter().find(|sample| sample.force.norm() >= 0.5);
+            let touched_s = touched.unwrap().t_s;
+            let next = push.finger.partition_point(|sample| sample.t_s < touched_s);
+            let at = push.before.point_to_object(push.finger[next].pose.position) * 1e3;
+            let slant = (at.x + at.y - 50.0) * std::f64::consts::FRAC_1_SQRT_2;
+            // the side that it is the farthest out of
+            let outside = [-50.0 - at.x, -50.0 - at.y, slant];
+            let (side, offset) = outside
+                .into_iter()
+                .enumerate()
+                .max_by(|(_, a), (_, b)| a.total_cmp(b))
+                .unwrap();
+            offsets[side].push(offset);
+        }
+        let squares = offsets.iter().flat_map(|side| {
+            let mean = side.iter().sum::<f64>() / side.len() as f64;
+            side.iter()
+                .map(move |offset| (offset - mean) * (offset - mean))
+        });
+        let rms = (squares.sum::<f64>() / 50.0).sqrt();
+        assert!((0.4..0.75).contains(&rms), "{name}: {rms} mm");
+    });
+}
+
+#[test]
 fn held_out_forces_are_predicted_within_the_stated_errors_and_the_surface_beats_the_decoupled_law()
 {
     each(|name, bounds, text| {
@@ -107,6 +137,47 @@ fn replayed_push_by_push_the_surface_errs_less_and_sends_less_than_the_decoupled
             "{name}"
         );
         assert!(surface.updates.sent < decoupled.updates.sent, "{name}");
+    });
+}
+
+#[test]
+fn through_mmt_the_targets_are_met_without_delay_and_at_250_ms_it_is_nearer_than_a_held_force() {
+    each(|name, _, text| {
+        let reports = pipeline(&Recording::parse(text).unwrap()).unwrap();
+        let of = |delay_ms: u64, system: &str| -> Vec<&PipelineReport> {
+            let all = reports.iter();
+            all.filter(|of| (of.delay_ms, of.system) == (delay_ms, system))
+                .collect()
+        };
+        let median = |of: &PipelineReport| of.errors.force_median.unwrap();
+        let rate = |of: &PipelineReport| of.contact_rate_hz.unwrap();
+        let near = of(0, "mmt")[0];
+        assert!(
+            rate(near) <= 3.0 && median(near) <= 0.05,
+            "{name}: {near:?}"
+        );
+        assert!(
+            near.errors.vector_median.unwrap() <= 0.08,
+            "{name}: {near:?}"
+        );
+        let far = of(250, "mmt")[0];
+        for held in of(250, "hold") {
+            assert!(rate(far) < rate(held), "{name}: {held:?}");
+            // one that sends more often may be nearer half of the time, but is not on the whole
+            let alike = rate(held) < 1.5 * rate(far);
+            let share = if alike { 0.85 } else { 0.95 };
+            let errors = |of: &PipelineReport| {
+                let errors = of.errors;
+                [errors.force_mean, errors.vector_mean, errors.impulse_error]
+            };
+            for (mmt, held) in errors(far).into_iter().zip(errors(held)) {
+                let least = held.map(|held| share * held);
+                assert!(mmt < least, "{name}: {mmt:?} of {held:?}");
+            }
+            if alike {
+                assert!(median(far) < 0.85 * median(held), "{name}: {held:?}");
+            }
+        }
     });
 }
 

@@ -6,6 +6,7 @@
 pub mod again;
 pub mod conditioning;
 pub mod contact;
+pub mod contact_prediction;
 pub mod end;
 pub mod environment;
 pub mod estimator;

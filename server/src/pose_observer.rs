@@ -22,7 +22,7 @@ mod vision;
 
 use mmt_shared::model::contact::Coupling;
 use mmt_shared::model::dynamics::Motion;
-use mmt_shared::model::geometry::{BoxFootprint, Face, Pose, Twist, Vec2, rotate};
+use mmt_shared::model::geometry::{BoxFootprint, Face, Pose, Twist, Vec2, rotate, wrap_angle};
 use mmt_shared::model::params::{ModelParams, friction_torque_of_square};
 use mmt_shared::model::settings::FrictionLaw;
 use mmt_shared::time::{TICK_S, Time};
@@ -119,6 +119,9 @@ impl PoseObserver {
     /// tangent, where it will be by then; of a box, the pose.
     #[must_use]
     pub fn pose_ahead(&self, omega: f64, tau_s: f64) -> Pose {
+        if let Some(expected) = self.expected() {
+            return expected;
+        }
         let inward = self.contact.map_or(Vec2::zeros(), |contact| contact.inward);
         let pose = Pose {
             position: self.motion.pose.position + inward * self.tracker.aside_m(),
@@ -132,6 +135,26 @@ impl PoseObserver {
             position: contact.surface + rotate(turn, pose.position - contact.surface),
             angle: pose.angle + turn,
         }
+    }
+
+    /// The box that the next contact is expected to be with, while nothing is touched; none where none is expected.
+    fn expected(&self) -> Option<Pose> {
+        match (&self.tracker, self.contact) {
+            (Tracker::Slow(slow), None) => slow.expected,
+            _ => None,
+        }
+    }
+
+    /// By how much a model at `pose` is off, m, and turned, rad. Of an object that is pushed slowly nothing is known where no
+    /// contact is expected.
+    #[must_use]
+    pub fn off(&self, pose: &Pose) -> (Vec2, f64) {
+        let wanted = match (&self.tracker, self.contact) {
+            (Tracker::Slow(slow), None) => slow.expected.unwrap_or(*pose),
+            _ => self.motion.pose,
+        };
+        let turn = wrap_angle(wanted.angle - pose.angle);
+        (wanted.position - pose.position, turn)
     }
 
     /// Velocity of the object.

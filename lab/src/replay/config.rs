@@ -3,7 +3,7 @@
 use mmt_shared::model::geometry::Vec2;
 use serde::Serialize;
 
-use super::surface::Friction;
+use mmt_server::contact_prediction::Support;
 
 /// How a recording is replayed. The command line checks the ranges; whatever they are, nothing panics.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -21,7 +21,7 @@ pub struct ReplayConfig {
     /// Friction believed before the first push, and the centre of the fit's weak prior. Default: 1 N, the
     /// wrong value that every model of this project starts from, an arm of 50 mm (the block under uniform
     /// pressure has 45 mm, under pressure towards its rim more), centred.
-    pub start: Friction,
+    pub start: Support,
     /// Share of the pushes that the held-out prediction is fitted on. Default 0.75.
     pub fitted_share: f64,
     /// Repeats of the held-out prediction, each with its own split. Default 5.
@@ -38,7 +38,7 @@ impl Default for ReplayConfig {
             force_floor_n: 0.3,
             contact_on_n: 0.5,
             contact_off_n: 0.3,
-            start: Friction {
+            start: Support {
                 friction_n: 1.0,
                 arm_m: 0.050,
                 centre_m: Vec2::new(0.0, 0.0),

@@ -6,8 +6,9 @@ use mmt_shared::stats::values::{mean, median};
 use serde::Serialize;
 
 use super::config::ReplayConfig;
-use super::fit::{Observation, fit};
-use super::surface::Law;
+use super::fit::fit;
+use super::surface::{Law, PushMotion};
+use mmt_server::contact_prediction::Observation;
 
 /// | |predicted| − |measured| | / |measured|.
 pub(super) fn relative_error(predicted: Vec2, measured: Vec2) -> f64 {
@@ -48,8 +49,13 @@ impl Split {
     }
 
     /// Relative |F| errors of the held-out pushes under a law.
-    pub(super) fn errors(&self, config: &ReplayConfig, law: Law, all: &[Observation]) -> Vec<f64> {
-        let of = |numbers: &[usize]| -> Vec<Observation> {
+    pub(super) fn errors(
+        &self,
+        config: &ReplayConfig,
+        law: Law,
+        all: &[Observation<PushMotion>],
+    ) -> Vec<f64> {
+        let of = |numbers: &[usize]| -> Vec<Observation<PushMotion>> {
             numbers
                 .iter()
                 .filter_map(|push| all.get(*push))

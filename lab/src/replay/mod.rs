@@ -14,16 +14,18 @@ mod trigger;
 
 pub use config::ReplayConfig;
 pub use heldout::HeldOut;
+pub use mmt_server::contact_prediction::Support;
 pub use pipeline::{Errors, PipelineReport, pipeline, table as pipeline_table};
 pub use report::{LawOnPush, LawReport, PushReport, Rates, ReplayReport, Spread};
-pub use surface::{Friction, Law, PushMotion};
+pub use surface::{Law, PushMotion};
 pub use trigger::Packets;
 
 use mmt_shared::model::geometry::{Vec2, rotate};
 use mmt_shared::recording::{Push, Recording};
 
-use fit::{Observation, fit};
+use fit::fit;
 use heldout::Split;
+use mmt_server::contact_prediction::Observation;
 use mmt_shared::stats::values::{mean_of_sum, quantile};
 use trigger::{Contact, TriggerTraffic};
 
@@ -81,7 +83,7 @@ fn replay_push(
     push: &Push,
     config: &ReplayConfig,
     learners: &mut [Learner],
-    observed: &mut Vec<Observation>,
+    observed: &mut Vec<Observation<PushMotion>>,
 ) -> PushReport {
     let motion = PushMotion::of(push);
     let measured = steady_force(config, push);
@@ -151,8 +153,8 @@ fn contact_time_s(config: &ReplayConfig, push: &Push) -> f64 {
 struct Learner {
     law: Law,
     config: ReplayConfig,
-    at_slave: Friction,
-    at_master: Friction,
+    at_slave: Support,
+    at_master: Support,
     packets: Packets,
     samples: u64,
     error_sum: f64,
@@ -203,7 +205,7 @@ impl Learner {
     }
 
     /// Fits the friction again, now that one more push is over.
-    fn learn(&mut self, observed: &[Observation]) {
+    fn learn(&mut self, observed: &[Observation<PushMotion>]) {
         self.at_slave = fit(self.law, &self.config.start, &self.at_slave, observed);
     }
 

@@ -73,6 +73,9 @@ pub fn table(reports: &[PipelineReport]) -> Table {
             column("|F| mean", "%", 1, |report| {
                 percent(report.errors.force_mean)
             }),
+            column("impulse", "%", 1, |report| {
+                percent(report.errors.impulse_error)
+            }),
             column("|F| of a push", "%", 1, |report| {
                 percent(report.errors.force_median_of_pushes)
             }),

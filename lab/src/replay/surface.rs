@@ -10,6 +10,7 @@
 //! (equivalently: of all forces at that point that the surface bears, the one that does most work on v_p).
 //! The measured turning then enters by v_p alone, which is what makes this prediction the more robust one.
 
+use mmt_server::contact_prediction::Support;
 use mmt_shared::model::geometry::{Vec2, cross, rotate, spin};
 use mmt_shared::recording::Push;
 use serde::Serialize;
@@ -58,35 +59,16 @@ impl Law {
         }
     }
 
-    /// Force on the block in its own frame (N) that this law expects for a motion under the friction
+    /// Force on the block in its own frame (N) that this law expects for a motion on the support
     /// `surface`; zero for no motion.
     #[must_use]
-    pub fn force(self, surface: &Friction, motion: &PushMotion) -> Vec2 {
+    pub fn force(self, surface: &Support, motion: &PushMotion) -> Vec2 {
         match self {
             Self::Decoupled => unit(motion.displacement) * surface.friction_n,
             Self::LimitSurfaceTwist => from_twist(surface, motion),
-            Self::LimitSurface => at_point(surface, motion),
+            Self::LimitSurface => surface.force_at(motion.touched, motion.at_touch()),
             Self::ThreePoint => on_three_points(surface, motion),
         }
-    }
-}
-
-/// What a law's friction looks like: its size, how hard it is to turn, and about which point.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Friction {
-    /// Friction c when the block slides without turning, N.
-    pub friction_n: f64,
-    /// e/c: friction torque over friction, m; positive.
-    pub arm_m: f64,
-    /// Centre of friction from the block's reference point, block's frame, m.
-    pub centre_m: Vec2,
-}
-
-impl Friction {
-    /// Friction torque e when the block turns about its centre of friction, N m.
-    #[must_use]
-    pub fn torque_nm(&self) -> f64 {
-        self.friction_n * self.arm_m
     }
 }
 
@@ -139,7 +121,7 @@ fn unit(v: Vec2) -> Vec2 {
 }
 
 /// f = c v / sqrt(|v|² + (e/c)² w²), v at the centre of friction.
-fn from_twist(surface: &Friction, motion: &PushMotion) -> Vec2 {
+fn from_twist(surface: &Support, motion: &PushMotion) -> Vec2 {
     let v = motion.displacement + spin(motion.turn, surface.centre_m);
     let w = surface.arm_m * motion.turn;
     let length = (v.norm_squared() + w * w).sqrt();
@@ -149,23 +131,8 @@ fn from_twist(surface: &Friction, motion: &PushMotion) -> Vec2 {
     v * (surface.friction_n / length)
 }
 
-/// The ellipsoid cut by "moment = lever arm × force": |f|² + (p·f)²/(e/c)² = c² with p = (−r_y, r_x); the
-/// force on that ellipse that does most work on v_p.
-fn at_point(surface: &Friction, motion: &PushMotion) -> Vec2 {
-    let v = motion.at_touch();
-    let p = spin(1.0, motion.touched - surface.centre_m);
-    let arm2 = surface.arm_m * surface.arm_m;
-    let u = v - p * (p.dot(&v) / (arm2 + p.norm_squared()));
-    let moment = p.dot(&u);
-    let length = (u.norm_squared() + moment * moment / arm2).sqrt();
-    if length.is_nan() || length < 1e-12 {
-        return Vec2::zeros();
-    }
-    u * (surface.friction_n / length)
-}
-
 /// Coulomb friction c/3 at three supports; the block turns about the touched point with least resistance.
-fn on_three_points(surface: &Friction, motion: &PushMotion) -> Vec2 {
+fn on_three_points(surface: &Support, motion: &PushMotion) -> Vec2 {
     let v = motion.at_touch();
     if v.norm() < 1e-12 {
         return Vec2::zeros();
@@ -210,7 +177,7 @@ fn root_of_increasing(f: impl Fn(f64) -> f64, scale: f64) -> f64 {
 mod tests {
     use super::*;
 
-    const SURFACE: Friction = Friction {
+    const SURFACE: Support = Support {
         friction_n: 4.2,
         arm_m: 0.05,
         centre_m: Vec2::new(0.004, -0.002),

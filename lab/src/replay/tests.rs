@@ -5,7 +5,7 @@ use mmt_shared::model::geometry::Pose;
 use mmt_shared::recording::{FingerSample, ForceSample};
 use mmt_shared::rng::Substream;
 
-const TRUTH: Friction = Friction {
+const TRUTH: Support = Support {
     friction_n: 4.2,
     arm_m: 0.055,
     centre_m: Vec2::new(0.003, 0.002),

@@ -27,6 +27,8 @@ pub(super) struct SlowTracker {
     pub(super) aside_m: f64,
     /// The newest image: where the object lies when it is let go.
     seen: Option<Pose>,
+    /// The box that the next contact is expected to be with.
+    pub(super) expected: Option<Pose>,
 }
 
 impl SlowTracker {

@@ -1,6 +1,6 @@
 //! One tick in contact with an object that is pushed so slowly that it is followed by the force alone.
 
-use mmt_shared::model::geometry::{Face, Twist, Vec2, rotate};
+use mmt_shared::model::geometry::{Face, Pose, Twist, Vec2, rotate, wrap_angle};
 use mmt_shared::time::TICK_S;
 
 use super::PoseObserver;
@@ -8,6 +8,7 @@ use super::contact_force::ContactForce;
 use super::contact_frame::ContactFrame;
 use super::track::Track;
 use super::tracker::Tracker;
+use crate::contact_prediction::Expected;
 
 /// Turning acceleration of the force that the angle filter allows for, rad/s²: a sixtieth of that of a fast push, as the
 /// speed is.
@@ -15,12 +16,35 @@ const TURN_RAD_PER_S2: f64 = 0.33;
 /// Time constant of the velocity, s: as long as the parameters' smoothing.
 const VELOCITY_S: f64 = 0.020;
 
+/// The force of a device's spring rises over a way on which that of a stiff contact is there at once. This share of the way
+/// lies before the point of contact: as much is felt too early as too late.
+const BEFORE: f64 = 0.5;
+
 impl PoseObserver {
     /// The master has not met the box that is pushed.
     pub(crate) fn approach(&mut self) {
         if let Tracker::Slow(slow) = &mut self.tracker {
             slow.approach(self.penetration.depth);
         }
+    }
+
+    /// Nothing is touched now; contact is expected at a point under a force. The model is then what it would be in that
+    /// contact: a small box, whose face is normal to the force.
+    pub(crate) fn expect(&mut self, expected: Option<Expected>) {
+        let Tracker::Slow(slow) = &mut self.tracker else {
+            return;
+        };
+        slow.expected = expected.map(|Expected { point, force }| {
+            let face = face_pushed_by(self.motion.pose.angle, force);
+            let heading = libm::atan2(-force.y, -force.x);
+            let before = BEFORE * force.norm() / self.config.coupling.stiffness_n_per_m;
+            let deep = self.faces.footprint.offset(face) - before;
+            Pose {
+                position: point + force.normalize() * deep,
+                angle: self.motion.pose.angle
+                    + wrap_angle(heading - face.outward_angle() - self.motion.pose.angle),
+            }
+        });
     }
 
     /// One tick of touch.
@@ -64,16 +88,24 @@ impl PoseObserver {
     fn begin_slowly(&mut self, tool: Vec2, force: Vec2) -> Face {
         self.penetration.begin(tool, force);
         if let Tracker::Slow(slow) = &mut self.tracker {
+            if let Some(expected) = slow.expected {
+                self.motion.pose = expected;
+            }
             slow.begin();
         }
         self.motion.twist = Twist::default();
-        let in_object = rotate(-self.motion.pose.angle, force);
-        let along = |face: &Face| -face.outward().dot(&in_object);
-        let best = Face::ALL
-            .into_iter()
-            .max_by(|a, b| along(a).total_cmp(&along(b)));
-        best.unwrap_or(Face::West)
+        face_pushed_by(self.motion.pose.angle, force)
     }
+}
+
+/// Of a box that is turned by `angle` (rad) the face that has to turn least to be normal to a force.
+fn face_pushed_by(angle: f64, force: Vec2) -> Face {
+    let in_object = rotate(-angle, force);
+    let along = |face: &Face| -face.outward().dot(&in_object);
+    let best = Face::ALL
+        .into_iter()
+        .max_by(|a, b| along(a).total_cmp(&along(b)));
+    best.unwrap_or(Face::West)
 }
 
 #[cfg(test)]
@@ -138,6 +170,34 @@ mod tests {
         let params = ModelParams::of_square(0.4, 0.0, 4.0, 0.04, &COUPLING).unwrap();
         slow.step(now + TICK, tool, Vec2::zeros(), false, &params);
         assert_eq!((slow.pose(), slow.twist()), (pose, Twist::default()));
+    }
+
+    #[test]
+    fn an_expected_contact_is_a_box_in_front_of_the_tool_and_the_contact_begins_with_it() {
+        let mut slow = observer(true);
+        let own = slow.pose();
+        let (point, force) = (Vec2::new(0.06, 0.01), rotate(0.9, Vec2::new(4.0, 0.0)));
+        slow.expect(Some(Expected { point, force }));
+        let expected = slow.pose_ahead(0.0, 0.1);
+        assert_eq!(slow.pose(), own, "nobody has touched it yet");
+        assert_eq!(slow.off(&expected), (Vec2::zeros(), 0.0));
+        // half of the force is rendered at the point
+        let depth = 2.0 / COUPLING.stiffness_n_per_m;
+        let face = slow.footprint().nearest(expected.point_to_object(point));
+        assert!((face.1 + depth).abs() < 1e-9, "{face:?}");
+        let outward = rotate(expected.angle, face.0.outward());
+        assert!((outward + force.normalize()).norm() < 1e-9, "{outward}");
+        assert!((expected.angle - own.angle).abs() <= std::f64::consts::FRAC_PI_4 + 1e-9);
+        let params = ModelParams::of_square(0.4, 0.0, 4.0, 0.04, &COUPLING).unwrap();
+        slow.step(Time::ZERO + TICK, point, force, true, &params);
+        assert_eq!(slow.contact().unwrap().face, face.0);
+        assert!((slow.pose().angle - expected.angle).abs() < 1e-3);
+        // where no contact is expected nothing of the model is wrong
+        let mut unknown = observer(true);
+        unknown.expect(None);
+        let elsewhere = Pose::new(0.5, 0.5, 1.0);
+        assert_eq!(unknown.off(&elsewhere), (Vec2::zeros(), 0.0));
+        assert!(observer(false).off(&elsewhere).0.norm() > 0.5);
     }
 
     #[test]

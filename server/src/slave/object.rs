@@ -16,6 +16,7 @@ use serde::{Deserialize, Serialize};
 
 use super::config::{SlaveConfig, SlaveError};
 use crate::contact::Contact;
+use crate::contact_prediction::{ContactPredictor, Expected};
 use crate::environment::SIDE_M;
 use crate::estimator::{Estimate, Estimator, EstimatorConfig, Measured, OBSTACLE_N, Seen};
 use crate::pose_observer::{ContactForce, ObserverConfig, PoseObserver};
@@ -24,6 +25,8 @@ use crate::pose_observer::{ContactForce, ObserverConfig, PoseObserver};
 pub(super) struct ObjectEstimate {
     pub(super) observer: PoseObserver,
     pub(super) estimator: Estimator,
+    /// Where the next contact of an object that is pushed slowly will be.
+    predictor: Option<ContactPredictor>,
     /// The last parameters that were accepted.
     pub(super) params: ModelParams,
     /// Estimates whose numbers were not accepted as parameters.
@@ -103,6 +106,7 @@ impl ObjectEstimate {
         Ok(Self {
             observer: PoseObserver::new(observer, pose, footprint),
             estimator: Estimator::new(&estimator, coupling, hand_force_max_n, tool_gives),
+            predictor: predictor(&observer),
             params,
             refused: 0,
             images_too_old: 0,
@@ -131,6 +135,11 @@ impl ObjectEstimate {
         self.found.insert(self.body, self.own());
         self.take_up(contact.body, contact.truth);
         true
+    }
+
+    /// The contact that is expected, or was before this one.
+    pub(super) fn expected(&self) -> Option<Expected> {
+        self.predictor.as_ref()?.expected()
     }
 
     /// Number of the body.
@@ -180,6 +189,7 @@ impl ObjectEstimate {
             self.tool_gives,
         );
         self.observer = PoseObserver::new(self.observer_config, pose, found.footprint);
+        self.predictor = predictor(&self.observer_config);
     }
 
     /// So many ticks, of which all but the last were missed; what the estimator was given. In those the tool and its force are
@@ -216,6 +226,11 @@ impl ObjectEstimate {
             contact.in_contact,
             &self.params,
         );
+        if let Some(predictor) = &mut self.predictor {
+            let touched = contact.in_contact.then_some(contact.force);
+            predictor.step(contact.tool, touched, observer.pose());
+            observer.expect(predictor.expected().filter(|_| !contact.in_contact));
+        }
         if let Some(vision) = contact.vision {
             self.images_too_old += u64::from(observer.is_too_old(&vision));
             observer.see(&vision);
@@ -266,6 +281,8 @@ impl ObjectEstimate {
             // a tool that may press no harder does not find out how hard the object is held
             Some(_) if estimate.sticking && held_back => OBSTACLE_N,
             Some(holding) => holding,
+            // before it slides it is as hard to push as expected
+            None if !estimate.excited => self.expected().map_or(estimate.c, |e| e.force.norm()),
             None => estimate.c,
         };
         let accepted = self.params_of(m, b, c, side);
@@ -278,6 +295,11 @@ impl ObjectEstimate {
         let e = friction_torque(c, self.observer.friction_radius());
         ModelParams::try_new(m, b, c, inertia_of_square(m, side), e, &self.coupling).ok()
     }
+}
+
+/// For an object that is pushed slowly.
+fn predictor(observer: &ObserverConfig) -> Option<ContactPredictor> {
+    observer.quasi_static.then(ContactPredictor::default)
 }
 
 /// Friction torque e (N m) of c (N) at the radius e/c (m), at most what is accepted. Damping resists turning too, so the radius of

@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use mmt_shared::model::geometry::{Vec2, wrap_angle};
+use mmt_shared::model::geometry::Vec2;
 use mmt_shared::model::local_model::LocalModel;
 
 use super::object::ObjectEstimate;
@@ -62,9 +62,13 @@ impl ForceReference {
         hip_stands: bool,
     ) -> TriggerInput {
         let (f_m, shadow_in_contact) = self.model_force(contact, shadow, held_back);
+        // the surface may be some tenths of a second away
+        let shadow_in_contact =
+            shadow_in_contact && (contact.in_contact || object.expected().is_none());
         let [f_s, f_m] = self.average([contact.force, f_m], contact.averaged);
         let estimate = object.estimator.estimate();
-        let (pose, model) = (object.observer.pose(), shadow.ahead().state());
+        let model = shadow.ahead().state();
+        let (shift, turn) = object.observer.off(&model.pose);
         TriggerInput {
             f_s,
             f_m,
@@ -83,9 +87,9 @@ impl ForceReference {
                 _ => estimate.force_deviation(),
             },
             params: object.params,
-            shift: pose.position - model.pose.position,
+            shift,
             shift_deviation: object.observer.deviation(),
-            turn: wrap_angle(pose.angle - model.pose.angle),
+            turn,
             turn_deviation: object.observer.angle_deviation(),
         }
     }

@@ -22,6 +22,8 @@ pub struct Errors {
     pub vector_median: Option<f64>,
     /// Its mean.
     pub vector_mean: Option<f64>,
+    /// Sum of |f_m − f_s| over that of |f_s|, over all milliseconds: what is felt before and after a contact counts too.
+    pub impulse_error: Option<f64>,
 }
 
 /// What a run has come to so far.
@@ -33,12 +35,18 @@ pub(super) struct Run {
     pub(super) sent: u64,
     /// The push, the error of |f| and that of f, of each millisecond of contact.
     errors: Vec<(usize, f64, f64)>,
+    /// Sums of |f_m − f_s| and of |f_s| over every millisecond, N.
+    sums: (f64, f64),
 }
 
 impl Run {
     /// Takes a millisecond at `t_s` of the recording, the force that was rendered for it (N), none if that is not known.
     pub(super) fn push(&mut self, course: &Course, t_s: f64, rendered: Option<Vec2>) {
         let f_s = course.force_at(t_s);
+        if let Some(f_m) = rendered {
+            self.sums.0 += (f_m - f_s).norm();
+            self.sums.1 += f_s.norm();
+        }
         let touches = self.contact.follow(&ReplayConfig::default(), f_s);
         let push = course.push_at(t_s).filter(|_| touches);
         let Some(push) = push else { return };
@@ -79,6 +87,7 @@ impl Run {
             force_median_of_pushes: median(of_push),
             vector_median: median(vector()),
             vector_mean: mean(vector()),
+            impulse_error: (self.sums.1 > 0.0).then(|| self.sums.0 / self.sums.1),
         }
     }
 }

@@ -31,6 +31,8 @@ const DEBOUNCE: Duration = Duration::from_millis(50);
 const MISMATCH_REPEAT: Duration = Duration::from_millis(400);
 /// (12) is judged by the means over so long: the ripple of the board is shorter.
 const JUDGED_OVER: Duration = Duration::from_millis(200);
+/// A contact that is expected is sent when the master's box is off by more, m: by a tenth of its half turned as well.
+const EXPECTED_M: f64 = 2e-3;
 /// How long the world goes on after the recording, for what is on its way.
 const AFTER: Duration = Duration::from_millis(600);
 
@@ -132,7 +134,7 @@ fn trigger(scheme: Scheme) -> TriggerConfig {
         },
         judged_over: JUDGED_OVER,
         judge_sticking: true,
-        free_space_error_m: 0.0,
+        free_space_error_m: EXPECTED_M,
         mismatch_debounce: DEBOUNCE,
         mismatch_repeat: MISMATCH_REPEAT,
         ..TriggerConfig::of_mode(Mode::Recommended)

@@ -8,8 +8,18 @@ use mmt_shared::recording::{FingerSample, ForceSample, Push};
 const WAY_M: (f64, f64) = (0.003, 0.010);
 const FINGER_M_PER_S: f64 = 0.0025;
 
-/// Pushes of a block of 0.1 m in x by `friction` (N) after an onset of 0.04 s, each from where the last one ended.
+/// Pushes at one point of the block.
 fn recording(pushes: u32, friction: impl Fn(u32) -> f64) -> Recording {
+    recording_along(pushes, friction, |_| 0.01)
+}
+
+/// Pushes of a block of 0.1 m in x by `friction` (N) after an onset of 0.04 s, each from where the last one ended, at a place
+/// along its west side, m.
+fn recording_along(
+    pushes: u32,
+    friction: impl Fn(u32) -> f64,
+    along: impl Fn(u32) -> f64,
+) -> Recording {
     let (air_s, end_s) = (
         WAY_M.0 / FINGER_M_PER_S,
         (WAY_M.0 + WAY_M.1) / FINGER_M_PER_S,
@@ -18,7 +28,7 @@ fn recording(pushes: u32, friction: impl Fn(u32) -> f64) -> Recording {
         let at = f64::from(n) * WAY_M.1;
         let finger = |t_s: f64| FingerSample {
             t_s,
-            pose: Pose::new(at - 0.05 - WAY_M.0 + t_s * FINGER_M_PER_S, 0.01, 0.0),
+            pose: Pose::new(at - 0.05 - WAY_M.0 + t_s * FINGER_M_PER_S, along(n), 0.0),
         };
         let force = |t_s: f64| ForceSample {
             t_s,
@@ -60,6 +70,34 @@ fn a_steady_friction_is_rendered_and_costs_less_than_to_hold_the_force() {
         assert!(report.sent < held.sent, "{} of {}", report.sent, held.sent);
         assert!((report.contact_s / 24.0 - 1.0).abs() < 0.05);
     }
+}
+
+#[test]
+fn a_side_that_earlier_pushes_have_shown_is_felt_without_the_round_trip() {
+    let course = Course::of(&recording_along(
+        10,
+        |_| 4.0,
+        |n| 0.01 * f64::from(n % 4) - 0.02,
+    ));
+    let delay = Duration::from_millis(250);
+    let mut late_s = vec![None; 10];
+    system::drive(&course, MMT, delay, |t_s, tick| {
+        let felt = tick.slave.as_ref().and_then(|slave| slave.f_m);
+        if let (Some(push), Some(force)) = (course.push_at(t_s), felt)
+            && force.x > 2.0
+        {
+            let touched_s = course.pushes[push].0 + WAY_M.0 / FINGER_M_PER_S;
+            late_s[push].get_or_insert(t_s - touched_s);
+        }
+    })
+    .unwrap();
+    let late_s: Vec<f64> = late_s.into_iter().flatten().collect();
+    assert!(late_s[0] > 0.5, "{late_s:?}");
+    // half of the force comes when the finger is at the side, to some tenths of a millimetre
+    assert!(
+        late_s[5..].iter().all(|late_s| late_s.abs() < 0.15),
+        "{late_s:?}"
+    );
 }
 
 #[test]
