@@ -1,7 +1,7 @@
 //! Where a tool will touch an object that is pushed slowly, and what force will meet it there: learned from the pushes before.
 //!
 //! Each push shows a point of the outline and, by how the object moved, what its support is. A tool that goes straight on at
-//! some mm/s then meets the nearest side where its way leads, and moves the touched point along with it; where that takes a
+//! some mm/s meets the side through which its way enters the object, and moves the touched point along with it; where that takes a
 //! force that the tool's friction does not bear, the tool slips along the side and the force is at the edge of the friction
 //! cone. Pure; it is given poses of the observer only, and must never use a force for the prediction of its own push.
 
@@ -122,16 +122,10 @@ impl Default for ContactPredictor {
 }
 
 impl ContactPredictor {
-    /// What will be touched, as far as that can be said; while something is touched what was expected before.
+    /// The contact that is to come; none where none can be predicted. In a contact it is the one that was predicted.
     #[must_use]
     pub fn expected(&self) -> Option<Expected> {
         self.expected
-    }
-
-    /// The support as the pushes so far have shown it.
-    #[must_use]
-    pub fn support(&self) -> &Support {
-        &self.support
     }
 
     /// One tick: the tool (m), the force on the object (N) if the tool touches it, and where the object is seen, which counts

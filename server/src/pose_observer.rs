@@ -149,10 +149,9 @@ impl PoseObserver {
     /// contact is expected.
     #[must_use]
     pub fn off(&self, pose: &Pose) -> (Vec2, f64) {
-        let wanted = match (&self.tracker, self.contact) {
-            (Tracker::Slow(slow), None) => slow.expected.unwrap_or(*pose),
-            _ => self.motion.pose,
-        };
+        let is_unknown = matches!((&self.tracker, self.contact), (Tracker::Slow(_), None));
+        let known = if is_unknown { *pose } else { self.motion.pose };
+        let wanted = self.expected().unwrap_or(known);
         let turn = wrap_angle(wanted.angle - pose.angle);
         (wanted.position - pose.position, turn)
     }

@@ -1,7 +1,6 @@
 //! The support of an object, fitted to the pushes so far.
 //!
-//! Its four numbers (c, e/c, centre) are found by
-//! Levenberg–Marquardt on the force vectors with a robust loss and a weak prior: the least of
+//! Its four numbers (c, e/c, centre) are found by Levenberg–Marquardt on the force vectors with a robust loss and a weak prior: the least of
 //! `Σ 2 k² (sqrt(1 + |f − f_law|²/k²) − 1) + k² Σ ((q − q_start)/sd)²`, q = (ln c, ln e/c, x, y). Fitted
 //! again after each push from where the last fit ended. It must never give a number that is not finite.
 

@@ -165,7 +165,7 @@ fn the_support_is_learned_whatever_it_is() {
     for n in 0..50 {
         bench.push(n);
     }
-    let support = bench.predictor.support();
+    let support = &bench.predictor.support;
     assert!((support.friction_n / 4.2 - 1.0).abs() < 0.05, "{support:?}");
     assert!((support.arm_m / 0.06 - 1.0).abs() < 0.15, "{support:?}");
     assert!((support.centre_m - TRUTH.centre_m).norm() < 3e-3);

@@ -313,6 +313,7 @@ fn friction_torque(c: f64, radius: f64) -> f64 {
 mod tests {
     use super::*;
     use crate::slave::StartModel;
+    use mmt_shared::model::geometry::Vec2;
 
     #[test]
     fn the_friction_torque_of_what_stands_is_accepted_however_large_the_radius_was_learned() {
@@ -320,6 +321,45 @@ mod tests {
         let coupling = Coupling::for_stiffness(1000.0);
         let e = friction_torque(OBSTACLE_N, 3.0);
         assert!(ModelParams::try_new(1.0, 3.0, OBSTACLE_N, 0.02, e, &coupling).is_ok());
+    }
+
+    #[test]
+    fn what_pushes_of_one_body_have_shown_predicts_no_contact_with_another() {
+        let config = SlaveConfig {
+            estimator: Some(EstimatorConfig::QuasiStatic(Default::default())),
+            ..SlaveConfig::of_mode(Mode::Recommended)
+        };
+        let coupling = Coupling::for_stiffness(1000.0);
+        let mut object =
+            ObjectEstimate::try_new(&config, coupling, Pose::default(), Vec::new()).unwrap();
+        let fresh = format!("{:?}", object.predictor);
+        let push = Contact {
+            force: Vec2::new(4.0, 0.0),
+            in_contact: true,
+            ..contact_with(0)
+        };
+        object.step(Time::from_millis(1), 1, &push, false);
+        assert_ne!(format!("{:?}", object.predictor), fresh);
+        assert!(!object.follow_body(&push));
+        assert!(object.follow_body(&contact_with(1)));
+        assert_eq!(format!("{:?}", object.predictor), fresh);
+    }
+
+    fn contact_with(body: usize) -> Contact {
+        let none = Vec2::zeros();
+        Contact {
+            tool: none,
+            back: none,
+            force: none,
+            steady: none,
+            noise_n: 0.0,
+            in_contact: false,
+            averaged: 1,
+            vision: None,
+            true_force: none,
+            truth: Pose::default(),
+            body,
+        }
     }
 
     /// What becomes of an estimate of m (kg), b (N s/m) and 5 N of friction, or of `holding` N that hold the object.

@@ -31,7 +31,7 @@ const DEBOUNCE: Duration = Duration::from_millis(50);
 const MISMATCH_REPEAT: Duration = Duration::from_millis(400);
 /// (12) is judged by the means over so long: the ripple of the board is shorter.
 const JUDGED_OVER: Duration = Duration::from_millis(200);
-/// A contact that is expected is sent when the master's box is off by more, m: by a tenth of its half turned as well.
+/// The box of a contact that is expected is sent where the master's is off by more, m; one turned by 0.1 rad is off by this.
 const EXPECTED_M: f64 = 2e-3;
 /// How long the world goes on after the recording, for what is on its way.
 const AFTER: Duration = Duration::from_millis(600);
