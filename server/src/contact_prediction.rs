@@ -122,6 +122,15 @@ impl Default for ContactPredictor {
 }
 
 impl ContactPredictor {
+    /// One that has learned nothing and expects this.
+    #[cfg(test)]
+    pub(crate) fn expecting(expected: Expected) -> Self {
+        Self {
+            expected: Some(expected),
+            ..Self::default()
+        }
+    }
+
     /// The contact that is to come; none where none can be predicted. In a contact it is the one that was predicted.
     #[must_use]
     pub fn expected(&self) -> Option<Expected> {

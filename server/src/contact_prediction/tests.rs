@@ -11,7 +11,7 @@ const TRUTH: Support = Support {
     centre_m: Vec2::new(0.004, -0.003),
 };
 /// Half of the finger's friction cone, rad.
-const FRICTION_RAD: f64 = 0.35;
+const FRICTION_RAD: f64 = 0.25;
 /// The finger is so far from the side where a push begins, m.
 const AIR_M: f64 = 0.004;
 
@@ -264,6 +264,16 @@ fn a_line_across_a_corner_is_no_side_and_an_outline_needs_no_corners() {
     // two touches, one on each of two sides
     let corner = [touch(-0.05, 0.0, east), touch(0.0, -0.05, north)];
     assert_eq!(outline::sides(&corner), []);
+    // two rows of touches: what has touches beyond it is no side
+    let rows = [-0.05, -0.02].map(|x| [-0.02, 0.0, 0.02].map(|y| touch(x, y, east)));
+    let sides = outline::sides(rows.as_flattened());
+    assert_eq!(sides.len(), 1, "{sides:?}");
+    let enters = |y: f64| outline::ahead(&sides, Vec2::new(-0.06, y), east);
+    assert!((enters(0.06).unwrap().0 - 0.01).abs() < 1e-9);
+    assert!(
+        enters(0.08).is_none(),
+        "nobody knows how far the side goes on"
+    );
     // a round body: short lines all round it, none of which cuts off more than a touch is known to
     let round: Vec<Touch> = (0..40)
         .map(|k| rotate(0.157 * f64::from(k), east))

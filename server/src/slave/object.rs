@@ -325,24 +325,54 @@ mod tests {
 
     #[test]
     fn what_pushes_of_one_body_have_shown_predicts_no_contact_with_another() {
-        let config = SlaveConfig {
-            estimator: Some(EstimatorConfig::QuasiStatic(Default::default())),
-            ..SlaveConfig::of_mode(Mode::Recommended)
-        };
-        let coupling = Coupling::for_stiffness(1000.0);
-        let mut object =
-            ObjectEstimate::try_new(&config, coupling, Pose::default(), Vec::new()).unwrap();
+        let mut object = pushed_slowly();
         let fresh = format!("{:?}", object.predictor);
-        let push = Contact {
-            force: Vec2::new(4.0, 0.0),
-            in_contact: true,
-            ..contact_with(0)
-        };
+        let push = contact_under(4.0);
         object.step(Time::from_millis(1), 1, &push, false);
         assert_ne!(format!("{:?}", object.predictor), fresh);
         assert!(!object.follow_body(&push));
         assert!(object.follow_body(&contact_with(1)));
         assert_eq!(format!("{:?}", object.predictor), fresh);
+    }
+
+    #[test]
+    fn until_it_slides_an_object_is_as_hard_to_push_as_was_expected() {
+        let mut object = pushed_slowly();
+        object.step(Time::from_millis(1), 1, &contact_under(1.5), false);
+        assert_eq!(object.params.c(), StartModel::default().friction_n);
+        object.predictor = Some(ContactPredictor::expecting(Expected {
+            point: Vec2::zeros(),
+            force: Vec2::new(0.0, 2.5),
+        }));
+        object.step(Time::from_millis(2), 1, &contact_under(1.5), false);
+        assert_eq!(object.params.c(), 2.5);
+        // 2 mm later it slides, and the measured force counts
+        let slid = Contact {
+            tool: Vec2::new(0.002, 0.0),
+            ..contact_under(1.5)
+        };
+        object.step(Time::from_millis(3), 1, &slid, false);
+        assert_eq!(object.params.c(), 1.5);
+    }
+
+    fn pushed_slowly() -> ObjectEstimate {
+        let config = SlaveConfig {
+            estimator: Some(EstimatorConfig::QuasiStatic(Default::default())),
+            ..SlaveConfig::of_mode(Mode::Recommended)
+        };
+        let coupling = Coupling::for_stiffness(1000.0);
+        ObjectEstimate::try_new(&config, coupling, Pose::default(), Vec::new()).unwrap()
+    }
+
+    /// A contact under so many N along x.
+    fn contact_under(force_n: f64) -> Contact {
+        let force = Vec2::new(force_n, 0.0);
+        Contact {
+            force,
+            steady: force,
+            in_contact: true,
+            ..contact_with(0)
+        }
     }
 
     fn contact_with(body: usize) -> Contact {

@@ -2,6 +2,7 @@
 
 use super::*;
 use mmt_shared::model::geometry::{Pose, Vec2};
+use mmt_shared::model::update::Cause;
 use mmt_shared::recording::{FingerSample, ForceSample, Push};
 
 /// How far the finger goes in the air and at the block, m.
@@ -80,9 +81,15 @@ fn a_side_that_earlier_pushes_have_shown_is_felt_without_the_round_trip() {
         |n| 0.01 * f64::from(n % 4) - 0.02,
     ));
     let delay = Duration::from_millis(250);
-    let mut late_s = vec![None; 10];
+    let (mut late_s, mut refuted) = (vec![None; 10], 0);
     system::drive(&course, MMT, delay, |t_s, tick| {
         let felt = tick.slave.as_ref().and_then(|slave| slave.f_m);
+        let cause = tick
+            .slave
+            .as_ref()
+            .and_then(|slave| slave.update)
+            .map(|update| update.cause);
+        refuted += usize::from(cause == Some(Cause::MasterOnlyContact));
         if let (Some(push), Some(force)) = (course.push_at(t_s), felt)
             && force.x > 2.0
         {
@@ -93,6 +100,7 @@ fn a_side_that_earlier_pushes_have_shown_is_felt_without_the_round_trip() {
     .unwrap();
     let late_s: Vec<f64> = late_s.into_iter().flatten().collect();
     assert!(late_s[0] > 0.5, "{late_s:?}");
+    assert_eq!(refuted, 0, "what is felt a little too early is no mismatch");
     // half of the force comes when the finger is at the side, to some tenths of a millimetre
     assert!(
         late_s[5..].iter().all(|late_s| late_s.abs() < 0.15),
@@ -159,6 +167,12 @@ fn a_held_force_is_sent_when_it_is_off_and_once_when_contact_ends() {
         "{report:?}"
     );
     assert_eq!(report.errors.force_median, Some(0.0));
+    // over all of the time: a tick late at each change, and 0.2 N to the end that no contact is
+    let (began_s, _) = course.pushes[0];
+    let rest = 0.2 * (course.duration_s() - began_s - 1.3) * 1e3;
+    let (error, all) = (1.0 + 100.0 * 0.05 + 0.2 + 1.0 + rest, 100.0 * 3.25 + rest);
+    let impulse_error = report.errors.impulse_error.unwrap();
+    assert!((impulse_error - error / all).abs() < 2e-3, "{report:?}");
     // a round trip late, nothing is felt of so short a touch
     let late = held(0.10, 250).report("hold", String::new(), 250);
     assert_eq!(late.errors.force_median, Some(1.0));
