@@ -6,7 +6,7 @@
 use mmt_shared::channel::datagram_channel::DatagramChannel;
 use mmt_shared::channel::peer::{Freshness, Loss, NumbersSpent, SequenceWindow};
 use mmt_shared::model::contact::Coupling;
-use mmt_shared::model::geometry::{BoxFootprint, Pose};
+use mmt_shared::model::geometry::{BoxFootprint, Pose, Vec2};
 use mmt_shared::model::params::ModelState;
 use mmt_shared::model::tool::Scene;
 use mmt_shared::model::update::{Cause, Update};
@@ -37,7 +37,7 @@ pub struct ObserverLive {
     pub footprint: Option<BoxFootprint>,
     /// m, b, c of the newest update.
     pub params: [f64; 3],
-    /// Whether the tool touched the object at the newest update.
+    /// Whether the tool touched the object at the newest update or scene.
     pub in_contact: bool,
     /// The remote scene as it last came.
     pub scene: Option<Scene>,
@@ -111,6 +111,7 @@ impl ObserverEnd {
             Message::Update(update) => self.handle_update(&update),
             Message::Scene(scene) if received.is_newest => {
                 (self.scene, self.scene_at) = (Some(scene), at);
+                self.in_contact = scene.force != Vec2::zeros();
             }
             Message::Scene(_) | Message::Tool(_) => self.messages_overtaken += 1,
             Message::Command(_) | Message::Heartbeat => {}

@@ -334,7 +334,11 @@ impl Slave {
             answers: tick.stamp,
             object: self.object.observer.pose(),
             tool: tick.tool,
-            force: tick.f_s,
+            force: if tick.in_contact {
+                tick.f_s
+            } else {
+                Vec2::zeros()
+            },
         }
     }
 }

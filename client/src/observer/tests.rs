@@ -49,11 +49,15 @@ impl Slave {
     }
 
     fn scene(&mut self, now: Time, tool_x: f64) -> Vec<u8> {
+        self.scene_with(now, tool_x, Vec2::zeros())
+    }
+
+    fn scene_with(&mut self, now: Time, tool_x: f64, force: Vec2) -> Vec<u8> {
         let scene = Scene {
             answers: AT(9),
             object: Pose::default(),
             tool: Vec2::new(tool_x, 0.0),
-            force: Vec2::zeros(),
+            force,
         };
         self.say(now, Message::Scene(scene))
     }
@@ -142,6 +146,18 @@ fn the_newest_scene_is_shown_with_its_age_and_an_older_one_never() {
     assert_eq!(live.scene.unwrap().tool.x, 2.0);
     let age = Duration::from_secs_f64(live.scene_age_s.unwrap());
     assert_eq!(age, Duration::from_millis(250));
+}
+
+#[test]
+fn contact_ends_and_begins_for_an_observer_with_the_scene_without_any_update() {
+    let (mut slave, mut observer) = (Slave::new(), observer());
+    observer.handle_datagram(AT(1), &slave.update(1, Cause::Timer, 0.5));
+    assert!(observer.live(AT(2)).in_contact, "the update's");
+    observer.handle_datagram(AT(3), &slave.scene(AT(3), 1.0));
+    assert!(!observer.live(AT(4)).in_contact);
+    let touching = slave.scene_with(AT(5), 1.0, Vec2::new(0.2, 0.0));
+    observer.handle_datagram(AT(5), &touching);
+    assert!(observer.live(AT(6)).in_contact);
 }
 
 #[test]

@@ -24,13 +24,14 @@ const CURVES: [Curve; 3] = [Curve::Deadband, Curve::Hybrid(50), Curve::Hybrid(15
 
 /// Other choices than [`READINGS`], made otherwise.
 #[rustfmt::skip]
-static VARIANTS: [Variant; 13] = [
+static VARIANTS: [Variant; 14] = [
     ("as stated", |_| {}),
     ("window 100 ms", |world| paper_estimator(world, |paper| paper.window_s = 0.1)),
     ("window 500 ms", |world| paper_estimator(world, |paper| paper.window_s = 0.5)),
     ("window 1 s", |world| paper_estimator(world, |paper| paper.window_s = 1.0)),
     ("rows x and y stacked", |world| paper_estimator(world, |paper| paper.rows = Rows::Stacked)),
     ("standstill left out", |world| paper_estimator(world, |paper| paper.leave_out_standstill = true)),
+    ("an update when contact ends", |world| world.slave.trigger.contact_lost = true),
     ("timer in contact only", |world| world.slave.trigger.timer_in_free_space = false),
     ("sticking is no mismatch", |world| world.slave.trigger.judge_sticking = false),
     ("no sensor noise", |world| noise(world, 0.0)),

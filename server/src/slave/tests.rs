@@ -260,6 +260,29 @@ fn a_fixed_body_is_pushed_with_no_more_than_the_tools_limit_and_stays() {
     }
 }
 
+/// The largest force (N) that a viewer is shown of a tool that stands at `hip` (m) for half a second, and the largest measured one.
+fn shown_and_measured(hip: Vec2) -> (f64, f64) {
+    let mut driven = Driven::new(Mode::Recommended, vec![cube(0.0, 0.7, false)]);
+    let (mut shown_n, mut measured_n) = (0.0_f64, 0.0_f64);
+    for _ in 0..500 {
+        driven.take(hip);
+        let Some(tick) = driven.slave.tick(driven.now) else {
+            continue;
+        };
+        shown_n = shown_n.max(driven.slave.scene(&tick).force.norm());
+        measured_n = measured_n.max(tick.f_s.norm());
+    }
+    (shown_n, measured_n)
+}
+
+#[test]
+fn a_viewer_is_shown_the_force_of_contact_and_no_noise_without_it() {
+    let (shown_n, measured_n) = shown_and_measured(Vec2::new(-0.3, 0.0));
+    assert!(shown_n == 0.0 && measured_n > 0.0, "{measured_n} N");
+    let (shown_n, _) = shown_and_measured(Vec2::new(-0.178, 0.0));
+    assert!(shown_n > 0.5, "{shown_n} N");
+}
+
 /// Largest force (N) of a tool whose HIP stays at `hip` from the start, over a second, and where it is at last.
 fn pressed(hip: Vec2) -> (f64, Vec2) {
     let coupling = Coupling::for_stiffness(1000.0);

@@ -43,6 +43,9 @@ pub struct TriggerConfig {
     /// An object that nobody touches and that is this much away from where the model has it is sent, m, if that is beyond the
     /// noise of the images; 0: only contact is sent, as in the paper.
     pub free_space_error_m: f64,
+    /// Whether the end of a contact is sent by itself. Default off: section III-A does not name it, both sides see it, and
+    /// where they differ that is a contact mismatch.
+    pub contact_lost: bool,
     /// How long only one side must be in contact before it counts.
     pub mismatch_debounce: Duration,
     /// How often a contact mismatch that lasts is sent again, and an untouched object that is elsewhere.
@@ -70,6 +73,7 @@ impl TriggerConfig {
             force_floor_n,
             judge_sticking,
             free_space_error_m,
+            contact_lost: false,
             mismatch_debounce: Duration::from_millis(10),
             mismatch_repeat: Duration::from_millis(50),
             contact: ContactConfig::default(),

@@ -2,8 +2,9 @@
 //!
 //! Pure, and only of what it is given. Rules that the paper leaves open: (12) is evaluated while both
 //! sides are in contact, with the force divided by no less than a floor; a contact that only one side has
-//! counts after a debounce and is sent again at intervals, not at every sample, and ever more rarely while the HIP stands; a
-//! lost contact is sent once. Every update, whatever its cause, resets the timer.
+//! counts after a debounce and is sent again at intervals, not at every sample, and ever more rarely while the HIP stands.
+//! The end of a contact, which III-A does not name, is sent once, and only if that is asked for. Every update, whatever its
+//! cause, resets the timer.
 
 mod config;
 mod contact;
@@ -119,8 +120,8 @@ impl Trigger {
         self.decide(now, input, |own| own.due(now, input))
     }
 
-    /// The same under a scheme of somebody else's, whose answer to this input is `asked`. A contact that only one side has, or
-    /// that has ended, and what was lost are sent as under every scheme, and come before it.
+    /// The same under a scheme of somebody else's, whose answer to this input is `asked`. A contact that only one side has, or,
+    /// where that is sent, that has ended, and what was lost are sent as under every scheme, and come before it.
     pub fn step_by(
         &mut self,
         now: Time,
@@ -155,9 +156,9 @@ impl Trigger {
         cause
     }
 
-    /// Contact that only one side has (III-A cases 1 and 2), and contact that has ended.
+    /// Contact that only one side has (III-A cases 1 and 2), and where it is sent, contact that has ended.
     fn geometry(&mut self, now: Time, input: &TriggerInput) -> Option<Cause> {
-        let lost = self.was_in_contact && !input.slave_in_contact;
+        let lost = self.config.contact_lost && self.was_in_contact && !input.slave_in_contact;
         self.was_in_contact = input.slave_in_contact;
         let cause = match (input.shadow_in_contact, input.slave_in_contact) {
             (true, false) => Some(Cause::MasterOnlyContact),

@@ -182,19 +182,27 @@ fn a_contact_of_one_side_that_lasts_while_the_hip_stands_is_sent_ever_more_rarel
 }
 
 #[test]
-fn a_lost_contact_is_sent_once() {
-    let mut trigger = trigger("deadband 10%", Mode::Recommended);
+fn the_end_of_a_contact_is_sent_once_and_only_if_that_is_asked_for() {
     let free = TriggerInput {
         slave_in_contact: false,
         shadow_in_contact: false,
         ..input(0.0, 0.0)
     };
-    assert_eq!(trigger.step(Time::ZERO, &input(2.0, 2.0)), None);
-    assert_eq!(
-        trigger.step(Time::from_millis(1), &free),
-        Some(Cause::ContactLost)
-    );
-    assert_eq!(trigger.step(Time::from_millis(2), &free), None);
+    for mode in [Mode::Paper, Mode::Recommended] {
+        for contact_lost in [TriggerConfig::of_mode(mode).contact_lost, true] {
+            let mut trigger = Trigger::new(TriggerConfig {
+                scheme: "deadband 10%".parse().unwrap(),
+                contact_lost,
+                ..TriggerConfig::of_mode(mode)
+            });
+            assert_eq!(trigger.step(Time::ZERO, &input(2.0, 2.0)), None);
+            let sent = contact_lost.then_some(Cause::ContactLost);
+            assert_eq!(trigger.step(Time::from_millis(1), &free), sent, "{mode:?}");
+            assert_eq!(trigger.step(Time::from_millis(2), &free), None, "{mode:?}");
+        }
+        // III-A names three mismatches, and this is none of them
+        assert!(!TriggerConfig::of_mode(mode).contact_lost, "{mode:?}");
+    }
 }
 
 #[test]
@@ -309,7 +317,11 @@ fn what_was_lost_is_said_again_once_at_once_and_under_every_scheme() {
 
 #[test]
 fn a_scheme_of_somebody_else_decides_alone_but_for_contact_and_loss() {
-    let mut trigger = trigger("every-sample", Mode::Paper);
+    let mut trigger = Trigger::new(TriggerConfig {
+        scheme: Scheme::EverySample,
+        contact_lost: true,
+        ..TriggerConfig::of_mode(Mode::Paper)
+    });
     let mut at = (0..).map(Time::from_millis);
     let mut now = || at.next().unwrap();
     let (alike, asked) = (input(2.0, 2.0), Some(Cause::Deadband));

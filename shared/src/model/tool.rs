@@ -37,6 +37,6 @@ pub struct Scene {
     pub object: Pose,
     /// The tool, m.
     pub tool: Vec2,
-    /// Measured contact force f_s on the object, N.
+    /// Measured contact force f_s on the object, N; zero where the tool does not touch it.
     pub force: Vec2,
 }
