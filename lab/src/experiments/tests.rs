@@ -225,7 +225,7 @@ fn ablation_without_a_timer_in_free_space_sends_less() {
         done.number("ablation.csv", &wanted, "rate_30")
     };
     assert!(rate("timer in contact only") < 0.8 * rate("as stated"));
-    assert_eq!(done.rows("ablation.csv", &[]).len(), 18 * 3);
+    assert_eq!(done.rows("ablation.csv", &[]).len(), 19 * 3);
 }
 
 #[test]

@@ -135,6 +135,8 @@ fn trigger(scheme: Scheme) -> TriggerConfig {
         judged_over: JUDGED_OVER,
         judge_sticking: true,
         free_space_error_m: EXPECTED_M,
+        // what the last instants of a push taught comes with its end: a place that is off by less than 2 mm sends nothing
+        contact_lost: true,
         mismatch_debounce: DEBOUNCE,
         mismatch_repeat: MISMATCH_REPEAT,
         ..TriggerConfig::of_mode(Mode::Recommended)
