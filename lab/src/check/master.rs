@@ -13,7 +13,10 @@ use mmt_shared::model::settings::ModelSettings;
 use mmt_shared::time::{TICK, Time};
 use mmt_shared::wire::{Command, Datagram, Message, Side};
 
+mod accepted;
 mod hand;
+
+use accepted::Accepted;
 
 use super::both::Totals;
 use super::channel::ChannelChecks;
@@ -88,11 +91,9 @@ pub struct MasterChecks {
     link: LinkState,
     /// Since the last tick.
     arrived: Vec<Arrived>,
-    accepted: u32,
+    accepted: Accepted,
     /// The last sequence that was too far ahead.
     far: u32,
-    /// One that came in the hair's breadth between.
-    unsure: u32,
     applied: u32,
     samples: VecDeque<HipSample>,
     stamps: VecDeque<Time>,
@@ -116,9 +117,8 @@ impl MasterChecks {
             ended: false,
             link: LinkState::Fresh,
             arrived: Vec::new(),
-            accepted: 0,
+            accepted: Accepted::default(),
             far: 0,
-            unsure: 0,
             applied: 0,
             samples: VecDeque::new(),
             stamps: VecDeque::new(),
@@ -167,15 +167,15 @@ impl MasterChecks {
             });
         }
         if sure {
-            self.accepted = update.sequence;
+            self.accepted.accepts(update.sequence);
         } else if silence < STALE && !path.is_some_and(too_old) {
-            self.unsure = update.sequence;
+            self.accepted.may_accept(update.sequence);
         }
     }
 
     /// Whether an update may be applied by its sequence: beyond the newest, and either near it or not alone there.
     fn is_fresh(&mut self, sequence: u32) -> bool {
-        let ahead = sequence.saturating_sub(self.accepted);
+        let ahead = sequence.saturating_sub(self.accepted.newest());
         let is_alone = ahead >= WINDOW && sequence.abs_diff(self.far) >= WINDOW;
         if is_alone {
             self.far = sequence;
@@ -311,16 +311,12 @@ impl MasterChecks {
     }
 
     fn commanded(&mut self, at: Time, command: &Command) {
-        if command.newest_update == self.unsure {
-            self.accepted = self.accepted.max(self.unsure);
-        }
-        let (newest, accepted) = (command.newest_update, self.accepted);
-        self.verdict
-            .judge(Invariant::Acknowledged, at, newest == accepted, || {
-                format!(
-                    "update {newest} is acknowledged, {accepted} is the newest that was accepted"
-                )
-            });
+        let newest = command.newest_update;
+        let holds = self.accepted.is_acknowledged(newest);
+        let accepted = self.accepted.newest();
+        self.verdict.judge(Invariant::Acknowledged, at, holds, || {
+            format!("update {newest} is acknowledged, {accepted} is the newest that was accepted")
+        });
         let samples = command.samples.as_slice();
         let holds =
             !samples.is_empty() && samples.iter().all(|sample| self.samples.contains(sample));
