@@ -191,7 +191,7 @@ fn the_end_of_a_contact_is_sent_once_and_only_if_that_is_asked_for() {
     for mode in [Mode::Paper, Mode::Recommended] {
         for contact_lost in [TriggerConfig::of_mode(mode).contact_lost, true] {
             let mut trigger = Trigger::new(TriggerConfig {
-                scheme: "deadband 10%".parse().unwrap(),
+                scheme: Scheme::Deadband { delta: 0.10 },
                 contact_lost,
                 ..TriggerConfig::of_mode(mode)
             });

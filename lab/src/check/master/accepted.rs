@@ -4,7 +4,7 @@
 #[derive(Clone, Debug, Default)]
 pub(super) struct Accepted {
     newest: u32,
-    /// Newer ones that came in the hair's breadth between: whether they were accepted is the end's own business.
+    /// Newer ones that may have been accepted: the datagrams alone do not show it.
     unsure: Vec<u32>,
 }
 
@@ -25,7 +25,8 @@ impl Accepted {
         self.unsure.push(sequence);
     }
 
-    /// A command acknowledges this one, and so tells whether it was accepted. Returns whether it is the newest that was.
+    /// The end sends a command that acknowledges this one. If it may have been accepted, it was. Returns whether it is the
+    /// newest that was accepted.
     pub(super) fn is_acknowledged(&mut self, sequence: u32) -> bool {
         if self.unsure.contains(&sequence) {
             self.accepts(sequence);
@@ -39,7 +40,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn any_update_of_the_hairs_breadth_may_be_the_newest_that_was_accepted_and_no_other() {
+    fn any_update_that_may_have_been_accepted_may_be_acknowledged_and_no_other() {
         let mut accepted = Accepted::default();
         accepted.accepts(1);
         (2..=5).for_each(|sequence| accepted.may_accept(sequence));
