@@ -1,7 +1,7 @@
 //! How the centre moves while the tool touches: with the plane of the face, and along it.
 
 use mmt_shared::model::dynamics::Motion;
-use mmt_shared::model::geometry::{Face, Vec2};
+use mmt_shared::model::geometry::{Face, Vec2, rotate};
 use mmt_shared::model::params::ModelParams;
 use mmt_shared::time::TICK_S;
 
@@ -26,6 +26,22 @@ impl PoseObserver {
             } else {
                 change
             };
+        }
+    }
+
+    /// Moves the centre along the face until `surface`, where the tool touches it, lies between the face's ends: the model is
+    /// to be where the tool has contact (III-A, case 2). Images do so where there are any.
+    pub(super) fn reach_along(&mut self, face: Face, surface: Vec2) {
+        if self.config.learn {
+            return;
+        }
+        let pose = &mut self.motion.pose;
+        let touched = pose.point_to_object(surface);
+        for beside in Face::ALL {
+            let beyond = self.faces.footprint.distance(beside, touched);
+            if beside.outward().dot(&face.outward()) == 0.0 && beyond > 0.0 {
+                pose.position += rotate(pose.angle, beside.outward()) * beyond;
+            }
         }
     }
 

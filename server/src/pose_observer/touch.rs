@@ -52,6 +52,7 @@ impl PoseObserver {
             }
             self.slide_along(inward, params);
             self.follow_plane(face, inward, surface);
+            self.reach_along(face, surface);
         }
         if let Tracker::Tangent(tangent) = &mut self.tracker {
             tangent.touch(self.motion.twist.angular);
