@@ -7,7 +7,8 @@ use std::collections::BTreeMap;
 use mmt_shared::model::contact::Coupling;
 use mmt_shared::model::geometry::{BoxFootprint, Pose};
 use mmt_shared::model::params::{
-    FRICTION_TORQUE_NM, ModelParams, inertia_of_square, least_stable_mass,
+    FRICTION_TORQUE_NM, ModelParams, friction_torque_of_square, inertia_of_square,
+    least_stable_mass,
 };
 use mmt_shared::model::settings::Mode;
 use mmt_shared::range::in_range;
@@ -258,7 +259,8 @@ impl ObjectEstimate {
     /// Takes m (kg), b (N s/m) and c (N) of somebody else's in the place of the estimator's, if they are accepted.
     pub(super) fn replace(&mut self, [m, b, c]: [f64; 3]) {
         let side = self.observer.footprint().mean_side();
-        self.take(self.params_of(m, b, c, side));
+        let radius = self.observer.friction_radius();
+        self.take(self.params_of(m, b, c, side, radius));
     }
 
     fn take(&mut self, params: Option<ModelParams>) {
@@ -285,14 +287,20 @@ impl ObjectEstimate {
             None if !estimate.excited => self.expected().map_or(estimate.c, |e| e.force.norm()),
             None => estimate.c,
         };
-        let accepted = self.params_of(m, b, c, side);
+        let radius = match estimate.holding {
+            // how an object turns that slides says nothing of one that is held: (9)
+            Some(_) => friction_torque_of_square(1.0, side),
+            None => self.observer.friction_radius(),
+        };
+        let accepted = self.params_of(m, b, c, side, radius);
         // an object that is held is held whatever m and b come out as
         let held = estimate.holding.and(Some(&self.params));
-        accepted.or_else(|| self.params_of(held?.m(), held?.b(), c, side))
+        accepted.or_else(|| self.params_of(held?.m(), held?.b(), c, side, radius))
     }
 
-    fn params_of(&self, m: f64, b: f64, c: f64, side: f64) -> Option<ModelParams> {
-        let e = friction_torque(c, self.observer.friction_radius());
+    /// The parameters of an object that turns as one does whose friction has this radius e/c, m; none if they are not accepted.
+    fn params_of(&self, m: f64, b: f64, c: f64, side: f64, radius: f64) -> Option<ModelParams> {
+        let e = friction_torque(c, radius);
         ModelParams::try_new(m, b, c, inertia_of_square(m, side), e, &self.coupling).ok()
     }
 }
@@ -303,7 +311,7 @@ fn predictor(observer: &ObserverConfig) -> Option<ContactPredictor> {
 }
 
 /// Friction torque e (N m) of c (N) at the radius e/c (m), at most what is accepted. Damping resists turning too, so the radius of
-/// an object that slides with next to no friction is large; where it then stands against a wall, c is [`OBSTACLE_N`].
+/// an object that slides with next to no friction is large, and another c may come beside it.
 fn friction_torque(c: f64, radius: f64) -> f64 {
     let (least, most) = FRICTION_TORQUE_NM;
     (c * radius).clamp(least, most)

@@ -5,11 +5,25 @@ use crate::slave::StartModel;
 use mmt_shared::model::geometry::Vec2;
 
 #[test]
-fn the_friction_torque_of_what_stands_is_accepted_however_large_the_radius_was_learned() {
+fn the_friction_torque_is_accepted_however_large_the_radius_was_learned() {
     assert_eq!(friction_torque(2.0, 0.15), 0.3);
     let coupling = Coupling::for_stiffness(1000.0);
     let e = friction_torque(OBSTACLE_N, 3.0);
     assert!(ModelParams::try_new(1.0, 3.0, OBSTACLE_N, 0.02, e, &coupling).is_ok());
+}
+
+#[test]
+fn what_is_held_turns_by_9_however_it_turned_where_it_slid() {
+    let object = pushed_slowly();
+    let slides = *object.estimator.estimate();
+    let held = Estimate {
+        holding: Some(20.0),
+        ..slides
+    };
+    let e_of = |estimate| object.accept(&estimate, 0.4, false).unwrap().e();
+    let radius = object.observer.friction_radius();
+    assert_eq!(e_of(slides), object.params.c() * radius);
+    assert_eq!(e_of(held), friction_torque_of_square(20.0, 0.4));
 }
 
 #[test]
