@@ -288,7 +288,7 @@ impl ObjectEstimate {
             None => estimate.c,
         };
         let radius = match estimate.holding {
-            // how an object turns that slides says nothing of one that is held: (9)
+            // (9): the radius was learned while the object slid, and now something holds it
             Some(_) => friction_torque_of_square(1.0, side),
             None => self.observer.friction_radius(),
         };

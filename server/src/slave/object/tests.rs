@@ -63,8 +63,13 @@ fn pushed_slowly() -> ObjectEstimate {
         estimator: Some(EstimatorConfig::QuasiStatic(Default::default())),
         ..SlaveConfig::of_mode(Mode::Recommended)
     };
-    let coupling = Coupling::for_stiffness(1000.0);
-    ObjectEstimate::try_new(&config, coupling, Pose::default(), Vec::new()).unwrap()
+    object_of(&config, 1000.0)
+}
+
+/// At the prior, for a device that renders `k_p` (N/m).
+fn object_of(config: &SlaveConfig, k_p: f64) -> ObjectEstimate {
+    let coupling = Coupling::for_stiffness(k_p);
+    ObjectEstimate::try_new(config, coupling, Pose::default(), Vec::new()).unwrap()
 }
 
 /// A contact under so many N along x.
@@ -97,9 +102,7 @@ fn contact_with(body: usize) -> Contact {
 
 /// What becomes of an estimate of m (kg), b (N s/m) and 5 N of friction, or of `holding` N that hold the object.
 fn accepted(mode: Mode, k_p: f64, [m, b]: [f64; 2], holding: Option<f64>) -> Option<ModelParams> {
-    let coupling = Coupling::for_stiffness(k_p);
-    let config = SlaveConfig::of_mode(mode);
-    let object = ObjectEstimate::try_new(&config, coupling, Pose::default(), Vec::new()).unwrap();
+    let object = object_of(&SlaveConfig::of_mode(mode), k_p);
     let estimate = Estimate {
         m,
         b,
