@@ -17,17 +17,17 @@ pub(super) struct Past {
     pub(super) contact: Option<ContactFrame>,
 }
 
-/// A ring of ticks.
+/// A ring of ticks. It is on the heap: it is far larger than all else that a session holds on its stack.
 #[derive(Clone, Debug)]
 pub(super) struct PastPoses {
-    ring: [Past; TICKS],
+    ring: Box<[Past; TICKS]>,
     next: usize,
 }
 
 impl Default for PastPoses {
     fn default() -> Self {
         Self {
-            ring: [Past::default(); TICKS],
+            ring: Box::new([Past::default(); TICKS]),
             next: 0,
         }
     }
