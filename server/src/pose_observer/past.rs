@@ -17,7 +17,7 @@ pub(super) struct Past {
     pub(super) contact: Option<ContactFrame>,
 }
 
-/// A ring of ticks. It is on the heap: it is far larger than all else that a session holds on its stack.
+/// A ring of ticks. It is on the heap: it is larger than all the rest of a slave.
 #[derive(Clone, Debug)]
 pub(super) struct PastPoses {
     ring: Box<[Past; TICKS]>,
