@@ -11,6 +11,7 @@ mod tests;
 
 use mmt_shared::model::contact::Coupling;
 use mmt_shared::model::geometry::{Pose, Vec2};
+use mmt_shared::model::settings::Mode;
 use mmt_shared::range::{OutOfRange, in_range};
 use mmt_shared::time::{TICK_S, Time};
 use serde::{Deserialize, Serialize};
@@ -25,6 +26,9 @@ pub use packet::{PlantAnswer, PlantCommand, SILENCE};
 /// Accepted greatest acceleration of the tool, m/s².
 const ACCELERATION_MAX_M_PER_S2: (f64, f64) = (0.5, 100.0);
 
+/// Accepted friction of a plant's tool: beyond it the force of a box may point at any face.
+const TOOL_FRICTION: (f64, f64) = (0.0, 0.5);
+
 /// What the tool meets.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -33,9 +37,20 @@ pub struct PlantConfig {
     pub link: bool,
     /// Greatest acceleration of the tool that a plant is sent, m/s². Default 13, what the manual of a common arm allows.
     pub acceleration_max_m_per_s2: f64,
+    /// Largest coefficient of friction that the plant's tool may have on what it pushes: images then tell what it turns the force by
+    /// from a box that is turned. 0: the tool is smooth. Default 0.2, steel on plastic. Paper mode takes every tool for smooth (III-A).
+    pub tool_friction: f64,
 }
 
 impl PlantConfig {
+    /// The friction of the tool that a slave in this mode reckons with; the tool of the simulated world is smooth.
+    pub(crate) fn friction_in(&self, mode: Mode) -> f64 {
+        match mode {
+            Mode::Recommended if self.link => self.tool_friction,
+            _ => 0.0,
+        }
+    }
+
     /// Checks every number.
     ///
     /// # Errors
@@ -46,6 +61,12 @@ impl PlantConfig {
             "m/s^2",
             self.acceleration_max_m_per_s2,
             ACCELERATION_MAX_M_PER_S2,
+        )?;
+        in_range(
+            "plant: tool_friction",
+            "",
+            self.tool_friction,
+            TOOL_FRICTION,
         )
     }
 }
@@ -55,6 +76,7 @@ impl Default for PlantConfig {
         Self {
             link: false,
             acceleration_max_m_per_s2: 13.0,
+            tool_friction: 0.2,
         }
     }
 }

@@ -5,6 +5,7 @@
 //! coordinate. Vision (slow, late, noisy) corrects what touch cannot see and teaches the distance from
 //! the centre to each face. Pure; it must never use the true pose.
 
+mod angle_track;
 mod centre;
 mod contact_force;
 mod contact_frame;
@@ -20,6 +21,8 @@ mod track;
 mod tracker;
 mod vision;
 
+use std::time::Duration;
+
 use mmt_shared::model::contact::Coupling;
 use mmt_shared::model::dynamics::Motion;
 use mmt_shared::model::geometry::{BoxFootprint, Face, Pose, Twist, Vec2, rotate, wrap_angle};
@@ -27,6 +30,7 @@ use mmt_shared::model::params::{ModelParams, friction_torque_of_square};
 use mmt_shared::model::settings::FrictionLaw;
 use mmt_shared::time::{TICK_S, Time};
 
+use angle_track::AngleTrack;
 use face_map::FaceMap;
 use past::{Past, PastPoses};
 use penetration::Penetration;
@@ -46,6 +50,9 @@ const COAST: (f64, f64) = (0.5, 2.5);
 /// Images in a row that show the tool clear of the object.
 const CLEAR_IMAGES: u32 = 5;
 
+/// For so long after an image there are images.
+const SEEN: Duration = Duration::from_millis(500);
+
 /// What the observer assumes of its sensors and whether it learns.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ObserverConfig {
@@ -59,6 +66,9 @@ pub struct ObserverConfig {
     pub vision_noise_rad: f64,
     /// Error of the footprint that it starts from, m r.m.s. per face; none where nothing is known of the faces.
     pub size_noise_m: Option<f64>,
+    /// Largest coefficient of friction that the tool may have on the object; 0 of a smooth tool, whose force is normal to the
+    /// face.
+    pub tool_friction: f64,
     /// Whether it takes images, learns the face offsets and reckons with how the box turns and slides. Otherwise vision
     /// gives the first pose only, as in the paper.
     pub learn: bool,
@@ -72,7 +82,7 @@ pub struct PoseObserver {
     config: ObserverConfig,
     motion: Motion,
     faces: FaceMap,
-    angle: Track,
+    angle: AngleTrack,
     /// How well the centre is known on each axis; in touch, along the face.
     centre: Track,
     contact: Option<ContactFrame>,
@@ -81,6 +91,8 @@ pub struct PoseObserver {
     past: PastPoses,
     /// Images in a row that show a tool in contact clear of the object.
     clear_images: u32,
+    /// When the newest image was taken.
+    seen: Option<Time>,
 }
 
 impl PoseObserver {
@@ -99,13 +111,14 @@ impl PoseObserver {
                 twist: Twist::default(),
             },
             faces: FaceMap::new(footprint, config.size_noise_m),
-            angle: Track::at_rest(config.vision_noise_rad.powi(2)),
+            angle: AngleTrack::at_rest(config.vision_noise_rad.powi(2)),
             centre: Track::at_rest(config.vision_noise_m.powi(2)),
             contact: None,
             penetration: Penetration::new(config.coupling),
             tracker,
             past: PastPoses::default(),
             clear_images: 0,
+            seen: None,
         }
     }
 
@@ -235,7 +248,20 @@ impl PoseObserver {
             tool,
             pose: self.motion.pose,
             contact: self.contact,
+            force_turned: self.angle.error(),
         });
+    }
+
+    /// By how much the friction of the tool may turn the force from the normal of the face, rad. 0 while there are no images,
+    /// because touch alone cannot tell this from a box that is turned, and where theta is the direction of the force by definition.
+    fn friction_angle(&self) -> f64 {
+        let is_seen = self
+            .seen
+            .is_some_and(|seen| self.past.newest().saturating_since(seen) <= SEEN);
+        match self.tracker {
+            Tracker::Box(_) if is_seen => libm::atan(self.config.tool_friction),
+            _ => 0.0,
+        }
     }
 
     fn let_go(&mut self, params: &ModelParams) {
@@ -252,14 +278,14 @@ impl PoseObserver {
                 }
             }
             self.centre.let_go(LET_GO.0 * LET_GO.0);
-            self.angle.hold(LET_GO.1 * LET_GO.1);
+            self.angle.let_go(LET_GO.1 * LET_GO.1);
         }
         // without images the friction alone shows where the box stops
         let coasts = self.config.learn && self.motion.twist != Twist::default();
         let (linear, angular) = if coasts { COAST } else { (0.0, 0.0) };
         self.centre.predict(linear);
         self.centre.widen(REST_DRIFT_M * REST_DRIFT_M * TICK_S);
-        self.angle.predict(angular);
+        self.angle.predict(angular, 0.0);
         let law = FrictionLaw::LimitSurface;
         self.motion = self.motion.step(law, params, Vec2::zeros(), Vec2::zeros());
     }

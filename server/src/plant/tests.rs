@@ -217,10 +217,26 @@ fn an_image_that_no_tick_took_and_one_that_is_too_old_are_counted() {
 }
 
 #[test]
-fn an_acceleration_that_no_tool_should_have_is_refused() {
-    let mut config = linked();
+fn a_limit_or_a_friction_that_no_tool_should_have_is_refused() {
     for bad in [f64::NAN, 0.0, 1e6] {
+        let mut config = linked();
         config.plant.acceleration_max_m_per_s2 = bad;
         assert!(Slave::try_new(&config, Coupling::for_stiffness(1000.0)).is_err());
     }
+    for bad in [f64::NAN, -0.1, 0.6] {
+        let mut config = linked();
+        config.plant.tool_friction = bad;
+        let Err(refused) = Slave::try_new(&config, Coupling::for_stiffness(1000.0)) else {
+            panic!("{bad} is accepted");
+        };
+        assert!(refused.to_string().contains("tool_friction"), "{refused}");
+    }
+}
+
+#[test]
+fn only_a_plant_s_tool_rubs_and_none_in_paper_mode() {
+    let linked = linked().plant;
+    assert!(linked.friction_in(Mode::Recommended) > 0.0);
+    assert_eq!(linked.friction_in(Mode::Paper), 0.0);
+    assert_eq!(PlantConfig::default().friction_in(Mode::Recommended), 0.0);
 }

@@ -15,6 +15,8 @@ pub(super) struct Past {
     pub(super) tool: Vec2,
     pub(super) pose: Pose,
     pub(super) contact: Option<ContactFrame>,
+    /// By how much the force was taken to be turned from the normal of the face, rad.
+    pub(super) force_turned: f64,
 }
 
 /// A ring of ticks. It is on the heap: it is larger than all the rest of a slave.

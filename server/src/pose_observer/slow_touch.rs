@@ -4,9 +4,9 @@ use mmt_shared::model::geometry::{Face, Pose, Twist, Vec2, rotate, wrap_angle};
 use mmt_shared::time::TICK_S;
 
 use super::PoseObserver;
+use super::angle_track::AngleTrack;
 use super::contact_force::ContactForce;
 use super::contact_frame::ContactFrame;
-use super::track::Track;
 use super::tracker::Tracker;
 use crate::contact_prediction::Expected;
 
@@ -79,7 +79,7 @@ impl PoseObserver {
             && slow.touch()
         {
             self.motion.twist.angular = 0.0;
-            self.angle = Track::of_any_normal();
+            self.angle = AngleTrack::of_any_normal();
         }
         self.follow_angle(face, contact, TURN_RAD_PER_S2);
     }
@@ -125,6 +125,7 @@ mod tests {
             vision_noise_m: 3e-4,
             vision_noise_rad: 3e-3,
             size_noise_m: None,
+            tool_friction: 0.0,
             learn: true,
             quasi_static,
         };

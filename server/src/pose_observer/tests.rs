@@ -1,5 +1,6 @@
 //! What the pose observer promises.
 
+mod direction;
 mod faces;
 
 use super::*;
@@ -20,6 +21,7 @@ fn observer(learn: bool) -> PoseObserver {
         vision_noise_m: 1e-3,
         vision_noise_rad: 5e-3,
         size_noise_m: None,
+        tool_friction: 0.0,
         learn,
     };
     PoseObserver::new(config, Pose::default(), BoxFootprint::square(0.40))

@@ -6,10 +6,10 @@ use mmt_shared::model::params::ModelParams;
 use mmt_shared::time::TICK_S;
 
 use super::PoseObserver;
+use super::angle_track::AngleTrack;
 use super::contact_force::ContactForce;
 use super::contact_frame::ContactFrame;
 use super::ground_moment::Push;
-use super::track::Track;
 use super::tracker::Tracker;
 
 /// Force below which its direction is only noise, N: fifteen times the default sensor noise.
@@ -75,6 +75,7 @@ impl PoseObserver {
             let tool_in_object = self.motion.pose.point_to_object(tool);
             return self.faces.footprint.nearest(tool_in_object).0;
         }
+        self.angle.begin_contact(self.friction_angle().powi(2));
         let in_object = rotate(-self.motion.pose.angle, force);
         let tool_in_object = self.motion.pose.point_to_object(tool);
         let footprint = &self.faces.footprint;
@@ -98,7 +99,7 @@ impl PoseObserver {
             tangent.begin();
         }
         self.motion.twist.angular = 0.0;
-        self.angle = Track::of_any_normal();
+        self.angle = AngleTrack::of_any_normal();
     }
 
     /// Turns the box by the moment of the push, where that can be reckoned, and returns the turning
@@ -128,21 +129,22 @@ impl PoseObserver {
     /// theta by the direction of the force.
     pub(super) fn follow_angle(&mut self, face: Face, contact: &ContactForce, acceleration: f64) {
         self.motion.pose.angle += self.motion.twist.angular * TICK_S;
-        self.angle.predict(acceleration);
+        let friction_angle = self.friction_angle();
+        self.angle.predict(acceleration, friction_angle.powi(2));
         let (force, size) = (contact.force, contact.force.norm());
         if size < FORCE_MIN_N.max(DEVIATIONS * contact.noise_n) {
             return;
         }
         let direction = libm::atan2(-force.y, -force.x) - face.outward_angle();
-        let innovation = wrap_angle(direction - self.motion.pose.angle);
+        let innovation = wrap_angle(direction - self.motion.pose.angle - self.angle.error());
         let tangent = matches!(self.tracker, Tracker::Tangent(_));
         if tangent && !self.tracker.is_settling() && innovation.abs() > JUMP_RAD {
             self.begin_tangent();
         }
         let spread = self.config.force_noise_n.max(contact.noise_n) / size;
         let variance = spread * spread + self.tracker.direction_floor_rad().powi(2);
-        let (angle, rate) = self.angle.measure(variance);
-        self.motion.pose.angle += angle * innovation;
-        self.motion.twist.angular += rate * innovation;
+        let (angle, rate) = self.angle.touch(variance, innovation);
+        self.motion.pose.angle += angle;
+        self.motion.twist.angular += rate;
     }
 }

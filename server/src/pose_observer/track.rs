@@ -63,13 +63,47 @@ impl Track {
 
     /// Takes a measured place of this variance; the shares of the innovation by which place and rate (1/s) are to be corrected.
     pub(super) fn measure(&mut self, variance: f64) -> (f64, f64) {
-        let [p, pc, q] = self.covariance;
-        let total = p + variance;
-        if total <= 0.0 {
-            return (1.0, 0.0);
-        }
-        let (place, rate) = (p / total, pc / total);
-        self.covariance = [p * (1.0 - place), pc * (1.0 - place), q - rate * pc];
-        (place, rate)
+        let gains = self.measure_with(&mut [0.0; 3], 0.0, variance);
+        gains.map_or((1.0, 0.0), |gains| (gains.place, gains.rate))
     }
+
+    /// Takes a measurement of this variance that contains the place once and another quantity `share` times, `other` being the
+    /// covariance of that one with the place, the rate and itself. None if the measurement and all of this are exact.
+    pub(super) fn measure_with(
+        &mut self,
+        other: &mut [f64; 3],
+        share: f64,
+        variance: f64,
+    ) -> Option<Gains> {
+        let [p, pc, q] = self.covariance;
+        let [po, co, o] = *other;
+        let (sp, sc, so) = (p + share * po, pc + share * co, po + share * o);
+        let total = sp + share * so + variance;
+        if total <= 0.0 {
+            return None;
+        }
+        let (place, rate) = (sp / total, sc / total);
+        self.covariance = [
+            p * (1.0 - place) - place * share * po,
+            pc * (1.0 - place) - place * share * co,
+            q - rate * sc,
+        ];
+        let gain = so / total;
+        *other = [po - place * so, co - rate * so, o - gain * so];
+        Some(Gains {
+            place,
+            rate,
+            other: gain,
+        })
+    }
+}
+
+/// Shares of an innovation by which a measurement corrects.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Gains {
+    pub(super) place: f64,
+    /// 1/s.
+    pub(super) rate: f64,
+    /// Of the other quantity in it.
+    pub(super) other: f64,
 }

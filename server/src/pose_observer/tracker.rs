@@ -72,10 +72,11 @@ pub(super) struct BoxTracker {
 }
 
 impl BoxTracker {
-    /// Takes the angle (rad) by which an image of the touched box differs from touch; `noise` is vision's, rad r.m.s.
-    /// True if the images show that the body is no box: one bad image does not.
-    pub(super) fn is_refuted(&mut self, turn: f64, noise: f64) -> bool {
-        let disagrees = turn.abs() > DISAGREEMENT_RAD.max(6.0 * noise);
+    /// Takes the angle (rad) by which an image of the touched box differs from the direction of the force; `noise` is vision's, rad
+    /// r.m.s., and the tool's friction turns the force by up to `friction_angle` (rad). True if the images show that the body is no
+    /// box: one bad image does not.
+    pub(super) fn is_refuted(&mut self, turn: f64, noise: f64, friction_angle: f64) -> bool {
+        let disagrees = turn.abs() > friction_angle + DISAGREEMENT_RAD.max(6.0 * noise);
         self.disagreeing = if disagrees { self.disagreeing + 1 } else { 0 };
         self.disagreeing >= IMAGES
     }

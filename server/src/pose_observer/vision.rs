@@ -24,6 +24,7 @@ impl PoseObserver {
         let Some(then) = then.filter(|_| self.config.learn) else {
             return;
         };
+        self.seen = Some(vision.taken);
         let error = vision.pose.position - then.pose.position;
         let turn = wrap_angle(vision.pose.angle + self.tracker.turned() - then.pose.angle);
         if self.shows_clear(vision, &then) {
@@ -50,14 +51,14 @@ impl PoseObserver {
     /// An image of an object that nobody touches shows where it is and how it moves, then and since.
     fn see_free(&mut self, vision: &VisionSample, error: Vec2, turn: f64) {
         let (place, velocity) = self.centre.measure(self.config.vision_noise_m.powi(2));
-        let (angle, omega) = self.angle.measure(self.config.vision_noise_rad.powi(2));
+        let (angle, omega) = self.angle.see(self.config.vision_noise_rad.powi(2), turn);
         let off = Pose {
             position: error * place,
-            angle: turn * angle,
+            angle,
         };
         let rate = Twist {
             linear: error * velocity,
-            angular: turn * omega,
+            angular: omega,
         };
         let seconds = self.past.newest().saturating_since(vision.taken);
         self.past.correct(vision.taken, off, rate);
@@ -75,9 +76,9 @@ impl PoseObserver {
                 tangent.see(vision.taken, turn);
             }
             _ => {
-                let (angle, omega) = self.angle.measure(self.config.vision_noise_rad.powi(2));
-                self.motion.pose.angle += turn * angle;
-                self.motion.twist.angular += turn * omega;
+                let (angle, omega) = self.angle.see(self.config.vision_noise_rad.powi(2), turn);
+                self.motion.pose.angle += angle;
+                self.motion.twist.angular += omega;
             }
         }
         let (gain, _) = self.centre.measure(variance);
@@ -114,10 +115,13 @@ impl PoseObserver {
 
     /// Whether an image that differs from touch by `turn` (rad) shows that the body that was taken for a box is none.
     fn refutes(&mut self, turn: f64, then: &Past) -> bool {
+        let friction_angle = self.friction_angle();
         match &mut self.tracker {
-            Tracker::Box(tracker) if then.contact.is_some() => {
-                tracker.is_refuted(turn, self.config.vision_noise_rad)
-            }
+            Tracker::Box(tracker) if then.contact.is_some() => tracker.is_refuted(
+                turn - then.force_turned,
+                self.config.vision_noise_rad,
+                friction_angle,
+            ),
             _ => false,
         }
     }
@@ -126,6 +130,7 @@ impl PoseObserver {
     /// `error` (m) away.
     fn become_tangent(&mut self, turn: f64, error: Vec2) {
         self.tracker = Tracker::Tangent(TangentTracker::new(-turn));
+        self.angle.forget_error();
         self.motion.pose.position += error;
         self.centre = Track::at_rest(self.config.vision_noise_m.powi(2));
     }

@@ -90,6 +90,7 @@ impl ObjectEstimate {
             vision_noise_m: sensing.vision.position_noise_m,
             vision_noise_rad: sensing.vision.angle_noise_rad,
             size_noise_m: sensing.vision.size_noise_m.filter(|_| !seen.is_empty()),
+            tool_friction: config.plant.friction_in(config.mode),
             learn: config.mode == Mode::Recommended || sensing.vision.rate_hz > 0.0,
         };
         let [m, b, c] = mbc;
