@@ -37,8 +37,8 @@ pub struct PlantConfig {
     pub link: bool,
     /// Greatest acceleration of the tool that a plant is sent, m/s². Default 13, what the manual of a common arm allows.
     pub acceleration_max_m_per_s2: f64,
-    /// Largest coefficient of friction that the plant's tool may have on what it pushes: images then tell what it turns the force by
-    /// from a box that is turned. 0: the tool is smooth. Default 0.2, steel on plastic. Paper mode takes every tool for smooth (III-A).
+    /// Largest coefficient of friction that the plant's tool may have on what it pushes: images tell a force that friction turns
+    /// from a box that is turned. 0: the tool is smooth. Default 0.2. Paper mode takes every tool for smooth (III-A).
     pub tool_friction: f64,
 }
 

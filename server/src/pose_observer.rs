@@ -50,7 +50,7 @@ const COAST: (f64, f64) = (0.5, 2.5);
 /// Images in a row that show the tool clear of the object.
 const CLEAR_IMAGES: u32 = 5;
 
-/// For so long after an image there are images.
+/// The newest image counts for so long; then there are none.
 const SEEN: Duration = Duration::from_millis(500);
 
 /// What the observer assumes of its sensors and whether it learns.

@@ -41,8 +41,8 @@ fn turned_by(
     too_far / 500.0
 }
 
-/// A slave that knows the friction of its tool.
-fn told(friction: f64) -> PoseObserver {
+/// An observer whose tool has at most this friction.
+fn with_friction(friction: f64) -> PoseObserver {
     let mut observer = observer(true);
     observer.config.tool_friction = friction;
     observer
@@ -51,30 +51,30 @@ fn told(friction: f64) -> PoseObserver {
 #[test]
 fn a_tool_that_rubs_turns_no_box_that_is_seen() {
     for (error, friction) in [(0.05, 0.05), (-0.04, 0.05), (0.2, 0.2)] {
-        let turned = turned_by(&mut told(friction), error, 0.0, 2, 2);
+        let turned = turned_by(&mut with_friction(friction), error, 0.0, 2, 2);
         assert!(turned.abs() < 5e-3, "{error}: {turned}");
     }
-    // who was not told takes the force for normal
-    let turned = turned_by(&mut told(0.0), 0.04, 0.0, 2, 2);
+    // a tool that rubs and is taken for smooth turns the box
+    let turned = turned_by(&mut with_friction(0.0), 0.04, 0.0, 2, 2);
     assert!(turned > 0.03, "{turned}");
 }
 
 #[test]
 fn a_box_that_turns_under_a_tool_that_rubs_is_followed() {
-    let turned = turned_by(&mut told(0.05), 0.05, 0.015, 2, 2);
+    let turned = turned_by(&mut with_friction(0.05), 0.05, 0.015, 2, 2);
     assert!(turned.abs() < 5e-3, "{turned}");
 }
 
 #[test]
-fn a_smooth_tool_that_was_told_to_rub_turns_no_box_either() {
-    let turned = turned_by(&mut told(0.05), 0.0, 0.015, 2, 2);
+fn a_smooth_tool_that_is_taken_for_rough_turns_no_box_either() {
+    let turned = turned_by(&mut with_friction(0.05), 0.0, 0.015, 2, 2);
     assert!(turned.abs() < 5e-3, "{turned}");
 }
 
 #[test]
 fn without_images_the_force_is_taken_for_normal() {
     for seen_s in [0, 1] {
-        let turned = turned_by(&mut told(0.2), 0.04, 0.0, 8, seen_s);
+        let turned = turned_by(&mut with_friction(0.2), 0.04, 0.0, 8, seen_s);
         assert!((turned - 0.04).abs() < 5e-3, "{seen_s}: {turned}");
     }
 }
@@ -82,7 +82,7 @@ fn without_images_the_force_is_taken_for_normal() {
 #[test]
 fn a_force_that_is_turned_by_more_than_the_friction_is_of_no_box() {
     for (error, is_box) in [(0.2, true), (0.3, false)] {
-        let mut observer = told(0.2);
+        let mut observer = with_friction(0.2);
         turned_by(&mut observer, error, 0.0, 1, 1);
         let still = matches!(observer.tracker, Tracker::Box(_));
         assert_eq!(still, is_box, "{error}");
@@ -91,7 +91,7 @@ fn a_force_that_is_turned_by_more_than_the_friction_is_of_no_box() {
 
 #[test]
 fn an_error_of_the_direction_is_forgotten_with_the_contact() {
-    let mut observer = told(0.05);
+    let mut observer = with_friction(0.05);
     turned_by(&mut observer, 0.05, 0.0, 2, 2);
     assert!((observer.angle.error() - 0.05).abs() < 5e-3);
     observer.step(
