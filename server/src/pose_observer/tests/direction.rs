@@ -86,6 +86,8 @@ fn a_force_that_is_turned_by_more_than_the_friction_is_of_no_box() {
         turned_by(&mut observer, error, 0.0, 1, 1);
         let still = matches!(observer.tracker, Tracker::Box(_));
         assert_eq!(still, is_box, "{error}");
+        // the force is normal to a tangent
+        assert_eq!(observer.angle.error() != 0.0, is_box, "{error}");
     }
 }
 
@@ -102,4 +104,22 @@ fn an_error_of_the_direction_is_forgotten_with_the_contact() {
         &params(),
     );
     assert_eq!(observer.angle.error(), 0.0);
+}
+
+#[test]
+fn the_first_force_of_a_rough_tool_turns_no_box_that_was_seen() {
+    let mut observer = with_friction(0.2);
+    let (tool, force) = (Vec2::new(-HALF, 0.0), rotate(0.2, Vec2::new(2.6, 0.0)));
+    for n in 1..=110 {
+        let now = Time::from_millis(n);
+        let in_contact = n > 100;
+        let felt = if in_contact { force } else { Vec2::zeros() };
+        observer.step(now, tool, felt, in_contact, &params());
+        if n % 33 == 0 {
+            let pose = Pose::default();
+            observer.see(&VisionSample { taken: now, pose });
+        }
+    }
+    let turned = observer.pose().angle;
+    assert!(turned.abs() < 5e-3, "{turned}");
 }
