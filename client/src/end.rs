@@ -328,7 +328,7 @@ impl MasterEnd {
             };
             return self.channel.encode(now, Message::Command(command), out);
         }
-        if self.poll_timeout() <= now {
+        if self.poll_timeout().has_come(now) {
             return self.channel.encode(now, Message::Heartbeat, out);
         }
         Ok(None)

@@ -156,7 +156,7 @@ impl ObserverEnd {
         now: Time,
         out: &mut [u8],
     ) -> Result<Option<usize>, NumbersSpent> {
-        if self.poll_timeout() <= now {
+        if self.poll_timeout().has_come(now) {
             return self.channel.encode(now, Message::Heartbeat, out);
         }
         Ok(None)

@@ -151,11 +151,11 @@ impl Feed {
         if let Some(scene) = self.take_due_scene(now) {
             return self.channel.encode(now, Message::Scene(scene), out);
         }
-        if let Some(update) = self.newest.filter(|_| self.repeat_due() <= Some(now)) {
+        if let Some(update) = self.due_repeat(now) {
             self.repeated.sent(update.cause);
             return self.send(now, update, out);
         }
-        if self.channel.heartbeat_due() <= now {
+        if self.channel.heartbeat_due().has_come(now) {
             return self.channel.encode(now, Message::Heartbeat, out);
         }
         Ok(None)
@@ -194,6 +194,11 @@ impl Feed {
             .encode(now, Message::Update((&update).into()), out)
     }
 
+    fn due_repeat(&self, now: Time) -> Option<Update> {
+        self.repeat_due().filter(|due| due.has_come(now))?;
+        self.newest
+    }
+
     fn repeat_due(&self) -> Option<Time> {
         self.newest.map(|_| self.update_sent + REPEAT)
     }
@@ -206,7 +211,7 @@ impl Feed {
     }
 
     fn take_due_scene(&mut self, now: Time) -> Option<Scene> {
-        self.scene_due().filter(|due| *due <= now)?;
+        self.scene_due().filter(|due| due.has_come(now))?;
         (self.scene, self.scene_sent) = (self.view.scene, now);
         self.scene
     }

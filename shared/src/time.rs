@@ -46,6 +46,13 @@ impl Time {
         self.0 as f64 * 1e-9
     }
 
+    /// Whether it is time, at `now`, for what is due at this point. [`Time::MAX`] never comes, or whatever is due again and
+    /// again would be due without end.
+    #[must_use]
+    pub fn has_come(self, now: Self) -> bool {
+        self <= now && self < Self::MAX
+    }
+
     /// Time passed since `earlier`; zero if `earlier` is later than `self`.
     #[must_use]
     pub const fn saturating_since(self, earlier: Self) -> Duration {
@@ -106,6 +113,13 @@ impl Sub<Duration> for Time {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn every_point_comes_but_the_end_of_time() {
+        let now = Time::from_millis(2);
+        assert!(now.has_come(now) && Time::ZERO.has_come(now) && now.has_come(Time::MAX));
+        assert!(!Time::from_millis(3).has_come(now) && !Time::MAX.has_come(Time::MAX));
+    }
 
     #[test]
     fn arithmetic_saturates_instead_of_wrapping() {

@@ -287,3 +287,12 @@ fn a_heartbeat_goes_out_when_nothing_else_did() {
     let unsent = end.commands.drops().map(|(_, samples)| samples);
     assert_eq!(unsent, [119, 0, 1]);
 }
+
+/// As the stamp of a broken record may be.
+#[test]
+fn at_the_end_of_time_what_is_to_be_sent_has_an_end() {
+    let mut end = end(CommandConfig::default(), Architecture::Mmt);
+    let mut out = [0; DATAGRAM_MAX];
+    let sent = std::iter::from_fn(|| end.poll_transmit(Time::MAX, &mut out).unwrap());
+    assert!(sent.take(10).count() < 10);
+}

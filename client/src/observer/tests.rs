@@ -109,6 +109,14 @@ fn an_observer_sends_heartbeats_and_nothing_else() {
 }
 
 #[test]
+fn at_the_end_of_time_what_is_to_be_sent_has_an_end() {
+    let mut end = observer();
+    let mut out = [0; DATAGRAM_MAX];
+    let sent = std::iter::from_fn(|| end.poll_transmit(Time::MAX, &mut out).unwrap());
+    assert!(sent.take(10).count() < 10);
+}
+
+#[test]
 fn whatever_an_operators_device_accepts_an_observer_shows() {
     let softer = Coupling {
         stiffness_n_per_m: COUPLING.stiffness_n_per_m.next_down(),

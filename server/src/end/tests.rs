@@ -227,6 +227,19 @@ fn scenes_are_due_as_often_as_somebody_wants_to_see_them() {
     assert_eq!(nobody.scene_due(), None);
 }
 
+/// As the stamp of a broken record may be.
+#[test]
+fn at_the_end_of_time_what_is_to_be_sent_has_an_end() {
+    let mut end = end("10ms 30ms", Architecture::Mmt, 20);
+    let mut master = DatagramChannel::new(Side::Master, Time::ZERO);
+    let bytes = command(&mut master, 1, 1..=10, 0, None);
+    end.handle_datagram(AT(1), &bytes);
+    end.tick(AT(2), &SlaveGiven::default());
+    let mut out = [0; DATAGRAM_MAX];
+    let sent = std::iter::from_fn(|| end.poll_transmit(Time::MAX, &mut out).unwrap());
+    assert!(sent.take(10).count() < 10);
+}
+
 #[test]
 fn each_update_that_a_tick_made_is_sent_superseded_or_unsent() {
     let mut config = SlaveConfig::default();

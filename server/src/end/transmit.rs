@@ -41,7 +41,7 @@ impl SlaveEnd {
             }
             return sent;
         }
-        if self.channel.heartbeat_due() <= now {
+        if self.channel.heartbeat_due().has_come(now) {
             return self.channel.encode(now, Message::Heartbeat, out);
         }
         Ok(None)
@@ -84,7 +84,7 @@ impl SlaveEnd {
     }
 
     fn take_due_repeat(&mut self, now: Time) -> Option<Update> {
-        self.repeat_due().filter(|due| *due <= now)?;
+        self.repeat_due().filter(|due| due.has_come(now))?;
         let repeating = self.repeating.as_mut()?;
         let due = repeating.take_due(now, &self.config.repeats);
         due.then_some(repeating.update)
@@ -98,7 +98,7 @@ impl SlaveEnd {
     }
 
     fn take_due_scene(&mut self, now: Time) -> Option<Scene> {
-        self.scene_due().filter(|due| *due <= now)?;
+        self.scene_due().filter(|due| due.has_come(now))?;
         self.scene_sent = now;
         self.scene
     }

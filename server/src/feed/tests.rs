@@ -139,6 +139,18 @@ fn scenes_come_at_the_rate_that_was_asked_for_and_none_twice() {
 }
 
 #[test]
+fn at_the_end_of_time_what_is_to_be_sent_has_an_end() {
+    let mut feed = Feed::new(AT(0), 20, &view(1, [1]));
+    feed.show(&ObserverView {
+        scene: Some(scene(1)),
+        ..view(1, [1])
+    });
+    let mut out = [0; DATAGRAM_MAX];
+    let sent = std::iter::from_fn(|| feed.poll_transmit(Time::MAX, &mut out).unwrap());
+    assert!(sent.take(10).count() < 10);
+}
+
+#[test]
 fn while_nothing_happens_heartbeats_go_twenty_times_a_second_and_carry_the_stop() {
     let mut feed = Feed::new(AT(0), 20, &view(0, []));
     let mut observer = Observer::new();
