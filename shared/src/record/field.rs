@@ -9,10 +9,14 @@ pub struct Stamp(pub u64);
 impl Stamp {
     const NANOS: u64 = 1_000_000_000;
 
-    /// Writes it as `builtin_interfaces/Time`.
+    /// The latest that `builtin_interfaces/Time` can hold, in the year 2038.
+    const LATEST: Self = Self(i32::MAX as u64 * Self::NANOS + Self::NANOS - 1);
+
+    /// Writes it as `builtin_interfaces/Time`; a later moment than that can hold is written as the latest.
     pub fn write(self, out: &mut CdrWriter) {
-        out.i32((self.0 / Self::NANOS) as i32);
-        out.u32((self.0 % Self::NANOS) as u32);
+        let Self(nanos) = self.min(Self::LATEST);
+        out.i32((nanos / Self::NANOS) as i32);
+        out.u32((nanos % Self::NANOS) as u32);
     }
 }
 
@@ -214,6 +218,22 @@ impl Field for Stamp {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_moment_after_the_last_second_of_a_stamp_is_written_as_the_end_of_that() {
+        let again = |stamp: Stamp| {
+            let mut out = CdrWriter::default();
+            stamp.write(out.begin());
+            <Stamp as Field>::read(&mut CdrReader::new(out.message()).unwrap()).unwrap()
+        };
+        let last = Stamp(2_147_483_647_999_999_999);
+        assert_eq!(Stamp::LATEST, last);
+        assert_eq!((again(last), again(Stamp(u64::MAX))), (last, last));
+        assert_eq!(
+            again(Stamp(1_700_000_000_000_000_007)).0,
+            1_700_000_000_000_000_007
+        );
+    }
 
     #[test]
     fn a_cell_with_a_comma_or_a_quote_is_quoted() {
