@@ -234,7 +234,10 @@ fn at_the_end_of_time_what_is_to_be_sent_has_an_end() {
     let mut master = DatagramChannel::new(Side::Master, Time::ZERO);
     let bytes = command(&mut master, 1, 1..=10, 0, None);
     end.handle_datagram(AT(1), &bytes);
-    end.tick(AT(2), &SlaveGiven::default());
+    for ms in 2..50 {
+        end.tick(AT(ms), &SlaveGiven::default());
+    }
+    assert!(end.scene.is_some());
     let mut out = [0; DATAGRAM_MAX];
     let sent = std::iter::from_fn(|| end.poll_transmit(Time::MAX, &mut out).unwrap());
     assert!(sent.take(10).count() < 10);
