@@ -1,20 +1,25 @@
-//! What is made of the measured force before anything judges it: noise is measured, a bias is tared and followed.
+//! What is made of the measured force before anything judges it: noise is measured, a bias is tared and followed, a gain is found
+//! where the stiffness of the contact is known.
 //!
 //! The default sensor's noise and a bias that nobody feels leave every force and every threshold as they are. Pure, of
 //! the measured force and the tool alone; it must never see the true force.
 
 mod bias;
+mod gain;
 mod noise;
+mod onset;
 mod withdrawal;
 
 use std::collections::VecDeque;
 
+use mmt_shared::model::contact::Coupling;
 use mmt_shared::model::geometry::Vec2;
 use mmt_shared::model::settings::Mode;
 use serde::{Deserialize, Serialize};
 
 use crate::trigger::{ContactConfig, ContactDetector};
 use bias::Bias;
+use gain::Gain;
 use noise::{CONTACT_MAX, Noise};
 use withdrawal::Withdrawal;
 
@@ -34,6 +39,9 @@ pub struct ConditioningConfig {
     /// Whether the thresholds of contact, and the averages that contact and (12) are judged by, follow the measured
     /// noise. Default: in recommended mode.
     pub follow_noise: bool,
+    /// Whether the gain of the force sensor is found: by how contacts begin, whose stiffness and damping must be the session's k_p
+    /// and k_d. Default: not, for who knows them?
+    pub find_gain: bool,
 }
 
 impl ConditioningConfig {
@@ -44,6 +52,7 @@ impl ConditioningConfig {
         Self {
             tare: cured,
             follow_noise: cured,
+            find_gain: false,
         }
     }
 }
@@ -57,24 +66,31 @@ impl Default for ConditioningConfig {
 /// The force of a tick, conditioned.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Conditioned {
-    /// Without bias, N.
+    /// Without bias, and with the gain that is known, N.
     pub force: Vec2,
     /// The same over as many samples as contact is judged by, N.
     pub steady: Vec2,
     /// Noise per axis as measured, N, where it is more than thresholds are made for; else 0.
     pub noise_n: f64,
+    /// Forces of ticks before were this many times as large as they were given, by the gain as it is known now; 1 where it stays.
+    pub rescaled: f64,
     /// Whether the tool touches.
     pub in_contact: bool,
     /// Samples that (12) is to be judged by: 1 or more.
     pub averaged: usize,
 }
 
-/// Measures noise and bias, and decides whether the tool touches.
+/// A real contact is no softer than this share of k_p.
+const SOFTEST: f64 = 0.25;
+
+/// Measures noise, bias and gain, and decides whether the tool touches.
 #[derive(Clone, Debug)]
 pub struct Conditioner {
     config: ConditioningConfig,
     noise: Noise,
     bias: Bias,
+    /// None where nobody knows the contact's stiffness.
+    gain: Option<Gain>,
     recent: VecDeque<Vec2>,
     withdrawal: Withdrawal,
     /// Where the last contact ended, m, until the tool is clear of that place.
@@ -86,15 +102,16 @@ pub struct Conditioner {
 }
 
 impl Conditioner {
-    /// `softest_n_per_m` is the softest contact that is expected.
+    /// Of a tool whose session has this coupling.
     #[must_use]
-    pub fn new(config: ConditioningConfig, contact: ContactConfig, softest_n_per_m: f64) -> Self {
+    pub fn new(config: ConditioningConfig, contact: ContactConfig, coupling: &Coupling) -> Self {
         Self {
             config,
             noise: Noise::default(),
             bias: Bias::default(),
+            gain: config.find_gain.then(|| Gain::new(*coupling)),
             recent: VecDeque::with_capacity(CONTACT_MAX),
-            withdrawal: Withdrawal::new(softest_n_per_m),
+            withdrawal: Withdrawal::new(SOFTEST * coupling.stiffness_n_per_m),
             left: None,
             detector: ContactDetector::new(contact),
             in_contact: false,
@@ -131,10 +148,17 @@ impl Conditioner {
         if self.config.tare {
             self.tare(measured, steady, tool, deviation);
         }
+        let force = measured - self.bias.known();
+        let (before, gain) = self.gain.as_mut().map_or((1.0, 1.0), |gain| {
+            let before = gain.known();
+            gain.step(force, tool, self.in_contact, self.noise.per_axis());
+            (before, gain.known())
+        });
         Conditioned {
-            force: measured - self.bias.known(),
-            steady,
+            force: force / gain,
+            steady: steady / gain,
             noise_n: self.noise.beyond(),
+            rescaled: before / gain,
             in_contact: self.in_contact,
             averaged: for_trigger,
         }

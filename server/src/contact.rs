@@ -23,6 +23,8 @@ pub struct Contact {
     pub steady: Vec2,
     /// Noise of `force` per axis as measured, N, where it is more than thresholds are made for; else 0.
     pub noise_n: f64,
+    /// Forces of ticks before were this many times as large as they were given: a gain of the sensor has been found; else 1.
+    pub rescaled: f64,
     /// Whether the tool touches the object, by the measured force.
     pub in_contact: bool,
     /// Samples of the force that (12) is to be judged by, for their noise: 1 or more.
@@ -47,6 +49,7 @@ impl Contact {
             force: self.force.lerp(&before.force, share),
             steady: self.steady.lerp(&before.steady, share),
             vision: None,
+            rescaled: 1.0,
             ..*self
         }
     }
@@ -126,6 +129,7 @@ impl ContactStage {
             force: conditioned.force,
             steady: conditioned.steady,
             noise_n: conditioned.noise_n,
+            rescaled: conditioned.rescaled,
             in_contact: conditioned.in_contact,
             averaged: conditioned.averaged,
             vision: sensed.vision,

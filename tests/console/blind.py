@@ -48,7 +48,7 @@ class Sitting(Tab):
 def start(mmt, folder, more=()):
     """The program in its folder, and the address of its page."""
     command = [mmt, "demo", "--blind", "near.toml", "far.toml", "--consent", "consent.txt", "--question", QUESTION,
-        "--study", "study", "--duration", "4s", *more]
+        "--study", "study", "--duration", "10s", *more]
     demo = subprocess.Popen(command, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     line = next(line for line in demo.stderr if "http://" in line)
     return demo, urlsplit(line.split()[-1]).geturl()

@@ -67,14 +67,14 @@ def main():
         pairing = slave.stdout.readline().strip()
         viewer = begin("master", pairing, "--observe", "--console", "--json")
         address = urlsplit(next(line for line in viewer.stderr if "http://" in line).split()[-1])
-        operator = begin("master", pairing, "--duration", "20s", "--json")
+        operator = begin("master", pairing, "--duration", "60s", "--json")
         with sync_playwright() as play:
             browser = play.chromium.launch(executable_path=arguments.browser, args=["--no-sandbox"])
             tab = Looking(browser.new_context(), address.geturl())
             check_page(tab, operator)
             holds("no error in the browser's console", not tab.errors, tab.errors)
             browser.close()
-        report = json.loads(operator.communicate(timeout=PATIENCE_S)[0])
+        report = json.loads(operator.communicate(timeout=2.0 * PATIENCE_S)[0])
         holds("the operator's session ends as it was asked for", operator.returncode == 0 and report["updates"]["applied"] > 0, report["ending"])
     finally:
         for process in began:

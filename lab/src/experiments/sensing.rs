@@ -47,29 +47,41 @@ fn ordinary(sensor: &mut SensingConfig) {
 }
 
 /// Who uses the force, and whether it is conditioned.
-const USERS: [(Mode, Curve, bool); 3] = [
-    (Mode::Recommended, Curve::Useful(150), true),
-    (Mode::Recommended, Curve::Useful(150), false),
-    (Mode::Paper, Curve::Hybrid(150), false),
+const USERS: [(Mode, Curve, Cure); 4] = [
+    (Mode::Recommended, Curve::Useful(150), Cure::Conditioned),
+    (Mode::Recommended, Curve::Useful(150), Cure::WithGain),
+    (Mode::Recommended, Curve::Useful(150), Cure::None),
+    (Mode::Paper, Curve::Hybrid(150), Cure::None),
 ];
 const DELTA: f64 = 0.10;
+
+/// What is made of the measured force.
+#[derive(Clone, Copy, PartialEq)]
+enum Cure {
+    /// Nothing.
+    None,
+    /// Noise and bias are cured.
+    Conditioned,
+    /// The gain as well: the stiffness of the contact is known.
+    WithGain,
+}
 
 struct Case {
     sensor: &'static Sensor,
     mode: Mode,
     curve: Curve,
-    conditioned: bool,
+    cure: Cure,
 }
 
 type Group = grid::Group<Case, Measured>;
 
 fn cases() -> Vec<Case> {
-    let of_user = |(mode, curve, conditioned)| {
+    let of_user = |(mode, curve, cure)| {
         SENSORS.iter().map(move |sensor| Case {
             sensor,
             mode,
             curve,
-            conditioned,
+            cure,
         })
     };
     USERS.into_iter().flat_map(of_user).collect()
@@ -80,8 +92,9 @@ fn world(case: &Case) -> WorldConfig {
     let (_, change) = case.sensor;
     change(&mut world.slave.sensing);
     world.slave.conditioning = ConditioningConfig {
-        tare: case.conditioned,
-        follow_noise: case.conditioned,
+        tare: case.cure != Cure::None,
+        follow_noise: case.cure != Cure::None,
+        find_gain: case.cure == Cure::WithGain,
     };
     world
 }
@@ -124,11 +137,13 @@ impl Row<'_> {
     }
 
     fn user(&self) -> String {
-        let Case {
-            mode, conditioned, ..
-        } = self.group.case;
-        let with = if conditioned { "with" } else { "without" };
-        format!("{}, {with} conditioning", mode_name(mode))
+        let Case { mode, cure, .. } = self.group.case;
+        let with = match cure {
+            Cure::None => "without conditioning",
+            Cure::Conditioned => "with conditioning",
+            Cure::WithGain => "the gain found as well",
+        };
+        format!("{}, {with}", mode_name(mode))
     }
 }
 
@@ -146,11 +161,16 @@ fn rows(groups: &[Group]) -> Vec<Row<'_>> {
     rows.collect()
 }
 
+fn yes(is: bool) -> &'static str {
+    if is { "yes" } else { "no" }
+}
+
 #[rustfmt::skip]
 fn columns<'a>() -> Vec<Column<'a, Row<'a>>> {
     let mut columns: Vec<Column<Row>> = vec![
         column("mode", "", 0, |row| mode_name(row.group.case.mode)),
-        column("conditioned", "", 0, |row| if row.group.case.conditioned { "yes" } else { "no" }),
+        column("conditioned", "", 0, |row| yes(row.group.case.cure != Cure::None)),
+        column("find_gain", "", 0, |row| yes(row.group.case.cure == Cure::WithGain)),
         column("sensor", "", 0, |row| row.group.case.sensor.0),
         column("packet_rate_hz", "Hz", 2, |row| row.group.mean(|run| run.updates.rate_hz())),
         column("pmse_true", "", 4, |row| row.group.mean(|run| run.true_force.pmse_true.get())),
@@ -167,6 +187,7 @@ fn columns<'a>() -> Vec<Column<'a, Row<'a>>> {
 fn figure(rows: &[Row]) -> Figure {
     let styles = [
         (Colour::BLUE, Mark::Circle),
+        (Colour::GREEN, Mark::Triangle),
         (Colour::VERMILION, Mark::Cross),
         (Colour::GREY, Mark::Square),
     ];
@@ -176,7 +197,7 @@ fn figure(rows: &[Row]) -> Figure {
             let dot = Dot::of_intervals(row.packets()?, row.pmse()?);
             let note = Some(row.group.case.sensor.0.to_owned());
             Some(Dot {
-                note: note.filter(|_| row.group.case.conditioned),
+                note: note.filter(|_| row.group.case.cure != Cure::None),
                 ..dot
             })
         });

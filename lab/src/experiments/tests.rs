@@ -249,18 +249,20 @@ fn scenarios_with_a_wrong_side_place_the_model_worse() {
     }
 }
 
-/// The default sensor's forces pass as they are, and 0.1 N of noise is no contact where noise is reckoned with.
+/// The default sensor's forces pass as they are, 0.1 N of noise is no contact where noise is reckoned with, and a gain is found.
 #[test]
 fn sensing_judges_by_the_true_force_and_conditioning_changes_nothing_that_is_sound() {
     let done = Done::of(&sensing::EXPERIMENT, 8000);
-    let of = |conditioned, sensor, key| {
+    let with = |find_gain, conditioned, sensor, key| {
         let wanted = [
             ("mode", "recommended"),
             ("conditioned", conditioned),
+            ("find_gain", find_gain),
             ("sensor", sensor),
         ];
         done.number("sensing.csv", &wanted, key)
     };
+    let of = |conditioned, sensor, key| with("no", conditioned, sensor, key);
     for key in ["packet_rate_hz", "pmse_true", "relative_error_true"] {
         assert_eq!(
             of("yes", "10 mN of noise", key),
@@ -271,7 +273,11 @@ fn sensing_judges_by_the_true_force_and_conditioning_changes_nothing_that_is_sou
         assert!(of("yes", sensor, "relative_error_true") < 0.25, "{sensor}");
         assert!(of("no", sensor, "relative_error_true") > 0.3, "{sensor}");
     }
-    assert_eq!(done.rows("sensing.csv", &[]).len(), 33);
+    for sensor in ["gain 1.1", "gain 0.9", "all, gain 1.1", "all, gain 0.9"] {
+        let [without, found] = ["no", "yes"].map(|find| with(find, "yes", sensor, "pmse_true"));
+        assert!(found < 0.8 * without, "{sensor}: {found} and {without}");
+    }
+    assert_eq!(done.rows("sensing.csv", &[]).len(), 44);
 }
 
 #[test]

@@ -1,5 +1,6 @@
 //! Promises of the conditioner, on a tool that presses on something that does not move.
 
+use mmt_shared::fixtures::COUPLING;
 use mmt_shared::rng::Substream;
 use mmt_shared::time::TICK_S;
 
@@ -23,7 +24,7 @@ impl Press {
     fn new(noise_n: f64, bias: Vec2, drift_n_per_s: Vec2) -> Self {
         let config = ConditioningConfig::default();
         Self {
-            conditioner: Conditioner::new(config, ContactConfig::default(), K_P / 4.0),
+            conditioner: Conditioner::new(config, ContactConfig::default(), &COUPLING),
             noise: Substream::new(1, "test/noise", 0),
             noise_n,
             bias,
@@ -220,7 +221,7 @@ fn a_light_touch_that_stays_is_no_bias() {
 #[test]
 fn without_the_cures_every_force_passes() {
     let config = ConditioningConfig::of_mode(Mode::Paper);
-    let mut conditioner = Conditioner::new(config, ContactConfig::default(), K_P / 4.0);
+    let mut conditioner = Conditioner::new(config, ContactConfig::default(), &COUPLING);
     for n in 0..1000 {
         let force = Vec2::new(0.2, f64::from(n % 7) * 0.1);
         let tick = conditioner.step(force, Vec2::zeros());

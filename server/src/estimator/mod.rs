@@ -138,6 +138,16 @@ impl Estimator {
         *self.estimate()
     }
 
+    /// The forces of all ticks so far were this many times as large: the gain of the sensor has been found. What has a short memory
+    /// forgets them by itself.
+    pub fn rescale(&mut self, times: f64) {
+        match &mut *self.0 {
+            Kind::Recommended(estimator) => estimator.rescale(times),
+            Kind::MultipleModel(estimator) => estimator.rescale(times),
+            Kind::Paper(_) | Kind::QuasiStatic(_) => {}
+        }
+    }
+
     /// The estimate after the last tick.
     #[must_use]
     pub fn estimate(&self) -> &Estimate {

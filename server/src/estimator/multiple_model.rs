@@ -62,6 +62,13 @@ impl MultipleModel {
         }
     }
 
+    /// The forces of all ticks so far were this many times as large.
+    pub(super) fn rescale(&mut self, times: f64) {
+        for estimator in &mut self.estimators {
+            estimator.rescale(times);
+        }
+    }
+
     /// Takes one tick.
     pub(super) fn step(&mut self, measured: &Measured) {
         let at_the_contact = Measured {

@@ -175,6 +175,15 @@ impl RecommendedEstimator {
         self.way.map(|way| way.farthest)
     }
 
+    /// The forces of all ticks so far were this many times as large.
+    pub(super) fn rescale(&mut self, times: f64) {
+        let copies = self.copies.iter_mut().chain(&mut self.before_hit);
+        for regression in copies.chain([&mut self.recursive]) {
+            regression.rescale(times);
+        }
+        self.publish();
+    }
+
     /// Takes one tick; a tick with numbers that no sensor gives ends the contact for the regression.
     pub(super) fn step(&mut self, measured: &Measured) {
         let usable = measured.is_usable();

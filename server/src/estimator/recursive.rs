@@ -169,6 +169,16 @@ impl RecursiveLeastSquares {
         (self.weight > 0.0).then(|| (self.force_squares - explained).max(0.0) / self.weight)
     }
 
+    /// The forces of all rows so far were this many times as large: a gain of the force sensor has been found.
+    pub(super) fn rescale(&mut self, times: f64) {
+        self.moment *= times;
+        self.squares *= times * times;
+        self.force_squares *= times * times;
+        self.held *= times;
+        self.estimate *= times;
+        self.covariance *= times * times;
+    }
+
     /// Takes one filtered row.
     pub(super) fn update(&mut self, row: &Row) -> Verdict {
         let error = row.force - self.estimate.dot(&row.regressor);

@@ -128,9 +128,6 @@ impl SlaveConfig {
     }
 }
 
-/// A real contact is no softer than this share of k_p of the coupling.
-const SOFTEST: f64 = 0.25;
-
 impl SlaveConfig {
     /// The same for a master that sends so many new samples in a command, and whose hand feels this: play-out waits as long
     /// as that needs ([`PlayoutConfig::for_session`]).
@@ -145,8 +142,7 @@ impl SlaveConfig {
     /// What conditions the measured force of a tool with this coupling.
     #[must_use]
     pub fn conditioner(&self, coupling: &Coupling) -> Conditioner {
-        let softest = SOFTEST * coupling.stiffness_n_per_m;
-        Conditioner::new(self.conditioning, self.trigger.contact, softest)
+        Conditioner::new(self.conditioning, self.trigger.contact, coupling)
     }
 }
 

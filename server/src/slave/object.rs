@@ -214,6 +214,9 @@ impl ObjectEstimate {
     }
 
     fn take_in(&mut self, now: Time, contact: &Contact, held_back: bool) -> Measured {
+        if contact.rescaled != 1.0 {
+            self.estimator.rescale(contact.rescaled);
+        }
         let beyond_m = self.estimator.beyond_m(contact.back, contact.force);
         let observer = &mut self.observer;
         observer.step(

@@ -27,6 +27,30 @@ fn what_is_held_turns_by_9_however_it_turned_where_it_slid() {
 }
 
 #[test]
+fn a_gain_of_the_sensor_that_is_found_late_multiplies_what_was_learned_before() {
+    for gives in [false, true] {
+        let mut config = SlaveConfig::of_mode(Mode::Recommended);
+        config.tool_compliance = gives.then(|| Coupling::for_stiffness(1200.0));
+        let mut object = object_of(&config, 1000.0);
+        let of = |object: &ObjectEstimate| {
+            let found = object.estimator.estimate();
+            [found.m, found.b, found.c]
+        };
+        let before = of(&object);
+        let later = Contact {
+            rescaled: 1.25,
+            ..contact_with(0)
+        };
+        object.step(Time::from_millis(1), 1, &later, false);
+        assert_eq!(
+            of(&object),
+            before.map(|value| 1.25 * value),
+            "gives: {gives}"
+        );
+    }
+}
+
+#[test]
 fn what_pushes_of_one_body_have_shown_predicts_no_contact_with_another() {
     let mut object = pushed_slowly();
     let fresh = format!("{:?}", object.predictor);
@@ -92,6 +116,7 @@ fn contact_with(body: usize) -> Contact {
         steady: none,
         noise_n: 0.0,
         in_contact: false,
+        rescaled: 1.0,
         averaged: 1,
         vision: None,
         true_force: none,
