@@ -10,7 +10,7 @@ use crate::experiment::prelude::*;
 /// The force sensors.
 pub(super) const EXPERIMENT: Experiment = Experiment::new(
     "sensing",
-    "What noise, bias, drift, lag and gain of the force sensor cost, with and without conditioning",
+    "What noise, bias, drift, lag and gain of the force sensor cost, with and without conditioning, and with the gain found",
     10,
     run,
 );
