@@ -195,9 +195,11 @@ fn figure(rows: &[Row]) -> Figure {
     let series = of_user.filter_map(|(rows, (colour, mark))| {
         let dots = rows.iter().filter_map(|row| {
             let dot = Dot::of_intervals(row.packets()?, row.pmse()?);
-            let note = Some(row.group.case.sensor.0.to_owned());
+            // the others lie too close together to be named
+            let (name, _) = row.group.case.sensor;
+            let named = name.contains("gain") && row.group.case.cure != Cure::None;
             Some(Dot {
-                note: note.filter(|_| row.group.case.cure != Cure::None),
+                note: named.then(|| (*name).to_owned()),
                 ..dot
             })
         });

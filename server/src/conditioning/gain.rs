@@ -38,8 +38,8 @@ enum State {
     Free(u32),
     /// An object that was at rest has been touched for so many ticks.
     Begins(usize),
-    /// Its beginning is fitted, a step a tick, so that no tick takes long: the search that goes on, and the best fit of those that ended.
-    Searches(Search, Option<Fit>),
+    /// Its beginning is fitted, a step a tick, so that no tick takes long.
+    Searches,
     /// Nothing more is to be learned from this contact.
     Ends,
 }
@@ -51,23 +51,28 @@ pub(super) struct Gain {
     state: State,
     /// Force (N) and tool (m) of the newest ticks.
     recent: VecDeque<(Vec2, Vec2)>,
-    /// The beginning that is fitted.
+    /// The beginning that is fitted, the search that goes on, and the best fit of those that ended.
     onset: Onset,
+    search: Search,
+    best: Option<Fit>,
 }
 
 impl Gain {
     /// By a contact of this stiffness and damping.
     pub(super) fn new(coupling: Coupling) -> Self {
+        let onset = Onset {
+            coupling,
+            tool: [0.0; WINDOW],
+            force: [0.0; WINDOW],
+            noise_n: 0.0,
+        };
         Self {
             sensor: ANY_SENSOR,
             state: State::Free(AT_REST_TICKS),
             recent: VecDeque::with_capacity(WINDOW),
-            onset: Onset {
-                coupling,
-                tool: [0.0; WINDOW],
-                force: [0.0; WINDOW],
-                noise_n: 0.0,
-            },
+            search: Search::new(&onset, &ANY_SENSOR, *FIRST_TOUCHES.start()),
+            onset,
+            best: None,
         }
     }
 
@@ -83,14 +88,15 @@ impl Gain {
         }
         self.recent.push_back((force, tool));
         self.state = match self.state {
-            State::Searches(search, best) => self.search(search, best),
+            State::Searches => self.search(),
             State::Free(ticks) if !in_contact => State::Free(ticks.saturating_add(1)),
             _ if !in_contact => State::Free(0),
             State::Free(ticks) if ticks >= AT_REST_TICKS => State::Begins(1),
             State::Begins(ticks) if ticks < AFTER => State::Begins(ticks + 1),
             State::Begins(_) if self.recent.len() == WINDOW => {
                 self.take_newest(noise_n);
-                self.begin(*FIRST_TOUCHES.start(), None)
+                self.best = None;
+                self.begin(*FIRST_TOUCHES.start())
             }
             _ => State::Ends,
         };
@@ -111,20 +117,23 @@ impl Gain {
         }
     }
 
-    fn begin(&self, touches: usize, best: Option<Fit>) -> State {
-        State::Searches(Search::new(&self.onset, &self.sensor, touches), best)
+    fn begin(&mut self, touches: usize) -> State {
+        self.search = Search::new(&self.onset, &self.sensor, touches);
+        State::Searches
     }
 
-    fn search(&mut self, mut search: Search, best: Option<Fit>) -> State {
-        if !search.step(&self.onset) {
-            return State::Searches(search, best);
+    /// One step of the search.
+    fn search(&mut self) -> State {
+        if !self.search.step(&self.onset) {
+            return State::Searches;
         }
-        let both = [best, search.found(&self.onset)].into_iter().flatten();
-        let best = both.min_by(|one, other| one.cost.total_cmp(&other.cost));
-        if search.touches < *FIRST_TOUCHES.end() {
-            return self.begin(search.touches + 1, best);
+        let both = [self.best, self.search.found(&self.onset)];
+        let both = both.into_iter().flatten();
+        self.best = both.min_by(|one, other| one.cost.total_cmp(&other.cost));
+        if self.search.touches < *FIRST_TOUCHES.end() {
+            return self.begin(self.search.touches + 1);
         }
-        if let Some(fit) = best {
+        if let Some(fit) = self.best {
             self.believe(&fit);
         }
         State::Ends

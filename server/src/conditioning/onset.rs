@@ -188,14 +188,18 @@ impl Search {
         let left = onset.left(&self.at, self.touches);
         let (hessian, _) = self.normal_equations(onset, &left);
         let covariance = hessian.cholesky()?.inverse();
-        let of = |index: usize| Normal {
-            mean: self.at[index],
-            deviation: covariance[(index, index)].sqrt(),
-        };
+        let [_, _, _, ln_gain, lag, _] = self.at.into();
+        let [_, _, _, gain_variance, lag_variance, _] = covariance.diagonal().into();
         Some(Fit {
             sensor: Sensor {
-                ln_gain: of(3),
-                lag: of(4),
+                ln_gain: Normal {
+                    mean: ln_gain,
+                    deviation: gain_variance.sqrt(),
+                },
+                lag: Normal {
+                    mean: lag,
+                    deviation: lag_variance.sqrt(),
+                },
             },
             misfit: onset.weight() * dot(&left, &left) / WINDOW as f64,
             cost: self.cost,
@@ -211,22 +215,19 @@ impl Search {
     fn normal_equations(&self, onset: &Onset, left: &Samples) -> (SMatrix<f64, 6, 6>, Unknowns) {
         let mut slopes = [[0.0; WINDOW]; 6];
         for (index, (slope, difference)) in slopes.iter_mut().zip(DIFFERENCES).enumerate() {
-            let mut beside = self.at;
-            beside[index] += difference;
+            let beside = self.at + Unknowns::ith(index, difference);
             *slope = onset.left(&beside, self.touches);
             for (r, left) in slope.iter_mut().zip(left) {
                 *r = (*r - left) / difference;
             }
         }
+        let slopes = slopes.each_ref();
+        let hessian = SMatrix::from(slopes.map(|one| slopes.map(|other| dot(one, other))));
+        let gradient = Unknowns::from(slopes.map(|one| dot(one, left)));
+        let known = (self.at - self.start).component_mul(&self.weights);
         let weight = onset.weight();
-        let mut hessian = SMatrix::from_diagonal(&self.weights);
-        let mut gradient = (self.at - self.start).component_mul(&self.weights);
-        for (row, one) in slopes.iter().enumerate() {
-            gradient[row] += weight * dot(one, left);
-            for (column, other) in slopes.iter().enumerate() {
-                hessian[(row, column)] += weight * dot(one, other);
-            }
-        }
+        let hessian = hessian * weight + SMatrix::from_diagonal(&self.weights);
+        let gradient = gradient * weight + known;
         (hessian, gradient)
     }
 }
