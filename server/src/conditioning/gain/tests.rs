@@ -13,6 +13,8 @@ struct Push {
     random: Substream,
     object: [f64; 3],
     times_k_p: f64,
+    /// What the object runs against, m.
+    wall: f64,
     sensor_gain: f64,
     lag_s: f64,
     noise_n: f64,
@@ -29,6 +31,7 @@ impl Push {
             random: Substream::new(seed, "test/gain", 0),
             object,
             times_k_p: 1.0,
+            wall: f64::INFINITY,
             sensor_gain,
             lag_s,
             noise_n,
@@ -54,6 +57,9 @@ impl Push {
         let left = (free.abs() - TICK_S * c).max(0.0);
         self.velocity = left.copysign(free) / (m + TICK_S * b);
         self.face += TICK_S * self.velocity;
+        if self.face > self.wall {
+            (self.face, self.velocity) = (self.wall, 0.0);
+        }
         let follows = 1.0 - libm::exp(-TICK_S / self.lag_s.max(1e-6));
         self.lagging += (force - self.lagging) * follows;
         let ((x, y), (at, _)) = (self.random.normal_pair(), self.random.normal_pair());
@@ -152,5 +158,15 @@ fn a_contact_of_another_stiffness_is_no_gain() {
             "{times_k_p}: {}",
             push.gain.known()
         );
+    }
+}
+
+#[test]
+fn an_object_that_runs_against_something_shows_no_gain() {
+    for way_m in [0.005, 0.01, 0.02] {
+        let mut push = Push::new(1, OBJECTS[0], 1.1, 0.0, 0.01);
+        push.wall = way_m;
+        push.push(400);
+        assert!(push.gain.known() == 1.0, "{way_m} m: {}", push.gain.known());
     }
 }
