@@ -135,6 +135,12 @@ impl Conditioner {
         self.noise.beyond()
     }
 
+    /// Measured force over true force, as contacts have shown it; none where it is not looked for, and before one has.
+    #[must_use]
+    pub fn sensor_gain(&self) -> Option<f64> {
+        self.gain.as_ref().and_then(Gain::found)
+    }
+
     /// Takes the measured force (N) of a tick with the tool at `tool` (m).
     pub fn step(&mut self, measured: Vec2, tool: Vec2) -> Conditioned {
         if self.config.follow_noise {

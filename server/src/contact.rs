@@ -117,6 +117,12 @@ impl ContactStage {
         self.conditioner.noise_n()
     }
 
+    /// Measured force over true force, as contacts have shown it; none where it is not looked for, and before one has.
+    #[must_use]
+    pub fn sensor_gain(&self) -> Option<f64> {
+        self.conditioner.sensor_gain()
+    }
+
     /// So many ticks, after which the tool is at `tool` (m) and has moved at `velocity` (m/s); what is known of the contact then.
     pub fn step(&mut self, now: Time, ticks: u32, tool: Vec2, velocity: Vec2) -> Contact {
         let met = self.plant.meet(now, ticks, tool, velocity, self.body);

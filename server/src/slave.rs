@@ -298,6 +298,12 @@ impl Slave {
         self.tool.force()
     }
 
+    /// Measured force over true force, as contacts have shown it; none where it is not looked for, and before one has.
+    #[must_use]
+    pub fn sensor_gain(&self) -> Option<f64> {
+        self.contact.sensor_gain()
+    }
+
     /// The limit of the tool's energy, and what passed both ports.
     #[must_use]
     pub fn tool_energy(&self) -> &ToolEnergy {

@@ -68,7 +68,8 @@ impl Gain {
         };
         Self {
             sensor: ANY_SENSOR,
-            state: State::Free(AT_REST_TICKS),
+            // a session may go on where another has pushed
+            state: State::Free(0),
             recent: VecDeque::with_capacity(WINDOW),
             search: Search::new(&onset, &ANY_SENSOR, *FIRST_TOUCHES.start()),
             onset,
@@ -79,6 +80,11 @@ impl Gain {
     /// Measured force over true force, as it is known.
     pub(super) fn known(&self) -> f64 {
         libm::exp(self.sensor.ln_gain.mean)
+    }
+
+    /// The same once a contact has shown it.
+    pub(super) fn found(&self) -> Option<f64> {
+        (self.sensor != ANY_SENSOR).then(|| self.known())
     }
 
     /// Takes the force (N) as the sensor gives it, less its bias, of a tick with the tool at `tool` (m). `noise_n` is its noise per axis.

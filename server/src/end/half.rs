@@ -52,6 +52,7 @@ fn tool(slave: &Slave) -> ToolReport {
         work_j: energy.tool_j().into(),
         hand_work_j: energy.hand_j().into(),
         energy_held_s: seconds(energy.held_ticks()),
+        sensor_gain: slave.sensor_gain().into(),
     }
 }
 

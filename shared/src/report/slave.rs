@@ -127,4 +127,6 @@ pub struct ToolReport {
     pub hand_work_j: Number,
     /// For how long the limit of its energy shortened its way, s.
     pub energy_held_s: Number,
+    /// Measured force over true force, as contacts have shown it; absent where it is not looked for, and before one has.
+    pub sensor_gain: Number,
 }

@@ -184,6 +184,7 @@ impl<C> RunReport<C> {
             row("largest force", [number(self.tool.force_peak_n, 2, " N")]),
             row("held back for", [number(self.tool.held_s, 3, " s"), after("by its energy", number(self.tool.energy_held_s, 3, " s"))]),
             row("work on the object", [number(self.tool.work_j, 3, " J"), after("hand", number(self.tool.hand_work_j, 3, " J"))]),
+            row("gain of its sensor", [number(self.tool.sensor_gain, 3, "")]),
         ]
     }
 

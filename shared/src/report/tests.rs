@@ -89,6 +89,7 @@ fn full() -> RunReport<Value> {
         work_j: 1.5.into(),
         hand_work_j: 1.25.into(),
         energy_held_s: 0.125.into(),
+        sensor_gain: 1.08.into(),
     };
     report.passivity = PassivityReport {
         energy_injected_j: 0.0.into(),
@@ -178,6 +179,7 @@ const REQUIRED: &str = "version command seed duration_s ending configuration dro
     model.friction_n.estimate model.friction_n.truth \
     pose.position_rms_m pose.position_max_m pose.angle_rms_rad pose.angle_max_rad \
     tool.held_s tool.force_peak_n tool.work_j tool.hand_work_j tool.energy_held_s \
+    tool.sensor_gain \
     passivity.energy_injected_j passivity.observer_min_j passivity.hand_work_j \
     link.rtt_ms.p50 link.rtt_ms.p99 link.loss_up link.loss_down link.unsent_up link.unsent_down \
     emulation.up.released emulation.up.late_us.p50 emulation.up.late_us.p99 \
