@@ -72,7 +72,7 @@ pub struct Conditioned {
     pub steady: Vec2,
     /// Noise per axis as measured, N, where it is more than thresholds are made for; else 0.
     pub noise_n: f64,
-    /// Forces of ticks before were this many times as large as they were given, by the gain as it is known now; 1 where it stays.
+    /// By the gain as it is known now, forces of earlier ticks are this many times what was given; 1 where the gain stays.
     pub rescaled: f64,
     /// Whether the tool touches.
     pub in_contact: bool,

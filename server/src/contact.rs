@@ -17,13 +17,13 @@ pub struct Contact {
     pub tool: Vec2,
     /// How far it stands back by a spring of its own, m.
     pub back: Vec2,
-    /// f_s as measured, less its bias where that is tared, N, world frame, on the object.
+    /// f_s as measured, less its bias where that is tared, over the sensor's gain where that is found, N, world frame, on the object.
     pub force: Vec2,
     /// The mean of the newest few of these where they are noisy, else the newest, N.
     pub steady: Vec2,
     /// Noise of `force` per axis as measured, N, where it is more than thresholds are made for; else 0.
     pub noise_n: f64,
-    /// Forces of ticks before were this many times as large as they were given: a gain of the sensor has been found; else 1.
+    /// By the sensor's gain as it is known now, forces of earlier ticks are this many times what was given; 1 where the gain stays.
     pub rescaled: f64,
     /// Whether the tool touches the object, by the measured force.
     pub in_contact: bool,

@@ -147,7 +147,9 @@ impl Gain {
 
     fn believe(&mut self, fit: &Fit) {
         let Sensor { ln_gain, lag } = fit.sensor;
-        if fit.misfit > MISFIT_MAX || ln_gain.mean.abs() > LN_GAIN_MAX {
+        // written so that NaN fails
+        let is_sensor = fit.misfit <= MISFIT_MAX && ln_gain.mean.abs() <= LN_GAIN_MAX;
+        if !is_sensor {
             return;
         }
         let (gain_best, lag_best) = BEST;

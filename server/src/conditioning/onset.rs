@@ -1,8 +1,8 @@
 //! How a contact begins, fitted: what a force sensor with a gain and a lag measures of an object at rest that is pressed through a
 //! contact of known stiffness, stands, and slides.
 //!
-//! While it stands, (6) alone says how the force grows with the tool's way; from where it slides, (1) says how it gives way. Six
-//! unknowns with priors, by least squares (Levenberg 1944, Marquardt 1963), a step at a time. Pure, of one window.
+//! While the object stands, (6) gives the force from the tool's way. Once it slides, (1) gives its motion. Least squares with priors
+//! find six unknowns (Levenberg 1944, Marquardt 1963), a step at a time. Pure, of one window.
 
 use mmt_shared::model::contact::Coupling;
 use mmt_shared::time::TICK_S;
@@ -27,11 +27,12 @@ const MODEL_ERROR_N: f64 = 0.03;
 type Unknowns = SVector<f64, 6>;
 type Samples = [f64; WINDOW];
 
-/// ln m (kg) and b (N s/m) of any object, with standard deviations.
+/// ln m (kg) of any object.
 const MASS: Normal = Normal {
     mean: -0.7,
     deviation: 1.0,
 };
+/// b (N s/m) of any object.
 const DAMPING: Normal = Normal {
     mean: 2.0,
     deviation: 3.0,

@@ -6,7 +6,7 @@ use mmt_shared::time::TICK_S;
 
 use super::*;
 
-const K_P: f64 = 1000.0;
+const K_P: f64 = COUPLING.stiffness_n_per_m;
 
 /// A tool before a wall at x = 0, and its sensor.
 struct Press {

@@ -7,7 +7,7 @@ use std::f64::consts::TAU;
 
 use super::*;
 
-/// An object of (1) on the x axis, a tool that goes as it is told, and a sensor.
+/// A tool pushes an object of (1) along x, and a sensor measures the force.
 struct Push {
     gain: Gain,
     random: Substream,
@@ -134,8 +134,8 @@ fn short_touches_and_an_object_that_may_just_have_been_touched_show_nothing() {
     let [object, ..] = OBJECTS;
     let mut push = Push::new(1, object, 1.1, 0.0, 0.01).rested();
     for _ in 0..10 {
-        // 0.2 s on the way, then less than 0.1 s of contact
-        push.push(70);
+        // 0.2 s on the way, then less than 0.3 s of contact
+        push.push(240);
     }
     assert!(
         push.gain.found().is_none(),
