@@ -11,6 +11,7 @@ pub mod end;
 pub mod environment;
 pub mod estimator;
 pub mod feed;
+mod levenberg_marquardt;
 mod motion_limits;
 pub mod plant;
 pub mod playout;

@@ -2,11 +2,13 @@
 //! contact of known stiffness, stands, and slides.
 //!
 //! While the object stands, (6) gives the force from the tool's way. Once it slides, (1) gives its motion. Least squares with priors
-//! find six unknowns (Levenberg 1944, Marquardt 1963), a step at a time. Pure, of one window.
+//! find six unknowns, a step at a time. Pure, of one window.
 
 use mmt_shared::model::contact::Coupling;
 use mmt_shared::time::TICK_S;
 use nalgebra::{SMatrix, SVector};
+
+use crate::levenberg_marquardt::{LevenbergMarquardt, Step};
 
 /// Ticks of a window before contact is noticed: a noisy force is averaged, and a lagging one comes late.
 const BEFORE: usize = 20;
@@ -121,9 +123,7 @@ pub(super) struct Search {
     start: Unknowns,
     /// Inverse variances of what was known.
     weights: Unknowns,
-    at: Unknowns,
-    cost: f64,
-    lift: f64,
+    descent: LevenbergMarquardt<6>,
     steps: u32,
 }
 
@@ -152,44 +152,37 @@ impl Search {
             touches,
             start,
             weights: Unknowns::from(known.map(|of| of.deviation.powi(-2))),
-            at: start,
-            cost: f64::INFINITY,
-            lift: 1e-2,
+            descent: LevenbergMarquardt::new(start, f64::INFINITY, 1e-2),
             steps: 0,
         }
     }
 
     /// One step; whether it is the last.
     pub(super) fn step(&mut self, onset: &Onset) -> bool {
-        let left = onset.left(&self.at, self.touches);
+        let mut descent = self.descent;
+        let left = onset.left(&descent.at, self.touches);
         if self.steps == 0 {
-            self.cost = self.cost_of(onset, &self.at, &left);
+            descent.cost = self.cost_of(onset, &descent.at, &left);
         }
         self.steps += 1;
         let (hessian, gradient) = self.normal_equations(onset, &left);
-        let lifted = hessian + SMatrix::from_diagonal(&(hessian.diagonal() * self.lift));
-        let Some(factor) = lifted.cholesky() else {
-            return true;
-        };
-        let next = self.at - factor.solve(&gradient);
-        let cost = self.cost_of(onset, &next, &onset.left(&next, self.touches));
-        if cost < self.cost {
-            let fall = (self.cost - cost) / self.cost;
-            (self.at, self.cost, self.lift) = (next, cost, self.lift * 0.2);
-            fall < FALL || self.steps >= STEPS_MAX
-        } else {
-            // A NaN lands here too.
-            self.lift *= 8.0;
-            self.steps >= STEPS_MAX
+        let step = descent.step(&hessian, &gradient, |next| {
+            self.cost_of(onset, next, &onset.left(next, self.touches))
+        });
+        self.descent = descent;
+        match step {
+            Step::Fell(share) if share < FALL => true,
+            Step::Fell(_) | Step::Stayed => self.steps >= STEPS_MAX,
+            Step::Stuck => true,
         }
     }
 
     /// What it found; none where the numbers are none.
     pub(super) fn found(&self, onset: &Onset) -> Option<Fit> {
-        let left = onset.left(&self.at, self.touches);
+        let left = onset.left(&self.descent.at, self.touches);
         let (hessian, _) = self.normal_equations(onset, &left);
         let covariance = hessian.cholesky()?.inverse();
-        let [_, _, _, ln_gain, lag, _] = self.at.into();
+        let [_, _, _, ln_gain, lag, _] = self.descent.at.into();
         let [_, _, _, gain_variance, lag_variance, _] = covariance.diagonal().into();
         Some(Fit {
             sensor: Sensor {
@@ -203,7 +196,7 @@ impl Search {
                 },
             },
             misfit: onset.weight() * dot(&left, &left) / WINDOW as f64,
-            cost: self.cost,
+            cost: self.descent.cost,
         })
     }
 
@@ -216,7 +209,7 @@ impl Search {
     fn normal_equations(&self, onset: &Onset, left: &Samples) -> (SMatrix<f64, 6, 6>, Unknowns) {
         let mut slopes = [[0.0; WINDOW]; 6];
         for (index, (slope, difference)) in slopes.iter_mut().zip(DIFFERENCES).enumerate() {
-            let beside = self.at + Unknowns::ith(index, difference);
+            let beside = self.descent.at + Unknowns::ith(index, difference);
             *slope = onset.left(&beside, self.touches);
             for (r, left) in slope.iter_mut().zip(left) {
                 *r = (*r - left) / difference;
@@ -225,7 +218,7 @@ impl Search {
         let slopes = slopes.each_ref();
         let hessian = SMatrix::from(slopes.map(|one| slopes.map(|other| dot(one, other))));
         let gradient = Unknowns::from(slopes.map(|one| dot(one, left)));
-        let known = (self.at - self.start).component_mul(&self.weights);
+        let known = (self.descent.at - self.start).component_mul(&self.weights);
         let weight = onset.weight();
         let hessian = hessian * weight + SMatrix::from_diagonal(&self.weights);
         let gradient = gradient * weight + known;

@@ -7,6 +7,7 @@
 use mmt_shared::model::geometry::Vec2;
 
 use super::support::Support;
+use crate::levenberg_marquardt::{LevenbergMarquardt, Step};
 
 /// k: force errors well below it count by their square, well above by their size, N.
 const ROBUST_N: f64 = 0.3;
@@ -68,29 +69,17 @@ fn to_support(q: &Vec4) -> Support {
 
 impl<M, L: Fn(&Support, &M) -> Vec2> Search<'_, L, M> {
     fn run(&self, from: &Support) -> Support {
-        let mut q = to_vector(from);
-        let mut cost = self.cost(&q);
-        let mut lift = 1e-3;
+        let begin = to_vector(from);
+        let mut search = LevenbergMarquardt::new(begin, self.cost(&begin), 1e-3);
         for _ in 0..ITERATIONS {
-            let (hessian, gradient) = self.normal_equations(&q);
-            let lifted = hessian + Mat4::from_diagonal(&hessian.diagonal()) * lift;
-            let Some(step) = lifted.cholesky().map(|factor| factor.solve(&gradient)) else {
-                break;
-            };
-            let next = q - step;
-            let next_cost = self.cost(&next);
-            if next_cost < cost {
-                let fall = (cost - next_cost) / cost;
-                (q, cost, lift) = (next, next_cost, lift * 0.2);
-                if fall < FALL {
-                    break;
-                }
-            } else {
-                // A NaN lands here too.
-                lift *= 8.0;
+            let (hessian, gradient) = self.normal_equations(&search.at);
+            match search.step(&hessian, &gradient, |q| self.cost(q)) {
+                Step::Fell(share) if share < FALL => break,
+                Step::Fell(_) | Step::Stayed => {}
+                Step::Stuck => break,
             }
         }
-        to_support(&q)
+        to_support(&search.at)
     }
 
     fn error(&self, q: &Vec4, push: &Observation<M>) -> Vec2 {
