@@ -3,6 +3,8 @@
 //! An update of the oracle's sets the model's box to the object's true pose and velocity in the tick in which it is sent, with
 //! parameters of its choice. So what comes after it depends on nothing before it, and the fewest updates are the fewest
 //! intervals that cover the ticks: an exact minimum. Pure. No slave could do this, and nothing that runs live may use it.
+//!
+//! Beside it stands a sender that knows the truth as well, but not what is to come: it shows what the hindsight is worth.
 
 use mmt_shared::model::dynamics::Motion;
 use mmt_shared::model::geometry::{BoxFootprint, Vec2};
@@ -40,29 +42,40 @@ pub struct Oracle<'a> {
     pub gap_ticks: usize,
 }
 
-impl Oracle<'_> {
-    /// The fewest updates with which a model that begins as `start` is never more than `epsilon_n` (N) off in a judged tick.
-    /// None if an update in every tick in which one may be sent would not do.
-    #[must_use]
-    pub fn fewest(&self, start: ModelState, epsilon_n: f64) -> Option<usize> {
-        let start = self.end(Body::new(start), 0, epsilon_n, &[]);
-        fewest(start, &self.ends(epsilon_n))
-    }
+/// How many updates do.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Needed {
+    /// The fewest, chosen with hindsight. None if an update in every tick in which one may be sent would not do.
+    pub fewest: Option<usize>,
+    /// Those of a sender that knows the truth, but not what is to come: it sends when the model is off, as soon as it may, always with
+    /// the same choice. Of all choices the one with which it sends the least; none without a choice.
+    pub when_off: Option<usize>,
+}
 
-    /// For each tick the first one in which a model that is set in it is off again, under the best of the choices; the tick
-    /// itself where it is off at once or no update may be sent.
-    fn ends(&self, epsilon_n: f64) -> Vec<usize> {
+impl Oracle<'_> {
+    /// How many updates a model needs that begins as `start` and is to be no more than `epsilon_n` (N) off in a judged tick.
+    #[must_use]
+    pub fn needed(&self, start: ModelState, epsilon_n: f64) -> Needed {
+        let start = self.end(Body::new(start), 0, epsilon_n, &[]);
+        let ends = |params| self.ends_of(params, epsilon_n);
+        let of_choices: Vec<Vec<usize>> = self.choices.iter().map(ends).collect();
         let mut best: Vec<usize> = (0..self.ticks.len()).collect();
-        for params in self.choices {
-            let of_choice = self.ends_of(params, epsilon_n);
-            for (best, end) in best.iter_mut().zip(of_choice) {
-                *best = end.max(*best);
+        for ends in &of_choices {
+            for (best, end) in best.iter_mut().zip(ends) {
+                *best = *end.max(best);
             }
         }
-        best
+        let sent = of_choices
+            .iter()
+            .map(|ends| when_off(start, ends, self.gap_ticks));
+        Needed {
+            fewest: fewest(start, &best),
+            when_off: sent.min(),
+        }
     }
 
-    /// The same for one choice, found from the last tick on.
+    /// For each tick the first one in which a model that is set in it is off again, with these parameters; the tick itself where it
+    /// is off at once or no update may be sent. Found from the last tick on.
     fn ends_of(&self, params: &ModelParams, epsilon_n: f64) -> Vec<usize> {
         let mut ends: Vec<usize> = (0..self.ticks.len()).collect();
         let allowed = self.ticks.iter().enumerate().rev();
@@ -126,6 +139,18 @@ fn fewest(start: usize, ends: &[usize]) -> Option<usize> {
     Some(updates)
 }
 
+/// The updates of who sends one whenever the model is off, in the first tick that is a multiple of `gap_ticks`. `start` and
+/// `ends` as for [`fewest`]; what is off at once again is sent anew after the gap.
+fn when_off(start: usize, ends: &[usize], gap_ticks: usize) -> usize {
+    let gap_ticks = gap_ticks.max(1);
+    let (mut off, mut updates) = (start, 0);
+    while let Some(end) = ends.get(off.next_multiple_of(gap_ticks)) {
+        updates += 1;
+        off = (*end).max(off.next_multiple_of(gap_ticks) + 1);
+    }
+    updates
+}
+
 #[cfg(test)]
 mod tests {
     use mmt_shared::fixtures::COUPLING;
@@ -175,6 +200,16 @@ mod tests {
         // the update in tick 1 reaches farther than the one in tick 2, where it is off first
         assert_eq!(fewest(2, &[2, 5, 4, 5, 5, 6]), Some(2));
         assert_eq!(fewest(1, &[1, 1, 4, 4]), None, "nothing mends tick 1");
+    }
+
+    #[test]
+    fn who_waits_until_the_model_is_off_sends_by_hand_made_ends_as_by_hand() {
+        assert_eq!(when_off(3, &[0, 0, 0], 1), 0, "never off");
+        // where an update of tick 1 would have reached farther
+        assert_eq!(when_off(2, &[2, 5, 4, 5, 5, 6], 1), 3);
+        assert_eq!(when_off(1, &[1, 1, 4, 4], 1), 2, "tick 1 stays off");
+        assert_eq!(when_off(1, &[1, 1, 4, 4], 2), 1, "sent in tick 2");
+        assert_eq!(when_off(3, &[4, 4, 4, 4], 2), 0, "too late to send");
     }
 
     fn params(c: f64) -> ModelParams {
@@ -241,10 +276,10 @@ mod tests {
                 ticks: &ticks,
                 gap_ticks,
             };
-            oracle.fewest(state(start), epsilon_n)
+            oracle.needed(state(start), epsilon_n)
         };
         let fewest =
-            |choices: &[ModelParams], start, epsilon_n| every(1, choices, start, epsilon_n);
+            |choices: &[ModelParams], start, epsilon_n| every(1, choices, start, epsilon_n).fewest;
         let both = [params(2.0), params(3.0)];
         assert_eq!(fewest(&both, 2.0, 1e-9), Some(1));
         assert_eq!(fewest(&both, 3.0, 1e-9), Some(2));
@@ -253,7 +288,12 @@ mod tests {
         let blind = fewest(&both[1..], 3.0, 0.2).unwrap();
         assert!(blind > 2, "{blind}");
         // the step comes in tick 400: an update of tick 399 is of before it
-        assert_eq!(every(200, &both, 2.0, 1e-9), Some(1));
-        assert_eq!(every(399, &both, 2.0, 1e-9), None);
+        assert_eq!(every(200, &both, 2.0, 1e-9).fewest, Some(1));
+        assert_eq!(every(399, &both, 2.0, 1e-9).fewest, None);
+        // who sends when it is off sends the second friction in tick 400 once, and the first again and again
+        assert_eq!(every(1, &both[1..], 2.0, 1e-9).when_off, Some(1));
+        assert_eq!(every(1, &both[..1], 2.0, 1e-9).when_off, Some(400));
+        assert_eq!(every(10, &both[..1], 2.0, 1e-9).when_off, Some(40));
+        assert_eq!(every(1, &[], 2.0, 1e-9).when_off, None);
     }
 }

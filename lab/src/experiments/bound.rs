@@ -56,6 +56,7 @@ fn columns<'a>() -> Vec<Column<'a, Run<'a, Case, Bounded>>> {
         column("contact_updates", "", 0, |run| run.measured.contact_updates),
         column("judged_updates", "", 0, |run| run.measured.judged_updates),
         column("fewest", "", 0, |run| run.measured.fewest.map(|fewest| fewest as u64)),
+        column("when_off", "", 0, |run| run.measured.when_off.map(|updates| updates as u64)),
         column("ratio", "", 2, |run| run.measured.ratio()),
     ]
 }
@@ -70,6 +71,7 @@ fn summary(groups: &[Group]) -> Table {
         mean("contact_updates", "", 1, |run| Some(run.contact_updates as f64)),
         mean("judged_updates", "", 1, |run| Some(run.judged_updates as f64)),
         mean("fewest", "", 1, |run| run.fewest.map(|fewest| fewest as f64)),
+        mean("when_off", "", 1, |run| run.when_off.map(|updates| updates as f64)),
     ];
     columns.extend(interval(["ratio", "ratio_low", "ratio_high"], "", 2, ratio));
     columns.push(column("target", "", 0, |group| ratio(group).map(|ratio| {

@@ -45,6 +45,8 @@ pub(super) struct Bounded {
     pub(super) judged_updates: u64,
     /// Updates of the oracle; none if it cannot stay within epsilon.
     pub(super) fewest: Option<usize>,
+    /// Updates of a sender that knows the truth, but not what is to come.
+    pub(super) when_off: Option<usize>,
     /// Of the run's event log.
     pub(super) digest: String,
 }
@@ -97,6 +99,7 @@ impl Bounded {
             gap_ticks: GAP_TICKS,
         };
         let start = *world.slave().state();
+        let needed = epsilon_n.map(|epsilon_n| oracle.needed(start, epsilon_n));
         Ok(Self {
             duration_s: duration.as_secs_f64(),
             judged_s: errors_n.len() as f64 * TICK_S,
@@ -104,7 +107,8 @@ impl Bounded {
             updates: kept.updates,
             contact_updates: kept.contact_updates,
             judged_updates: kept.judged_updates,
-            fewest: epsilon_n.and_then(|epsilon_n| oracle.fewest(start, epsilon_n)),
+            fewest: needed.and_then(|needed| needed.fewest),
+            when_off: needed.and_then(|needed| needed.when_off),
             digest: world.digest(),
         })
     }
