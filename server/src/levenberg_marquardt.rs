@@ -4,18 +4,18 @@ use nalgebra::{SMatrix, SVector};
 
 /// A search for the `N` unknowns with the least cost.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct LevenbergMarquardt<const N: usize> {
+pub(crate) struct LevenbergMarquardt<const N: usize> {
     /// The best unknowns so far.
-    pub at: SVector<f64, N>,
+    pub(crate) at: SVector<f64, N>,
     /// Their cost.
-    pub cost: f64,
+    pub(crate) cost: f64,
     /// Share of the Hessian's diagonal that is added to it: a small one makes the step Gauss and Newton's, a large one a short step.
     lift: f64,
 }
 
 /// What a step came to.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Step {
+pub(crate) enum Step {
     /// The cost fell by this share.
     Fell(f64),
     /// The cost would not have fallen. The next step is shorter.
@@ -26,12 +26,12 @@ pub enum Step {
 
 impl<const N: usize> LevenbergMarquardt<N> {
     /// Begins at `at`, whose cost is `cost`, with `lift` added to the Hessian's diagonal, as a share of it.
-    pub fn new(at: SVector<f64, N>, cost: f64, lift: f64) -> Self {
+    pub(crate) fn new(at: SVector<f64, N>, cost: f64, lift: f64) -> Self {
         Self { at, cost, lift }
     }
 
     /// One step, given half of the Gauss–Newton Hessian and half of the gradient of the cost where the search is.
-    pub fn step(
+    pub(crate) fn step(
         &mut self,
         hessian: &SMatrix<f64, N, N>,
         gradient: &SVector<f64, N>,
