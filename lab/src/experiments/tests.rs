@@ -176,6 +176,7 @@ fn bound_is_below_every_scheme() {
         let [updates, contact, judged, fewest] =
             ["updates", "contact_updates", "judged_updates", "fewest"].map(|key| number(&row, key));
         assert!((1.0..updates).contains(&fewest), "{row:?}");
+        assert!((1.0..updates).contains(&number(&row, "when_off")), "{row:?}");
         assert!(contact <= updates && judged <= updates, "{row:?}");
         assert!((number(&row, "ratio") - updates / fewest).abs() < 1e-12);
         assert!((0.001..1.0).contains(&number(&row, "epsilon_n")), "{row:?}");
