@@ -173,10 +173,17 @@ fn bound_is_below_every_scheme() {
     let rows = done.rows("bound.csv", &[]);
     assert_eq!(rows.len(), 6);
     for row in rows {
-        let [updates, contact, judged, fewest] =
-            ["updates", "contact_updates", "judged_updates", "fewest"].map(|key| number(&row, key));
-        assert!((1.0..updates).contains(&fewest), "{row:?}");
-        assert!((1.0..updates).contains(&number(&row, "when_off")), "{row:?}");
+        let [updates, contact, judged, fewest, when_off] = [
+            "updates",
+            "contact_updates",
+            "judged_updates",
+            "fewest",
+            "when_off",
+        ]
+        .map(|key| number(&row, key));
+        for truth in [fewest, when_off] {
+            assert!((1.0..updates).contains(&truth), "{row:?}");
+        }
         assert!(contact <= updates && judged <= updates, "{row:?}");
         assert!((number(&row, "ratio") - updates / fewest).abs() < 1e-12);
         assert!((0.001..1.0).contains(&number(&row, "epsilon_n")), "{row:?}");
