@@ -289,7 +289,7 @@ impl RecursiveLeastSquares {
     fn solve(&mut self, row: &Row) {
         let variance = (self.squares / self.weight).max(ROW_VARIANCE_MIN);
         let pull = self.pull(variance);
-        // noise in a regressor makes its parameter look smaller, 0.8 % of m at 10 µm and 3 % at 0.1 N: taken away, it does not
+        // noise in a regressor makes its parameter look smaller, 0.8 % of m at 10 µm and 3 to 5 % at 0.1 N: taken away, it does not
         let matrix = self.gram - self.noise.gram * self.weight + pull;
         let right = self.moment - self.noise.moment * self.weight + pull * self.held;
         // (3), under the bounds
