@@ -290,10 +290,10 @@ mod tests {
         // the step comes in tick 400: an update of tick 399 is of before it
         assert_eq!(every(200, &both, 2.0, 1e-9).fewest, Some(1));
         assert_eq!(every(399, &both, 2.0, 1e-9).fewest, None);
-        // who sends when it is off sends the second friction in tick 400 once, and the first again and again
+        // who sends when it is off sends the second friction once, in tick 401, and the first again and again from then on
         assert_eq!(every(1, &both[1..], 2.0, 1e-9).when_off, Some(1));
-        assert_eq!(every(1, &both[..1], 2.0, 1e-9).when_off, Some(400));
-        assert_eq!(every(10, &both[..1], 2.0, 1e-9).when_off, Some(40));
+        assert_eq!(every(1, &both[..1], 2.0, 1e-9).when_off, Some(399));
+        assert_eq!(every(10, &both[..1], 2.0, 1e-9).when_off, Some(39));
         assert_eq!(every(1, &[], 2.0, 1e-9).when_off, None);
     }
 }
