@@ -44,7 +44,7 @@ def main(control: str) -> None:
     ratio = median(python / rust for rust, python in turns)
     print(f"A run of {SECONDS} s in virtual time, CPU time, medians of {TURNS} turns")
     print(f"  Rust      {rust:6.3f} s")
-    print(f"  Python    {python:6.3f} s    {ratio:.3f} of it, at most {MOST}")
+    print(f"  Python    {python:6.3f} s    {ratio:.3f} of the Rust run of the same turn, at most {MOST}")
     if ratio > MOST:
         sys.exit("FAILED: a run costs too much from Python")
 

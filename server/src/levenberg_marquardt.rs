@@ -20,8 +20,19 @@ pub(crate) enum Step {
     Fell(f64),
     /// The cost would not have fallen. The next step is shorter.
     Stayed,
-    /// The Hessian has no inverse: there is no step.
+    /// The Hessian is not positive definite: there is no step.
     Stuck,
+}
+
+impl Step {
+    /// Whether a search ends here that ends where the cost falls by less than this share.
+    pub(crate) fn is_last(self, fall: f64) -> bool {
+        match self {
+            Self::Fell(share) => share < fall,
+            Self::Stayed => false,
+            Self::Stuck => true,
+        }
+    }
 }
 
 impl<const N: usize> LevenbergMarquardt<N> {
@@ -30,7 +41,8 @@ impl<const N: usize> LevenbergMarquardt<N> {
         Self { at, cost, lift }
     }
 
-    /// One step, given half of the Gauss–Newton Hessian and half of the gradient of the cost where the search is.
+    /// One step, given half of the Gauss–Newton Hessian and half of the gradient of the cost where the search is. It never goes to where the
+    /// cost is no number.
     pub(crate) fn step(
         &mut self,
         hessian: &SMatrix<f64, N, N>,
@@ -43,7 +55,7 @@ impl<const N: usize> LevenbergMarquardt<N> {
         };
         let next = self.at - factor.solve(gradient);
         let cost = cost_of(&next);
-        // a cost that is no number is not below
+        // written so that NaN fails
         if cost < self.cost {
             let fall = (self.cost - cost) / self.cost;
             (self.at, self.cost, self.lift) = (next, cost, self.lift * 0.2);
@@ -109,8 +121,11 @@ mod tests {
         let begin = Vector2::new(2.0, 3.0);
         let mut search = LevenbergMarquardt::new(begin, 1.0, 1e-2);
         assert_eq!(search.step(&Matrix2::zeros(), &begin, |_| 0.0), Step::Stuck);
+        assert!(Step::Stuck.is_last(0.0));
         let nothing = search.step(&Matrix2::identity(), &begin, |_| f64::NAN);
         assert_eq!(nothing, Step::Stayed);
+        assert!(!nothing.is_last(1.0));
+        assert!(Step::Fell(0.1).is_last(0.2) && !Step::Fell(0.2).is_last(0.1));
         assert_eq!((search.at, search.cost), (begin, 1.0));
     }
 }

@@ -8,7 +8,7 @@ use mmt_shared::model::contact::Coupling;
 use mmt_shared::time::TICK_S;
 use nalgebra::{SMatrix, SVector};
 
-use crate::levenberg_marquardt::{LevenbergMarquardt, Step};
+use crate::levenberg_marquardt::LevenbergMarquardt;
 
 /// Ticks of a window before contact is noticed: a noisy force is averaged, and a lagging one comes late.
 const BEFORE: usize = 20;
@@ -170,11 +170,7 @@ impl Search {
             self.cost_of(onset, next, &onset.left(next, self.touches))
         });
         self.descent = descent;
-        match step {
-            Step::Fell(share) if share < FALL => true,
-            Step::Fell(_) | Step::Stayed => self.steps >= STEPS_MAX,
-            Step::Stuck => true,
-        }
+        step.is_last(FALL) || self.steps >= STEPS_MAX
     }
 
     /// What it found; none where the numbers are none.

@@ -7,7 +7,7 @@
 use mmt_shared::model::geometry::Vec2;
 
 use super::support::Support;
-use crate::levenberg_marquardt::{LevenbergMarquardt, Step};
+use crate::levenberg_marquardt::LevenbergMarquardt;
 
 /// k: force errors well below it count by their square, well above by their size, N.
 const ROBUST_N: f64 = 0.3;
@@ -73,10 +73,9 @@ impl<M, L: Fn(&Support, &M) -> Vec2> Search<'_, L, M> {
         let mut search = LevenbergMarquardt::new(begin, self.cost(&begin), 1e-3);
         for _ in 0..ITERATIONS {
             let (hessian, gradient) = self.normal_equations(&search.at);
-            match search.step(&hessian, &gradient, |q| self.cost(q)) {
-                Step::Fell(share) if share < FALL => break,
-                Step::Fell(_) | Step::Stayed => {}
-                Step::Stuck => break,
+            let step = search.step(&hessian, &gradient, |q| self.cost(q));
+            if step.is_last(FALL) {
+                break;
             }
         }
         to_support(&search.at)
