@@ -294,6 +294,7 @@ mod tests {
         assert_eq!(every(1, &both[1..], 2.0, 1e-9).when_off, Some(1));
         assert_eq!(every(1, &both[..1], 2.0, 1e-9).when_off, Some(399));
         assert_eq!(every(10, &both[..1], 2.0, 1e-9).when_off, Some(39));
+        assert_eq!(every(1, &both, 2.0, 1e-9).when_off, Some(1));
         assert_eq!(every(1, &[], 2.0, 1e-9).when_off, None);
     }
 }
