@@ -236,8 +236,6 @@ impl LocalModel {
             correction.bleed(pose, touch.as_ref(), &settings.coupling, rates);
             if touch.is_none() {
                 body.keep_off(hip, gap, correction);
-                body.god
-                    .after_jump(&body.state.footprint, &body.state.pose, hip);
             }
         });
         let stands = self.body.stands() && !self.replay.is_busy();

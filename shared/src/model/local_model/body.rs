@@ -126,7 +126,7 @@ impl Body {
 
     /// Takes back so much of a correction that a HIP in free space, which was `before` away from the box,
     /// is no nearer to it than [`ROOM_M`], or than it was: a correction may bring the box to the hand but
-    /// not into it.
+    /// not into it. What was touched before is touched no more.
     pub(super) fn keep_off(&mut self, hip: Vec2, before: f64, correction: &mut Correction) {
         let (face, gap) = self.gap(hip);
         let wanted = before.min(ROOM_M);
@@ -134,6 +134,8 @@ impl Body {
             let inward = -rotate(self.state.pose.angle, face.outward());
             correction.back_off(&mut self.state.pose, inward * (wanted - gap));
         }
+        self.god
+            .after_jump(&self.state.footprint, &self.state.pose, hip);
     }
 
     /// One sample period with the HIP (m, world) and its velocity (m/s). Returns what was rendered and the power that the

@@ -1,6 +1,7 @@
 //! Reconciliation by replay: exact, sliced, and without a jolt.
 
 use super::*;
+use crate::model::geometry::Face;
 
 /// Answers with what `model` was at a stamp.
 fn answer(model: &LocalModel, ms: u64) -> Update {
@@ -345,4 +346,32 @@ fn a_box_that_would_have_to_come_round_the_hip_goes_at_once() {
     // where the HIP would be deep in it, the hand has run ahead of the box
     let off = beside_the_hip(8e-3);
     assert!(off > 0.05, "{off} m");
+}
+
+#[test]
+fn a_thin_box_that_goes_at_once_to_the_other_side_of_the_hip_is_not_pressed_through() {
+    let mut model = replayed();
+    let at = |x: f64| BodyState {
+        footprint: BoxFootprint {
+            east: 0.01,
+            west: 0.01,
+            ..BoxFootprint::square(0.4)
+        },
+        pose: Pose::new(x, 0.0, 0.0),
+        ..state(0.7, 3.0, 2.06).into()
+    };
+    model.body.state = at(0.0);
+    model.step(Time::from_millis(1), Vec2::new(-0.0105, 0.0));
+    let hip = Vec2::new(-0.0095, 0.0);
+    assert!(model.step(Time::from_millis(2), hip).in_contact());
+    // the box gives way, and its place has the HIP just inside of the east face
+    model.body.state.pose.position.x = 0.55e-3;
+    assert!(model.body.touch(hip).is_none());
+    model.apply(&update(Cause::Deadband, 2, at(hip.x - 0.0095)));
+    model.go_on_replaying();
+    let east = model.body.gap(hip);
+    assert!(east.0 == Face::East && east.1 > 0.0, "{east:?}");
+    let injected = model.energy_injected_j();
+    assert!(injected < 1e-9, "{injected} J");
+    assert!(model.body.touch(hip).is_none());
 }
