@@ -113,9 +113,10 @@ impl SlaveChecks {
         let period = elapsed.max(TICK).as_secs_f64();
         let velocity = way / period;
         let slower = playout.acceleration_max_m_per_s2 * period * (1.0 - CLOCKS);
-        // a limit of the tool's may have it brake along a face before it brakes across it
-        let brakes = velocity.norm() <= self.velocity_before.norm() - 0.5 * slower
-            && (velocity - self.velocity_before).norm() >= slower;
+        let before = self.velocity_before;
+        let brakes = velocity.norm()
+            <= before.norm() - slower * least_share(before.norm() / slower)
+            && (velocity - before).norm() >= slower;
         let stands = stands || brakes;
         // after ticks that were missed the way may have been gone in the last of them
         self.velocity_before = way / TICK_S;
@@ -177,6 +178,39 @@ impl SlaveChecks {
                 .judge(Invariant::ToolForce, now, force <= most, || {
                     format!("{force} N, {most} N are allowed")
                 });
+        }
+    }
+}
+
+/// The least share of its greatest acceleration by which a tool gets slower that brakes as hard as it may. A limit of the tool's
+/// may have it brake against a face before it brakes along it: the change of its velocity is then along −v̂ − r (n̂·v̂) n̂ at the most,
+/// n̂ pointing into the face, r (`speed`) being its speed over what it may lose in a tick. With x = r (n̂·v̂)² the part of that along
+/// −v̂ is (1 + x)/√(1 + (r + 2) x), which is least at x = r/(r + 2).
+fn least_share(speed: f64) -> f64 {
+    2.0 * (1.0 + speed).sqrt() / (2.0 + speed)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_least_share_is_the_least_over_all_directions_of_the_face() {
+        for speed in [0.0, 0.5, 13.7, 30.0] {
+            let shares = (0..=10_000).map(|k| {
+                let angle = f64::from(k) * 1e-4 * std::f64::consts::FRAC_PI_2;
+                let (velocity, n) = (
+                    Vec2::new(1.0, 0.0),
+                    Vec2::new(libm::cos(angle), libm::sin(angle)),
+                );
+                let change = -velocity - n * (speed * n.dot(&velocity));
+                -change.dot(&velocity) / change.norm()
+            });
+            let least = shares.fold(f64::INFINITY, f64::min);
+            assert!(
+                (least_share(speed) - least).abs() < 1e-6,
+                "{speed}: {least}"
+            );
         }
     }
 }
