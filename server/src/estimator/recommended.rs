@@ -17,12 +17,15 @@ use super::gate::{Gate, GateConfig, GateState};
 use super::measured::{Measured, Seen};
 use super::obstacle::{Friction, MotionState, Obstacle, Stays};
 use super::off_centre;
-use super::recursive::{RecursiveConfig, RecursiveLeastSquares, Verdict};
+use super::recursive::{RecursiveConfig, RecursiveLeastSquares, RowNoise, Verdict};
 use super::surface::{Surface, SurfaceMotion};
 
 /// Rows between two copies of the regression. On an obstacle the older copy returns: what was learned while
 /// the object ran up against it is no friction.
 const COPY_ROWS: u64 = 250;
+
+/// After so many ticks a wrong sample of the force is forgotten.
+const RESPONSE_TICKS: u32 = 500;
 
 /// On the first press the surface may seem to move by so much, m, and by this share of the depth, although the object stands: the
 /// stiffness of the contact is known that badly.
@@ -100,6 +103,24 @@ impl RecommendedConfig {
         let (s, w) = (self.position_noise_m, self.cutoff_rad_per_s);
         0.1875 * s * s * TICK_S * w * w * w * w * w
     }
+
+    /// What white noise of the force puts into a filtered row, for each N²: the surface is found through the force, so that its noise is in
+    /// the motion as well. Of the response to one wrong sample: what it adds to the sums, all other samples add likewise.
+    fn force_noise(&self) -> RowNoise {
+        let normal = Vec2::new(1.0, 0.0);
+        let mut surface = Surface::new(self.coupling);
+        let mut filter = StateVariableFilter::new(self.cutoff_rad_per_s);
+        let mut noise = RowNoise::ZERO;
+        for tick in 0..RESPONSE_TICKS {
+            let wrong = if tick == 2 { normal } else { Vec2::zeros() };
+            if let Some(motion) = surface.step(Vec2::zeros(), wrong, normal) {
+                let Row { regressor, force } = filter.step(motion.row);
+                noise.gram += regressor * regressor.transpose();
+                noise.moment += regressor * force;
+            }
+        }
+        noise
+    }
 }
 
 /// The recommended estimator.
@@ -135,7 +156,8 @@ impl RecommendedEstimator {
             speed_min_m_per_s: speed_min,
             ..config.gate
         };
-        let recursive = RecursiveLeastSquares::new(config.recursive, config.acceleration_noise());
+        let noise = RowNoise::of_acceleration(config.acceleration_noise());
+        let recursive = RecursiveLeastSquares::new(config.recursive, noise, config.force_noise());
         let mut estimate = Estimate::at(recursive.estimate);
         estimate.covariance = recursive.covariance;
         Self {
@@ -218,7 +240,8 @@ impl RecommendedEstimator {
             creeps,
             measured.force_noise_n,
         );
-        self.slide(gate, &self.row(&motion, normal, measured.seen.as_ref()));
+        let row = self.row(&motion, normal, measured.seen.as_ref());
+        self.slide(gate, &row, measured.force_noise_n);
         let way = self.way.get_or_insert(Way::new(motion.point));
         let way = way.step(motion.point, normal, self.speed_weight);
         let stayed = self.stays.step(motion.point, normal);
@@ -288,7 +311,7 @@ impl RecommendedEstimator {
         }
     }
 
-    fn slide(&mut self, gate: GateState, row: &Row) {
+    fn slide(&mut self, gate: GateState, row: &Row, force_noise_n: f64) {
         if gate == GateState::Closed {
             self.estimate.acceleration = 0.0;
             return self.recursive.hold();
@@ -299,7 +322,7 @@ impl RecommendedEstimator {
         let filtered = self.filter.step(*row);
         self.estimate.acceleration = filtered.regressor.x;
         if gate == GateState::Open {
-            if self.recursive.update(&filtered) == Verdict::Changed {
+            if self.recursive.update(&filtered, force_noise_n) == Verdict::Changed {
                 self.gate.close();
             }
             let [_, newer] = self.copies;
@@ -332,5 +355,42 @@ impl RecommendedEstimator {
         estimate.condition = found.condition;
         estimate.excited = found.excited;
         estimate.samples = found.samples;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use mmt_shared::fixtures::COUPLING;
+    use mmt_shared::rng::Substream;
+    use nalgebra::{Matrix3, Vector3};
+
+    use super::*;
+
+    #[test]
+    fn the_noise_that_one_wrong_sample_leaves_is_the_one_of_many() {
+        let normal = Vec2::new(1.0, 0.0);
+        let config = RecommendedConfig::new(COUPLING);
+        let mut surface = Surface::new(config.coupling);
+        let mut filter = StateVariableFilter::new(config.cutoff_rad_per_s);
+        let mut random = Substream::new(1, "force noise", 0);
+        let (mut gram, mut moment, mut rows) = (Matrix3::zeros(), Vector3::zeros(), 0);
+        for k in 0..400_000 {
+            let (noise, _) = random.normal_pair();
+            let Some(motion) = surface.step(Vec2::zeros(), normal * noise, normal) else {
+                continue;
+            };
+            let row = filter.step(motion.row);
+            if k > 1000 {
+                gram += row.regressor * row.regressor.transpose();
+                moment += row.regressor * row.force;
+                rows += 1;
+            }
+        }
+        let known = config.force_noise();
+        let (gram, moment) = (gram / f64::from(rows), moment / f64::from(rows));
+        let within = |many: f64, one: f64| (many / one - 1.0).abs() < 0.03;
+        assert!(within(gram.m11, known.gram.m11), "{gram} {known:?}");
+        assert!(within(gram.m22, known.gram.m22), "{gram} {known:?}");
+        assert!(within(moment.x, known.moment.x), "{moment} {known:?}");
     }
 }

@@ -49,6 +49,38 @@ impl Default for ChangeTest {
     }
 }
 
+/// What noise of the measurements adds to the sums of products of a filtered row, in the mean.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct RowNoise {
+    /// Covariance of the regressor: of a (m/s²), v (m/s) and s.
+    pub(super) gram: Matrix3<f64>,
+    /// Covariance of the regressor and the force, N.
+    pub(super) moment: Vector3<f64>,
+}
+
+impl RowNoise {
+    pub(super) const ZERO: Self = Self {
+        gram: Matrix3::new(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
+        moment: Vector3::new(0.0, 0.0, 0.0),
+    };
+
+    /// Of the acceleration alone, whose variance is this, (m/s²)².
+    pub(super) fn of_acceleration(variance: f64) -> Self {
+        Self {
+            gram: Matrix3::from_diagonal(&Vector3::new(variance, 0.0, 0.0)),
+            ..Self::ZERO
+        }
+    }
+
+    /// With that of noise which has nothing to do with this, `power` times.
+    fn with(&self, other: &Self, power: f64) -> Self {
+        Self {
+            gram: self.gram + other.gram * power,
+            moment: self.moment + other.moment * power,
+        }
+    }
+}
+
 /// Whether a row was taken.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Verdict {
@@ -99,8 +131,10 @@ impl Default for RecursiveConfig {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct RecursiveLeastSquares {
     config: RecursiveConfig,
-    /// Variance of the noise in a filtered acceleration, (m/s²)².
-    acceleration_noise: f64,
+    /// Noise that is in every row, what white noise of the force of 1 N adds, and the noise of the last row.
+    least_noise: RowNoise,
+    force_noise: RowNoise,
+    noise: RowNoise,
     gram: Matrix3<f64>,
     moment: Vector3<f64>,
     weight: f64,
@@ -126,15 +160,16 @@ pub(super) struct RecursiveLeastSquares {
 }
 
 impl RecursiveLeastSquares {
-    /// At the prior. `acceleration_noise` is the variance of the noise in a filtered acceleration,
-    /// (m/s²)².
+    /// At the prior. `noise` is in every row, and `force_noise` for each N² of white noise of the force.
     #[must_use]
-    pub(super) fn new(config: RecursiveConfig, acceleration_noise: f64) -> Self {
+    pub(super) fn new(config: RecursiveConfig, noise: RowNoise, force_noise: RowNoise) -> Self {
         let prior = Vector3::from(config.prior).sup(&LEAST);
         let [b, c] = config.prior_deviation;
         Self {
             config,
-            acceleration_noise,
+            least_noise: noise,
+            force_noise,
+            noise,
             gram: Matrix3::zeros(),
             moment: Vector3::zeros(),
             weight: 0.0,
@@ -179,8 +214,10 @@ impl RecursiveLeastSquares {
         self.covariance *= times * times;
     }
 
-    /// Takes one filtered row.
-    pub(super) fn update(&mut self, row: &Row) -> Verdict {
+    /// Takes one filtered row of a force with this much white noise, N.
+    pub(super) fn update(&mut self, row: &Row, force_noise_n: f64) -> Verdict {
+        let power = force_noise_n * force_noise_n;
+        self.noise = self.least_noise.with(&self.force_noise, power);
         let error = row.force - self.estimate.dot(&row.regressor);
         let verdict = self.doubt(row.force, error);
         match verdict {
@@ -252,8 +289,9 @@ impl RecursiveLeastSquares {
     fn solve(&mut self, row: &Row) {
         let variance = (self.squares / self.weight).max(ROW_VARIANCE_MIN);
         let pull = self.pull(variance);
-        let matrix = self.gram - self.noise() + pull;
-        let right = self.moment + pull * self.held;
+        // noise in a regressor makes its parameter look smaller, 0.8 % of m at 10 µm and 3 to 5 % at 0.1 N: taken away, it does not
+        let matrix = self.gram - self.noise.gram * self.weight + pull;
+        let right = self.moment - self.noise.moment * self.weight + pull * self.held;
         // (3), under the bounds
         let Some(estimate) = minimum_above(&matrix, &right, &LEAST) else {
             return self.hold();
@@ -282,15 +320,14 @@ impl RecursiveLeastSquares {
         } else {
             (PRIOR_PULL, self.config.prior_deviation)
         };
-        let m = excitation * self.acceleration_noise * self.weight;
+        let m = self.weight * self.outweighs(excitation);
         Matrix3::from_diagonal(&Vector3::new(m, variance / (b * b), variance / (c * c)))
     }
 
-    /// What noise alone adds to the Gram matrix. Noise in a regressor makes its parameter look smaller
-    /// (0.8 % of m at 10 µm); taken away, it does not. In v and s the noise does not matter.
-    fn noise(&self) -> Matrix3<f64> {
-        let noise = self.acceleration_noise * self.weight;
-        Matrix3::from_diagonal(&Vector3::new(noise, 0.0, 0.0))
+    /// So many times the power of the noise of an acceleration, (m/s²)²: of that which is always there, or what outweighs all of it.
+    fn outweighs(&self, times: f64) -> f64 {
+        let always = times * self.least_noise.gram.m11;
+        always.max(PRIOR_PULL * self.noise.gram.m11)
     }
 
     fn judge(&mut self, row: &Row, variance: f64) {
@@ -302,7 +339,7 @@ impl RecursiveLeastSquares {
             let b_force = (variance * inverse.m22).sqrt() * row.regressor.y.abs();
             self.condition.is_finite()
                 && row.regressor.y.abs() > TELLING_SPEED
-                && seen > self.config.excitation * self.acceleration_noise * self.weight
+                && seen > self.weight * self.outweighs(self.config.excitation)
                 && b_force < self.config.damping_force_n
         });
     }

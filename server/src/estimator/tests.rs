@@ -10,7 +10,7 @@ use mmt_shared::stats::values::quantile;
 use proptest::prelude::*;
 
 use super::filter::StateVariableFilter;
-use super::recursive::{RecursiveConfig, RecursiveLeastSquares};
+use super::recursive::{RecursiveConfig, RecursiveLeastSquares, RowNoise};
 use super::surface::Surface;
 use super::*;
 use plant::{COUPLING, Motion, Noise, Plant, TRUTH};
@@ -127,7 +127,8 @@ fn m_with_force(filtered_alike: bool) -> f64 {
     let motion = Motion::of_operator(1, 0);
     let mut surface = Surface::new(COUPLING);
     let mut filter = StateVariableFilter::new(120.0);
-    let mut recursive = RecursiveLeastSquares::new(RecursiveConfig::default(), 0.0);
+    let mut recursive =
+        RecursiveLeastSquares::new(RecursiveConfig::default(), RowNoise::ZERO, RowNoise::ZERO);
     for k in 0..6000 {
         let measured = plant.push(&motion);
         let normal = measured.normal.unwrap_or_default();
@@ -143,7 +144,7 @@ fn m_with_force(filtered_alike: bool) -> f64 {
             if !filtered_alike {
                 row.force = raw.force;
             }
-            recursive.update(&row);
+            recursive.update(&row, 0.0);
         }
     }
     recursive.estimate.x
@@ -171,26 +172,42 @@ fn default_noise_leaves_1_percent_of_m_1_5_of_b_and_0_4_of_c() {
     assert!(b < 0.75 * shorter[1] && c < 0.75 * shorter[2]);
 }
 
+/// Median of the relative error of m with this noise, of which the estimator is told so much of the position (m) and of the
+/// force (N).
+fn bias_of_m(noise: Noise, told: Noise) -> f64 {
+    let mut all = vec![];
+    for seed in 0..10 {
+        let mut estimator = recommended(|config| config.position_noise_m = told.0);
+        let mut plant = Plant::new(seed, noise);
+        plant.told_n = told.1;
+        for number in 0..4 {
+            let motion = Motion::of_operator(seed, number);
+            push(&mut estimator, &mut plant, &motion, |k, _, estimate| {
+                if number > 0 && k > 200 {
+                    all.push(estimate.m / TRUTH[0] - 1.0);
+                }
+            });
+        }
+    }
+    median(&all)
+}
+
 #[test]
 fn noise_in_the_acceleration_would_make_m_look_smaller() {
-    let bias = |position_noise_m: f64| {
-        let mut all = vec![];
-        for seed in 0..10 {
-            let mut estimator = recommended(|config| config.position_noise_m = position_noise_m);
-            let mut plant = Plant::new(seed, Noise(30e-6, 10e-3));
-            for number in 0..4 {
-                let motion = Motion::of_operator(seed, number);
-                push(&mut estimator, &mut plant, &motion, |k, _, estimate| {
-                    if number > 0 && k > 200 {
-                        all.push(estimate.m / TRUTH[0] - 1.0);
-                    }
-                });
-            }
-        }
-        median(&all)
-    };
-    let (told_nothing, told) = (bias(0.0), bias(30e-6));
+    let noise = Noise(30e-6, 10e-3);
+    let told = Noise(30e-6, 0.0);
+    let (told_nothing, told) = (bias_of_m(noise, Noise::NONE), bias_of_m(noise, told));
     assert!(told_nothing < -0.03, "{told_nothing}");
+    assert!(told.abs() < 0.01, "{told}");
+}
+
+#[test]
+fn noise_of_the_force_would_too_for_the_surface_is_found_through_it() {
+    let noise = Noise(10e-6, 0.1);
+    let told_position = bias_of_m(noise, Noise(10e-6, 0.0));
+    let told = bias_of_m(noise, noise);
+    println!("m with 0.1 N of noise: {told_position:.4}, told so {told:.4}");
+    assert!(told_position < -0.02, "{told_position}");
     assert!(told.abs() < 0.01, "{told}");
 }
 

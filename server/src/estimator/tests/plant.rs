@@ -64,6 +64,8 @@ pub(super) struct Plant {
     pub(super) params: [f64; 3],
     pub(super) heading: f64,
     noise: Noise,
+    /// Noise of the force as the estimator is told it, N.
+    pub(super) told_n: f64,
     random: Substream,
     tool: f64,
     tool_speed: f64,
@@ -82,6 +84,7 @@ impl Plant {
             params: TRUTH,
             heading: 0.4,
             noise,
+            told_n: 0.0,
             random: Substream::new(seed, "plant", 0),
             tool: -0.001,
             tool_speed: 0.0,
@@ -138,7 +141,7 @@ impl Plant {
         let tool = rotate(self.heading, Vec2::new(self.tool, self.side));
         Measured {
             back: Vec2::zeros(),
-            force_noise_n: 0.0,
+            force_noise_n: self.told_n,
             tool: tool + Vec2::new(px, py) * self.noise.0,
             force: ahead * force + Vec2::new(fx, fy) * self.noise.1,
             normal: touching.then_some(ahead),
