@@ -113,10 +113,10 @@ impl SlaveChecks {
         let period = elapsed.max(TICK).as_secs_f64();
         let velocity = way / period;
         let slower = playout.acceleration_max_m_per_s2 * period * (1.0 - CLOCKS);
-        let before = self.velocity_before;
-        let brakes = velocity.norm()
-            <= before.norm() - slower * least_share(before.norm() / slower)
-            && (velocity - before).norm() >= slower;
+        let (before, change) = (self.velocity_before, velocity - self.velocity_before);
+        let speed = before.norm();
+        let against = slower * least_share(speed / slower);
+        let brakes = change.norm() >= slower && -change.dot(&before) >= against * speed;
         let stands = stands || brakes;
         // after ticks that were missed the way may have been gone in the last of them
         self.velocity_before = way / TICK_S;
@@ -182,10 +182,10 @@ impl SlaveChecks {
     }
 }
 
-/// The least share of its greatest acceleration by which a tool gets slower that brakes as hard as it may. A limit of the tool's
-/// may have it brake against a face before it brakes along it: the change of its velocity is then along −v̂ − r (n̂·v̂) n̂ at the most,
-/// n̂ pointing into the face, r (`speed`) being its speed over what it may lose in a tick. With x = r (n̂·v̂)² the part of that along
-/// −v̂ is (1 + x)/√(1 + (r + 2) x), which is least at x = r/(r + 2).
+/// The least share of its greatest acceleration that is against the velocity of a tool that brakes as hard as it may. A limit of the
+/// tool's may have it brake against a face before it brakes along it: the change of its velocity is then along −v̂ − r (n̂·v̂) n̂ at the
+/// most, n̂ pointing into the face, r (`speed`) being its speed over what it may lose in a tick. With x = r (n̂·v̂)² the part of that
+/// along −v̂ is (1 + x)/√(1 + (r + 2) x), which is least at x = r/(r + 2).
 fn least_share(speed: f64) -> f64 {
     2.0 * (1.0 + speed).sqrt() / (2.0 + speed)
 }
