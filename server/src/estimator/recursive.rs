@@ -324,7 +324,8 @@ impl RecursiveLeastSquares {
         Matrix3::from_diagonal(&Vector3::new(m, variance / (b * b), variance / (c * c)))
     }
 
-    /// So many times the power of the noise of an acceleration, (m/s²)²: of that which is always there, or what outweighs all of it.
+    /// The power that outweighs the noise of an acceleration, (m/s²)²: `times` that of the noise which is in every row, and at least
+    /// `PRIOR_PULL` times that of the last row's.
     fn outweighs(&self, times: f64) -> f64 {
         let always = times * self.least_noise.gram.m11;
         always.max(PRIOR_PULL * self.noise.gram.m11)

@@ -172,14 +172,13 @@ fn default_noise_leaves_1_percent_of_m_1_5_of_b_and_0_4_of_c() {
     assert!(b < 0.75 * shorter[1] && c < 0.75 * shorter[2]);
 }
 
-/// Median of the relative error of m with this noise, of which the estimator is told so much of the position (m) and of the
-/// force (N).
-fn bias_of_m(noise: Noise, told: Noise) -> f64 {
+/// Median relative error of m. The plant adds `noise`; the estimator expects `expected`.
+fn bias_of_m(noise: Noise, expected: Noise) -> f64 {
     let mut all = vec![];
     for seed in 0..10 {
-        let mut estimator = recommended(|config| config.position_noise_m = told.0);
+        let mut estimator = recommended(|config| config.position_noise_m = expected.0);
         let mut plant = Plant::new(seed, noise);
-        plant.told_n = told.1;
+        plant.expected_force_noise_n = expected.1;
         for number in 0..4 {
             let motion = Motion::of_operator(seed, number);
             push(&mut estimator, &mut plant, &motion, |k, _, estimate| {
@@ -195,20 +194,20 @@ fn bias_of_m(noise: Noise, told: Noise) -> f64 {
 #[test]
 fn noise_in_the_acceleration_would_make_m_look_smaller() {
     let noise = Noise(30e-6, 10e-3);
-    let told = Noise(30e-6, 0.0);
-    let (told_nothing, told) = (bias_of_m(noise, Noise::NONE), bias_of_m(noise, told));
-    assert!(told_nothing < -0.03, "{told_nothing}");
-    assert!(told.abs() < 0.01, "{told}");
+    let unexpected = bias_of_m(noise, Noise::NONE);
+    let expected = bias_of_m(noise, Noise(30e-6, 0.0));
+    assert!(unexpected < -0.03, "{unexpected}");
+    assert!(expected.abs() < 0.01, "{expected}");
 }
 
 #[test]
 fn noise_of_the_force_would_too_for_the_surface_is_found_through_it() {
     let noise = Noise(10e-6, 0.1);
-    let told_position = bias_of_m(noise, Noise(10e-6, 0.0));
-    let told = bias_of_m(noise, noise);
-    println!("m with 0.1 N of noise: {told_position:.4}, told so {told:.4}");
-    assert!(told_position < -0.02, "{told_position}");
-    assert!(told.abs() < 0.01, "{told}");
+    let unexpected = bias_of_m(noise, Noise(10e-6, 0.0));
+    let expected = bias_of_m(noise, noise);
+    println!("m with 0.1 N of noise: {unexpected:.4}, where it is expected {expected:.4}");
+    assert!(unexpected < -0.02, "{unexpected}");
+    assert!(expected.abs() < 0.01, "{expected}");
 }
 
 #[test]

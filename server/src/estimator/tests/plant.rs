@@ -64,8 +64,8 @@ pub(super) struct Plant {
     pub(super) params: [f64; 3],
     pub(super) heading: f64,
     noise: Noise,
-    /// Noise of the force as the estimator is told it, N.
-    pub(super) told_n: f64,
+    /// Noise of the force that the estimator expects, N.
+    pub(super) expected_force_noise_n: f64,
     random: Substream,
     tool: f64,
     tool_speed: f64,
@@ -84,7 +84,7 @@ impl Plant {
             params: TRUTH,
             heading: 0.4,
             noise,
-            told_n: 0.0,
+            expected_force_noise_n: 0.0,
             random: Substream::new(seed, "plant", 0),
             tool: -0.001,
             tool_speed: 0.0,
@@ -141,7 +141,7 @@ impl Plant {
         let tool = rotate(self.heading, Vec2::new(self.tool, self.side));
         Measured {
             back: Vec2::zeros(),
-            force_noise_n: self.told_n,
+            force_noise_n: self.expected_force_noise_n,
             tool: tool + Vec2::new(px, py) * self.noise.0,
             force: ahead * force + Vec2::new(fx, fy) * self.noise.1,
             normal: touching.then_some(ahead),
