@@ -7,7 +7,8 @@
 
 Real contact in three dimensions with friction: between the object and the table, and between the sphere and the object. The sphere
 is the tip of an arm under impedance control: a small mass on the spring and the damper that mmt asks for, and its place and its
-contact force are what is sent back. Nothing of mmt's own world is used.
+contact force are what is sent back. With --stiffness it is position controlled: a stiff spring, whatever mmt asks for. Nothing of mmt's own
+world is used.
 """
 
 import argparse
@@ -21,6 +22,7 @@ import numpy
 from plant import Plant, asked, serve
 
 SUBSTEPS = 2
+TOOL_KG = 0.1
 OBJECTS = {
     # 0.36 m and 0.7 kg, as the default object of mmt
     "cube": '<freejoint/><geom type="box" size="0.18 0.18 0.18" mass="0.7"/>',
@@ -40,7 +42,7 @@ SCENE = """
     <body name="object" pos="0 0 {height}">{geometry}</body>
     <body name="tool" pos="0 0 {tool_height}">
       <joint name="tool_x" type="slide" axis="1 0 0"/><joint name="tool_y" type="slide" axis="0 1 0"/>
-      <geom name="tool" type="sphere" size="{radius}" mass="0.1" priority="1"
+      <geom name="tool" type="sphere" size="{radius}" mass="{tool_mass}" priority="1"
             friction="{tool_friction} 0.001 0.0001" solref="0.004 1" contype="2" conaffinity="1"/>
     </body>
   </worldbody>
@@ -56,15 +58,17 @@ class World:
         self.model = mujoco.MjModel.from_xml_string(SCENE.format(
             step=0.001 / SUBSTEPS, friction=options.friction, height=HEIGHTS[options.object],
             geometry=OBJECTS[options.object].replace("<geom ", f'<geom name="object" friction="{options.friction} 0.001 0.0001" contype="1" conaffinity="3" '),
-            radius=options.radius, tool_height=options.tool_height or HEIGHTS[options.object], tool_friction=options.tool_friction))
+            radius=options.radius, tool_mass=TOOL_KG, tool_height=options.tool_height or HEIGHTS[options.object], tool_friction=options.tool_friction))
         self.data = mujoco.MjData(self.model)
         self.object = self.model.body("object").id
         self.tool_geom = self.model.geom("tool").id
         self.tool_at = [self.model.joint(name).qposadr[0] for name in ("tool_x", "tool_y")]
         self.tool_speed = [self.model.joint(name).dofadr[0] for name in ("tool_x", "tool_y")]
         self.damping = options.damping
+        self.stiffness = options.stiffness
+        self.noise, self.random = options.force_noise, numpy.random.default_rng(1)
         self.sensor = 1.0 - math.exp(-2.0 * math.pi * options.sensor_hz * 0.001)
-        self.force = (0.0, 0.0)
+        self.force = self.measured = (0.0, 0.0)
         self.data.qpos[self.tool_at] = (-0.45, 0.0)
         for _ in range(500 * SUBSTEPS):
             self.substep((-0.45, 0.0), (0.0, 0.0), 500.0, 10.0, 15.0)
@@ -75,13 +79,17 @@ class World:
             self.data.qpos[self.tool_at] = command.tool
             self.data.qvel[self.tool_speed] = 0.0
         total = numpy.zeros(2)
+        control = (command.stiffness, command.damping, command.force_max)
+        if self.stiffness:
+            control = (self.stiffness, 1.4 * math.sqrt(self.stiffness * TOOL_KG), math.inf)
         for n in range(SUBSTEPS):
             ahead = (n + 1) * 0.001 / SUBSTEPS - 0.001
             goal = [t + v * ahead for t, v in zip(command.tool, command.velocity)]
-            self.substep(goal, command.velocity, command.stiffness, command.damping, command.force_max)
+            self.substep(goal, command.velocity, *control)
             total += self.contact_force()
         # the filter of a force sensor: stiff bodies chatter at some 100 Hz
         self.force = tuple(f + self.sensor * (t - f) for f, t in zip(self.force, total / SUBSTEPS))
+        self.measured = tuple(f + self.noise * n for f, n in zip(self.force, self.random.standard_normal(2)))
 
     def substep(self, goal, velocity, stiffness, damping, force_max):
         at, speed = self.data.qpos[self.tool_at], self.data.qvel[self.tool_speed]
@@ -113,7 +121,7 @@ class World:
         return total
 
     def tool_state(self):
-        return tuple(self.data.qpos[self.tool_at]), tuple(self.data.qvel[self.tool_speed]), self.force
+        return tuple(self.data.qpos[self.tool_at]), tuple(self.data.qvel[self.tool_speed]), self.measured
 
     def pose(self):
         x, y, _ = self.data.xpos[self.object]
@@ -134,7 +142,9 @@ def main():
     arguments.add_argument("--tool-friction", type=float, default=0.05, help="of sphere and object")
     arguments.add_argument("--tool-height", type=float, help="of the sphere above the table, m [default: that of the middle of the object]")
     arguments.add_argument("--radius", type=float, default=0.01, help="of the sphere, m")
-    arguments.add_argument("--sensor-hz", type=float, default=20.0, help="corner frequency of the force sensor's own filter")
+    arguments.add_argument("--stiffness", type=float, help="of a position-controlled tool, N/m [default: the tool is under impedance control]")
+    arguments.add_argument("--sensor-hz", type=float, default=100.0, help="corner frequency of the force sensor's own filter")
+    arguments.add_argument("--force-noise", type=float, default=0.0, help="of the force sensor, N per axis")
     arguments.add_argument("--seconds", type=float, default=math.inf, help="how long")
     options = arguments.parse_args()
     world, plug = World(options), Plant(asked(options.address, "plant"))

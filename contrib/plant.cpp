@@ -22,16 +22,17 @@ struct Block {
     const std::array<double, 2> tool{command[0], command[1]};
     tool_speed = {command[2], command[3]};
     force = {};
+    tip = tool;
     const std::array<double, 2> inside{half - std::abs(tool[0] - at[0]), half - std::abs(tool[1] - at[1])};
     if (std::min(inside[0], inside[1]) > 0.0) {
       const int axis = inside[0] <= inside[1] ? 0 : 1;
       const double side = std::copysign(1.0, at[axis] - tool[axis]);
       const double closing = (tool_speed[axis] - speed[axis]) * side;
       force[axis] = side * std::clamp(command[4] * inside[axis] + command[5] * closing, 0.0, command[6]);
+      // a tip that gives stands at the surface
+      tip[axis] -= side * inside[axis];
     }
     for (int axis = 0; axis < 2; ++axis) {
-      // a tip that gives by the force
-      tip[axis] = tool[axis] - force[axis] / command[4];
       const double next = speed[axis] + period_s * (force[axis] - damping * speed[axis]) / mass;
       speed[axis] = std::copysign(std::max(std::abs(next) - period_s * coulomb / mass, 0.0), next);
       at[axis] += period_s * speed[axis];

@@ -108,7 +108,7 @@ class Block:
 
     def step(self, command):
         self.tool, self.tool_speed = command.tool, command.velocity
-        self.force = [0.0, 0.0]
+        self.force, tip = [0.0, 0.0], list(self.tool)
         inside = [self.half - abs(t - o) for t, o in zip(self.tool, self.at)]
         if min(inside) > 0.0:
             axis = inside.index(min(inside))
@@ -116,7 +116,8 @@ class Block:
             closing = (self.tool_speed[axis] - self.speed[axis]) * side
             force = command.stiffness * inside[axis] + command.damping * closing
             self.force[axis] = side * min(max(force, 0.0), command.force_max)
-        self.tip = tuple(t - f / command.stiffness for t, f in zip(self.tool, self.force))
+            tip[axis] -= side * inside[axis]
+        self.tip = tuple(tip)
         for axis in (0, 1):
             speed = self.speed[axis] + PERIOD_S * (self.force[axis] - self.damping * self.speed[axis]) / self.mass
             # what friction can take away of the speed in a period
@@ -125,7 +126,7 @@ class Block:
             self.at[axis] += PERIOD_S * self.speed[axis]
 
     def tool_state(self):
-        """The tip of a tool that gives by the force stands at the surface."""
+        """The tip of a tool that gives stands at the surface."""
         return self.tip, self.tool_speed, self.force
 
     def pose(self):

@@ -7,7 +7,7 @@ use std::hint::black_box;
 use std::time::Duration;
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use mmt_server::estimator::{Estimator, EstimatorConfig, Measured, Seen};
+use mmt_server::estimator::{Estimator, EstimatorConfig, Measured, Seen, ToolGives};
 use mmt_server::trigger::{Trigger, TriggerConfig, TriggerInput};
 use mmt_shared::model::contact::Coupling;
 use mmt_shared::model::geometry::Vec2;
@@ -54,7 +54,7 @@ fn estimators(criterion: &mut Criterion) {
             &EstimatorConfig::of_mode(mode, coupling),
             coupling,
             8.0,
-            false,
+            ToolGives::No,
         );
         let mut next = ticks.iter().cycle();
         criterion.bench_function(&format!("estimator/{name}"), |bencher| {

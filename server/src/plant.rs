@@ -17,6 +17,7 @@ use mmt_shared::time::{TICK_S, Time};
 use serde::{Deserialize, Serialize};
 
 use crate::environment::Environment;
+use crate::estimator::ToolGives;
 use crate::motion_limits::MotionLimits;
 use crate::sensing::{Sensed, Sensing, SensorFaults, VisionSample};
 use follower::Follower;
@@ -197,9 +198,10 @@ pub(crate) struct LinkedPlant {
     /// `k_p` and `k_d` that the tool is to meet things with.
     coupling: Coupling,
     force_max_n: f64,
-    /// Whether the slave itself lets the tool give: then the plant's need not.
-    is_stiff: bool,
+    gives: ToolGives,
     newest: Option<PlantAnswer>,
+    /// How far the tool gives by its own spring and damper, m.
+    given: Vec2,
     /// An image that no tick has taken yet.
     image: Option<VisionSample>,
     /// Images that a newer one took the place of before a tick took them.
@@ -208,14 +210,14 @@ pub(crate) struct LinkedPlant {
 }
 
 impl LinkedPlant {
-    /// A plant that has not answered yet. `stand_in` is the configured object; the tool meets things with `coupling`, by
-    /// itself or, if `is_stiff`, by the slave's compliance.
+    /// A plant that has not answered yet. `stand_in` is the configured object; the tool meets things with `coupling`, and `gives` by
+    /// itself or by the slave's compliance.
     pub(crate) fn new(
         config: PlantConfig,
         stand_in: Environment,
         coupling: Coupling,
         (speed_max_m_per_s, force_max_n): (f64, f64),
-        is_stiff: bool,
+        gives: ToolGives,
     ) -> Self {
         let limits = MotionLimits {
             speed_m_per_s: speed_max_m_per_s,
@@ -226,8 +228,9 @@ impl LinkedPlant {
             follower: Follower::new(limits),
             coupling,
             force_max_n,
-            is_stiff,
+            gives,
             newest: None,
+            given: Vec2::zeros(),
             image: None,
             images_dropped: 0,
             command: None,
@@ -268,14 +271,13 @@ impl LinkedPlant {
             None => (at, Vec2::zeros()),
         };
         // what the model renders as penetration of the HIP is how far the tool gives
-        let given = if self.is_stiff {
-            Vec2::zeros()
-        } else {
-            force / self.coupling.stiffness_n_per_m
-        };
+        if self.gives == ToolGives::ByPlant {
+            let given = |f, before| self.coupling.penetration(f, before, TICK_S);
+            self.given = force.zip_map(&self.given, given);
+        }
         Met {
             sensed: Sensed {
-                tool: measured + given,
+                tool: measured + self.given,
                 force,
                 vision: self.image.take(),
             },

@@ -26,7 +26,7 @@ use mmt_client::operator::pointer::{Driver, HandEvent, HandTuning, Person, Point
 use mmt_client::operator::scripted::{Scripted, ScriptedConfig};
 use mmt_client::path::PathRecorder;
 use mmt_server::end::{SlaveEnd, SlaveEndConfig, SlaveGiven};
-use mmt_server::estimator::{Estimator, EstimatorConfig, Measured, Seen};
+use mmt_server::estimator::{Estimator, EstimatorConfig, Measured, Seen, ToolGives};
 use mmt_server::playout::{PlayoutBuffer, PlayoutConfig};
 use mmt_server::repeats::Repeats;
 use mmt_server::shadow::Shadow;
@@ -276,9 +276,9 @@ impl Parts {
         };
         Self {
             estimators: [
-                estimator(Mode::Paper, false),
-                estimator(Mode::Recommended, true),
-                estimator(Mode::Recommended, false),
+                estimator(Mode::Paper, ToolGives::No),
+                estimator(Mode::Recommended, ToolGives::BySlave),
+                estimator(Mode::Recommended, ToolGives::No),
             ],
             trigger: Trigger::new(TriggerConfig::of_mode(Mode::Recommended)),
             shadow: Shadow::new(*slave.settings(), *slave.state()),

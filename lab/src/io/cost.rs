@@ -1,6 +1,6 @@
 //! What a piece of the system costs in CPU time, which other processes on the machine do not change much.
 
-use mmt_server::estimator::{Estimator, EstimatorConfig, Measured, Seen};
+use mmt_server::estimator::{Estimator, EstimatorConfig, Measured, Seen, ToolGives};
 use mmt_shared::io::clock::thread_cpu_time;
 use mmt_shared::model::contact::Coupling;
 use mmt_shared::model::geometry::Vec2;
@@ -18,7 +18,7 @@ pub fn estimator_tick_ms(mode: Mode) -> f64 {
         &EstimatorConfig::of_mode(mode, coupling),
         coupling,
         8.0,
-        false,
+        ToolGives::No,
     );
     let began = thread_cpu_time();
     for k in 0..TICKS {

@@ -82,6 +82,18 @@ impl EstimatorConfig {
     }
 }
 
+/// What gives while the tool presses, and with that how the surface is found.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ToolGives {
+    /// Not the tool: the contact does, by k_p and k_d. The surface is found through the force.
+    No,
+    /// The tool, by a spring of the slave's, and behind it a contact whose stiffness nobody knows.
+    BySlave,
+    /// The tool of a plant, by k_p and k_d. The plant reports where its tool is, and that is the surface: noise of the force is not
+    /// in it.
+    ByPlant,
+}
+
 /// The slave's estimator of m, b and c. On the heap: a slave is moved about on stacks of 2 MB.
 #[derive(Clone, Debug)]
 pub struct Estimator(Box<Kind>);
@@ -104,23 +116,29 @@ enum Kind {
 
 impl Estimator {
     /// An estimator at its prior, of an object touched through `coupling` by a hand that presses with no more than
-    /// `hand_force_max_n`, N, with a tool that `gives` by a spring of its own or not. Settings from outside pass
+    /// `hand_force_max_n`, N, with a tool that `gives` so. Settings from outside pass
     /// [`EstimatorConfig::check`] first.
     #[must_use]
     pub fn new(
         config: &EstimatorConfig,
         coupling: Coupling,
         hand_force_max_n: f64,
-        gives: bool,
+        gives: ToolGives,
     ) -> Self {
         Self(Box::new(match config {
             EstimatorConfig::Paper(config) => Kind::Paper(PaperEstimator::new(config, coupling)),
-            EstimatorConfig::Recommended(config) if gives => {
-                Kind::MultipleModel(MultipleModel::new(config, hand_force_max_n))
-            }
-            EstimatorConfig::Recommended(config) => {
-                Kind::Recommended(RecommendedEstimator::new(config, hand_force_max_n))
-            }
+            EstimatorConfig::Recommended(config) => match gives {
+                ToolGives::BySlave => {
+                    Kind::MultipleModel(MultipleModel::new(config, hand_force_max_n))
+                }
+                ToolGives::No => {
+                    Kind::Recommended(RecommendedEstimator::new(config, hand_force_max_n))
+                }
+                ToolGives::ByPlant => {
+                    let through_force = RecommendedEstimator::new(config, hand_force_max_n);
+                    Kind::Recommended(through_force.at_the_surface())
+                }
+            },
             EstimatorConfig::QuasiStatic(config) => {
                 Kind::QuasiStatic(QuasiStaticEstimator::new(config))
             }

@@ -171,7 +171,7 @@ mod tests {
     use mmt_shared::time::TICK_S;
     use std::f64::consts::TAU;
 
-    use crate::estimator::{Estimator, EstimatorConfig};
+    use crate::estimator::{Estimator, EstimatorConfig, ToolGives};
     use crate::tool::compliance::{Compliance, spring_for};
 
     const TRUTH: [f64; 3] = [2.0, 3.0, 1.0];
@@ -221,8 +221,12 @@ mod tests {
             let measured = push(seed, times, TRUTH);
             let config = RecommendedConfig::new(COUPLING);
             let mut many = MultipleModel::new(&config, 8.0);
-            let mut single =
-                Estimator::new(&EstimatorConfig::Recommended(config), COUPLING, 8.0, false);
+            let mut single = Estimator::new(
+                &EstimatorConfig::Recommended(config),
+                COUPLING,
+                8.0,
+                ToolGives::No,
+            );
             for tick in &measured {
                 many.step(tick);
                 single.step(tick);

@@ -76,7 +76,7 @@ pub(super) fn creeping(motion: &SurfaceMotion, normal: Vec2, seen: &Seen) -> Row
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::estimator::{Estimator, EstimatorConfig, Measured, RecommendedConfig};
+    use crate::estimator::{Estimator, EstimatorConfig, Measured, RecommendedConfig, ToolGives};
     use mmt_shared::fixtures::COUPLING;
     use mmt_shared::model::geometry::{Pose, Twist, rotate};
     use mmt_shared::time::TICK_S;
@@ -154,8 +154,12 @@ mod tests {
     fn worst_error(aside: f64, is_seen: bool) -> f64 {
         let mut config = RecommendedConfig::new(COUPLING);
         config.position_noise_m = 0.0;
-        let mut estimator =
-            Estimator::new(&EstimatorConfig::Recommended(config), COUPLING, 8.0, false);
+        let mut estimator = Estimator::new(
+            &EstimatorConfig::Recommended(config),
+            COUPLING,
+            8.0,
+            ToolGives::No,
+        );
         let mut pushed = Box::at_rest();
         let (mut tool, mut turned) = (Vec2::new(-SIDE / 2.0, aside), 0.0_f64);
         for k in 0..2000 {

@@ -185,6 +185,14 @@ impl RecommendedEstimator {
         self
     }
 
+    /// The same of a tool that stands at the surface: noise of the force is not in its motion.
+    #[must_use]
+    pub(super) fn at_the_surface(mut self) -> Self {
+        self.recursive = self.recursive.without_force_noise();
+        self.copies = [self.recursive; 2];
+        self
+    }
+
     /// Mean square of the force that the estimate leaves unexplained, N²; none before anything counted.
     #[must_use]
     pub(super) fn misfit(&self) -> Option<f64> {

@@ -195,6 +195,13 @@ impl RecursiveLeastSquares {
         self
     }
 
+    /// The same where noise of the force is not in the motion.
+    #[must_use]
+    pub(super) fn without_force_noise(mut self) -> Self {
+        self.force_noise = RowNoise::ZERO;
+        self
+    }
+
     /// Mean square of what the estimate leaves of the rows in memory, N²; none before there are any.
     #[must_use]
     pub(super) fn misfit(&self) -> Option<f64> {

@@ -62,10 +62,8 @@ impl Surface {
     /// unit normal n.
     #[must_use]
     pub(super) fn locate(&mut self, tool: Vec2, force: Vec2, normal: Vec2) -> Vec2 {
-        // (6) with damping, inverted: f = k_p pen_n + k_d (pen_n − pen_{n−1})/T
-        let k_d_per_tick = self.coupling.damping_ns_per_m / TICK_S;
-        let stiffness = self.coupling.stiffness_n_per_m + k_d_per_tick;
-        self.penetration = (force.dot(&normal) + k_d_per_tick * self.penetration) / stiffness;
+        let force = force.dot(&normal);
+        self.penetration = (self.coupling).penetration(force, self.penetration, TICK_S);
         tool - normal * self.penetration
     }
 

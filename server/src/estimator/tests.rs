@@ -35,13 +35,23 @@ fn values(estimate: &Estimate) -> [f64; 3] {
 fn recommended(change: impl FnOnce(&mut RecommendedConfig)) -> Estimator {
     let mut config = RecommendedConfig::new(COUPLING);
     change(&mut config);
-    Estimator::new(&EstimatorConfig::Recommended(config), COUPLING, 8.0, false)
+    Estimator::new(
+        &EstimatorConfig::Recommended(config),
+        COUPLING,
+        8.0,
+        ToolGives::No,
+    )
 }
 
 fn paper(change: impl FnOnce(&mut PaperConfig)) -> Estimator {
     let mut config = PaperConfig::default();
     change(&mut config);
-    Estimator::new(&EstimatorConfig::Paper(config), COUPLING, 8.0, false)
+    Estimator::new(
+        &EstimatorConfig::Paper(config),
+        COUPLING,
+        8.0,
+        ToolGives::No,
+    )
 }
 
 /// One push and the way to the next face; `see` gets each tick of the push.
@@ -399,7 +409,7 @@ proptest! {
         ticks in prop::collection::vec((hostile(), hostile(), hostile(), hostile(), any::<bool>()), 1..200),
     ) {
         let config = EstimatorConfig::Recommended(RecommendedConfig::new(COUPLING));
-        let giving = Estimator::new(&config, COUPLING, 8.0, true);
+        let giving = Estimator::new(&config, COUPLING, 8.0, ToolGives::BySlave);
         for mut estimator in [recommended(|_| {}), paper(|config| config.window_s = 0.05), giving] {
             for &(x, y, fx, fy, touching) in &ticks {
                 let measured = Measured {

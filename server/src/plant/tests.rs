@@ -2,6 +2,7 @@
 
 use mmt_shared::model::sample::{ForceCounts, HipCounts, HipSample};
 use mmt_shared::plug::{NotTaken, PLANT_BYTES, PlugHead, PlugKind, PlugToken, encode};
+use mmt_shared::rng::Substream;
 use mmt_shared::time::{TICK, TICK_S};
 
 use super::*;
@@ -102,14 +103,23 @@ fn a_packet_of_another_kind_or_token_is_not_taken() {
 }
 
 /// A slave whose hand goes along x at 0.1 m/s from −0.3 m, and whose plant answers what `plant` makes of the command.
-fn drive(ticks: u64, mut plant: impl FnMut(&PlantCommand) -> Option<PlantAnswer>) -> Slave {
+fn drive(ticks: u64, plant: impl FnMut(&PlantCommand) -> Option<PlantAnswer>) -> Slave {
+    drive_along(|t| 0.1 * t, ticks, plant)
+}
+
+/// The same with a hand that has gone `way` (m) after a time (s).
+fn drive_along(
+    way: impl Fn(f64) -> f64,
+    ticks: u64,
+    mut plant: impl FnMut(&PlantCommand) -> Option<PlantAnswer>,
+) -> Slave {
     let mut slave = Slave::try_new(&linked(), Coupling::for_stiffness(1000.0)).unwrap();
     slave.start_at(Vec2::new(-0.3, 0.0));
     for n in 1..=ticks {
         let now = Time::ZERO + TICK * n as u32;
         let sample = HipSample {
             stamp: now,
-            hip: HipCounts::nearest(Vec2::new(-0.3 + 1e-4 * n as f64, 0.0)),
+            hip: HipCounts::nearest(Vec2::new(-0.3 + way(n as f64 * TICK_S), 0.0)),
             force: ForceCounts::nearest(Vec2::zeros()),
         };
         slave.handle_sample(now, &sample, 0);
@@ -164,14 +174,71 @@ fn the_force_that_a_plant_measured_is_f_s_a_period_later_and_the_tool_goes_where
 fn a_tool_that_gives_by_itself_is_rendered_as_penetration() {
     let coupling = Coupling::for_stiffness(1000.0);
     let limits = (0.6, 15.0);
-    for (is_stiff, given) in [(false, 0.0015), (true, 0.0)] {
+    for (gives, given) in [(ToolGives::ByPlant, 0.0015), (ToolGives::BySlave, 0.0)] {
         let stand_in = Environment::try_new(EnvironmentConfig::default()).unwrap();
-        let mut plant = LinkedPlant::new(linked().plant, stand_in, coupling, limits, is_stiff);
+        let mut plant = LinkedPlant::new(linked().plant, stand_in, coupling, limits, gives);
         plant.take(Time::ZERO, &answer());
-        let met = plant.meet(Time::ZERO, Vec2::zeros(), Vec2::zeros());
+        let mut met = plant.meet(Time::ZERO, Vec2::zeros(), Vec2::zeros());
+        // the damper gives way in some 10 ms
+        assert!((met.sensed.tool.x - 0.1 - 0.1 * given).abs() < 1e-4);
+        for _ in 0..1000 {
+            met = plant.meet(Time::ZERO, Vec2::zeros(), Vec2::zeros());
+        }
         assert!((met.sensed.tool.x - 0.1 - given).abs() < 1e-12);
         assert_eq!(met.force, answer().force);
         assert_eq!(met.pose, Pose::new(0.5, 0.6, 0.7));
+    }
+}
+
+/// A block of 0.7 kg, b = 3 N s/m and c = 2 N. The tool is a spring and a damper, and stands at the face while it touches.
+struct Block {
+    face: f64,
+    speed: f64,
+    tool: f64,
+    noise: Substream,
+    noise_n: f64,
+}
+
+impl Block {
+    fn answer(&mut self, command: &PlantCommand) -> PlantAnswer {
+        let tool = command.tool.x;
+        let depth = tool - self.face;
+        let rate = (tool - self.tool) / TICK_S - self.speed;
+        let spring = command.stiffness_n_per_m * depth + command.damping_ns_per_m * rate;
+        let force = if depth > 0.0 { spring.max(0.0) } else { 0.0 };
+        let (noise, beside) = self.noise.normal_pair();
+        let answer = PlantAnswer {
+            tool: Vec2::new(tool.min(self.face), command.tool.y),
+            force: Vec2::new(force + noise * self.noise_n, beside * self.noise_n),
+            object: Some(Pose::new(self.face + 0.18, 0.0, 0.0)),
+            ..PlantAnswer::default()
+        };
+        let free = self.speed + TICK_S * (force - 3.0 * self.speed) / 0.7;
+        self.speed = (free - TICK_S * 2.0 / 0.7).max(0.0);
+        self.face += TICK_S * self.speed;
+        self.tool = tool;
+        answer
+    }
+}
+
+#[test]
+fn noise_of_the_force_does_not_make_the_object_of_a_plant_light() {
+    for noise_n in [0.0, 0.1, 0.2] {
+        let mut block = Block {
+            face: -0.18,
+            speed: 0.0,
+            tool: -0.3,
+            noise: Substream::new(8, "plant", 0),
+            noise_n,
+        };
+        let shake = |t: f64| 0.004 * libm::sin(12.0 * t);
+        let slave = drive_along(
+            |t| 0.1 * t + shake(t),
+            6000,
+            |command| Some(block.answer(command)),
+        );
+        let mass_kg = slave.estimate().m;
+        assert!((mass_kg - 0.7).abs() < 0.03, "{noise_n} N: {mass_kg} kg");
     }
 }
 

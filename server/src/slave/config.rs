@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::conditioning::{Conditioner, ConditioningConfig};
 use crate::environment::{EnvironmentConfig, EnvironmentError, SceneConfig};
-use crate::estimator::EstimatorConfig;
+use crate::estimator::{EstimatorConfig, ToolGives};
 use crate::plant::PlantConfig;
 use crate::playout::PlayoutConfig;
 use crate::repeats::Repeats;
@@ -136,6 +136,16 @@ impl SlaveConfig {
         Self {
             playout: self.playout.for_session(samples_per_command, architecture),
             ..self.clone()
+        }
+    }
+
+    /// What gives while the tool presses.
+    #[must_use]
+    pub fn tool_gives(&self) -> ToolGives {
+        match self.tool_compliance {
+            Some(_) => ToolGives::BySlave,
+            None if self.plant.link => ToolGives::ByPlant,
+            None => ToolGives::No,
         }
     }
 

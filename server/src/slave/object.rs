@@ -19,7 +19,9 @@ use super::config::{SlaveConfig, SlaveError};
 use crate::contact::Contact;
 use crate::contact_prediction::{ContactPredictor, Expected};
 use crate::environment::SIDE_M;
-use crate::estimator::{Estimate, Estimator, EstimatorConfig, Measured, OBSTACLE_N, Seen};
+use crate::estimator::{
+    Estimate, Estimator, EstimatorConfig, Measured, OBSTACLE_N, Seen, ToolGives,
+};
 use crate::pose_observer::{ContactForce, ObserverConfig, PoseObserver};
 
 /// The pose observer and the estimator, which need each other.
@@ -39,8 +41,8 @@ pub(super) struct ObjectEstimate {
     coupling: Coupling,
     /// No hand presses with more, N.
     hand_force_max_n: f64,
-    /// Whether the tool gives by a spring of its own.
-    tool_gives: bool,
+    /// What gives while the tool presses.
+    tool_gives: ToolGives,
     observer_config: ObserverConfig,
     estimator_config: EstimatorConfig,
     /// What was met in the last tick.
@@ -97,7 +99,7 @@ impl ObjectEstimate {
         in_range("start model: side", "m", start.side_m, SIDE_M)?;
         estimator.check()?;
         let hand_force_max_n = config.tool_energy.hand_force_max_n;
-        let tool_gives = config.tool_compliance.is_some();
+        let tool_gives = config.tool_gives();
         let footprint = (seen.first().copied()).unwrap_or(BoxFootprint::square(start.side_m));
         let params = ModelParams::of_square(m, b, c, footprint.mean_side(), &coupling)?;
         let start = Found {

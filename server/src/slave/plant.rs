@@ -17,8 +17,8 @@ pub(super) fn of_config(
 ) -> Result<Plant, SlaveError> {
     if config.plant.link {
         let limits = (speed_max_m_per_s, config.tool_force_max_n);
-        let is_stiff = config.tool_compliance.is_some();
-        let plant = LinkedPlant::new(config.plant, environment, coupling, limits, is_stiff);
+        let gives = config.tool_gives();
+        let plant = LinkedPlant::new(config.plant, environment, coupling, limits, gives);
         return Ok(Plant::Linked(Box::new(plant)));
     }
     Ok(Plant::World {

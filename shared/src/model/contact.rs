@@ -38,6 +38,14 @@ impl Coupling {
         (self.stiffness_n_per_m * penetration + self.damping_ns_per_m * penetration_rate).max(0.0)
     }
 
+    /// The force law inverted: the penetration, m, after a period of `period_s`, s, under a force along the inward normal, N.
+    /// `before` is the penetration at its beginning, m.
+    pub fn penetration(&self, force: f64, before: f64, period_s: f64) -> f64 {
+        // f = k_p pen_n + k_d (pen_n − pen_{n−1})/T
+        let k_d_per_period = self.damping_ns_per_m / period_s;
+        (force + k_d_per_period * before) / (self.stiffness_n_per_m + k_d_per_period)
+    }
+
     /// Elastic energy stored in the coupling at a penetration (m), J.
     pub fn energy(&self, penetration: f64) -> f64 {
         0.5 * self.stiffness_n_per_m * penetration * penetration

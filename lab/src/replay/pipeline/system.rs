@@ -10,9 +10,10 @@ use mmt_server::plant::{PlantAnswer, PlantConfig};
 use mmt_server::sensing::{SensingConfig, VisionConfig};
 use mmt_server::slave::{SlaveConfig, StartModel};
 use mmt_server::trigger::{ContactConfig, Scheme, TriggerConfig};
+use mmt_shared::model::contact::Coupling;
 use mmt_shared::model::geometry::Vec2;
 use mmt_shared::model::settings::Mode;
-use mmt_shared::time::{TICK, Time};
+use mmt_shared::time::{TICK, TICK_S, Time};
 
 use super::course::Course;
 use super::measures::Run;
@@ -59,6 +60,7 @@ pub(super) fn drive(
     };
     let mut world = World::along(&config(course, scheme, delay), hand.clone())?;
     let last = Time::ZERO + hand.duration() + delay * 2 + AFTER;
+    let mut plug = Plug::default();
     loop {
         let tick = world.step();
         if tick.now > last {
@@ -69,19 +71,30 @@ pub(super) fn drive(
             let elapsed = slave.stamp.saturating_since(Time::ZERO + TICK);
             let t_s = elapsed.as_secs_f64();
             watch(t_s, &tick);
-            world.answer_of_plant(answer(course, t_s, hand.at(elapsed)));
+            world.answer_of_plant(plug.answer(course, t_s, hand.at(elapsed)));
         }
     }
 }
 
-/// What the recording measured by then. The plug takes a tool to give by f/k_p; the recorded finger did not.
-fn answer(course: &Course, t_s: f64, finger: Vec2) -> PlantAnswer {
-    let force = course.force_at(t_s);
-    PlantAnswer {
-        tool: finger - force / STIFFNESS_N_PER_M,
-        force,
-        object: course.image_at(t_s),
-        ..PlantAnswer::default()
+/// The recording as a plant. The plug takes its tool to give by the force law; the recorded finger did not.
+#[derive(Default)]
+struct Plug {
+    given: Vec2,
+}
+
+impl Plug {
+    /// What the recording measured by then, a tick after the last answer.
+    fn answer(&mut self, course: &Course, t_s: f64, finger: Vec2) -> PlantAnswer {
+        let force = course.force_at(t_s);
+        let coupling = Coupling::for_stiffness(STIFFNESS_N_PER_M);
+        let given = |f, before| coupling.penetration(f, before, TICK_S);
+        self.given = force.zip_map(&self.given, given);
+        PlantAnswer {
+            tool: finger - self.given,
+            force,
+            object: course.image_at(t_s),
+            ..PlantAnswer::default()
+        }
     }
 }
 
