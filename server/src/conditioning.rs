@@ -6,6 +6,7 @@
 
 mod bias;
 mod gain;
+mod lag;
 mod noise;
 mod onset;
 mod withdrawal;
@@ -15,8 +16,12 @@ use std::collections::VecDeque;
 use mmt_shared::model::contact::Coupling;
 use mmt_shared::model::geometry::Vec2;
 use mmt_shared::model::settings::Mode;
+use mmt_shared::range::{OutOfRange, in_range};
 use serde::{Deserialize, Serialize};
 
+pub(crate) use lag::SensorLag;
+
+use crate::sensing::FORCE_LAG_MS;
 use crate::trigger::{ContactConfig, ContactDetector};
 use bias::Bias;
 use gain::Gain;
@@ -31,7 +36,7 @@ const DEVIATIONS: f64 = 5.0;
 const CLEAR_M: f64 = 3e-3;
 
 /// Whether the force is conditioned.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct ConditioningConfig {
     /// Whether the bias is tared in free space and followed. Default: in recommended mode.
@@ -42,9 +47,20 @@ pub struct ConditioningConfig {
     /// Whether the gain of the force sensor is found: by how contacts begin, whose stiffness and damping must be the session's k_p
     /// and k_d. Default: not, for who knows them?
     pub find_gain: bool,
+    /// Time constant of the force sensor's own low-pass, ms: 1000/(2 pi f) for a corner of f Hz. The estimator's tool goes through the
+    /// same. Default 0.
+    pub lag_ms: f64,
 }
 
 impl ConditioningConfig {
+    /// Checks every number.
+    ///
+    /// # Errors
+    /// Names the one that is out of range or not a number.
+    pub(crate) fn check(&self) -> Result<(), OutOfRange> {
+        in_range("conditioning: lag", "ms", self.lag_ms, FORCE_LAG_MS)
+    }
+
     /// Paper mode takes the force as it is measured, as the paper does.
     #[must_use]
     pub fn of_mode(mode: Mode) -> Self {
@@ -53,6 +69,7 @@ impl ConditioningConfig {
             tare: cured,
             follow_noise: cured,
             find_gain: false,
+            lag_ms: 0.0,
         }
     }
 }

@@ -15,6 +15,7 @@ use mmt_shared::model::params::FACE_OFFSET_M;
 use mmt_shared::rng::Substream;
 use mmt_shared::time::Time;
 
+pub(crate) use config::FORCE_LAG_MS;
 use config::IMAGES_MAX;
 pub use config::{SensingConfig, SensingError, VisionConfig};
 pub use force::ForceFault;

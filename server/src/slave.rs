@@ -111,6 +111,7 @@ impl Slave {
     ) -> Result<Self, SlaveError> {
         config.plant.check()?;
         config.trigger.check()?;
+        config.conditioning.check()?;
         let coupling = settings.checked().map_err(SlaveError::Settings)?.coupling;
         let environment = EnvironmentConfig {
             coupling,

@@ -95,6 +95,7 @@ fn world(case: &Case) -> WorldConfig {
         tare: case.cure != Cure::None,
         follow_noise: case.cure != Cure::None,
         find_gain: case.cure == Cure::WithGain,
+        lag_ms: 0.0,
     };
     world
 }

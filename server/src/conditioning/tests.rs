@@ -5,6 +5,7 @@ use mmt_shared::rng::Substream;
 use mmt_shared::time::TICK_S;
 
 use super::*;
+use crate::slave::{Slave, SlaveConfig};
 
 const K_P: f64 = COUPLING.stiffness_n_per_m;
 
@@ -286,4 +287,16 @@ fn what_images_show_clear_ends_unless_it_presses_harder_than_any_drift() {
         50,
         "1.5 N are contact, whatever is seen"
     );
+}
+
+#[test]
+fn a_lag_that_no_sensor_has_is_refused() {
+    for bad in [f64::NAN, -1.0, 101.0] {
+        let mut config = SlaveConfig::default();
+        config.conditioning.lag_ms = bad;
+        let Err(refused) = Slave::try_new(&config, COUPLING) else {
+            panic!("{bad} is accepted");
+        };
+        assert!(refused.to_string().contains("conditioning"), "{refused}");
+    }
 }

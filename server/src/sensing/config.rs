@@ -19,7 +19,7 @@ pub(super) const FORCE_BIAS_N: (f64, f64) = (0.0, 10.0);
 pub(super) const FORCE_DRIFT_N_PER_S: (f64, f64) = (0.0, 1.0);
 
 /// Accepted lag of the force, ms.
-pub(super) const FORCE_LAG_MS: (f64, f64) = (0.0, 100.0);
+pub(crate) const FORCE_LAG_MS: (f64, f64) = (0.0, 100.0);
 
 /// Accepted measured force over true force.
 pub(super) const FORCE_GAIN: (f64, f64) = (0.5, 2.0);

@@ -16,6 +16,7 @@ use mmt_shared::time::{TICK, Time};
 use serde::{Deserialize, Serialize};
 
 use super::config::{SlaveConfig, SlaveError};
+use crate::conditioning::SensorLag;
 use crate::contact::Contact;
 use crate::contact_prediction::{ContactPredictor, Expected};
 use crate::environment::SIDE_M;
@@ -43,6 +44,9 @@ pub(super) struct ObjectEstimate {
     hand_force_max_n: f64,
     /// What gives while the tool presses.
     tool_gives: ToolGives,
+    /// The tool as the estimator is given it, and how far that stands back, as late as the force.
+    tool: SensorLag,
+    back: SensorLag,
     observer_config: ObserverConfig,
     estimator_config: EstimatorConfig,
     /// What was met in the last tick.
@@ -119,6 +123,8 @@ impl ObjectEstimate {
             coupling,
             hand_force_max_n,
             tool_gives,
+            tool: SensorLag::new(config.conditioning.lag_ms),
+            back: SensorLag::new(config.conditioning.lag_ms),
             observer_config: observer,
             estimator_config: estimator,
             met: None,
@@ -245,8 +251,8 @@ impl ObjectEstimate {
         // as wide as the learned faces; the paper's never change
         let side = observer.footprint().mean_side();
         let measured = Measured {
-            tool: contact.tool,
-            back: contact.back,
+            tool: self.tool.step(contact.tool),
+            back: self.back.step(contact.back),
             force: contact.force,
             force_noise_n: contact.noise_n,
             normal: observer.contact().map(|frame| frame.inward),

@@ -267,6 +267,27 @@ fn behind_a_contact_of_unknown_stiffness_a_hand_that_trembles_does_not_make_the_
 }
 
 #[test]
+fn a_sensor_whose_lag_is_told_does_not_make_the_object_lighter() {
+    let spring = spring_for(DeviceProfile::default().coupling());
+    for (seed, spring) in [(1, None), (2, None), (3, Some(spring))] {
+        let errors_told = |lag_ms| {
+            let mut config = experiment(seed);
+            let slave = &mut config.slave;
+            slave.tool_compliance = spring;
+            slave.sensing.force_lag_ms = 15.0;
+            slave.conditioning.lag_ms = lag_ms;
+            let mut world = World::try_new(&config).unwrap();
+            world.run(Duration::from_secs(15), |_| {});
+            errors(&world)
+        };
+        let ([m, _, c], [m_late, _, _]) = (errors_told(15.0), errors_told(0.0));
+        println!("seed {seed}: told, m {m:.3} c {c:.3}; not told, m {m_late:.3}");
+        assert!(m < 0.03 && c < 0.03, "seed {seed}: m {m} c {c}");
+        assert!(m_late > 0.06, "seed {seed}: {m_late}");
+    }
+}
+
+#[test]
 fn a_tool_that_gives_learns_how_far_a_contact_gives_by_itself() {
     let coupling = DeviceProfile::default().coupling();
     // mean |f_m − true force| from the third push on, N
