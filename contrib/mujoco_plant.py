@@ -68,10 +68,12 @@ class World:
         self.stiffness = options.stiffness
         self.noise, self.random = options.force_noise, numpy.random.default_rng(1)
         self.sensor = 1.0 - math.exp(-2.0 * math.pi * options.sensor_hz * 0.001)
-        self.force = self.measured = (0.0, 0.0)
+        self.force = (0.0, 0.0)
+        self.periods, self.measure_every = 0, options.measure_every
         self.data.qpos[self.tool_at] = (-0.45, 0.0)
         for _ in range(500 * SUBSTEPS):
             self.substep((-0.45, 0.0), (0.0, 0.0), 500.0, 10.0, 15.0)
+        self.measured = (*self.state(), (0.0, 0.0))
 
     def step(self, command):
         """One millisecond."""
@@ -89,7 +91,10 @@ class World:
             total += self.contact_force()
         # the filter of a force sensor: stiff bodies chatter at some 100 Hz
         self.force = tuple(f + self.sensor * (t - f) for f, t in zip(self.force, total / SUBSTEPS))
-        self.measured = tuple(f + self.noise * n for f, n in zip(self.force, self.random.standard_normal(2)))
+        if self.periods % self.measure_every == 0:
+            noise = self.noise * self.random.standard_normal(2)
+            self.measured = (*self.state(), tuple(self.force + noise))
+        self.periods += 1
 
     def substep(self, goal, velocity, stiffness, damping, force_max):
         at, speed = self.data.qpos[self.tool_at], self.data.qvel[self.tool_speed]
@@ -120,8 +125,11 @@ class World:
             total += world[:2] * (-1.0 if contact.geom[1] == self.tool_geom else 1.0)
         return total
 
+    def state(self):
+        return tuple(self.data.qpos[self.tool_at]), tuple(self.data.qvel[self.tool_speed])
+
     def tool_state(self):
-        return tuple(self.data.qpos[self.tool_at]), tuple(self.data.qvel[self.tool_speed]), self.measured
+        return self.measured
 
     def pose(self):
         x, y, _ = self.data.xpos[self.object]
@@ -145,6 +153,7 @@ def main():
     arguments.add_argument("--stiffness", type=float, help="of a position-controlled tool, N/m [default: the tool is under impedance control]")
     arguments.add_argument("--sensor-hz", type=float, default=100.0, help="corner frequency of the force sensor's own filter")
     arguments.add_argument("--force-noise", type=float, default=0.0, help="of the force sensor, N per axis")
+    arguments.add_argument("--measure-every", type=int, default=1, help="so many periods: a robot that is slower than mmt")
     arguments.add_argument("--seconds", type=float, default=math.inf, help="how long")
     options = arguments.parse_args()
     world, plug = World(options), Plant(asked(options.address, "plant"))

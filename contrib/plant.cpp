@@ -16,13 +16,14 @@ constexpr double period_s = 1e-3;
 
 struct Block {
   double mass = 0.7, half = 0.18, damping = 3.0, coulomb = 0.3 * 0.7 * 9.81;
-  std::array<double, 2> at{}, speed{}, force{}, tip{-0.45, 0.0}, tool_speed{};
+  std::array<double, 2> at{}, speed{}, force{}, tip{-0.45, 0.0}, tip_speed{};
 
   void step(const std::array<double, 10> &command) {
     const std::array<double, 2> tool{command[0], command[1]};
-    tool_speed = {command[2], command[3]};
+    const std::array<double, 2> tool_speed{command[2], command[3]};
     force = {};
     tip = tool;
+    tip_speed = tool_speed;
     const std::array<double, 2> inside{half - std::abs(tool[0] - at[0]), half - std::abs(tool[1] - at[1])};
     if (std::min(inside[0], inside[1]) > 0.0) {
       const int axis = inside[0] <= inside[1] ? 0 : 1;
@@ -31,6 +32,7 @@ struct Block {
       force[axis] = side * std::clamp(command[4] * inside[axis] + command[5] * closing, 0.0, command[6]);
       // a tip that gives stands at the surface
       tip[axis] -= side * inside[axis];
+      tip_speed[axis] = speed[axis];
     }
     for (int axis = 0; axis < 2; ++axis) {
       const double next = speed[axis] + period_s * (force[axis] - damping * speed[axis]) / mass;
@@ -58,7 +60,7 @@ int main(int count, char **words) {
     for (unsigned n = 0; n < periods; ++n, ++period) block.step(command->numbers);
     // 30 images a second
     const bool seen = !command || (periods > 0 && period % 33 == 0);
-    plug.send(seen ? 1 : 0, {block.tip[0], block.tip[1], block.tool_speed[0], block.tool_speed[1], block.force[0], block.force[1],
+    plug.send(seen ? 1 : 0, {block.tip[0], block.tip[1], block.tip_speed[0], block.tip_speed[1], block.force[0], block.force[1],
                              block.at[0], block.at[1], 0.0, 0.0});
   }
 }

@@ -103,12 +103,12 @@ class Block:
         self.mass, self.half, self.damping = mass, side / 2, damping
         self.coulomb = friction * mass * 9.81
         self.at, self.speed, self.force = [0.0, 0.0], [0.0, 0.0], [0.0, 0.0]
-        self.tip = (-0.45, 0.0)
+        self.tip, self.tip_speed = (-0.45, 0.0), (0.0, 0.0)
         self.tool, self.tool_speed = (-0.45, 0.0), (0.0, 0.0)
 
     def step(self, command):
         self.tool, self.tool_speed = command.tool, command.velocity
-        self.force, tip = [0.0, 0.0], list(self.tool)
+        self.force, tip, speed = [0.0, 0.0], list(self.tool), list(self.tool_speed)
         inside = [self.half - abs(t - o) for t, o in zip(self.tool, self.at)]
         if min(inside) > 0.0:
             axis = inside.index(min(inside))
@@ -117,7 +117,8 @@ class Block:
             force = command.stiffness * inside[axis] + command.damping * closing
             self.force[axis] = side * min(max(force, 0.0), command.force_max)
             tip[axis] -= side * inside[axis]
-        self.tip = tuple(tip)
+            speed[axis] = self.speed[axis]
+        self.tip, self.tip_speed = tuple(tip), tuple(speed)
         for axis in (0, 1):
             speed = self.speed[axis] + PERIOD_S * (self.force[axis] - self.damping * self.speed[axis]) / self.mass
             # what friction can take away of the speed in a period
@@ -127,7 +128,7 @@ class Block:
 
     def tool_state(self):
         """The tip of a tool that gives stands at the surface."""
-        return self.tip, self.tool_speed, self.force
+        return self.tip, self.tip_speed, self.force
 
     def pose(self):
         return (self.at[0], self.at[1], 0.0)

@@ -27,6 +27,9 @@ pub use packet::{PlantAnswer, PlantCommand, SILENCE};
 /// Accepted greatest acceleration of the tool, m/s².
 const ACCELERATION_MAX_M_PER_S2: (f64, f64) = (0.5, 100.0);
 
+/// For so many periods the tool of a plant is taken to move on as it was measured last.
+const MOVES_ON: u32 = 20;
+
 /// Accepted friction of a plant's tool: beyond it the force of a box may point at any face.
 const TOOL_FRICTION: (f64, f64) = (0.0, 0.5);
 
@@ -200,6 +203,9 @@ pub(crate) struct LinkedPlant {
     force_max_n: f64,
     gives: ToolGives,
     newest: Option<PlantAnswer>,
+    /// Place (m) and velocity (m/s) of its tool as measured last, and for how many periods nothing newer has been.
+    motion: Option<(Vec2, Vec2)>,
+    age: u32,
     /// How far the tool gives by its own spring and damper, m.
     given: Vec2,
     /// An image that no tick has taken yet.
@@ -230,6 +236,8 @@ impl LinkedPlant {
             force_max_n,
             gives,
             newest: None,
+            motion: None,
+            age: 0,
             given: Vec2::zeros(),
             image: None,
             images_dropped: 0,
@@ -266,10 +274,7 @@ impl LinkedPlant {
     fn meet(&mut self, _now: Time, tool: Vec2, velocity: Vec2) -> Met {
         let (at, speed) = self.follower.step(tool, velocity);
         self.command = Some(self.commanded(at, speed));
-        let (measured, force) = match &self.newest {
-            Some(answer) => (answer.tool, answer.force),
-            None => (at, Vec2::zeros()),
-        };
+        let (measured, force) = self.measured_by_now().unwrap_or((at, Vec2::zeros()));
         // what the model renders as penetration of the HIP is how far the tool gives
         if self.gives == ToolGives::ByPlant {
             let given = |f, before| self.coupling.penetration(f, before, TICK_S);
@@ -285,6 +290,19 @@ impl LinkedPlant {
             pose: self.stand_in.pose(),
             body: 0,
         }
+    }
+
+    /// Place of the tool (m) and its force (N). A plant that measures more rarely than every period moves on meanwhile.
+    fn measured_by_now(&mut self) -> Option<(Vec2, Vec2)> {
+        let newest = self.newest?;
+        let motion = (newest.tool, newest.velocity);
+        if self.motion == Some(motion) {
+            self.age = (self.age + 1).min(MOVES_ON);
+        } else {
+            (self.motion, self.age) = (Some(motion), 0);
+        }
+        let moved = newest.velocity * (f64::from(self.age) * TICK_S);
+        Some((newest.tool + moved, newest.force))
     }
 
     fn commanded(&self, tool: Vec2, velocity: Vec2) -> PlantCommand {

@@ -7,7 +7,7 @@ use mmt_shared::time::{TICK, TICK_S};
 
 use super::*;
 use crate::environment::EnvironmentConfig;
-use crate::slave::{Slave, SlaveConfig};
+use crate::slave::{Slave, SlaveConfig, SlaveTick};
 
 const TOKEN: PlugToken = PlugToken::new([3; 16]);
 
@@ -104,14 +104,15 @@ fn a_packet_of_another_kind_or_token_is_not_taken() {
 
 /// A slave whose hand goes along x at 0.1 m/s from −0.3 m, and whose plant answers what `plant` makes of the command.
 fn drive(ticks: u64, plant: impl FnMut(&PlantCommand) -> Option<PlantAnswer>) -> Slave {
-    drive_along(|t| 0.1 * t, ticks, plant)
+    drive_along(|t| 0.1 * t, ticks, plant, |_| {})
 }
 
-/// The same with a hand that has gone `way` (m) after a time (s).
+/// The same with a hand that has gone `way` (m) after a time (s); `watch` gets each tick.
 fn drive_along(
     way: impl Fn(f64) -> f64,
     ticks: u64,
     mut plant: impl FnMut(&PlantCommand) -> Option<PlantAnswer>,
+    mut watch: impl FnMut(&SlaveTick),
 ) -> Slave {
     let mut slave = Slave::try_new(&linked(), Coupling::for_stiffness(1000.0)).unwrap();
     slave.start_at(Vec2::new(-0.3, 0.0));
@@ -127,7 +128,9 @@ fn drive_along(
         if let Some(answer) = plant(&command) {
             slave.handle_plant(now, &answer);
         }
-        slave.tick(now);
+        if let Some(tick) = slave.tick(now) {
+            watch(&tick);
+        }
     }
     slave
 }
@@ -177,7 +180,11 @@ fn a_tool_that_gives_by_itself_is_rendered_as_penetration() {
     for (gives, given) in [(ToolGives::ByPlant, 0.0015), (ToolGives::BySlave, 0.0)] {
         let stand_in = Environment::try_new(EnvironmentConfig::default()).unwrap();
         let mut plant = LinkedPlant::new(linked().plant, stand_in, coupling, limits, gives);
-        plant.take(Time::ZERO, &answer());
+        let stands = PlantAnswer {
+            velocity: Vec2::zeros(),
+            ..answer()
+        };
+        plant.take(Time::ZERO, &stands);
         let mut met = plant.meet(Time::ZERO, Vec2::zeros(), Vec2::zeros());
         // the damper gives way in some 10 ms
         assert!((met.sensed.tool.x - 0.1 - 0.1 * given).abs() < 1e-4);
@@ -200,6 +207,16 @@ struct Block {
 }
 
 impl Block {
+    fn new(noise_n: f64) -> Self {
+        Self {
+            face: -0.18,
+            speed: 0.0,
+            tool: -0.3,
+            noise: Substream::new(8, "plant", 0),
+            noise_n,
+        }
+    }
+
     fn answer(&mut self, command: &PlantCommand) -> PlantAnswer {
         let tool = command.tool.x;
         let depth = tool - self.face;
@@ -207,8 +224,14 @@ impl Block {
         let spring = command.stiffness_n_per_m * depth + command.damping_ns_per_m * rate;
         let force = if depth > 0.0 { spring.max(0.0) } else { 0.0 };
         let (noise, beside) = self.noise.normal_pair();
+        let velocity = if depth > 0.0 {
+            Vec2::new(self.speed, 0.0)
+        } else {
+            command.velocity
+        };
         let answer = PlantAnswer {
             tool: Vec2::new(tool.min(self.face), command.tool.y),
+            velocity,
             force: Vec2::new(force + noise * self.noise_n, beside * self.noise_n),
             object: Some(Pose::new(self.face + 0.18, 0.0, 0.0)),
             ..PlantAnswer::default()
@@ -224,21 +247,42 @@ impl Block {
 #[test]
 fn noise_of_the_force_does_not_make_the_object_of_a_plant_light() {
     for noise_n in [0.0, 0.1, 0.2] {
-        let mut block = Block {
-            face: -0.18,
-            speed: 0.0,
-            tool: -0.3,
-            noise: Substream::new(8, "plant", 0),
-            noise_n,
-        };
+        let mut block = Block::new(noise_n);
         let shake = |t: f64| 0.004 * libm::sin(12.0 * t);
         let slave = drive_along(
             |t| 0.1 * t + shake(t),
             6000,
             |command| Some(block.answer(command)),
+            |_| {},
         );
         let mass_kg = slave.estimate().m;
         assert!((mass_kg - 0.7).abs() < 0.03, "{noise_n} N: {mass_kg} kg");
+    }
+}
+
+#[test]
+fn a_plant_that_measures_every_few_periods_shows_the_object_as_it_is() {
+    for (periods, noise_n) in [(4, 0.0), (8, 0.0), (4, 0.05), (8, 0.05)] {
+        let mut block = Block::new(noise_n);
+        let shake = |t: f64| 0.004 * libm::sin(12.0 * t);
+        let (mut n, mut contacts) = (0, 0);
+        let slave = drive_along(
+            |t| 0.1 * t + shake(t),
+            6000,
+            |command| {
+                let answer = block.answer(command);
+                n += 1;
+                (n % periods == 0).then_some(answer)
+            },
+            |tick| contacts += u32::from(tick.in_contact && tick.true_force.norm() < 0.3),
+        );
+        let mass_kg = slave.estimate().m;
+        let what = format!("{periods} periods, {noise_n} N");
+        assert!((mass_kg - 0.7).abs() < 0.08, "{what}: {mass_kg} kg");
+        assert!(
+            contacts < 60,
+            "{what}: contact of {contacts} ticks in free space"
+        );
     }
 }
 
