@@ -6,7 +6,6 @@
 
 mod bias;
 mod gain;
-mod lag;
 mod noise;
 mod onset;
 mod withdrawal;
@@ -18,8 +17,6 @@ use mmt_shared::model::geometry::Vec2;
 use mmt_shared::model::settings::Mode;
 use mmt_shared::range::{OutOfRange, in_range};
 use serde::{Deserialize, Serialize};
-
-pub(crate) use lag::SensorLag;
 
 use crate::sensing::FORCE_LAG_MS;
 use crate::trigger::{ContactConfig, ContactDetector};

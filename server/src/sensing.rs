@@ -7,6 +7,7 @@
 
 mod config;
 mod force;
+mod lag;
 
 use std::collections::VecDeque;
 
@@ -20,6 +21,7 @@ use config::IMAGES_MAX;
 pub use config::{SensingConfig, SensingError, VisionConfig};
 pub use force::ForceFault;
 use force::{ForceSensor, pair};
+pub(crate) use lag::SensorLag;
 
 /// What vision saw.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -32,26 +32,20 @@ fn values(estimate: &Estimate) -> [f64; 3] {
     [estimate.m, estimate.b, estimate.c]
 }
 
+fn of(config: &EstimatorConfig) -> Estimator {
+    Estimator::new(config, COUPLING, 8.0, ToolGives::No)
+}
+
 fn recommended(change: impl FnOnce(&mut RecommendedConfig)) -> Estimator {
     let mut config = RecommendedConfig::new(COUPLING);
     change(&mut config);
-    Estimator::new(
-        &EstimatorConfig::Recommended(config),
-        COUPLING,
-        8.0,
-        ToolGives::No,
-    )
+    of(&EstimatorConfig::Recommended(config))
 }
 
 fn paper(change: impl FnOnce(&mut PaperConfig)) -> Estimator {
     let mut config = PaperConfig::default();
     change(&mut config);
-    Estimator::new(
-        &EstimatorConfig::Paper(config),
-        COUPLING,
-        8.0,
-        ToolGives::No,
-    )
+    of(&EstimatorConfig::Paper(config))
 }
 
 /// One push and the way to the next face; `see` gets each tick of the push.

@@ -9,6 +9,7 @@ use mmt_shared::rng::Substream;
 use mmt_shared::time::TICK_S;
 
 use super::config::SensingConfig;
+use super::lag::SensorLag;
 
 /// How a force sensor is broken.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -28,9 +29,7 @@ pub(super) struct ForceSensor {
     bias: Vec2,
     drift: Vec2,
     gain: f64,
-    /// Weight of the newest force in the lagging one; none without lag.
-    weight: Option<f64>,
-    lagging: Vec2,
+    lag: SensorLag,
     /// What it gave last, N.
     given: Vec2,
     pub(super) fault: Option<ForceFault>,
@@ -38,15 +37,13 @@ pub(super) struct ForceSensor {
 
 impl ForceSensor {
     pub(super) fn new(config: &SensingConfig, seed: u64) -> Self {
-        let lag_s = config.force_lag_ms * 1e-3;
         Self {
             noise_n: config.force_noise_n,
             noise: Substream::new(seed, "slave/force-noise", 0),
             bias: direction(seed, "slave/force-bias") * config.force_bias_n,
             drift: direction(seed, "slave/force-drift") * (config.force_drift_n_per_s * TICK_S),
             gain: config.force_gain,
-            weight: (lag_s > 0.0).then(|| 1.0 - libm::exp(-TICK_S / lag_s)),
-            lagging: Vec2::zeros(),
+            lag: SensorLag::new(config.force_lag_ms, Some(Vec2::zeros())),
             given: Vec2::zeros(),
             fault: None,
         }
@@ -54,12 +51,8 @@ impl ForceSensor {
 
     /// Measures the true force of one tick, N.
     pub(super) fn measure(&mut self, force: Vec2) -> Vec2 {
-        let followed = match self.weight {
-            Some(weight) => self.lagging + (force - self.lagging) * weight,
-            None => force,
-        };
-        self.lagging = followed;
-        let measured = followed * self.gain + self.bias + pair(&mut self.noise) * self.noise_n;
+        let measured =
+            self.lag.step(force) * self.gain + self.bias + pair(&mut self.noise) * self.noise_n;
         self.bias += self.drift;
         self.given = match self.fault {
             None => measured,

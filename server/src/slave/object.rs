@@ -16,7 +16,6 @@ use mmt_shared::time::{TICK, Time};
 use serde::{Deserialize, Serialize};
 
 use super::config::{SlaveConfig, SlaveError};
-use crate::conditioning::SensorLag;
 use crate::contact::Contact;
 use crate::contact_prediction::{ContactPredictor, Expected};
 use crate::environment::SIDE_M;
@@ -24,6 +23,7 @@ use crate::estimator::{
     Estimate, Estimator, EstimatorConfig, Measured, OBSTACLE_N, Seen, ToolGives,
 };
 use crate::pose_observer::{ContactForce, ObserverConfig, PoseObserver};
+use crate::sensing::SensorLag;
 
 /// The pose observer and the estimator, which need each other.
 pub(super) struct ObjectEstimate {
@@ -123,8 +123,8 @@ impl ObjectEstimate {
             coupling,
             hand_force_max_n,
             tool_gives,
-            tool: SensorLag::new(config.conditioning.lag_ms),
-            back: SensorLag::new(config.conditioning.lag_ms),
+            tool: SensorLag::new(config.conditioning.lag_ms, None),
+            back: SensorLag::new(config.conditioning.lag_ms, None),
             observer_config: observer,
             estimator_config: estimator,
             met: None,
