@@ -141,6 +141,15 @@ class World:
         return math.acos(min(1.0, max(-1.0, self.data.xmat[self.object][8])))
 
 
+def at_least(least):
+    """A whole number that is not below this, for argparse."""
+    def number(text):
+        if int(text) < least:
+            raise argparse.ArgumentTypeError(f"{text} is below {least}")
+        return int(text)
+    return number
+
+
 def main():
     arguments = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     arguments.add_argument("address", nargs="?", default="-", help="as mmt printed it after “plant: ”; `-`, the default, asks for it or reads it from standard input")
@@ -153,13 +162,14 @@ def main():
     arguments.add_argument("--stiffness", type=float, help="of a position-controlled tool, N/m [default: the tool is under impedance control]")
     arguments.add_argument("--sensor-hz", type=float, default=100.0, help="corner frequency of the force sensor's own filter")
     arguments.add_argument("--force-noise", type=float, default=0.0, help="of the force sensor, N per axis")
-    arguments.add_argument("--measure-every", type=int, default=1, help="so many periods: a robot that is slower than mmt")
+    arguments.add_argument("--measure-every", type=at_least(1), default=1, help="so many periods: a robot that is slower than mmt")
+    arguments.add_argument("--image-hz", type=at_least(0), default=30, help="images of the object a second; 0: no camera")
     arguments.add_argument("--seconds", type=float, default=math.inf, help="how long")
     options = arguments.parse_args()
     world, plug = World(options), Plant(asked(options.address, "plant"))
     begin = world.pose()
     try:
-        serve(plug, world, options.seconds)
+        serve(plug, world, options.seconds, options.image_hz)
     except KeyboardInterrupt:
         pass
     end = world.pose()

@@ -135,7 +135,7 @@ class Block:
 
 
 def serve(plug, world, seconds=math.inf, image_hz=30):
-    """Answers commands with what a world does; it has step(command), tool_state() and pose()."""
+    """Answers commands with what a world does; it has step(command), tool_state() and pose(). 0 images a second: there is no camera."""
     period = 0
     last = begin = time.monotonic()
     while time.monotonic() - begin < seconds:
@@ -147,8 +147,8 @@ def serve(plug, world, seconds=math.inf, image_hz=30):
                 period += 1
         elif time.monotonic() - last < 0.010:
             continue
-        # 30 images a second; and the object's place without a session, that a new one begins with it
-        seen = not command or (command.periods and period % max(1, 1000 // image_hz) == 0)
+        # an image; and the object's place without a session, that a new one begins with it
+        seen = not command or (image_hz and command.periods and period % max(1, 1000 // image_hz) == 0)
         plug.answer(*world.tool_state(), world.pose() if seen else None)
 
 
