@@ -173,13 +173,17 @@ fn the_force_that_a_plant_measured_is_f_s_a_period_later_and_the_tool_goes_where
     );
 }
 
+/// A plant whose contacts have 1000 N/m, and whose tool is sent at 0.6 m/s at the most.
+fn plugged_in(gives: ToolGives) -> LinkedPlant {
+    let stand_in = Environment::try_new(EnvironmentConfig::default()).unwrap();
+    let (coupling, limits) = (Coupling::for_stiffness(1000.0), (0.6, 15.0));
+    LinkedPlant::new(linked().plant, stand_in, coupling, limits, gives)
+}
+
 #[test]
 fn a_tool_that_gives_by_itself_is_rendered_as_penetration() {
-    let coupling = Coupling::for_stiffness(1000.0);
-    let limits = (0.6, 15.0);
     for (gives, given) in [(ToolGives::ByPlant, 0.0015), (ToolGives::BySlave, 0.0)] {
-        let stand_in = Environment::try_new(EnvironmentConfig::default()).unwrap();
-        let mut plant = LinkedPlant::new(linked().plant, stand_in, coupling, limits, gives);
+        let mut plant = plugged_in(gives);
         let stands = PlantAnswer {
             velocity: Vec2::zeros(),
             ..answer()
@@ -284,6 +288,24 @@ fn a_plant_that_measures_every_few_periods_shows_the_object_as_it_is() {
             "{what}: contact of {contacts} ticks in free space"
         );
     }
+}
+
+#[test]
+fn a_velocity_that_no_tool_is_sent_with_moves_it_by_little() {
+    let mut plant = plugged_in(ToolGives::BySlave);
+    let answer = PlantAnswer {
+        velocity: Vec2::new(-15.0, 0.0),
+        force: Vec2::zeros(),
+        ..answer()
+    };
+    plant.take(Time::ZERO, &answer);
+    let places: Vec<f64> = (0..100)
+        .map(|_| plant.meet(Time::ZERO, Vec2::zeros(), Vec2::zeros()))
+        .map(|met| answer.tool.x - met.sensed.tool.x)
+        .collect();
+    // 20 ms at 0.6 m/s
+    assert!((places[20] - 0.012).abs() < 1e-9, "{} m", places[20]);
+    assert_eq!(places[99], places[20]);
 }
 
 #[test]
