@@ -67,6 +67,8 @@ pub struct Axis {
     pub scale: Scale,
     /// What is shown; of the data if absent.
     pub range: Option<Range<f64>>,
+    /// What is written at 0, 1, 2, … in place of the numbers; empty where the numbers are.
+    pub names: Vec<String>,
 }
 
 impl Axis {
@@ -77,6 +79,17 @@ impl Axis {
             label: label.to_owned(),
             scale: Scale::Linear,
             range: None,
+            names: Vec::new(),
+        }
+    }
+
+    /// An axis of things without an order, at 0, 1, 2, ….
+    #[must_use]
+    pub fn named(names: Vec<String>) -> Self {
+        Self {
+            range: Some(-0.6..names.len() as f64 - 0.4),
+            names,
+            ..Self::linear("")
         }
     }
 

@@ -184,39 +184,50 @@ fn columns<'a>() -> Vec<Column<'a, Row<'a>>> {
     columns
 }
 
-/// Packets and PMSE of every sensor over those of the default one.
-fn figure(rows: &[Row]) -> Figure {
+/// PMSE and packets of every sensor over those of the default one, which stands at 1.
+fn figure<'a>(rows: &[Row<'a>]) -> Figure {
+    let names = SENSORS.iter().rev().map(|(name, _)| (*name).to_owned());
+    let names: Vec<String> = names.collect();
+    // the legend stands above them
+    let above = names.len() as f64 + 2.2;
+    let panel = |title: &str, of: fn(&Row<'a>) -> Option<Interval>| {
+        Panel::new(
+            title,
+            Axis::log("ratio"),
+            Axis::named(names.clone()).over(-0.6..above),
+            series(rows, of),
+        )
+    };
+    let panels = [
+        panel(
+            "PMSE against the true force, over the default sensor's",
+            Row::pmse,
+        ),
+        panel("Updates, over the default sensor's", Row::packets),
+    ];
+    Figure::of_alike(panels, Legend::UpperRight, 2, (640, 560))
+}
+
+/// A series for each user, with a dot for each sensor: those of one sensor lie one below another.
+fn series<'a>(rows: &[Row<'a>], of: fn(&Row<'a>) -> Option<Interval>) -> Vec<Series> {
     let styles = [
-        (Colour::BLUE, Mark::Circle),
-        (Colour::GREEN, Mark::Triangle),
-        (Colour::VERMILION, Mark::Cross),
-        (Colour::GREY, Mark::Square),
+        (Colour::BLUE, Mark::Circle, 0.27),
+        (Colour::GREEN, Mark::Triangle, 0.09),
+        (Colour::VERMILION, Mark::Cross, -0.09),
+        (Colour::GREY, Mark::Square, -0.27),
     ];
     let of_user = rows.chunks(SENSORS.len()).zip(styles);
-    let series = of_user.filter_map(|(rows, (colour, mark))| {
-        let dots = rows.iter().filter_map(|row| {
-            let dot = Dot::of_intervals(row.packets()?, row.pmse()?);
-            // the others lie too close together to be named
-            let (name, _) = row.group.case.sensor;
-            let named = name.contains("gain") && row.group.case.cure != Cure::None;
+    let series = of_user.filter_map(|(rows, (colour, mark, beside))| {
+        let dots = rows.iter().rev().enumerate().filter_map(|(n, row)| {
+            let ratio = of(row)?;
             Some(Dot {
-                note: named.then(|| (*name).to_owned()),
-                ..dot
+                x_interval: Some((ratio.low, ratio.high)),
+                ..Dot::at(ratio.mean, n as f64 + beside)
             })
         });
         let label = rows.first()?.user();
-        let dots = dots.collect();
-        Some(
-            Series::line(&label, colour, dots)
-                .stroked(Stroke::Solid, 0)
-                .marked(mark),
-        )
+        let line = Series::line(&label, colour, dots.collect());
+        Some(line.stroked(Stroke::Solid, 0).marked(mark))
     });
-    let panel = Panel::new(
-        "Force sensors with errors, over the default one",
-        Axis::log("updates, ratio"),
-        Axis::log("PMSE against the true force, ratio"),
-        series,
-    );
-    Figure::of_alike([panel], Legend::LowerRight, 1, (720, 480))
+    series.collect()
 }

@@ -126,6 +126,31 @@ impl Scale {
     }
 }
 
+impl Axis {
+    /// What is written at a mark.
+    fn written(&self, value: f64) -> String {
+        match self.names.as_slice() {
+            [] => ticks::written(value),
+            names => (names.get(value.round() as usize).cloned()).unwrap_or_default(),
+        }
+    }
+
+    /// Most marks; each name has one.
+    fn marks(&self) -> usize {
+        match &self.range {
+            Some(range) if !self.names.is_empty() => (range.end - range.start) as usize + 2,
+            _ => MARKS,
+        }
+    }
+
+    /// Width that is left for what is written beside a vertical axis and for its label, pixels.
+    fn room(&self) -> u32 {
+        let longest = self.names.iter().map(|name| name.chars().count()).max();
+        // a letter is a little wider than half of its height
+        64.max(longest.unwrap_or_default() as u32 * NUMBER * 11 / 20 + 20)
+    }
+}
+
 fn draw_on<X: Numbers, Y: Numbers>(
     area: &Area,
     panel: &Panel,
@@ -136,10 +161,13 @@ fn draw_on<X: Numbers, Y: Numbers>(
         .caption(&panel.title, (FAMILY, TITLE))
         .margin(12)
         .x_label_area_size(46)
-        .y_label_area_size(64)
+        .y_label_area_size(panel.y.room())
         .build_cartesian_2d(x, y)
         .map_err(failed)?;
-    let written = |value: &f64| ticks::written(*value);
+    let (on_x, on_y) = (
+        |value: &f64| panel.x.written(*value),
+        |value: &f64| panel.y.written(*value),
+    );
     chart
         .configure_mesh()
         .light_line_style(TRANSPARENT)
@@ -149,10 +177,10 @@ fn draw_on<X: Numbers, Y: Numbers>(
         .axis_desc_style((FAMILY, LABEL))
         .x_desc(panel.x.label.as_str())
         .y_desc(panel.y.label.as_str())
-        .x_labels(MARKS)
-        .y_labels(MARKS)
-        .x_label_formatter(&written)
-        .y_label_formatter(&written)
+        .x_labels(panel.x.marks())
+        .y_labels(panel.y.marks())
+        .x_label_formatter(&on_x)
+        .y_label_formatter(&on_y)
         .draw()
         .map_err(failed)?;
     for series in &panel.series {

@@ -34,6 +34,20 @@ fn the_same_data_give_the_same_bytes_and_every_text_is_there() {
 }
 
 #[test]
+fn things_without_an_order_stand_under_their_names() {
+    let names: Vec<String> = (0..11).map(|n| format!("thing {n}")).collect();
+    let named = Axis::named(names.clone());
+    for axis in [named.clone(), named.over(-0.6..13.2)] {
+        let panel = Panel::new("Title", Axis::log("x"), axis, []);
+        let figure = Figure::of_alike([panel], Legend::UpperRight, 1, (400, 300));
+        let svg = figure.draw().unwrap();
+        for name in &names {
+            assert_eq!(svg.matches(&format!("\n{name}\n")).count(), 1, "{name}");
+        }
+    }
+}
+
+#[test]
 fn what_cannot_be_drawn_is_left_out_and_breaks_nothing() {
     for dots in [
         vec![],
