@@ -200,7 +200,6 @@ pub(crate) struct LinkedPlant {
     follower: Follower,
     /// `k_p` and `k_d` that the tool is to meet things with.
     coupling: Coupling,
-    speed_max_m_per_s: f64,
     force_max_n: f64,
     gives: ToolGives,
     newest: Option<PlantAnswer>,
@@ -234,7 +233,6 @@ impl LinkedPlant {
             stand_in,
             follower: Follower::new(limits),
             coupling,
-            speed_max_m_per_s,
             force_max_n,
             gives,
             newest: None,
@@ -304,7 +302,9 @@ impl LinkedPlant {
             (self.motion, self.age) = (Some(motion), 0);
         }
         // no faster than a tool is ever sent
-        let velocity = newest.velocity.cap_magnitude(self.speed_max_m_per_s);
+        let velocity = newest
+            .velocity
+            .cap_magnitude(self.follower.speed_max_m_per_s());
         let moved = velocity * (f64::from(self.age) * TICK_S);
         Some((newest.tool + moved, newest.force))
     }

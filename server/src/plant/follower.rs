@@ -18,6 +18,11 @@ impl Follower {
         Self { limits, at: None }
     }
 
+    /// No tool is sent faster, m/s.
+    pub(super) fn speed_max_m_per_s(&self) -> f64 {
+        self.limits.speed_m_per_s
+    }
+
     /// At rest at a place, m.
     pub(super) fn place(&mut self, tool: Vec2) {
         self.at = Some((tool, Vec2::zeros()));
