@@ -43,6 +43,7 @@ pub(crate) fn idle(config: &WorldConfig, key: &str) -> Option<&'static str> {
         .or_else(|| of_bodies(config, key))
         .or_else(|| of_vision(config, key))
         .or_else(|| of_trigger(config, key))
+        .or_else(|| of_tool_energy(config, key))
         .or_else(|| of_architecture(config, key))
 }
 
@@ -138,7 +139,15 @@ fn of_vision(config: &WorldConfig, key: &str) -> Option<&'static str> {
     let vision = &config.slave.sensing.vision;
     let blind = vision.rate_hz == 0.0;
     match key {
-        // the noise of place and angle is that of the pose at the start as well
+        // the noise of place and angle is that of the pose at the start as well: how sure the place is decides whether an untouched
+        // object is sent
+        "slave.sensing.vision.position_noise_m"
+            if blind && config.slave.trigger.free_space_error_m == 0.0 =>
+        {
+            Some(
+                "`slave.sensing.vision.rate_hz` and `slave.trigger.free_space_error_m` are 0: nothing asks for the place",
+            )
+        }
         "slave.sensing.vision.latency_ms" | "slave.sensing.vision.size_noise_m" if blind => {
             Some("`slave.sensing.vision.rate_hz` is 0: there are no images")
         }
@@ -152,6 +161,8 @@ fn of_vision(config: &WorldConfig, key: &str) -> Option<&'static str> {
 fn of_trigger(config: &WorldConfig, key: &str) -> Option<&'static str> {
     use Scheme as S;
     let key = key.strip_prefix("slave.trigger.")?;
+    // a time may be given by its `secs` and `nanos`
+    let key = key.split('.').next()?;
     let trigger = &config.slave.trigger;
     let by_force = trigger.metric == MismatchMetric::Force;
     let (used, why) = match (key, trigger.scheme) {
@@ -163,20 +174,31 @@ fn of_trigger(config: &WorldConfig, key: &str) -> Option<&'static str> {
             !matches!(scheme, S::Deadband { .. } | S::EverySample),
             "this scheme has no timer",
         ),
-        ("metric" | "force_floor_n", S::Timer { .. } | S::EverySample | S::Dis { .. }) => {
-            (false, "this scheme has no deadband")
-        }
+        ("free_space_error_m", S::EverySample) => (false, "every sample is sent anyway"),
+        (
+            "metric" | "force_floor_n" | "judged_over",
+            S::Timer { .. } | S::EverySample | S::Dis { .. },
+        ) => (false, "this scheme has no deadband"),
         ("judge_sticking", S::Timer { .. } | S::EverySample) => {
             (false, "this scheme does not judge the force")
         }
         ("judge_sticking", S::Dis { .. }) => return None,
         ("judge_sticking", _) => (by_force, "`slave.trigger.metric` is not the force"),
-        ("force_floor_n", S::Deadband { .. } | S::Hybrid { .. }) => {
+        ("force_floor_n" | "judged_over", S::Deadband { .. } | S::Hybrid { .. }) => {
             (by_force, "`slave.trigger.metric` is not the force")
         }
         _ => return None,
     };
     (!used).then_some(why)
+}
+
+fn of_tool_energy(config: &WorldConfig, key: &str) -> Option<&'static str> {
+    let key = key.strip_prefix("slave.tool_energy.")?;
+    if config.architecture.feels_tool() && matches!(key, "bounded" | "share") {
+        return Some("with this architecture each port has a bound of its own");
+    }
+    let is_free = key == "share" && !config.slave.tool_energy.bounded;
+    is_free.then_some("`slave.tool_energy.bounded` is false, as in paper mode; give that as well")
 }
 
 fn of_architecture(config: &WorldConfig, key: &str) -> Option<&'static str> {

@@ -18,9 +18,11 @@ const SOMETIMES: &[[&str; 4]] = &[
     ["operator.home_radius_m", "operator.push_m = 1.0\noperator.push_speed_m_per_s = [0.3, 0.3]\n", "0.5", "the box does not get far"],
     ["operator.nudge_m", "operator.dwell_s = 0.5\n", "0.02", "there are no nudges"],
     ["slave.tool_force_max_n", "slave.environment.friction_coefficient = 1.0\n", "3.0", "the box is light"],
-    ["slave.tool_energy.bounded", "slave.tool_energy.share = 0.0\nslave.tool_energy.hand_force_max_n = 0.1\n", "false", "the budget is kept"],
+    ["slave.tool_energy.bounded", "slave.tool_energy.hand_force_max_n = 0.1\n", "false", "the budget is kept"],
     ["slave.tool_energy.share", "slave.tool_energy.hand_force_max_n = 0.1\n", "10.0", "the budget is kept"],
     ["slave.tool_energy.hand_force_max_n", "slave.tool_energy.share = 0.0\n", "0.1", "the budget is kept"],
+    ["slave.sensing.vision.latency_ms", "slave.sensing.vision.rate_hz = 30.0\n", "100.0", "paper mode has no images"],
+    ["slave.sensing.vision.position_noise_m", "slave.sensing.vision.rate_hz = 30.0\n", "0.01", "paper mode has no images"],
     ["slave.conditioning.follow_noise", "slave.sensing.force_noise_n = 0.1\n", "false", "the sensor is sound"],
     ["slave.conditioning.tare", "slave.sensing.force_bias_n = 0.2\n", "false", "the sensor is sound"],
     ["slave.environment.shape", "", "{ disc = { diameter_m = 0.3 } }", "a shape has measures"],
@@ -145,10 +147,10 @@ fn check(mode: Mode, chosen: fn(&str) -> bool) {
     };
     let usual = digest(&format!("{DELAY}{mode}"), 5).unwrap();
     let known = layers.known().unwrap();
-    // networks are words, seeds are the plan's, and what is left out or empty has no value to change
+    // networks are words, seeds are the plan's, the mode is given, and what is left out or empty has no value to change
     let wanted = known.iter().filter(|known| {
         let key = known.key.as_str();
-        let other = ["up", "down", "seed"].contains(&key) || key.ends_with(".seed");
+        let other = ["up", "down", "seed", "slave.mode"].contains(&key) || key.ends_with(".seed");
         let has_value = known.value.as_deref().is_some_and(|value| value != "[]");
         chosen(key) && !other && has_value
     });
@@ -175,4 +177,11 @@ fn every_key_of_an_estimator_changes_a_run_or_is_refused() {
     for mode in [Mode::Recommended, Mode::Paper] {
         check(mode, |key| within(key, "slave.estimator"));
     }
+}
+
+#[test]
+fn every_key_of_the_slave_in_paper_mode_changes_a_run_or_is_refused() {
+    check(Mode::Paper, |key| {
+        within(key, "slave") && !within(key, "slave.estimator")
+    });
 }

@@ -64,6 +64,11 @@ fn what_another_key_makes_idle_is_refused_and_with_the_other_value_taken() {
         (&["slave.trigger.scheme = \"every-sample\"", "slave.trigger.force_floor_n = 1.0"], "no deadband", &[]),
         (&["slave.trigger.metric = \"pose\"", "slave.trigger.judge_sticking = true"], "not the force", &[]),
         (&["architecture = \"tdpa\"", "samples_per_command = 5"], "goes up alone", &[]),
+        (&["slave.mode = \"paper\"", "slave.sensing.vision.position_noise_m = 0.01"], "asks for the place", &["slave.mode = \"paper\"", "slave.sensing.vision.rate_hz = 30.0"]),
+        (&["slave.trigger.scheme = \"every-sample\"", "slave.trigger.free_space_error_m = 0.01"], "sent anyway", &[]),
+        (&["slave.mode = \"paper\"", "slave.tool_energy.share = 0.5"], "bounded", &["slave.mode = \"paper\"", "slave.tool_energy.bounded = true"]),
+        (&["architecture = \"tdpa\"", "slave.tool_energy.share = 0.5"], "of its own", &[]),
+        (&["architecture = \"tdpa\"", "slave.tool_energy.bounded = false"], "of its own", &[]),
     ];
     for (lines, words, cure) in cases {
         refuses(lines, words);
@@ -86,6 +91,26 @@ fn what_another_key_makes_idle_is_refused_and_with_the_other_value_taken() {
         refused.contains("`slave.scene.bodies.0.side_m` has no effect"),
         "{refused}"
     );
+}
+
+#[test]
+fn a_time_that_no_scheme_of_the_plan_judges_by_is_refused() {
+    let time = "slave.trigger.judged_over = { secs = 1, nanos = 0 }\n";
+    let of = |given: &str| complaint(&format!("[base]\n{given}{time}"));
+    let scheme = |scheme: &str| format!("slave.trigger.scheme = \"{scheme}\"\n");
+    let by_pose = format!(
+        "{}slave.trigger.metric = \"pose\"\n",
+        scheme("hybrid 10% 150ms")
+    );
+    assert!(of(&scheme("timer 100ms")).contains("this scheme has no deadband"));
+    assert!(of(&by_pose).contains("is not the force"));
+    for taken in [
+        "",
+        &scheme("hybrid 10% 150ms"),
+        "slave.trigger.metric = \"pose\"\n",
+    ] {
+        assert_eq!(of(taken), "", "{taken}");
+    }
 }
 
 #[test]
