@@ -160,6 +160,10 @@ fn through_mmt_the_targets_are_met_without_delay_and_at_250_ms_it_is_nearer_than
             near.errors.vector_median.unwrap() <= 0.08,
             "{name}: {near:?}"
         );
+        let nearer = of(0, "hold").into_iter();
+        for held in nearer.filter(|held| median(held) <= median(near)) {
+            assert!(rate(near) < rate(held), "{name}: {held:?}");
+        }
         let far = of(250, "mmt")[0];
         for held in of(250, "hold") {
             assert!(rate(far) < rate(held), "{name}: {held:?}");

@@ -2,6 +2,7 @@
 
 use mmt_client::device::DeviceProfile;
 use mmt_client::device::link::DeviceLinkConfig;
+use mmt_server::environment::Wall;
 
 use super::*;
 
@@ -92,6 +93,33 @@ fn what_does_not_move_is_felt_to_give_way_for_a_round_trip_and_then_where_it_is(
                     "{felt:?}"
                 );
             }
+        }
+    }
+}
+
+#[test]
+fn a_light_box_that_a_wall_holds_is_felt_where_it_is_as_well() {
+    for one_way_ms in [0, 25, 50, 125, 250] {
+        for seed in 11..=13 {
+            let mut config = over(&format!("delay {one_way_ms}ms"), seed);
+            config.slave.environment.wall = Some(Wall {
+                distance_m: 0.18,
+                angle_rad: 0.0,
+            });
+            let round_trip_ms = 2 * one_way_ms + PLAYOUT_MS;
+            let felt = felt(&config, round_trip_ms);
+            println!("{one_way_ms:4} ms, a wall, seed {seed}: {felt:.4?}");
+            let ahead_m = SPEED_M_PER_S * round_trip_ms as f64 * 1e-3;
+            assert!(felt.most_m <= (0.010 + ahead_m).min(0.1), "{felt:?}");
+            assert!(
+                felt.after_one_m <= 0.010 && felt.after_two_m <= 0.005,
+                "{felt:?}"
+            );
+            assert_eq!(felt.inward, 0, "{felt:?}");
+            assert!(
+                felt.injected_j <= 1e-9 && felt.observer_min_j >= -1e-3,
+                "{felt:?}"
+            );
         }
     }
 }
