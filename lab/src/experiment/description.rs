@@ -15,6 +15,8 @@ pub struct Experiment {
     pub about: &'static str,
     /// Seeds if no other number is asked for.
     pub seeds: u64,
+    /// So many seeds are left out from the runner's first one on: somebody has looked at them.
+    pub seeds_left_out: u64,
     /// Length of a run if no other is asked for.
     pub duration: Duration,
     /// Arguments that it alone takes.
@@ -37,11 +39,19 @@ impl Experiment {
             name,
             about,
             seeds,
+            seeds_left_out: 0,
             duration: DURATION,
             arguments: &[],
             in_all: true,
             run,
         }
+    }
+
+    /// Its first seed: that of the request, else on this runner.
+    #[must_use]
+    pub fn first_seed(&self, runner: &Runner, request: &Request) -> u64 {
+        let first = runner.first_seed() + self.seeds_left_out;
+        request.first_seed().unwrap_or(first)
     }
 
     /// Does it: its part of the manifest.
@@ -56,7 +66,7 @@ impl Experiment {
         Ok(Section {
             experiment: self.name,
             extent: request.extent,
-            first_seed: runner.first_seed(),
+            first_seed: self.first_seed(runner, request),
             findings: (self.run)(runner, request)?,
         })
     }
@@ -90,6 +100,13 @@ impl Request {
     #[must_use]
     pub fn flag(&self, name: &str) -> bool {
         self.given.contains_key(name)
+    }
+
+    /// The first seed, if one was given: as `first`, or as `world`, the only one.
+    #[must_use]
+    pub fn first_seed(&self) -> Option<u64> {
+        let given = ["world", "first"].iter().find_map(|name| self.number(name));
+        given.filter(|seed| *seed >= 1.0).map(|seed| seed as u64)
     }
 
     /// A number, if it was given.

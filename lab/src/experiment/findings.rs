@@ -13,7 +13,7 @@ use crate::world::WorldConfig;
 /// How much of an experiment is done.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Extent {
-    /// So many seeds, from the runner's first one on.
+    /// So many seeds, from the experiment's first one on.
     pub seeds: u64,
     /// Length of a run.
     #[serde(rename = "duration_s", serialize_with = "seconds")]

@@ -21,6 +21,11 @@ pub(super) const EXPERIMENT: Experiment = Experiment {
             number: Some(("N", 0.0)),
         },
         Argument {
+            name: "first",
+            help: "The first world",
+            number: Some(("N", 30_001.0)),
+        },
+        Argument {
             name: "stiff-tool",
             help: "With a tool that does not give",
             number: None,
@@ -32,6 +37,8 @@ pub(super) const EXPERIMENT: Experiment = Experiment {
         },
     ],
     duration: Duration::from_secs(20),
+    // rules were made with single worlds below 30000 in view
+    seeds_left_out: 25_000,
     ..Experiment::new(
         "worlds",
         "Random worlds by one documented distribution: force error, packets, pose, energy, and the worst ten",
@@ -43,10 +50,9 @@ pub(super) const EXPERIMENT: Experiment = Experiment {
 /// Keeps `worlds.csv` and `worlds.svg`, or `worlds-ideal.csv`.
 fn run(runner: &Runner, request: &Request) -> Result<Findings, ExperimentError> {
     let extent = request.extent;
-    let one = request.number("world").filter(|number| *number >= 1.0);
-    let (seeds, first) = one.map_or((extent.seeds, runner.first_seed()), |number| {
-        (1, number as u64)
-    });
+    let one = request.number("world").is_some_and(|number| number >= 1.0);
+    let first = EXPERIMENT.first_seed(runner, request);
+    let seeds = if one { 1 } else { extent.seeds };
     if request.flag("ideal") {
         return ideal::compare(runner, extent, first);
     }
@@ -63,7 +69,7 @@ fn run(runner: &Runner, request: &Request) -> Result<Findings, ExperimentError> 
     runner.keep_table("worlds.csv", &all)?;
     let digests = rows.iter().map(|row| row.reached.digest.as_str());
     let digest = crate::digest::of_runs(digests);
-    if one.is_some() {
+    if one {
         let tables = vec![all];
         return Ok(Findings {
             digest,
@@ -77,8 +83,21 @@ fn run(runner: &Runner, request: &Request) -> Result<Findings, ExperimentError> 
         tables: vec![
             tables::distribution(&rows, first, extent),
             tables::targets(&rows),
-            tables::worst(&rows),
+            tables::worst(&rows, &options(request)),
         ],
         ..Findings::default()
     })
+}
+
+/// The options that make a world what it is, besides its number.
+fn options(request: &Request) -> String {
+    let duration = request.extent.duration;
+    let mut options = String::new();
+    if request.flag("stiff-tool") {
+        options.push_str(" --stiff-tool");
+    }
+    if duration != EXPERIMENT.duration {
+        options.push_str(&format!(" --duration {}ms", duration.as_millis()));
+    }
+    options
 }

@@ -63,12 +63,13 @@ const PARTS: [Choice; 4] = [
     ("immovable", |row| !row.world.is_movable()),
 ];
 
-const MEASURES: [Measure; 6] = [
+const MEASURES: [Measure; 7] = [
     ("relative_error_true", |row| row.reached.relative_error),
     ("packet_rate_hz", |row| row.reached.packets_hz),
     ("breaks_per_push", |row| row.reached.breaks_per_push),
     ("pose_rms_mm", |row| row.reached.pose_rms_m.map(mm)),
     ("pose_max_mm", |row| Some(mm(row.reached.pose_max_m))),
+    ("injected_j", |row| Some(row.reached.injected_j)),
     ("work_excess_j", |row| Some(row.reached.work_excess_j)),
 ];
 
@@ -167,8 +168,8 @@ pub(super) fn targets(rows: &[Row]) -> Table {
     Table::of("Targets", &targets, &columns)
 }
 
-/// The ten movable worlds with the largest error, each with what runs it again.
-pub(super) fn worst(rows: &[Row]) -> Table {
+/// The ten movable worlds with the largest error, each with what runs it again with these `options`.
+pub(super) fn worst(rows: &[Row], options: &str) -> Table {
     let mut worst: Vec<&Row> = rows.iter().filter(|row| row.world.is_movable()).collect();
     worst.sort_by(|a, b| {
         let error = |row: &Row| row.reached.relative_error.unwrap_or_default();
@@ -182,7 +183,7 @@ pub(super) fn worst(rows: &[Row]) -> Table {
         column("delay_ms", "ms", 0, |row: &&Row| row.world.delay_ms),
         column("obstacle", "", 0, |row: &&Row| row.world.obstacle.name()),
         column("pose_rms_mm", "mm", 1, |row: &&Row| row.reached.pose_rms_m.map(mm)),
-        column("again", "", 0, |row: &&Row| format!("mmt reproduce worlds --world {}", row.world.number)),
+        Column::new("again", "", 0, |row: &&Row| Cell::from(format!("mmt reproduce worlds --world {}{options}", row.world.number))),
     ];
     Table::of("The worst ten", &worst, &columns)
 }
