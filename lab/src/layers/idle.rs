@@ -8,6 +8,7 @@ mod tests;
 
 use mmt_server::environment::Shape;
 use mmt_server::trigger::{MismatchMetric, Scheme};
+use mmt_shared::model::settings::Mode;
 
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
@@ -139,13 +140,15 @@ fn of_vision(config: &WorldConfig, key: &str) -> Option<&'static str> {
     let vision = &config.slave.sensing.vision;
     let blind = vision.rate_hz == 0.0;
     match key {
-        // the noise of place and angle is that of the pose at the start as well: how sure the place is decides whether an untouched
-        // object is sent
+        // the noise of place and angle is that of the pose at the start as well, which decides what touch teaches of the faces
+        // and whether an untouched object is sent
         "slave.sensing.vision.position_noise_m"
-            if blind && config.slave.trigger.free_space_error_m == 0.0 =>
+            if blind
+                && config.slave.mode == Mode::Paper
+                && config.slave.trigger.free_space_error_m == 0.0 =>
         {
             Some(
-                "`slave.sensing.vision.rate_hz` and `slave.trigger.free_space_error_m` are 0: nothing asks for the place",
+                "paper mode learns no faces, and `slave.sensing.vision.rate_hz` and `slave.trigger.free_space_error_m` are 0: nothing asks how sure the place is",
             )
         }
         "slave.sensing.vision.latency_ms" | "slave.sensing.vision.size_noise_m" if blind => {

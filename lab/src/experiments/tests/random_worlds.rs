@@ -19,6 +19,11 @@ fn each_random_world_is_a_row_keeps_the_promises_and_is_the_same_by_its_number()
     let from = BTreeMap::from([("first", first + 1.0)]);
     let from = Done::given(&worlds::EXPERIMENT, 2, 5000, from);
     assert_eq!(from.rows("worlds.csv", &[]), rows[1..3]);
+    let stiff = BTreeMap::from([("stiff-tool", 1.0)]);
+    let stiff = Done::given(&worlds::EXPERIMENT, 2, 5000, stiff);
+    let worst = stiff.findings.tables.last().unwrap().to_string();
+    let again = format!("mmt reproduce worlds --world {first} --stiff-tool --duration 5000ms");
+    assert!(worst.contains(&again), "{worst}");
     let one = BTreeMap::from([("world", first + 2.0)]);
     let again = Done::given(&worlds::EXPERIMENT, 1000, 5000, one);
     assert_eq!(again.rows("worlds.csv", &[]), [rows[2].clone()]);

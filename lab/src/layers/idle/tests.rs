@@ -22,7 +22,7 @@ const SOMETIMES: &[[&str; 4]] = &[
     ["slave.tool_energy.share", "slave.tool_energy.hand_force_max_n = 0.1\n", "10.0", "the budget is kept"],
     ["slave.tool_energy.hand_force_max_n", "slave.tool_energy.share = 0.0\n", "0.1", "the budget is kept"],
     ["slave.sensing.vision.latency_ms", "slave.sensing.vision.rate_hz = 30.0\n", "100.0", "paper mode has no images"],
-    ["slave.sensing.vision.position_noise_m", "slave.sensing.vision.rate_hz = 30.0\n", "0.01", "paper mode has no images"],
+    ["slave.sensing.vision.position_noise_m", "slave.sensing.vision.rate_hz = 0.0\nslave.trigger.free_space_error_m = 0.0\n", "0.01", "paper mode has no images"],
     ["slave.conditioning.follow_noise", "slave.sensing.force_noise_n = 0.1\n", "false", "the sensor is sound"],
     ["slave.conditioning.tare", "slave.sensing.force_bias_n = 0.2\n", "false", "the sensor is sound"],
     ["slave.environment.shape", "", "{ disc = { diameter_m = 0.3 } }", "a shape has measures"],

@@ -64,7 +64,7 @@ fn what_another_key_makes_idle_is_refused_and_with_the_other_value_taken() {
         (&["slave.trigger.scheme = \"every-sample\"", "slave.trigger.force_floor_n = 1.0"], "no deadband", &[]),
         (&["slave.trigger.metric = \"pose\"", "slave.trigger.judge_sticking = true"], "not the force", &[]),
         (&["architecture = \"tdpa\"", "samples_per_command = 5"], "goes up alone", &[]),
-        (&["slave.mode = \"paper\"", "slave.sensing.vision.position_noise_m = 0.01"], "asks for the place", &["slave.mode = \"paper\"", "slave.sensing.vision.rate_hz = 30.0"]),
+        (&["slave.mode = \"paper\"", "slave.sensing.vision.position_noise_m = 0.01"], "how sure the place is", &["slave.mode = \"paper\"", "slave.sensing.vision.rate_hz = 30.0"]),
         (&["slave.trigger.scheme = \"every-sample\"", "slave.trigger.free_space_error_m = 0.01"], "sent anyway", &[]),
         (&["slave.mode = \"paper\"", "slave.tool_energy.share = 0.5"], "bounded", &["slave.mode = \"paper\"", "slave.tool_energy.bounded = true"]),
         (&["architecture = \"tdpa\"", "slave.tool_energy.share = 0.5"], "of its own", &[]),
