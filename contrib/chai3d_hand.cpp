@@ -24,7 +24,7 @@ int main(int count, char **words) {
     return 2;
   }
   std::signal(SIGINT, [](int) { ended = 1; });
-  mmt::DevicePlug plug(mmt::address_of(words[1]));
+  auto plug = mmt::plugged_in<mmt::DevicePlug>(words[1]);
   chai3d::cHapticDeviceHandler handler;
   chai3d::cGenericHapticDevicePtr device;
   if (!handler.getDevice(device, 0) || !device->open() || !device->calibrate()) {
@@ -43,7 +43,7 @@ int main(int count, char **words) {
     device->getUserSwitch(0, is_down);
     const auto f = [](double number) { return static_cast<float>(number); };
     plug.send(is_down ? 1 : 0, {f(place.x()), f(place.y()), f(place.z()), f(velocity.x()), f(velocity.y()), f(velocity.z())});
-    if (const auto taken = plug.receive(0)) {
+    if (const auto taken = plug.receive(0); taken && taken->periods > 0) {
       force.set(taken->numbers[0], taken->numbers[1], taken->numbers[2]);
       last_answer = due;
     } else if (due - last_answer > std::chrono::milliseconds(20)) {

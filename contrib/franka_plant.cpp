@@ -5,7 +5,7 @@
 //
 // (X, Y), m in the robot's base frame, is the origin of mmt's world: put it where the slave's [environment] has the object. Height and
 // orientation stay as they are at the start. Limits: 0.25 m from the start along x and y, the force that the slave allows, libfranka's own
-// limits of torque rates, and the robot's reflexes at 20 N and 20 Nm. Keep the stop button in your hand.
+// limiter of torque rates, and the robot's reflexes at 20 N and 20 Nm. Keep the stop button in your hand.
 
 #include <franka/exception.h>
 #include <franka/model.h>
@@ -33,6 +33,9 @@ constexpr std::uint64_t silence_ns = 20'000'000;
 constexpr double arm_kg = 4.0;
 // N/m, Nm/rad: what holds height and orientation; Nm s/rad: what keeps the elbow from drifting.
 constexpr double stiff_up = 2000.0, stiff_turn = 40.0, still_joint = 1.0;
+
+// N/m, N: what holds the tool in the plane before the first command.
+constexpr double first_stiffness = 500.0, first_force_max = 15.0;
 
 double critical(double stiffness, double inertia) { return 2.0 * std::sqrt(stiffness * inertia); }
 
@@ -63,7 +66,7 @@ int main(int count, char **words) {
   std::signal(SIGINT, [](int) { ended = 1; });
   const std::array<double, 2> origin{std::atof(words[3]), std::atof(words[4])};
   const double seconds = count > 5 ? std::atof(words[5]) : 1e9;
-  mmt::PlantPlug plug(mmt::address_of(words[2]));
+  auto plug = mmt::plugged_in<mmt::PlantPlug>(words[2]);
   try {
     franka::Robot robot(words[1]);
     robot.setCollisionBehavior({{20, 20, 20, 20, 20, 20, 20}}, {{20, 20, 20, 20, 20, 20, 20}}, {{20, 20, 20, 20, 20, 20}},
@@ -71,14 +74,15 @@ int main(int count, char **words) {
     const franka::Model model = robot.loadModel();
     const auto start = robot.readOnce().O_T_EE;
     std::array<double, 2> goal{start[12], start[13]}, goal_speed{};
-    double stiffness = 0.0, damping = 0.0, force_max = 0.0, peak_n = 0.0, way_m = 0.0;
+    double stiffness = first_stiffness, damping = critical(first_stiffness, arm_kg), force_max = first_force_max;
+    double peak_n = 0.0, way_m = 0.0;
     std::uint64_t last_command = 0;
     bool stands = false;
     const auto begin = mmt::now_ns();
-    robot.control([&](const franka::RobotState &state, franka::Duration) -> franka::Torques {
+    const auto period = [&](const franka::RobotState &state, franka::Duration) -> franka::Torques {
       const auto now = mmt::now_ns();
       const Vector at = column(state.O_T_EE, 3);
-      if (const auto taken = plug.receive(0)) {
+      if (const auto taken = plug.receive(0); taken && taken->periods > 0) {
         last_command = now;
         stands = false;
         for (std::size_t axis = 0; axis < 2; ++axis) {
@@ -119,7 +123,10 @@ int main(int count, char **words) {
       way_m = std::max(way_m, std::hypot(at[0] - start[12], at[1] - start[13]));
       franka::Torques answer(torques);
       return ended != 0 || static_cast<double>(now - begin) > seconds * 1e9 ? franka::MotionFinished(answer) : answer;
-    });
+    };
+    // its limiter of torque rates is off unless it is asked for
+    constexpr bool limits_rate = true;
+    robot.control(period, limits_rate);
     std::printf("{\"sent\": %u, \"way_m\": %.4f, \"force_peak_n\": %.2f}\n", plug.sent(), way_m, peak_n);
   } catch (const franka::Exception &error) {
     // the plug is silent from here on: mmt stops the tool and takes the force from the hand

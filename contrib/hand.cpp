@@ -20,14 +20,14 @@ int main(int count, char **words) {
   constexpr std::uint16_t session = 1, engaged = 2, in_contact = 4, stopped = 8;
   const double way = count > 2 ? std::atof(words[2]) : 0.35, speed = 0.1, period = 1e-3;
   const double mass = 0.5, stiffness = 400.0, damping = 25.0;
-  mmt::DevicePlug plug(mmt::address_of(words[1]));
+  auto plug = mmt::plugged_in<mmt::DevicePlug>(words[1]);
   double position = 0.0, velocity = 0.0, wanted = 0.0, peak = 0.0, contact_s = 0.0;
   std::array<float, 6> force{};
   std::uint16_t state = 0;
   int since_up = 0;
   auto due = std::chrono::steady_clock::now(), last_answer = due, begin = due;
   while (wanted < way && due - begin < std::chrono::seconds(30)) {
-    if (const auto taken = plug.receive(0)) {
+    if (const auto taken = plug.receive(0); taken && taken->periods > 0) {
       force = taken->numbers;
       state = taken->flags;
       last_answer = due;

@@ -21,6 +21,8 @@ HEAD = struct.Struct("<4sBBHIIQ16s")
 READING = struct.Struct("<6f")
 FORCE = struct.Struct("<6f")
 SESSION, ENGAGED, IN_CONTACT, STOPPED, LINK_LATE, REFUSED = (1 << bit for bit in range(6))
+# numbers go round: this many ahead, or more, is behind
+HALF, ALL = 1 << 31, 1 << 32
 # without a packet for so long a device has to take its force away by itself
 SILENCE_S = 0.020
 
@@ -52,7 +54,8 @@ class Device:
 
     def send(self, position, velocity, buttons, stamp_ns=None):
         """A reading: m and m/s along the device's axes, a bit for each button; when it was taken, if that is not now."""
-        self.sequence += 1
+        # it goes round, and 0 is none
+        self.sequence = self.sequence % (ALL - 1) + 1
         stamp_ns = time.monotonic_ns() if stamp_ns is None else stamp_ns
         head = HEAD.pack(b"MMTL", 1, 1, buttons, self.sequence, self.newest, stamp_ns, self.token)
         try:
@@ -70,9 +73,10 @@ class Device:
             if len(packet) != 64:
                 continue
             magic, version, kind, state, sequence, _, _, token = HEAD.unpack_from(packet)
-            if (magic, version, kind, token) != (b"MMTL", 1, 2, self.token) or sequence <= self.newest:
+            ahead = (sequence - self.newest) % ALL if self.newest else 1
+            if (magic, version, kind, token) != (b"MMTL", 1, 2, self.token) or not 0 < ahead < HALF:
                 continue
-            self.lost_down += sequence - self.newest - 1
+            self.lost_down += ahead - 1
             self.received += 1
             x, y, z, hip_x, hip_y, lost = FORCE.unpack_from(packet, HEAD.size)
             self.newest, self.state, self.last_answer = sequence, state, time.monotonic()

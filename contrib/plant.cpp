@@ -50,7 +50,7 @@ int main(int count, char **words) {
     return 2;
   }
   const double seconds = count > 2 ? std::atof(words[2]) : 1e9;
-  mmt::PlantPlug plug(mmt::address_of(words[1]));
+  auto plug = mmt::plugged_in<mmt::PlantPlug>(words[1]);
   Block block;
   unsigned long long period = 0;
   for (const auto begin = mmt::now_ns(); static_cast<double>(mmt::now_ns() - begin) < seconds * 1e9;) {

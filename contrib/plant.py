@@ -22,6 +22,8 @@ NUMBERS = struct.Struct("<10d")
 SESSION, BEGINS, HELD = 1, 2, 4
 OBJECT_SEEN = 1
 PERIOD_S = 0.001
+# numbers go round: this many ahead, or more, is behind
+HALF, ALL = 1 << 31, 1 << 32
 # without a command for so long the tool has to stand by itself
 SILENCE_S = 0.020
 
@@ -49,10 +51,12 @@ class Plant:
         self.socket = socket.socket(family, socket.SOCK_DGRAM)
         self.socket.connect((host, port))
         self.sequence = self.newest = self.received = self.lost = 0
+        self.last = None
 
     def answer(self, tool, velocity, force, pose=None, image_age_s=0.0):
         """What was measured: the tool (m, m/s), its force on the object (N), and, where it was seen since, the object (m, m, rad)."""
-        self.sequence += 1
+        # it goes round, and 0 is none
+        self.sequence = self.sequence % (ALL - 1) + 1
         flags = OBJECT_SEEN if pose else 0
         stamp = time.monotonic_ns()
         head = HEAD.pack(b"MMTL", 1, 4, flags, self.sequence, self.newest, stamp, self.token)
@@ -62,13 +66,16 @@ class Plant:
             pass  # nobody is there (any more): the silence shows it
 
     def command(self, wait_s):
-        """The newest command, with the periods of 1 ms that have passed since the one before; None if none comes."""
-        newest = None
+        """The newest command, with the periods of 1 ms that have passed since the one before: 0 where only late ones came. None if
+        none comes."""
+        newest, until = None, time.monotonic() + wait_s
         while True:
             # the first is waited for; then those that wait already
-            self.socket.settimeout(0.0 if newest else wait_s)
+            self.socket.settimeout(0.0 if newest else max(until - time.monotonic(), 0.0))
             try:
                 packet = self.socket.recv(256)
+            except ConnectionRefusedError:
+                continue  # nobody is there (any more): whoever comes is waited for
             except OSError:
                 return newest
             command = self.read(packet)
@@ -83,17 +90,17 @@ class Plant:
         magic, version, kind, flags, sequence, _, _, token = HEAD.unpack_from(packet)
         if (magic, version, kind, token) != (b"MMTL", 1, 3, self.token) or not flags & SESSION:
             return None
-        if sequence <= self.newest:
-            # sent again, or late: answer, but do not compute it twice
-            periods = 0
-        else:
-            periods = sequence - self.newest if self.newest else 1
-            self.lost += periods - 1
-            self.newest = sequence
+        periods = (sequence - self.newest) % ALL if self.newest else 1
         self.received += 1
+        if not 0 < periods < HALF:
+            # sent again, or late: answer, but do not compute it twice
+            return self.last._replace(periods=0)
+        self.lost += periods - 1
+        self.newest = sequence
         x, y, v_x, v_y, stiffness, damping, force_max, *_ = NUMBERS.unpack_from(packet, HEAD.size)
         begins, held = bool(flags & BEGINS), bool(flags & HELD)
-        return Command((x, y), (v_x, v_y), stiffness, damping, force_max, begins, held, periods)
+        self.last = Command((x, y), (v_x, v_y), stiffness, damping, force_max, begins, held, periods)
+        return self.last
 
 
 class Block:

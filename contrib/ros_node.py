@@ -19,7 +19,7 @@ from rclpy.qos import qos_profile_sensor_data
 from rclpy.time import Time
 from std_msgs.msg import Bool
 
-from hand import ENGAGED, Device, asked
+from hand import Device, asked
 from plant import Plant
 
 # a robot of which nothing came for so long is not there: mmt then holds the tool and takes the force from the hand
@@ -147,9 +147,9 @@ class HandNode(Node):
         message = WrenchStamped()
         message.header.stamp = self.get_clock().now().to_msg()
         message.header.frame_id = self.frame
-        if self.device.state & ENGAGED:
-            newtons = message.wrench.force
-            newtons.x, newtons.y, newtons.z = self.device.force
+        # also after a release: the force that ramps out
+        newtons = message.wrench.force
+        newtons.x, newtons.y, newtons.z = self.device.force
         self.force.publish(message)
 
 

@@ -120,15 +120,16 @@ def hand_side(hand, ros_node):
     print("readings that come at once keep their own times, and the velocity is between them")
     sequence = 0
 
-    def felt():
+    def felt(state, newtons):
         nonlocal sequence
         sequence += 1
-        head = hand.HEAD.pack(b"MMTL", 1, 2, hand.SESSION | hand.ENGAGED, sequence, 0, sequence, TOKEN)
-        mmt.sendto(head + hand.FORCE.pack(1.0, -2.0, 0.5, 0.0, 0.0, 0.0), peer)
+        head = hand.HEAD.pack(b"MMTL", 1, 2, state, sequence, 0, sequence, TOKEN)
+        mmt.sendto(head + hand.FORCE.pack(*newtons, 0.0, 0.0, 0.0), peer)
         force = forces[-1].wrench.force if forces else None
-        return force and close((force.x, force.y, force.z), (1.0, -2.0, 0.5))
+        return force and close((force.x, force.y, force.z), newtons)
 
-    until("the force of the master is a wrench on the hand", felt)
+    until("the force of the master is a wrench on the hand", lambda: felt(hand.SESSION | hand.ENGAGED, (1.0, -2.0, 0.5)))
+    until("and so is what ramps out after a release", lambda: felt(hand.SESSION, (0.5, -1.0, 0.25)))
     until("without the master there is none", lambda: forces[-1].wrench.force.x == 0.0)
 
 
