@@ -21,7 +21,7 @@ use super::tls::{self, PinVerifier, TlsError};
 
 /// What quinn's queues cost for each datagram beyond its payload, bytes (`size_of::<Datagram>()`).
 const QUEUE_ENTRY: usize = 32;
-/// Datagrams that may wait for the congestion window: the newest, and the one before it.
+/// Of the longest datagrams so many may wait for the congestion window: the newest, and the one before it.
 const QUEUED: usize = 2;
 /// Received datagrams that may wait for the application, bytes with overhead: the oldest go first.
 const RECEIVE_QUEUE: usize = 64 * 1024;
@@ -40,9 +40,8 @@ const KEEP_ALIVE: Duration = Duration::from_secs(5);
 /// What a side declares to QUIC about its traffic.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Traffic {
-    /// Longest datagram that this side sends, bytes of payload. Two of these may wait for the window, so a
-    /// side whose messages differ much in length can have more of the short ones wait. 0: datagrams go beside QUIC,
-    /// and it takes none.
+    /// Longest datagram that this side sends, bytes of payload. What may wait for the window is bounded in bytes, by two
+    /// of these with quinn's own: more of the shorter ones wait. 0: datagrams go beside QUIC, and it takes none.
     pub datagram_max: usize,
     /// The most that this side ever sends.
     pub rate_cap: RateCap,
@@ -119,7 +118,7 @@ pub fn transport(traffic: Traffic) -> TransportConfig {
     config
         // Loss must not stop the flow, nor may the flow fill a queue.
         .congestion_controller_factory(Arc::new(traffic.rate_cap))
-        // The newest message wins: no more than two wait, the oldest goes first.
+        // The newest message wins: no more wait than two of the longest, the oldest goes first.
         .datagram_send_buffer_size(QUEUED * (traffic.datagram_max + QUEUE_ENTRY))
         .datagram_receive_buffer_size(carries_datagrams.then_some(RECEIVE_QUEUE))
         // Reordering is no loss: only what is two round trips late is.
