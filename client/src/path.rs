@@ -5,8 +5,8 @@
 
 use std::time::Duration;
 
-use mmt_netem::trace::Sample;
 use mmt_netem::trace::path::PathTrace;
+use mmt_netem::trace::{Sample, lost_between};
 use mmt_shared::channel::peer::Peer;
 use mmt_shared::time::Time;
 
@@ -39,14 +39,18 @@ impl PathRecorder {
             && trips > self.trips
         {
             self.trips = trips;
-            self.push(now, Some(trip / 2));
+            self.push(now, trip / 2);
         }
     }
 
     fn note_missing(&mut self, now: Time, missing: u32) {
-        while self.missing < missing && self.samples.len() < SAMPLES_MAX {
-            self.missing += 1;
-            self.push(now, None);
+        if self.missing < missing {
+            let since = self.samples.last().map_or(Duration::ZERO, |last| last.at);
+            let until = now.saturating_since(Time::ZERO);
+            let lost = lost_between(since, until, (missing - self.missing).into());
+            let room = SAMPLES_MAX.saturating_sub(self.samples.len());
+            self.samples.extend(lost.take(room));
+            self.missing = missing;
         }
         while self.missing > missing {
             // it was late, not lost
@@ -61,9 +65,9 @@ impl PathRecorder {
         }
     }
 
-    fn push(&mut self, now: Time, delay: Option<Duration>) {
+    fn push(&mut self, now: Time, delay: Duration) {
         if self.samples.len() < SAMPLES_MAX {
-            let at = now.saturating_since(Time::ZERO);
+            let (at, delay) = (now.saturating_since(Time::ZERO), Some(delay));
             self.samples.push(Sample { at, delay });
         }
     }
@@ -79,6 +83,8 @@ impl PathRecorder {
 
 #[cfg(test)]
 mod tests {
+    use mmt_netem::trace::mmt::path_text;
+
     use super::*;
 
     const DOWN_MS: u64 = 20;
@@ -108,6 +114,11 @@ mod tests {
         let half = Some(Duration::from_millis((UP_MS + DOWN_MS) / 2));
         let (before, after) = (vec![half; 3], vec![half; 5]);
         assert_eq!(delays, [before, vec![None; 2], after].concat());
+        // a packet that meets the path later is lost where those were: two of the three steps from 200 to 500 ms
+        let replayed = PathTrace::parse(&path_text(path.samples()), None).unwrap();
+        for (at_ms, met) in [(250, half), (350, None), (450, None), (550, half)] {
+            assert_eq!(replayed.at(Duration::from_millis(at_ms)), met, "{at_ms} ms");
+        }
     }
 
     #[test]

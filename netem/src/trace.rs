@@ -67,6 +67,15 @@ pub(crate) fn samples(met: &[(Duration, Met)]) -> Vec<Sample> {
     met.iter().map(&mut sample).collect()
 }
 
+/// The samples of `lost` probes between two others, evenly.
+pub fn lost_between(since: Duration, until: Duration, lost: u64) -> impl Iterator<Item = Sample> {
+    let way = until.saturating_sub(since).as_secs_f64() / (lost as f64 + 1.0);
+    (1..=lost).map(move |step| Sample {
+        at: since + Duration::from_secs_f64(way * step as f64),
+        delay: None,
+    })
+}
+
 /// The lines that are not empty and no comment, with their numbers from 1.
 pub(crate) fn meaningful_lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
     let lines = text.lines().enumerate();

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use super::{Sample, TraceError};
+use super::{Sample, TraceError, lost_between};
 
 /// Reads it. Half of each round trip is taken for one way: ping does not show more. A sequence number that
 /// is missing was lost, at the time at which it would have been sent.
@@ -61,11 +61,7 @@ fn with_the_lost(mut answers: Vec<(u64, Sample)>) -> Option<Vec<Sample>> {
             let steps = number.saturating_sub(last);
             if (2..=GAP_MAX).contains(&steps) {
                 room = room.checked_sub(steps)?;
-                let way = sample.at.saturating_sub(since).as_secs_f64() / steps as f64;
-                samples.extend((1..steps).map(|step| Sample {
-                    at: since + Duration::from_secs_f64(way * step as f64),
-                    delay: None,
-                }));
+                samples.extend(lost_between(since, sample.at, steps - 1));
             }
         }
         before = Some((number, sample.at));
