@@ -65,6 +65,15 @@ pub(super) struct Sent<P> {
     pub(super) dropped: Option<DropCause>,
 }
 
+/// Who stands before a packet that comes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Ahead {
+    /// All that wait.
+    All,
+    /// Only the one whose sending has begun.
+    Begun,
+}
+
 /// What the bottleneck does next.
 enum Next {
     /// Something at this time, under the settings then.
@@ -99,26 +108,40 @@ impl<P> Bottleneck<P> {
         self.free_at = self.free_at.max(now);
     }
 
-    /// Whether a packet that weighs `weight` finds no room at `now`.
+    /// Whether a packet that weighs `weight` finds no room at `now` behind those `ahead`.
     pub(super) fn is_full(
         &mut self,
         rate: &Rate,
         queue: &Queue,
         now: Duration,
         weight: u64,
+        ahead: Ahead,
     ) -> bool {
-        let packets = self.waiting.len();
+        let (packets, bytes) = match (ahead, self.begun()) {
+            (Ahead::All, _) => (self.waiting.len(), self.bytes),
+            (Ahead::Begun, Some(begun)) => (1, begun.weight),
+            (Ahead::Begun, None) => (0, 0),
+        };
         queue.packets.is_some_and(|limit| packets >= limit as usize)
             || queue
                 .bytes
-                .is_some_and(|limit| self.bytes.saturating_add(weight) > limit)
+                .is_some_and(|limit| bytes.saturating_add(weight) > limit)
             || queue
                 .wait
-                .is_some_and(|limit| self.wait(&rate.service, now) > limit)
+                .is_some_and(|limit| self.wait(&rate.service, now, ahead) > limit)
     }
 
-    /// How long a packet that comes at `now` waits until its sending begins, if the settings stay.
-    fn wait(&mut self, service: &Service, now: Duration) -> Duration {
+    /// The packet whose sending has begun.
+    fn begun(&self) -> Option<&Waiting<P>> {
+        self.waiting.front().filter(|first| first.began.is_some())
+    }
+
+    /// How long a packet that comes at `now` behind those `ahead` waits until its sending begins, if the settings stay.
+    fn wait(&mut self, service: &Service, now: Duration, ahead: Ahead) -> Duration {
+        let bytes_left = match ahead {
+            Ahead::All => self.bytes_left,
+            Ahead::Begun => self.begun().map_or(0, |begun| begun.left),
+        };
         let free_at = self.sending_until.unwrap_or(self.free_at);
         match service {
             Service::Constant { bits_per_second } => {
@@ -126,11 +149,14 @@ impl<P> Bottleneck<P> {
                     self.count_time_left(*bits_per_second);
                 }
                 let on_the_wire = free_at.saturating_sub(now);
-                on_the_wire.saturating_add(self.time_left.total)
+                on_the_wire.saturating_add(match ahead {
+                    Ahead::All => self.time_left.total,
+                    Ahead::Begun => sending_time(*bits_per_second, bytes_left),
+                })
             }
             Service::Opportunities(trace) => {
                 let (mut number, left) = self.opportunity.at(trace, free_at.max(now));
-                if let Some(beyond) = self.bytes_left.checked_sub(left) {
+                if let Some(beyond) = bytes_left.checked_sub(left) {
                     number = number.saturating_add(1 + beyond / OPPORTUNITY_BYTES);
                 }
                 trace.time(number).saturating_sub(now)
@@ -165,8 +191,8 @@ impl<P> Bottleneck<P> {
 
     /// Drops the packet that has waited longest, but for one whose sending has begun.
     pub(super) fn drop_head(&mut self, now: Duration) -> Option<Sent<P>> {
-        let begun = self.waiting.front().is_some_and(|w| w.began.is_some());
-        self.take(usize::from(begun), now, Some(DropCause::Queue))
+        let begun = usize::from(self.begun().is_some());
+        self.take(begun, now, Some(DropCause::Queue))
     }
 
     /// The next packet that has left the bottleneck by `now`.

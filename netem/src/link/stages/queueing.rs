@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use super::{Before, Stages, Transit};
 use crate::config::{Cross, Rate};
-use crate::link::bottleneck::Sent;
+use crate::link::bottleneck::{Ahead, Sent};
 use crate::link::by_time::ByTime;
 use crate::link::timeline::Timeline;
 use crate::packet::{DropCause, Fate};
@@ -58,7 +58,13 @@ impl<T> Stages<T> {
         weight: u64,
     ) -> Result<(), DropCause> {
         let queue = &timeline.at(now).queue;
-        while self.bottleneck.is_full(rate, queue, now, weight) {
+        // nobody is driven out for one that finds no room all the same
+        let in_vain =
+            queue.drop_head && (self.bottleneck).is_full(rate, queue, now, weight, Ahead::Begun);
+        if in_vain {
+            return Err(DropCause::Queue);
+        }
+        while (self.bottleneck).is_full(rate, queue, now, weight, Ahead::All) {
             let victim = queue.drop_head.then(|| self.bottleneck.drop_head(now));
             let victim = victim.flatten().ok_or(DropCause::Queue)?;
             self.pass_on(timeline, victim);

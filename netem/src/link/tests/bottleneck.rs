@@ -85,6 +85,16 @@ fn a_queue_that_drops_at_its_head_keeps_the_newest() {
 }
 
 #[test]
+fn who_finds_no_room_beside_the_packet_on_the_wire_drives_nobody_out() {
+    let mut link = link("rate 1mbit queue 1500b drop-head", 1, LinkId::UP);
+    // 1000 bytes are on the wire
+    let offers = [1000, 200, 1400, 300].map(|bytes| (Time::ZERO, Packet::new(bytes, ())));
+    let out = run(&mut link, offers.into_iter());
+    let kept: Vec<bool> = out.iter().map(|out| met(out).is_ok()).collect();
+    assert_eq!(kept, [true, true, false, true]);
+}
+
+#[test]
 fn an_overloaded_queue_never_outgrows_the_links_own_limit() {
     let mut link = link("rate 1kbit limit 50", 1, LinkId::UP);
     for packets in 0..1000 {
