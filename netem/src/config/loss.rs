@@ -225,7 +225,15 @@ impl Loss {
         .filter(|packets| packets.is_finite())
     }
 
+    /// Whether no packet is ever lost. A chain may lose some before it comes to rest, and none in the long run.
     pub(super) fn never(&self) -> bool {
-        self.share() == Some(0.0)
+        let zero = |p: Probability| p == Probability::ZERO;
+        match self {
+            Self::Gemodel(chain) => {
+                zero(chain.loss_in_good) && (zero(chain.to_bad) || zero(chain.loss_in_bad))
+            }
+            Self::FourState(chain) => zero(chain.p13) && zero(chain.p14),
+            _ => self.share() == Some(0.0),
+        }
     }
 }

@@ -130,6 +130,19 @@ fn bursts_in_time_have_their_share_and_their_length_at_any_rate() {
 }
 
 #[test]
+fn a_chain_that_loses_until_it_comes_to_rest_is_no_link_that_never_loses() {
+    let is_transparent = |words: &str| words.parse::<LinkConfig>().unwrap().is_transparent();
+    for words in ["loss state 100% 0% 100% 0%", "loss gemodel 100% 0% 0% 100%"] {
+        let lost = lost(words, 1);
+        let at: Vec<usize> = (0..lost.len()).filter(|at| lost[*at]).collect();
+        assert_eq!((at, is_transparent(words)), (vec![0], false), "{words}");
+    }
+    for words in ["loss state 0% 50% 50% 0%", "loss gemodel 0% 50% 100% 0%"] {
+        assert!(is_transparent(words), "{words}");
+    }
+}
+
+#[test]
 fn named_packets_and_scheduled_outages_are_lost_and_no_others() {
     let listed = lost("loss list 11-12,3,10-11", 1);
     let at: Vec<usize> = (0..listed.len()).filter(|at| listed[*at]).collect();
