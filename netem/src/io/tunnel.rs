@@ -1,6 +1,6 @@
 //! The *tunnel* driver: an emulated link in each direction between two network interfaces of IP packets (TUN devices).
 //!
-//! Up is from the near one to the far one. A packet is an IP packet with its headers. Everything happens on one thread.
+//! Up is from the near one to the far one. A packet is an IPv4 packet with its headers; others end here. Everything happens on one thread.
 
 use std::io;
 use std::os::fd::{AsFd, OwnedFd};
@@ -126,6 +126,9 @@ impl Worker {
                 match rustix::io::read(end, &mut self.buffer) {
                     Ok(bytes) => {
                         let contents = self.buffer.get(..bytes).unwrap_or_default().to_owned();
+                        if !is_ipv4(&contents) {
+                            continue;
+                        }
                         *offered = now().max(*offered);
                         let ecn = ecn(&contents);
                         link.offer(
@@ -180,44 +183,48 @@ impl Worker {
     }
 }
 
-/// The ECN field of an IP packet.
-fn ecn(packet: &[u8]) -> Option<EcnCodepoint> {
-    let (first, second) = (packet.first()?, packet.get(1)?);
-    let bits = match first >> 4 {
-        4 => second & 3,
-        6 => second >> 4 & 3,
-        _ => return None,
-    };
-    EcnCodepoint::from_bits(bits)
+fn is_ipv4(packet: &[u8]) -> bool {
+    packet.first().is_some_and(|first| first >> 4 == 4)
 }
 
-/// Marks an IP packet as having met congestion (RFC 3168), with the right checksum.
+/// The ECN field of an IPv4 packet.
+fn ecn(packet: &[u8]) -> Option<EcnCodepoint> {
+    EcnCodepoint::from_bits(packet.get(1)? & 3)
+}
+
+/// Marks an IPv4 packet as having met congestion (RFC 3168), with the right checksum.
 fn mark(packet: &mut [u8]) {
-    match packet.first().map(|first| first >> 4) {
-        Some(6) => {
-            if let Some(second) = packet.get_mut(1) {
-                *second |= 3 << 4;
-            }
-        }
-        Some(4) => {
-            let Some([_, class, _, _, _, _, _, _, _, _, high, low]) = packet.first_chunk_mut()
-            else {
-                return;
-            };
-            let added = u32::from(3 - (*class & 3));
-            *class |= 3;
-            // RFC 1624: the sum of the header grows by as much, its complement falls
-            let sum = u32::from(!u16::from_be_bytes([*high, *low])) + added;
-            let sum = (sum & 0xffff) + (sum >> 16);
-            [*high, *low] = (!(sum as u16)).to_be_bytes();
-        }
-        _ => {}
-    }
+    let Some([_, class, _, _, _, _, _, _, _, _, high, low]) = packet.first_chunk_mut() else {
+        return;
+    };
+    let added = u32::from(3 - (*class & 3));
+    *class |= 3;
+    // RFC 1624: the sum of the header grows by as much, its complement falls
+    let sum = u32::from(!u16::from_be_bytes([*high, *low])) + added;
+    let sum = (sum & 0xffff) + (sum >> 16);
+    [*high, *low] = (!(sum as u16)).to_be_bytes();
 }
 
 #[cfg(test)]
 mod tests {
+    use std::os::unix::net::UnixDatagram;
+
     use super::*;
+
+    #[test]
+    fn what_is_no_ipv4_goes_no_way() {
+        let (near, inside) = UnixDatagram::pair().unwrap();
+        let (far, outside) = UnixDatagram::pair().unwrap();
+        let [up, down] = [(); 2].map(|()| LinkConfig::default());
+        let ends = (near.into(), far.into());
+        let tunnel = Tunnel::start(ends.0, ends.1, up, down, 1, Extras::default()).unwrap();
+        inside.send(&[0x60, 0, 1]).unwrap();
+        inside.send(&[0x45, 0, 2]).unwrap();
+        let mut packet = [0; 3];
+        outside.recv(&mut packet).unwrap();
+        assert_eq!(packet, [0x45, 0, 2]);
+        assert_eq!(tunnel.stop().unwrap().up.link.offered.packets, 1);
+    }
 
     #[test]
     fn a_mark_leaves_the_checksum_of_the_header_right() {
@@ -241,10 +248,6 @@ mod tests {
             let (read, _) = etherparse::Ipv4Header::from_slice(&packet).unwrap();
             assert_eq!(read.header_checksum, read.calc_header_checksum());
         }
-        let mut v6 = [0x60, 0x20, 0, 0];
-        assert_eq!(ecn(&v6), EcnCodepoint::from_bits(2));
-        mark(&mut v6);
-        assert_eq!(ecn(&v6), Some(EcnCodepoint::Ce));
         mark(&mut []);
     }
 }
