@@ -6,16 +6,18 @@ use std::time::Duration;
 use mmt_shared::rng::Substream;
 use mmt_shared::time::Time;
 
-use crate::config::{Correlation, LinkConfig, Loss};
+use crate::config::{Correlation, Cross, LinkConfig, Loss};
 use crate::record::summary::runs;
 
 /// Packets sampled. The mean of a delay is then known to 0.4 % of its standard deviation.
 pub const PACKETS: u32 = 60_000;
 /// The most packets sampled: where delays or losses hang together in time, or a queue follows a long trace.
 pub(super) const PACKETS_MAX: u32 = 10 * PACKETS;
+/// The most packets of cross traffic worked out, whose time somebody waits for: those sampled are fewer where more would come.
+pub(super) const CROSS_MAX: u32 = 1_000_000;
 /// The stretches of an even stream; each begins at a random point of the time between two packets, so that a
 /// stream does not keep step with a trace.
-const STRETCHES: u32 = 100;
+pub(super) const STRETCHES: u32 = 100;
 /// The rates that can be asked for, packets per second; others are taken to the nearest.
 pub const RATE_RANGE_HZ: (f64, f64) = (0.01, 1e6);
 
@@ -113,7 +115,18 @@ fn sample_size(config: &LinkConfig, rate_hz: f64) -> u32 {
     } else {
         needed
     };
-    needed.clamp(PACKETS.into(), PACKETS_MAX.into()) as u32
+    let needed = needed.clamp(PACKETS.into(), PACKETS_MAX.into());
+    let of_others: f64 = config.links().map(cross_per_s).sum();
+    let most = f64::from(CROSS_MAX) * rate_hz / of_others.max(f64::MIN_POSITIVE);
+    needed.min(most).max(STRETCHES.into()) as u32
+}
+
+/// Packets of cross traffic a second, at its fastest.
+fn cross_per_s(link: &LinkConfig) -> f64 {
+    let steps = link.profile.steps.iter().map(|step| step.settings.cross);
+    let all = steps.chain([link.cross]).flatten();
+    let per_s = |cross: Cross| cross.bits_per_second as f64 / (8.0 * f64::from(cross.bytes));
+    all.map(per_s).fold(0.0, f64::max)
 }
 
 pub(super) fn clamp_rate(rate_hz: f64) -> f64 {

@@ -1,6 +1,6 @@
 //! The line printed at the start tells the truth.
 
-use super::offers::PACKETS_MAX;
+use super::offers::{CROSS_MAX, PACKETS_MAX, STRETCHES};
 use super::*;
 use crate::record::summary::runs;
 
@@ -202,6 +202,30 @@ fn a_whole_trace_shows_and_no_stream_keeps_step_with_it() {
     });
     let effect = replayed(beat.collect()).expected(100.0, BYTES).unwrap();
     assert!((effect.loss - 0.5).abs() < 0.2, "{effect}");
+}
+
+#[test]
+fn fast_cross_traffic_shortens_the_stream() {
+    let packets = |words: &str, rate_hz| {
+        let offers = Offers::even(&words.parse().unwrap(), rate_hz, BYTES);
+        offers.packets.len() as u32
+    };
+    let ordinary = "rate 10mbit queue 50ms cross 6mbit poisson 1200";
+    assert_eq!(packets(ordinary, 100.0), PACKETS);
+    // 62 500 packets of others a second
+    let fast = "rate 1gbit queue 50ms cross 600mbit poisson 1200";
+    for words in [
+        fast.to_owned(),
+        format!("delay 5ms; then {fast}"),
+        format!("rate 1gbit; at 1s {fast}"),
+    ] {
+        assert_eq!(
+            packets(&words, 100.0),
+            CROSS_MAX / 625 / 100 * 100,
+            "{words}"
+        );
+        assert_eq!(packets(&words, 0.01), STRETCHES, "{words}");
+    }
 }
 
 #[test]
