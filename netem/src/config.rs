@@ -141,7 +141,7 @@ impl LinkConfig {
     }
 
     /// The links of the chain that begins here, in order; mostly one.
-    pub(crate) fn links(&self) -> impl Iterator<Item = &Self> {
+    pub fn links(&self) -> impl Iterator<Item = &Self> {
         std::iter::successors(Some(self), |link| link.then.as_deref())
     }
 

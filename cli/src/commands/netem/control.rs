@@ -27,14 +27,25 @@ impl Command {
         let (command, words) = line.split_once(' ').unwrap_or((line, ""));
         match command {
             "" => Ok(None),
-            "up" => Ok(Some(Self::Link(Direction::Up, Box::new(network(words)?)))),
-            "down" => Ok(Some(Self::Link(Direction::Down, Box::new(network(words)?)))),
+            "up" => Ok(Some(Self::Link(Direction::Up, running(words)?))),
+            "down" => Ok(Some(Self::Link(Direction::Down, running(words)?))),
             "rebind" if words.is_empty() => Ok(Some(Self::Rebind)),
             _ => Err(format!(
                 "no command {line:?}: up WORDS, down WORDS or rebind"
             )),
         }
     }
+}
+
+/// New settings of a link at work.
+fn running(words: &str) -> Result<Box<LinkConfig>, String> {
+    let link = network(words)?;
+    if link.links().any(|link| link.seed.is_some()) {
+        return Err(format!(
+            "{words:?}: a link at work keeps its draws: leave the seed out"
+        ));
+    }
+    Ok(Box::new(link))
 }
 
 /// Hands the lines of stdin to `apply` on a thread of their own, until stdin ends or `apply` returns false.
@@ -66,6 +77,9 @@ mod tests {
         assert_eq!(parse("up"), Ok(Some(none)));
         assert_eq!(parse("rebind"), Ok(Some(Command::Rebind)));
         assert!(parse("up delay 5").unwrap_err().contains("unit"));
+        for seeded in ["up delay 5ms seed 7", "down none; then seed 7 delay 5ms"] {
+            assert!(parse(seeded).unwrap_err().contains("seed"), "{seeded}");
+        }
         assert!(parse("sideways").unwrap_err().contains("up WORDS"));
     }
 }
