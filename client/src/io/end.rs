@@ -22,6 +22,8 @@ pub enum SessionEnd {
     SlaveEnded(Ending),
     /// One of the two ways was silent for so long that the hand was released.
     LinkSilent,
+    /// An observer received nothing for so long that the slave counts as gone.
+    SlaveSilent,
     /// A number of the local model was none, and the hand was released.
     ModelBroken,
     /// Another operator has taken the slave over.
@@ -42,6 +44,7 @@ impl SessionEnd {
             Self::Stopped => Ending::Interrupted,
             Self::SlaveEnded(ending) => ending,
             Self::LinkSilent
+            | Self::SlaveSilent
             | Self::ModelBroken
             | Self::ThreadPanicked
             | Self::TakenOver
@@ -76,6 +79,9 @@ impl fmt::Display for SessionEnd {
             Self::LinkSilent => {
                 "for 1 s nothing came from the slave, or nothing that was sent was answered, and the hand \
                  was released: see whether the slave and the network are alive, and start again"
+            }
+            Self::SlaveSilent => {
+                "for 10 s nothing came from the slave: see whether the slave and the network are alive, and start again"
             }
             Self::ModelBroken => {
                 "a number of the local model was not finite and the hand was released: this is a \

@@ -218,8 +218,11 @@ impl Sight<'_> {
         let mut beat = interval(BEAT);
         loop {
             let now = self.clock.now();
-            if self.send(now).is_err() || self.is_silent(now) {
+            if self.send(now).is_err() {
                 return (SessionEnd::ConnectionLost, None);
+            }
+            if self.is_silent(now) {
+                return (SessionEnd::SlaveSilent, None);
             }
             let rest = self.end.poll_timeout().saturating_since(now);
             tokio::select! {
