@@ -3,8 +3,9 @@
 //! Needs namespaces and `python3`, and `tshark` for the capture: where the host forbids them the message is held to
 //! be right, the test prints that it did not run, and with `CI` set it fails.
 
+use std::io::Read;
 use std::path::Path;
-use std::process::{Command, Output};
+use std::process::{Child, Command, Output, Stdio};
 
 use serde_json::Value;
 
@@ -301,4 +302,48 @@ fn as_root_the_way_leads_to_the_network_of_the_host_under_its_address() {
     assert_eq!(peer, "10.92.0.1");
     let left = on(here, "nft").args(["list", "tables"]).output().unwrap();
     assert!(left.stdout.is_empty(), "{left:?}");
+}
+
+#[test]
+fn the_last_of_the_runs_that_overlap_switches_forwarding_off() {
+    let home = home();
+    let Some(cable) = Cable::make("overlap") else {
+        return did_not_run("shells that overlap", "it needs root and `ip`");
+    };
+    let on = |program: &str| {
+        let mut command = Command::new("ip");
+        command.args(["netns", "exec", &cable.0[0], program]);
+        command.current_dir(home.path());
+        command
+    };
+    let is_on = || {
+        let forwarding = on("cat").arg("/proc/sys/net/ipv4/ip_forward").output();
+        forwarding.unwrap().stdout == b"1\n"
+    };
+    assert!(!is_on());
+    let begin = || {
+        let mut shell = on(PROGRAM);
+        shell.args([
+            "netem",
+            "shell",
+            "--",
+            "sh",
+            "-c",
+            "echo begun; read end; true",
+        ]);
+        let pipes = shell.stdin(Stdio::piped()).stdout(Stdio::piped());
+        let mut shell = pipes.stderr(Stdio::piped()).spawn().unwrap();
+        // fails where the host forbids it
+        let _ = shell.stdout.as_mut().unwrap().read_exact(&mut [0; 6]);
+        shell
+    };
+    // whose stdin closes, ends
+    let end = |shell: Child| shell.wait_with_output().unwrap();
+    let (first, second) = (begin(), begin());
+    let first = end(first);
+    let is_on_for_the_second = is_on();
+    let second = end(second);
+    if ran(&first) && ran(&second) {
+        assert!(is_on_for_the_second && !is_on());
+    }
 }

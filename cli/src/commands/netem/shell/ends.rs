@@ -17,6 +17,8 @@ use crate::failure::Failure;
 
 /// Where the kernel keeps whether it forwards packets.
 const FORWARDING: &str = "/proc/sys/net/ipv4/ip_forward";
+/// An empty chain in the table of each run that needs forwarding on a host where it was off: the last of them switches it off.
+const WAS_OFF: &str = "mmt_forwarding_was_off";
 
 /// Both ends; their devices and rules are gone when it is dropped.
 pub(super) struct Ends {
@@ -168,14 +170,15 @@ fn set_up(name: &str, address: Ipv4Addr) -> io::Result<()> {
 
 /// Runs `ip` in the namespace of this thread.
 fn ip(words: &str) -> io::Result<()> {
-    done("ip", Command::new("ip").args(words.split(' ')))
+    done("ip", Command::new("ip").args(words.split(' '))).map(drop)
 }
 
-fn done(name: &str, command: &mut Command) -> io::Result<()> {
+/// What a command printed.
+fn done(name: &str, command: &mut Command) -> io::Result<String> {
     let output = command.output();
     let output = output.map_err(|error| Error::new(error.kind(), format!("{name}: {error}")))?;
     if output.status.success() {
-        return Ok(());
+        return Ok(String::from_utf8_lossy(&output.stdout).into_owned());
     }
     let printed = String::from_utf8_lossy(&output.stderr);
     Err(Error::other(format!("{name}: {}", printed.trim())))
@@ -210,15 +213,25 @@ impl Namespace {
 /// Lets the packets of the command out under the host's address; ends when dropped.
 struct Nat {
     table: String,
-    forwarding_before: String,
+    /// Whether forwarding was off before this run and those that overlap it.
+    was_off: bool,
 }
 
 impl Nat {
     fn set_up(name: &str, near: Ipv4Addr) -> io::Result<Self> {
+        let alone = alone()?;
+        let off = std::fs::read_to_string(FORWARDING)?.trim() == "0";
         let nat = Self {
             table: name.to_owned(),
-            forwarding_before: std::fs::read_to_string(FORWARDING)?,
+            was_off: off || is_on_for_others()?,
         };
+        let begun = nat.begin(near);
+        // who ends it waits for this
+        drop(alone);
+        begun.map(|()| nat)
+    }
+
+    fn begin(&self, near: Ipv4Addr) -> io::Result<()> {
         let rule = format!("ip saddr {near} masquerade");
         let chain = "type nat hook postrouting priority 100;";
         let mut nft = Command::new("nft");
@@ -229,27 +242,46 @@ impl Nat {
         let mut child = nft.spawn().map_err(cannot)?;
         if let Some(mut stdin) = child.stdin.take() {
             let chain = format!("chain leaving {{ {chain} {rule}; }}");
-            write!(stdin, "table ip {name} {{\n{chain}\n}}\n")?;
+            let mark = if self.was_off {
+                format!("chain {WAS_OFF} {{ }}")
+            } else {
+                String::new()
+            };
+            write!(stdin, "table ip {} {{\n{chain}\n{mark}\n}}\n", self.table)?;
         }
         let output = child.wait_with_output()?;
         if !output.status.success() {
             let printed = String::from_utf8_lossy(&output.stderr);
             return Err(Error::other(format!("nft: {}", printed.trim())));
         }
-        if nat.forwarding_before.trim() != "1" {
+        if self.was_off {
             std::fs::write(FORWARDING, "1")?;
         }
-        Ok(nat)
+        Ok(())
     }
 }
 
 impl Drop for Nat {
     fn drop(&mut self) {
-        let mut nft = Command::new("nft");
         // best effort: nobody is left to read an error
+        let _alone = alone();
+        let mut nft = Command::new("nft");
         let _ = done("nft", nft.args(["delete", "table", "ip", &self.table]));
-        if self.forwarding_before.trim() != "1" {
-            let _ = std::fs::write(FORWARDING, &self.forwarding_before);
+        if self.was_off && matches!(is_on_for_others(), Ok(false)) {
+            let _ = std::fs::write(FORWARDING, "0");
         }
     }
+}
+
+/// Keeps other runs from beginning or ending until it is dropped.
+fn alone() -> io::Result<File> {
+    let file = File::open(FORWARDING)?;
+    file.lock()?;
+    Ok(file)
+}
+
+/// Whether a run that is there has switched forwarding on.
+fn is_on_for_others() -> io::Result<bool> {
+    let chains = done("nft", Command::new("nft").args(["list", "chains", "ip"]))?;
+    Ok(chains.contains(WAS_OFF))
 }
