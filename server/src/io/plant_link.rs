@@ -4,6 +4,8 @@
 //! plant or this thread.
 
 mod lock_step;
+#[cfg(test)]
+mod tests;
 
 use std::io;
 use std::net::SocketAddr;
@@ -13,12 +15,13 @@ use std::time::Duration;
 
 use mmt_shared::io::clock::Clock;
 use mmt_shared::io::plug_socket::{PACKET_MAX, PlugSocket, PlugSocketError};
-use mmt_shared::plug::{Admitted, PlugCounts, PlugHead, PlugPeer};
+use mmt_shared::model::geometry::Pose;
+use mmt_shared::plug::{Admitted, PlugCounts, PlugHead, PlugPeer, PlugToken};
 use mmt_shared::time::Time;
 use rtrb::{Consumer, Producer, RingBuffer};
 
 use crate::plant::{PlantAnswer, PlantCommand, SILENCE};
-use crate::slave::Memory;
+use crate::slave::{Memory, SlaveConfig};
 pub use lock_step::{LockStep, LockStepError};
 
 /// Answers that may wait for the loop: a quarter of a second at 1 kHz.
@@ -40,9 +43,10 @@ pub enum PlantHostError {
     Thread(#[source] io::Error),
 }
 
-/// An answer, and where it came from.
+/// An answer, when it came, and where from.
 #[derive(Clone, Copy, Debug)]
 struct Taken {
+    at: Time,
     from: SocketAddr,
     sequence: u32,
     answer: PlantAnswer,
@@ -52,6 +56,8 @@ struct Taken {
 #[derive(Debug, Default)]
 struct Known {
     newest: Option<Taken>,
+    /// Where the object was seen last.
+    object: Option<Pose>,
     to_loop: Option<Producer<Taken>>,
     counts: PlugCounts,
     /// Answers for which the loop had no room.
@@ -71,6 +77,17 @@ struct Shared {
 }
 
 impl Shared {
+    fn new(socket: PlugSocket) -> Self {
+        Self {
+            socket,
+            clock: Clock::start(),
+            sent: AtomicU32::new(0),
+            superseded: AtomicU64::new(0),
+            known: Mutex::default(),
+            first: Condvar::new(),
+        }
+    }
+
     fn known(&self) -> MutexGuard<'_, Known> {
         self.known.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -89,14 +106,7 @@ impl PlantHost {
         let socket = PlugSocket::bind(listen)?;
         let patience = socket.socket().set_write_timeout(Some(SEND_WAIT));
         patience.map_err(PlantHostError::Setup)?;
-        let shared = Arc::new(Shared {
-            socket,
-            clock: Clock::start(),
-            sent: AtomicU32::new(0),
-            superseded: AtomicU64::new(0),
-            known: Mutex::default(),
-            first: Condvar::new(),
-        });
+        let shared = Arc::new(Shared::new(socket));
         let served = Arc::clone(&shared);
         std::thread::Builder::new()
             .name("mmt-plant".to_owned())
@@ -120,12 +130,18 @@ impl PlantHost {
         known.newest.is_some()
     }
 
-    /// What a session begins with: the tool and the object as the plant reported them last. None before its first answer.
-    pub(super) fn memory(&self, earlier: Option<&Memory>) -> Option<Memory> {
-        let answer = self.0.known().newest?.answer;
-        let seen = earlier.and_then(Memory::object);
-        let object = answer.object.or(seen).unwrap_or_default();
-        Some(Memory::of_plant(answer.tool, object, earlier))
+    /// What a session begins with: the tool as the plant reported it last, and the object where it was seen last, or, until it
+    /// was, where it is configured. None before its first answer.
+    pub(super) fn memory(&self, config: &SlaveConfig, earlier: Option<&Memory>) -> Option<Memory> {
+        let (newest, seen) = {
+            let known = self.0.known();
+            (known.newest?, known.object)
+        };
+        let first = config.scene.bodies.first();
+        let configured = first.map_or(config.environment.pose, |body| body.pose);
+        let seen = seen.or_else(|| earlier.and_then(Memory::object));
+        let object = seen.unwrap_or(configured);
+        Some(Memory::of_plant(newest.answer.tool, object, earlier))
     }
 
     /// The plant for the loop of a session that begins; the one before gets nothing any more.
@@ -165,21 +181,28 @@ pub(super) struct PlantPort {
 }
 
 impl PlantPort {
-    /// The newest answer, if one has come since the tick before; `now` is this one's deadline.
+    /// The newest answer, if one has come since the tick before, with the newest image since then; `now` is this one's deadline.
     pub(super) fn receive(&mut self, now: Time) -> Option<PlantAnswer> {
         self.last_answer.get_or_insert(now);
         let mut anew = false;
-        let mut newest = None;
+        let (mut newest, mut image) = (None, None);
         while let Ok(taken) = self.answers.pop() {
             anew |= taken.answer.anew;
+            image = taken.answer.object.map(|_| taken).or(image);
             if newest.replace(taken).is_some() {
                 self.shared.superseded.fetch_add(1, Ordering::Relaxed);
             }
         }
         let taken = newest?;
         (self.newest, self.last_answer) = (newest, Some(now));
+        let image_age_s = image.map_or(0.0, |image: Taken| {
+            let since = taken.at.saturating_since(image.at);
+            image.answer.image_age_s + since.as_secs_f64()
+        });
         Some(PlantAnswer {
             anew,
+            object: image.and_then(|image| image.answer.object),
+            image_age_s,
             ..taken.answer
         })
     }
@@ -210,16 +233,37 @@ impl PlantPort {
 }
 
 fn serve(shared: &Shared) {
-    let mut peer = PlugPeer::new(SILENCE);
-    let mut is_new = false;
+    let mut receiver = Receiver::new();
     let mut packet = [0; PACKET_MAX];
     loop {
         let (packet, from) = shared.socket.receive(&mut packet);
-        let taken = take(&mut peer, &mut is_new, shared, from, packet);
+        receiver.handle(shared, shared.clock.now(), from, packet);
+    }
+}
+
+/// Takes the answers of the plant that is plugged in.
+struct Receiver {
+    peer: PlugPeer,
+    /// When the newest answer came that could be.
+    last: Option<Time>,
+}
+
+impl Receiver {
+    fn new() -> Self {
+        Self {
+            peer: PlugPeer::new(SILENCE),
+            last: None,
+        }
+    }
+
+    /// Takes in a packet that came from there at `now`, and hands an answer on.
+    fn handle(&mut self, shared: &Shared, now: Time, from: SocketAddr, packet: &[u8]) {
+        let taken = self.take(shared.socket.token(), now, from, packet);
         let mut known = shared.known();
-        known.counts = peer.counts;
+        known.counts = self.peer.counts;
         if let Some(taken) = taken {
             known.newest = Some(taken);
+            known.object = taken.answer.object.or(known.object);
             // a full ring is a loop that stands: it takes what waits later
             let to_loop = known.to_loop.as_mut().filter(|ring| !ring.is_abandoned());
             let is_full = to_loop.is_some_and(|ring| ring.push(taken).is_err());
@@ -227,33 +271,33 @@ fn serve(shared: &Shared) {
             shared.first.notify_all();
         }
     }
-}
 
-/// An answer of the plant that is plugged in, if it is one; `is_new`: none of it has been taken yet.
-fn take(
-    peer: &mut PlugPeer,
-    is_new: &mut bool,
-    shared: &Shared,
-    from: SocketAddr,
-    packet: &[u8],
-) -> Option<Taken> {
-    let read = PlantAnswer::read(shared.socket.token(), packet);
-    let (head, answer) = read.map_err(|why| peer.refuse(why)).ok()?;
-    let admitted = peer.admit(shared.clock.now(), from, head.sequence)?;
-    if admitted == Admitted::First {
-        *is_new = true;
-        tracing::info!("a plant is plugged in at {from}");
+    /// An answer of the plant that is plugged in, if it is one.
+    fn take(
+        &mut self,
+        token: &PlugToken,
+        now: Time,
+        from: SocketAddr,
+        packet: &[u8],
+    ) -> Option<Taken> {
+        let read = PlantAnswer::read(token, packet);
+        let (head, answer) = read.map_err(|why| self.peer.refuse(why)).ok()?;
+        let admitted = self.peer.admit(now, from, head.sequence)?;
+        if admitted == Admitted::First {
+            tracing::info!("a plant is plugged in at {from}");
+        }
+        let Some(answer) = answer else {
+            self.peer.counts.nonsense += 1;
+            return None;
+        };
+        // nonsense is a silence too
+        let last = self.last.replace(now);
+        let anew = last.is_none_or(|last| now.saturating_since(last) >= SILENCE);
+        Some(Taken {
+            at: now,
+            from,
+            sequence: head.sequence,
+            answer: PlantAnswer { anew, ..answer },
+        })
     }
-    let Some(answer) = answer else {
-        peer.counts.nonsense += 1;
-        return None;
-    };
-    Some(Taken {
-        from,
-        sequence: head.sequence,
-        answer: PlantAnswer {
-            anew: std::mem::take(is_new),
-            ..answer
-        },
-    })
 }

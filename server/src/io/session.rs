@@ -108,7 +108,7 @@ pub(super) async fn serve_with(
     let plugged_in = context
         .plant
         .as_ref()
-        .and_then(|plant| plant.memory(earlier));
+        .and_then(|plant| plant.memory(&context.config, earlier));
     let earlier = plugged_in.as_ref().or(earlier);
     let end = match SlaveEnd::of_session(began, &context.config, &hello, earlier) {
         Ok(end) => end,
