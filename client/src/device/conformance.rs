@@ -11,7 +11,7 @@ use std::time::Duration;
 use mmt_shared::model::geometry::Vec2;
 
 use super::link::{DeviceKind, HandOutput, Hold};
-use plugged::{GENTLE, Plugged};
+use plugged::{GENTLE, Interruption, Plugged};
 use rigs::{Rig, rigs};
 
 /// What the model presses with where a test asks for more than any device may give, N, world.
@@ -202,6 +202,26 @@ fn any_device_that_comes_back_elsewhere_does_not_move_the_hip() {
         plugged.grip(elsewhere);
         (0..5).for_each(|_| plugged.at(elsewhere, true));
         assert!(plugged.hip_is(hip), "{name}: it goes on from where it was");
+    });
+}
+
+#[test]
+fn a_stop_a_pause_and_a_new_session_let_any_device_go_and_it_can_be_held_again() {
+    each(|rig| {
+        for by in [
+            Interruption::Stop,
+            Interruption::Pause,
+            Interruption::NewSession,
+        ] {
+            let mut plugged = Plugged::pushing(rigs_named(rig.name()));
+            let (name, place) = (plugged.rig.name(), plugged.place(0.0, 0.0));
+            let step = plugged.interrupted(by, place, 300);
+            assert!(step < 0.02, "{name}, {by:?}: a step of {step} N");
+            assert!(!plugged.held() && !plugged.pushed(), "{name}, {by:?}");
+            plugged.grip(place);
+            (0..250).for_each(|_| plugged.at(place, true));
+            assert!(plugged.pushed(), "{name}, {by:?}");
+        }
     });
 }
 

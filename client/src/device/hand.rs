@@ -2,8 +2,9 @@
 //! force that may act on it.
 //!
 //! Pure. The hand is held from a press of the button to its release; where the HIP was then it goes on. A reading that cannot
-//! be, or of a place where the device may not be, lets the hand go, and no force acts until the button has been up. Of a
-//! device without a button, rest is the press: see [`Hold::Rest`](super::link::Hold::Rest).
+//! be, or of a place where the device may not be, lets the hand go, and no force acts until the button has been up. The same
+//! where the loop has let it go: at an emergency stop, a pause, a new session. Of a device without a button, rest is the
+//! press: see [`Hold::Rest`](super::link::Hold::Rest).
 
 use std::time::Duration;
 
@@ -15,6 +16,8 @@ use crate::operator::pointer::{HandEvent, PointerSample};
 
 /// A loop of which no tick has been seen for so long is taken for gone: no force.
 const LOOP_SILENCE: Duration = Duration::from_millis(50);
+/// A loop that does not hold what is held here for so many ticks has let it go: all the events that may wait for it are taken by then.
+const LET_GO_TICKS: u64 = 20;
 /// For so long after the button is up the force of the ramp goes out: its 200 ms and some periods.
 const RAMP_OUT: Duration = Duration::from_millis(210);
 /// How far a reading may be from the one before besides what the greatest speed allows, m: quantization and noise.
@@ -65,7 +68,7 @@ pub(super) struct Action {
     pub(super) runs: bool,
     /// Whether the force may act.
     pub(super) acts: bool,
-    /// Whether the newest reading was refused, or the button was never up.
+    /// Whether the button has to be up before it counts.
     pub(super) refused: bool,
 }
 
@@ -84,6 +87,8 @@ pub(super) struct Hand {
     held: Option<Time>,
     /// The newest tick that was seen, and when it was new.
     ticked: (u64, Time),
+    /// The tick since which the loop does not hold what is held here.
+    unheld: Option<u64>,
     /// When something came last over a line that is the device's own.
     last_packet: Option<Time>,
     seen: Option<Reading>,
@@ -115,6 +120,7 @@ impl Hand {
             rests: None,
             held: None,
             ticked: (0, Time::ZERO),
+            unheld: None,
             last_packet: None,
             seen: None,
         })
@@ -176,6 +182,7 @@ impl Hand {
             self.ticked = (output.tick, now);
         }
         let runs = output.tick > 0 && now.saturating_since(self.ticked.1) < LOOP_SILENCE;
+        self.follow_loop(runs, output);
         if self.grip == Grip::Held {
             self.held = Some(now);
         }
@@ -188,6 +195,18 @@ impl Hand {
             runs,
             acts,
             refused: self.grip == Grip::Barred,
+        }
+    }
+
+    /// Ends a grip that the loop has ended; the force of its ramp still acts.
+    fn follow_loop(&mut self, runs: bool, output: &HandOutput) {
+        let holds = output.engaged && !output.stopped;
+        let unheld = runs && self.grip == Grip::Held && !holds;
+        // a new session begins to count anew
+        let since = self.unheld.unwrap_or(output.tick).min(output.tick);
+        self.unheld = unheld.then_some(since);
+        if unheld && output.tick - since >= LET_GO_TICKS {
+            (self.grip, self.rests) = (Grip::Barred, None);
         }
     }
 

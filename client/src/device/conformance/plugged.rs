@@ -3,12 +3,13 @@
 use std::time::Duration;
 
 use mmt_shared::model::geometry::{BoxFootprint, Pose, Vec2};
-use mmt_shared::time::Time;
+use mmt_shared::time::{TICK, Time};
 
 use super::rigs::Rig;
 use crate::device::DeviceProfile;
 use crate::device::link::{DeviceLinkConfig, HandOutput, Hold};
 use crate::limiter::ForceLimiter;
+use crate::operator::Operator;
 use crate::operator::pointer::{Driver, HandEvent, Person};
 use crate::operator::scripted::{Scripted, ScriptedConfig, View};
 
@@ -23,12 +24,27 @@ fn view() -> View {
     }
 }
 
+fn person(config: &DeviceLinkConfig) -> Operator {
+    let scripted = Scripted::try_new(ScriptedConfig::default(), view()).unwrap();
+    let person = Person::new(scripted, Driver::Pointer, config.tuning());
+    Operator::Person(Box::new(person))
+}
+
+/// What ends a grip, though the device does not let go.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Interruption {
+    Stop,
+    Pause,
+    NewSession,
+}
+
 /// A device at a haptic loop of which only hand and limiter are there.
 pub(super) struct Plugged {
     pub(super) rig: Box<dyn Rig>,
     pub(super) config: DeviceLinkConfig,
-    person: Person,
+    operator: Operator,
     limiter: ForceLimiter,
+    stopped: bool,
     pub(super) now: Time,
     pub(super) ticks: u64,
     pub(super) hip: Vec2,
@@ -42,13 +58,13 @@ impl Plugged {
     pub(super) fn new(rig: Box<dyn Rig>) -> Self {
         let config = rig.config();
         let profile = DeviceProfile::plugged_in(&config).unwrap();
-        let scripted = Scripted::try_new(ScriptedConfig::default(), view()).unwrap();
-        let person = Person::new(scripted, Driver::Pointer, config.tuning());
+        let operator = person(&config);
         Self {
             config,
-            hip: person.hip(),
-            person,
+            hip: operator.start(),
+            operator,
             limiter: ForceLimiter::try_new(profile.limits()).unwrap(),
+            stopped: false,
             now: Time::from_millis(7),
             ticks: 0,
             wanted: GENTLE,
@@ -84,10 +100,14 @@ impl Plugged {
         come(&mut **rig, self.now, &mut |event| events.push(event));
         let elapsed = self.now.saturating_since(Time::ZERO);
         for event in &self.events {
-            self.person.handle(elapsed, *event);
+            self.operator.handle(elapsed, *event);
         }
-        self.hip = self.person.step(elapsed, &view(), Vec2::zeros());
-        if self.person.engaged() {
+        if self.stopped {
+            self.operator.stand(TICK);
+        } else {
+            self.hip = self.operator.step(elapsed, &view(), Vec2::zeros());
+        }
+        if self.operator.engaged() {
             self.limiter.engage();
         } else {
             self.limiter.release();
@@ -97,8 +117,9 @@ impl Plugged {
             tick: self.ticks,
             force: self.limiter.limit(self.wanted),
             hip: self.hip,
-            engaged: self.person.engaged(),
+            engaged: self.operator.engaged(),
             in_contact: true,
+            stopped: self.stopped,
             ..HandOutput::default()
         };
         self.acts = self.rig.acts(self.now, &output);
@@ -132,7 +153,26 @@ impl Plugged {
     }
 
     pub(super) fn held(&self) -> bool {
-        self.person.engaged()
+        self.operator.engaged()
+    }
+
+    /// The session is interrupted for so long, ms, while the device stands there; the greatest change of what acts, N.
+    pub(super) fn interrupted(&mut self, by: Interruption, place: [f64; 3], ms: u64) -> f64 {
+        let elapsed = self.now.saturating_since(Time::ZERO);
+        match by {
+            Interruption::Stop => self.stopped = true,
+            Interruption::Pause => self.operator.handle(elapsed, HandEvent::Pause(true)),
+            Interruption::NewSession => (self.operator, self.ticks) = (person(&self.config), 0),
+        }
+        let (mut most, mut last) = (0.0_f64, self.in_world());
+        for _ in 0..ms {
+            self.at(place, true);
+            most = most.max((self.in_world() - last).norm());
+            last = self.in_world();
+        }
+        self.stopped = false;
+        self.operator.handle(elapsed, HandEvent::Pause(false));
+        most
     }
 
     /// Whether the HIP is there, but for what adding and taking away rounds.
