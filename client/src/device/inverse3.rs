@@ -185,7 +185,6 @@ impl Inverse3 {
 
     /// Takes in a message, and gives what the hand does by it.
     pub fn handle(&mut self, now: Time, message: &str, mut give: impl FnMut(HandEvent)) {
-        self.hand.note_packet(now, &mut give);
         let Ok(frame) = serde_json::from_str::<Frame>(message) else {
             self.counts.malformed += 1;
             self.lose(give);
@@ -206,8 +205,10 @@ impl Inverse3 {
         }
         let Some(place) = cursor.state.cursor_position else {
             self.counts.late += 1;
+            self.miss(now, give);
             return;
         };
+        self.hand.note_packet(now, &mut give);
         let still = Vector {
             x: 0.0,
             y: 0.0,
@@ -224,8 +225,7 @@ impl Inverse3 {
     }
 
     /// Something came that is no text.
-    pub fn handle_other(&mut self, now: Time, mut give: impl FnMut(HandEvent)) {
-        self.hand.note_packet(now, &mut give);
+    pub fn handle_other(&mut self, give: impl FnMut(HandEvent)) {
         self.counts.malformed += 1;
         self.lose(give);
     }

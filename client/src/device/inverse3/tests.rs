@@ -1,5 +1,7 @@
 //! That messages are read and written as the vendor's pages have them.
 
+use mmt_shared::model::geometry::Vec2;
+
 use super::*;
 use crate::device::link::DeviceKind;
 
@@ -98,4 +100,32 @@ fn a_frame_without_a_position_is_no_reading() {
     let partial = r#"{"inverse3": [{"device_id": "049D", "state": {}}]}"#;
     device.handle(Time::from_millis(2), partial, |_| ());
     assert_eq!((device.seen(), device.counts.late), (None, 1));
+}
+
+#[test]
+fn frames_without_a_position_are_a_silence() {
+    let mut device = begun(None);
+    device.handle(Time::from_millis(1), INVENTORY, |_| ());
+    let pressed = INVENTORY.replace(r#""a": false"#, r#""a": true"#);
+    device.handle(Time::from_millis(2), &pressed, |_| ());
+    let pushed = |device: &mut Inverse3, ms| {
+        let output = HandOutput {
+            tick: ms,
+            force: Vec2::new(1.0, 0.0),
+            engaged: true,
+            ..HandOutput::default()
+        };
+        let answer = device.answer(Time::from_millis(ms), &output);
+        answer.contains(r#""x":1.0"#)
+    };
+    assert!(pushed(&mut device, 2));
+    let partial = r#"{"inverse3": [{"device_id": "049D", "state": {}}]}"#;
+    let mut released = Vec::new();
+    for ms in 3..=60 {
+        device.handle(Time::from_millis(ms), partial, |event| {
+            released.extend((event == HandEvent::Release).then_some(ms));
+        });
+        assert_eq!(pushed(&mut device, ms), ms < 42, "{ms} ms");
+    }
+    assert_eq!(released, [42]);
 }

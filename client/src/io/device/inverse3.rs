@@ -137,7 +137,7 @@ fn exchange(
                 shared.take(now, |give| {
                     match &message {
                         Message::Text(text) => device.handle(now, text, give),
-                        Message::Binary(_) => device.handle_other(now, give),
+                        Message::Binary(_) => device.handle_other(give),
                         _ => {}
                     }
                     (device.seen(), *device.counts())
