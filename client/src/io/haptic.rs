@@ -243,7 +243,7 @@ impl HapticLoop {
         let others = self.events.iter_mut();
         let others = others.flat_map(|events| std::iter::from_fn(|| events.next_event()));
         let others = others.take(EVENTS_PER_TICK);
-        let others = others.filter(|event| !has_device || !event.is_of_the_hand());
+        let others = others.filter(|event| !has_device || event.goes_beside_a_device());
         let device = self.device.iter_mut();
         let device = device.flat_map(|device| std::iter::from_fn(|| device.event()));
         for event in others.chain(device.take(EVENTS_PER_TICK)) {

@@ -21,13 +21,16 @@ use mmt_shared::wire::{DATAGRAM_MAX, Side};
 use super::fake::{state, welcome_for};
 use super::*;
 use crate::again::MasterSetting;
+use crate::device::link::DeviceLinkConfig;
 use crate::end::MasterEnd;
+use crate::io::device::{DeviceAddress, DeviceHost};
 use crate::io::hand_events::hand_events;
 use crate::io::haptic::HapticLoop;
 use crate::io::record;
 use crate::limiter::{ForceLimiter, RAMP_TICKS};
 use crate::master::Master;
-use crate::operator::pointer::{HandEvent, PointerSample};
+use crate::operator::pointer::{Driver, HandEvent, HandTuning, Person, PointerSample};
+use crate::operator::scripted::{Scripted, ScriptedConfig};
 
 /// A loop, its network task's side, and a slave.
 struct Ticked {
@@ -296,6 +299,38 @@ async fn a_model_that_breaks_releases_the_hand_fails_the_session_and_is_counted(
             .pose
             .is_finite()
     );
+}
+
+#[tokio::test]
+async fn where_a_device_is_plugged_in_a_console_pauses_and_ends_and_gives_the_hand_to_nobody_else()
+{
+    let at = DeviceAddress::Link("127.0.0.1:0".parse().unwrap());
+    let host = DeviceHost::start(&at, DeviceLinkConfig::default()).unwrap();
+    let (mut console, events) = hand_events(8);
+    let mut ticked = pressing(None);
+    let view = ticked.haptic.end().master().view();
+    let scripted = Scripted::try_new(ScriptedConfig::default(), view).unwrap();
+    let person = Person::new(scripted, Driver::Pointer, HandTuning::POINTER);
+    ticked.haptic.operator = Operator::Person(Box::new(person));
+    ticked.haptic = (ticked.haptic.operated_through(Some(events))).plugged_into(Some(host.port()));
+    let mut after = |index, event| {
+        console.send(event);
+        // a hand that nobody holds is at rest at once when it ends
+        let _ = ticked.tick(index);
+        let person = ticked.haptic.operator.person().unwrap();
+        (
+            person.driver(),
+            person.engaged(),
+            person.is_paused(),
+            person.finished(),
+        )
+    };
+    let scripted = HandEvent::Drive(Driver::Scripted);
+    assert_eq!(after(0, scripted), (Driver::Pointer, false, false, false));
+    let paused = after(1, HandEvent::Pause(true));
+    assert_eq!(paused, (Driver::Pointer, false, true, false));
+    let finished = after(2, HandEvent::Finish);
+    assert_eq!(finished, (Driver::Pointer, false, true, true));
 }
 
 #[tokio::test]

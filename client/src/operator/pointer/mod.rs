@@ -243,8 +243,8 @@ impl Person {
 }
 
 impl HandEvent {
-    /// Whether it is of the hand itself; the others steer who works.
-    pub fn is_of_the_hand(&self) -> bool {
-        !matches!(self, Self::Drive(_) | Self::Pause(_) | Self::Finish)
+    /// Whether a console may say it beside a device, which is the one hand and works alone.
+    pub fn goes_beside_a_device(&self) -> bool {
+        matches!(self, Self::Pause(_) | Self::Finish)
     }
 }
