@@ -13,14 +13,13 @@ pub mod pantograph;
 pub mod two_diy;
 
 use mmt_shared::model::contact::Coupling;
+use mmt_shared::model::settings::STIFFNESS_N_PER_M;
 use mmt_shared::range::{OutOfRange, in_range};
 use serde::Serialize;
 
 use crate::limiter::{Limits, STEP_MAX_N};
 use link::DeviceLinkConfig;
 
-/// Least accepted k_p, N/m: softer than a pillow, nothing can be pushed.
-const STIFFNESS_MIN_N_PER_M: f64 = 50.0;
 /// Accepted scale s: the paper displays with 13.
 const SCALE: (f64, f64) = (0.1, 100.0);
 
@@ -148,8 +147,9 @@ impl DeviceProfile {
         let value = stiffness_n_per_m.unwrap_or(self.stiffness_n_per_m);
         let limit = self.stiffness_max_n_per_m;
         // the ceiling of the simulated hand holds for k_p itself as well: at s < 1 the device allows
-        // more than the local model was made for
-        let accepted = (STIFFNESS_MIN_N_PER_M, (limit / scale).min(limit));
+        // more than the local model was made for; and a slave accepts no more than the session's settings do
+        let (least, most) = STIFFNESS_N_PER_M;
+        let accepted = (least, (limit / scale).min(limit).min(most));
         in_range("stiffness", "N/m", value, accepted).map_err(|range| DeviceError::Stiffness {
             range,
             device: self.name,
@@ -238,6 +238,20 @@ mod tests {
              \"falcon\" at scale 2 (the hand feels scale x stiffness, at most 3000 N/m); \
              change the stiffness or the scale"
         );
+    }
+
+    #[test]
+    fn no_device_is_stiffer_than_a_slave_accepts() {
+        let stiff = |stiffness_n_per_m| {
+            DeviceProfile::plugged_in(&DeviceLinkConfig {
+                stiffness_n_per_m,
+                stiffness_max_n_per_m: 30_000.0,
+                ..DeviceLinkConfig::default()
+            })
+        };
+        assert!(stiff(10_000.0).is_ok());
+        let refused = stiff(10_001.0).unwrap_err().to_string();
+        assert!(refused.contains("50 to 10000 N/m"), "{refused}");
     }
 
     #[test]
