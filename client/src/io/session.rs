@@ -143,6 +143,10 @@ pub(super) async fn operate(
     };
     let mut farewell = pin!(receive_farewell(&mut receive, Side::Slave));
     let Some(mut haptic) = session.run(farewell.as_mut(), &mut stop).await else {
+        // without a report: what counts is gone with the loop
+        let wait = farewell_wait(&connected.connection, timeouts.farewell);
+        let failed = session.part(Ending::Failed, None, &mut send, farewell, wait);
+        failed.await;
         connected
             .close("the master's haptic loop failed", timeouts.idle)
             .await;
@@ -152,11 +156,10 @@ pub(super) async fn operate(
     // the loop keeps its own reasons, the network task the others; one without a reason was asked to end
     let why = haptic.why.or(session.why).unwrap_or(SessionEnd::Stopped);
     tracing::info!("the session ends: {why}");
-    if session.task.is_connected() {
-        let wait = farewell_wait(&connected.connection, timeouts.farewell);
-        let half = half(&haptic, &session.task, &connected, duration);
-        session.part(why, &half, &mut send, farewell, wait).await;
-    }
+    let own = half(&haptic, &session.task, &connected, duration);
+    let wait = farewell_wait(&connected.connection, timeouts.farewell);
+    let ended = session.part(why.ending(), Some(&own), &mut send, farewell, wait);
+    ended.await;
     if session.ended_well()
         && let Some(resume) = &options.resume
     {
@@ -216,17 +219,20 @@ impl Session<'_> {
     }
 
     /// Sends the slave why the session ends and what this side has counted, and receives its farewell if that is still due; waits
-    /// no longer than `wait`.
+    /// no longer than `wait`. Nothing where the connection is gone.
     async fn part(
         &mut self,
-        why: SessionEnd,
-        half: &MasterHalf,
+        ending: Ending,
+        half: Option<&MasterHalf>,
         send: &mut SendStream,
         farewell: impl Future<Output = FarewellRead>,
         wait: Duration,
     ) {
+        if !self.task.is_connected() {
+            return;
+        }
         let deadline = Instant::now() + wait;
-        if let Err(error) = send_farewell(send, why.ending(), half, wait).await {
+        if let Err(error) = send_farewell(send, ending, &half, wait).await {
             tracing::warn!(%error, "the farewell did not reach the slave");
         }
         if self.task.awaits_farewell() {

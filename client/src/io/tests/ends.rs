@@ -22,19 +22,19 @@ async fn a_master_whose_session_failed_keeps_what_lets_it_in_again_at_once() {
     }
 }
 
-/// What becomes of a session whose haptic thread does this in its first tick; the slave is not left waiting.
+/// What becomes of a session whose haptic thread does this in its first tick; the slave is sent a farewell without a report.
 async fn ended_by(
     body: impl FnOnce() -> HapticLoop + Send + 'static,
 ) -> Result<MasterReport, MasterHostError> {
     let fake = Fake::new();
     let options = scripted(&fake);
     let opening = Opening::of_operator(&options, Vec2::new(-0.45, 0.0));
-    let (opened, slave) = tokio::join!(open(&opening, &TIMEOUTS), Session::welcomed(&fake));
+    let (opened, mut slave) = tokio::join!(open(&opening, &TIMEOUTS), Session::welcomed(&fake));
     let (_stop, stop) = watch::channel(Wish::GoOn);
     let (live, _shown) = watch::channel(MasterLive::default());
     let clock = Clock::start();
     let opened = opened.unwrap();
-    let ended = operate(
+    let ending = operate(
         &options,
         opened,
         clock,
@@ -45,8 +45,9 @@ async fn ended_by(
         stop,
         live,
         &TIMEOUTS,
-    )
-    .await;
+    );
+    let (ended, farewell) = tokio::join!(ending, slave.serve());
+    assert_eq!((farewell.ending, farewell.report), (Ending::Failed, None));
     timeout(FOR_EVER, slave.connection.closed()).await.unwrap();
     ended
 }
