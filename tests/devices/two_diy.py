@@ -5,8 +5,9 @@
     mmt device test --device 2diy --device-at /dev/pts/N
 
 The board answers torques alone, keeps those that it got last, and turns counts of its encoders into degrees with what it was set
-up with. What it was not set up for, and what is no command, is refused: it is reported at the end. The arms' geometry is computed
-here by bisection and difference quotients, unlike in mmt. Standard library only.
+up with. A real board counts from where its arms stand at each set-up; this one always from the vendor's start. What it was not
+set up for, and what is no command, is refused: it is reported at the end. The arms' geometry is computed here by bisection and
+difference quotients, unlike in mmt. Standard library only.
 """
 
 import math

@@ -23,6 +23,10 @@ const ANSWERS_MAX: usize = 16;
 /// Between two attempts to open the port.
 const RETRY: Duration = Duration::from_millis(500);
 
+/// What a person has to know of a board that is set up while they use it.
+const ANEW: &str = "the 2DIY is set up anew, and counts from where its arms stand now: if that is not the vendor's start, end mmt, \
+                    set them to it, and begin again";
+
 /// Serves the device until the host ends; a port that goes away is opened again.
 pub(super) fn serve(path: &Path, first: Serial, device: &mut TwoDiy, shared: &Shared) {
     let clock = Clock::start();
@@ -43,6 +47,9 @@ pub(super) fn serve(path: &Path, first: Serial, device: &mut TwoDiy, shared: &Sh
         while !shared.has_ended() && port.is_none() {
             clock.sleep_until(clock.now() + RETRY);
             port = Serial::open(path).ok();
+        }
+        if port.is_some() {
+            tracing::warn!("{ANEW}");
         }
     }
 }
@@ -84,6 +91,7 @@ fn exchange(
         if came > 0 {
             last_answer = now;
         } else if now.saturating_since(last_answer) > SILENCE {
+            tracing::warn!("{ANEW}");
             set_up(port, device)?;
             last_answer = now;
         }
