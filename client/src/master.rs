@@ -147,6 +147,11 @@ impl Master {
         }
     }
 
+    /// Where the hand was in the newest tick, m: the HIP without that by which it was carried.
+    pub fn reading(&self) -> Vec2 {
+        self.reading
+    }
+
     /// A pose of the world from where the hand is: the HIP may be elsewhere than the device.
     pub fn seen_by_hand(&self, pose: Pose) -> Pose {
         Pose {

@@ -161,7 +161,8 @@ impl Callbacks {
         self.operator.is_none() && self.trigger.is_none() && self.estimator.is_none()
     }
 
-    /// Where the operator has the HIP after the tick before.
+    /// Where the operator has the hand after the tick before. All that it is given is as the hand has it: the HIP may have been
+    /// carried to elsewhere than the device.
     fn hip(
         &self,
         py: Python<'_>,
@@ -174,7 +175,7 @@ impl Callbacks {
         let view = running.world().master().view();
         let start = running.world().operator().start();
         let (time, hip, force) = before.map_or((0.0, start, Vec2::zeros()), |tick| {
-            let hip = tick.master.sample.hip.metres();
+            let hip = running.world().master().reading();
             (tick.now.as_secs_f64(), hip, tick.master.hand_force)
         });
         let pose = (view.pose.position.x, view.pose.position.y, view.pose.angle);

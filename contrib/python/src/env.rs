@@ -59,8 +59,8 @@ struct Action {
 /// in the place of the update scheme: once, in the first sample of the step. What a dict leaves out is mmt's own, for
 /// "hip" the scripted operator.
 ///
-/// An observation is what the hand feels and sees, float64, (11,), of the names in OBSERVATION: the HIP, the force on the hand, the
-/// master's model and its parameters. The reward is always 0.0: what is good the user decides, in a wrapper. Terminated: the
+/// An observation is what the hand feels and sees, float64, (11,), of the names in OBSERVATION: where the hand is, the force on it,
+/// the master's model as the hand has it, and its parameters. The reward is always 0.0: what is good the user decides, in a wrapper. Terminated: the
 /// link was silent for so long that the hand was released. Truncated: the duration is over.
 ///
 /// info: time, s; from the first sample on that the slave plays, its stamp, s, and the slave's tool, f_s and
@@ -165,7 +165,7 @@ impl Env {
         let updates = py.detach(|| go_on(running, ticks, &action, last));
         let updates = updates.map_err(|error| refused(&error))?;
         let last = last.as_ref();
-        self.hip = last.map_or(self.hip, |tick| tick.master.sample.hip.metres());
+        self.hip = last.map_or(self.hip, |_| running.world().master().reading());
         let released = last.is_some_and(|tick| tick.master.link == LinkState::Released);
         let (seen, over) = (observation(py, running, last, self.hip), running.is_over());
         let info = info(py, running, last, &updates)?;
@@ -271,12 +271,10 @@ fn observation<'py>(
     hip: Vec2,
 ) -> Bound<'py, PyAny> {
     let master = running.world().master();
-    let (state, force) = (
-        master.model().state(),
-        last.map_or(Vec2::zeros(), |tick| tick.master.hand_force),
-    );
+    let force = last.map_or(Vec2::zeros(), |tick| tick.master.hand_force);
     let touching = last.is_some_and(|tick| tick.master.rendered.in_contact());
-    let (pose, params) = (&state.pose, &state.params);
+    // as the hand has it, as the place of the hand is
+    let (pose, params) = (master.view().pose, &master.model().state().params);
     let numbers = [
         hip.x,
         hip.y,

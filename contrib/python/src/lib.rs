@@ -1,7 +1,7 @@
 //! The Python package `mmt`: Python's values become the lab's types, and what the lab computes becomes arrays; and a client of both
 //! plugs of the live programs.
 //!
-//! Nothing is computed here. Long calls let other threads of Python run, and end at Ctrl-C. Times are seconds of the model's
+//! Nothing is computed here. Long calls let other threads of Python run; runs and sweeps end at Ctrl-C. Times are seconds of the model's
 //! clock, lengths metres, forces newtons, angles radians.
 //!
 //! The macros of pyo3 make `unsafe` code; nothing that is written here has any.

@@ -6,6 +6,7 @@ mod plant;
 pub(crate) use device::Device;
 pub(crate) use plant::{Command, Plant};
 
+use std::io::ErrorKind;
 use std::net::{Ipv4Addr, Ipv6Addr, SocketAddr, ToSocketAddrs, UdpSocket};
 use std::time::{Duration, Instant};
 
@@ -27,6 +28,8 @@ struct End {
     token: PlugToken,
     sequence: u32,
     newest: u32,
+    /// Flags and numbers of that.
+    kept: (u16, [u8; ROOM]),
     received: u64,
     lost: u64,
 }
@@ -58,6 +61,7 @@ impl End {
             token,
             sequence: 0,
             newest: 0,
+            kept: (0, [0; ROOM]),
             received: 0,
             lost: 0,
         })
@@ -83,7 +87,8 @@ impl End {
         let _ = self.socket.send(&packet);
     }
 
-    /// The next packet of mmt that waits or comes within `wait`: by how many it is ahead of the newest, its flags, and its numbers.
+    /// The next packet of mmt that waits or comes within `wait`: by how many it is ahead of the newest, its flags, and its
+    /// numbers; of one that came late or twice 0, and those of the newest.
     fn receive(
         &mut self,
         kind: PlugKind,
@@ -98,17 +103,27 @@ impl End {
                 self.socket.set_read_timeout(Some(left)).ok()?;
             }
             let mut packet = [0; ROOM];
-            // nothing came, nobody is there, or a signal for Python
-            let bytes = self.socket.recv(&mut packet).ok()?;
+            let bytes = match self.socket.recv(&mut packet) {
+                Ok(bytes) => bytes,
+                // nobody is there (any more): whoever comes is waited for
+                Err(error) if error.kind() == ErrorKind::ConnectionRefused => continue,
+                // nothing came, or a signal for Python
+                Err(_) => return None,
+            };
             let bytes = packet.get(..bytes).unwrap_or_default();
             let Ok((head, numbers)) = decode(kind, length, &self.token, bytes) else {
                 continue;
             };
-            let mut room = [0; ROOM];
-            for (to, from) in room.iter_mut().zip(numbers) {
-                *to = *from;
+            let ahead = self.ahead(head.sequence);
+            if ahead > 0 {
+                let (flags, room) = &mut self.kept;
+                *flags = head.flags;
+                for (to, from) in room.iter_mut().zip(numbers) {
+                    *to = *from;
+                }
             }
-            return Some((self.ahead(head.sequence), head.flags, room));
+            let (flags, room) = self.kept;
+            return Some((ahead, flags, room));
         }
     }
 

@@ -8,6 +8,7 @@ import struct
 import subprocess
 import sys
 import threading
+import time
 
 import pytest
 
@@ -147,6 +148,36 @@ def test_packets_are_those_of_the_document(bound):
     assert (command.tool, command.velocity, command.stiffness, command.damping) == ((6.0, 0.5), (0.1, 0.2), 700.0, 30.0)
     assert (command.force_max, command.begins, command.held, command.periods) == (15.0, True, False, 3)
     assert (plant.received, plant.lost, plant.command(0.0)) == (2, 1, None)
+
+
+def test_a_command_that_comes_late_or_twice_is_answered_and_takes_nothing_back(bound, contrib):
+    end, address = bound
+    for client in (contrib[1].Plant, mmt.Plant):
+        plant = client(address)
+        plant.answer((0.0, 0.0), (0.0, 0.0), (0.0, 0.0))
+        _, plugged = end.recvfrom(256)
+        found = []
+        for sequences in ((2**32 - 2, 2**32 - 1), (2**32 - 2,), (2**32 - 1,), (1, 2**32 - 1), (2,)):
+            for sequence in sequences:
+                head = HEAD.pack(b"MMTL", 1, 3, 1, sequence, 1, 0, bytes.fromhex(TOKEN))
+                end.sendto(head + struct.pack("<10d", sequence % 7, 0.5, 0.1, 0.2, 700.0, 30.0, 15.0, 0, 0, 0), plugged)
+            threading.Event().wait(0.02)
+            command = plant.command(1.0)
+            found.append((command.tool[0], command.periods))
+        newest = (2**32 - 1) % 7
+        assert found == [(newest, 2), (newest, 0), (newest, 0), (1, 2), (2, 1)], client
+
+
+def test_a_plant_waits_where_nobody_is_any_more(bound, contrib):
+    end, address = bound
+    for client in (contrib[1].Plant, mmt.Plant):
+        plant = client(address)
+        end.close()
+        began = time.monotonic()
+        for _ in range(3):
+            plant.answer((0.0, 0.0), (0.0, 0.0), (0.0, 0.0))
+            assert plant.command(0.05) is None
+        assert time.monotonic() - began > 0.14, client
 
 
 def test_what_no_master_sent_moves_nobody(bound):

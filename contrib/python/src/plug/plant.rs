@@ -49,7 +49,7 @@ impl Command {
 /// socket can be had.
 #[pyclass(module = "mmt")]
 pub(crate) struct Plant {
-    // one thread may look on while another waits
+    // a call from another thread waits until the command that is waited for has come
     end: Mutex<End>,
 }
 
@@ -67,7 +67,8 @@ impl Plant {
         Ok(Self { end })
     }
 
-    /// The newest command, which is waited for so long, s, 0 to 10; None if none came. Releases the GIL.
+    /// The newest command, which is waited for so long, s, 0 to 10; None if none came. Releases the GIL; other calls of this plant
+    /// wait as well.
     fn command(&self, py: Python<'_>, wait_s: f64) -> PyResult<Option<Command>> {
         if !(0.0..=WAIT_MAX_S).contains(&wait_s) {
             let what = format!("wait_s is {wait_s}; it must be 0 to {WAIT_MAX_S} s");
@@ -138,23 +139,18 @@ fn newest(end: &mut End, wait: Duration) -> Option<Command> {
             continue;
         }
         wait = Duration::ZERO;
-        let before = newest.take();
-        let periods = ahead.saturating_add(before.as_ref().map_or(0, |before| before.periods));
-        let late = before.filter(|_| ahead == 0);
-        let command = late.unwrap_or_else(|| {
-            let [x, y, v_x, v_y, stiffness, damping, force_max] = doubles(&numbers);
-            Command {
-                tool: (x, y),
-                velocity: (v_x, v_y),
-                stiffness,
-                damping,
-                force_max,
-                begins: flags & BEGINS != 0,
-                held: flags & HELD != 0,
-                periods: 0,
-            }
+        let before = newest.map_or(0, |before| before.periods);
+        let [x, y, v_x, v_y, stiffness, damping, force_max] = doubles(&numbers);
+        newest = Some(Command {
+            tool: (x, y),
+            velocity: (v_x, v_y),
+            stiffness,
+            damping,
+            force_max,
+            begins: flags & BEGINS != 0,
+            held: flags & HELD != 0,
+            periods: ahead.saturating_add(before),
         });
-        newest = Some(Command { periods, ..command });
     }
     newest
 }
