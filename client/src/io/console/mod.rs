@@ -40,6 +40,8 @@ pub use shared::Source;
 const FRAME: Duration = Duration::from_millis(16);
 /// Events that may wait for the loop: at 1000 a second, a second in which it stands.
 const EVENTS_MAX: usize = 1024;
+/// Orders that may wait for the command: far more than a person gives while it is busy.
+const ORDERS_MAX: usize = 256;
 /// The longest message of a page, bytes: a second of readings.
 const MESSAGE_MAX: usize = 64 * 1024;
 /// Viewers at one time.
@@ -77,7 +79,7 @@ pub enum ConsoleError {
 pub struct Console {
     address: String,
     shared: Arc<Shared>,
-    orders: mpsc::UnboundedReceiver<Order>,
+    orders: mpsc::Receiver<Order>,
 }
 
 impl Console {
@@ -99,7 +101,7 @@ impl Console {
         let bound = runtime.block_on(tokio::net::TcpListener::bind(listen));
         let listener = bound.map_err(unheard)?;
         let local = listener.local_addr().map_err(unheard)?;
-        let (send, orders) = mpsc::unbounded_channel();
+        let (send, orders) = mpsc::channel(ORDERS_MAX);
         let shared = Arc::new(Shared {
             admission: Admission::new(listen.ip(), ticket.clone()),
             assets: Assets::new(options.assets),

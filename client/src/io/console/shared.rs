@@ -40,7 +40,7 @@ pub(super) struct Shared {
     pub(super) about: watch::Sender<Utf8Bytes>,
     /// Who operates.
     pub(super) operator: watch::Sender<Option<u64>>,
-    pub(super) orders: mpsc::UnboundedSender<Order>,
+    pub(super) orders: mpsc::Sender<Order>,
     /// That of the sessions which are shown.
     pub(super) emergency: EmergencyStop,
 }

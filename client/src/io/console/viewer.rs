@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use axum::extract::ws::{Message, Utf8Bytes, WebSocket};
+use tokio::sync::mpsc::error::TrySendError;
 
 use super::message::FromPage;
 use super::shared::Shared;
@@ -116,9 +117,11 @@ impl Viewer {
                 stage.give(event);
             }
         }
-        if let Some(order) = message.order() {
-            // nobody who takes orders: the process ends
-            let _ = self.shared.orders.send(order);
+        // where nobody takes orders any more the process ends
+        if let Some(order) = message.order()
+            && let Err(TrySendError::Full(_)) = self.shared.orders.try_send(order)
+        {
+            tracing::warn!("too many orders of pages wait: this one is dropped");
         }
     }
 }
