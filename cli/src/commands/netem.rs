@@ -7,6 +7,7 @@ use std::time::{Duration, Instant};
 use mmt_netem::io::relay::{Extras, Relay, RelayHandle};
 use mmt_netem::record::Heading;
 use mmt_netem::{Direction, LinkConfig};
+use mmt_shared::io::connect::in_order;
 use mmt_shared::pairing::Address;
 
 use super::conclusion::conclude;
@@ -218,10 +219,15 @@ fn resolve(address: &Address) -> Result<SocketAddr, Failure> {
         Failure::usage(what).remedy("check the name, or give the slave's IP address")
     };
     let found = address.to_string().to_socket_addrs();
-    let mut found = found.map_err(|error| unknown(error.to_string()))?;
-    found
-        .next()
-        .ok_or_else(|| unknown("the name has no address".to_owned()))
+    let found = in_order(found.map_err(|error| unknown(error.to_string()))?);
+    let first = found.first().copied();
+    let first = first.ok_or_else(|| unknown("the name has no address".to_owned()))?;
+    if found.len() > 1 {
+        note(format_args!(
+            "{address} has several addresses: the relay sends to {first}"
+        ));
+    }
+    Ok(first)
 }
 
 #[cfg(test)]

@@ -7,7 +7,7 @@ use std::time::Duration;
 use mmt_netem::io::socket::{EmulatedSocket, SocketExtras, SocketMeter};
 use mmt_netem::{LinkConfig, LinkId};
 use mmt_shared::io::congestion::RateCap;
-use mmt_shared::io::connect::ConnectError;
+use mmt_shared::io::connect::{ConnectError, in_order};
 use mmt_shared::io::farewell::FAREWELL_WAIT;
 use mmt_shared::io::quic::Traffic;
 use mmt_shared::io::socket;
@@ -142,15 +142,7 @@ async fn look_up(pairing: &Pairing, limit: Duration) -> Result<Vec<SocketAddr>, 
         Ok(Err(source)) => return Err(MasterHostError::Lookup { address, source }),
         Err(_) => return Err(MasterHostError::LookupSlow { address, limit }),
     };
-    let mut addresses: Vec<SocketAddr> = Vec::new();
-    for one in found {
-        if !addresses.contains(&one) {
-            addresses.push(one);
-        }
-    }
-    // a slave listens on IPv4 unless it is given another address, and a wrong first address costs the whole wait
-    addresses.sort_by_key(SocketAddr::is_ipv6);
-    Ok(addresses)
+    Ok(in_order(found))
 }
 
 fn leads_nowhere(error: &MasterHostError) -> bool {

@@ -29,6 +29,17 @@ fn header_bytes(address: &SocketAddr) -> usize {
     if address.is_ipv4() { 28 } else { 48 }
 }
 
+/// What there is to say of an address that means this host itself wherever it is used.
+fn own_host(address: &SocketAddr) -> String {
+    if !address.ip().is_loopback() {
+        return String::new();
+    }
+    let port = address.port();
+    format!(
+        " This address is this host itself: on two hosts start the slave with --listen 0.0.0.0:{port}"
+    )
+}
+
 /// Why a master got no connection.
 #[derive(Debug, thiserror::Error)]
 pub enum ConnectError {
@@ -36,8 +47,9 @@ pub enum ConnectError {
     #[error(
         "nothing answered at {address} for {limit:?}: is the slave running there, is the port right, \
          does a firewall let UDP through, does the path carry UDP packets of {MTU_MIN} bytes (an MTU of {} \
-         at the least)?",
-        MTU_MIN + header_bytes(.address)
+         at the least)?{}",
+        MTU_MIN + header_bytes(.address),
+        own_host(.address)
     )]
     NoAnswer {
         /// Where.
@@ -127,6 +139,19 @@ pub async fn connect(
         },
         None => connect_error(address, limit, source),
     })
+}
+
+/// The addresses of a name in the order in which they are tried, each once: IPv4 first. A slave listens on IPv4 unless it
+/// is given another address, and a wrong first address costs the whole wait.
+pub fn in_order(found: impl IntoIterator<Item = SocketAddr>) -> Vec<SocketAddr> {
+    let mut addresses: Vec<SocketAddr> = Vec::new();
+    for one in found {
+        if !addresses.contains(&one) {
+            addresses.push(one);
+        }
+    }
+    addresses.sort_by_key(SocketAddr::is_ipv6);
+    addresses
 }
 
 fn connect_error(address: SocketAddr, limit: Duration, source: ConnectionError) -> ConnectError {

@@ -4,7 +4,7 @@ use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr};
 use std::time::Duration;
 
 use mmt_shared::io::congestion::RateCap;
-use mmt_shared::io::connect::ConnectError;
+use mmt_shared::io::connect::{ConnectError, in_order};
 use mmt_shared::io::quic::Traffic;
 use mmt_shared::io::socket;
 use mmt_shared::io::transport::{CLOSE_FINISHED, Connection, Endpoint, Transport};
@@ -44,7 +44,7 @@ async fn look(slave: &Pairing) -> Vec<Finding> {
     let name = slave.address.to_string();
     let found = timeout(PATIENCE, tokio::net::lookup_host(name.clone())).await;
     let addresses: Vec<SocketAddr> = match found {
-        Ok(Ok(found)) => found.collect(),
+        Ok(Ok(found)) => in_order(found),
         Ok(Err(error)) => return vec![unfit(format!("{name}: {error}"), "check its name")],
         Err(_) => {
             return vec![unfit(

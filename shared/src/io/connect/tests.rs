@@ -128,6 +128,29 @@ async fn silence_is_reported_with_the_address_and_what_to_check() {
     );
 }
 
+#[test]
+fn only_an_address_of_this_host_itself_is_explained_as_one() {
+    let told = |address: &str| {
+        let (address, limit) = (address.parse().unwrap(), Duration::from_secs(10));
+        let text = ConnectError::NoAnswer { address, limit }.to_string();
+        text.contains("this host itself") && text.contains("--listen 0.0.0.0:4433")
+    };
+    assert!(told("127.0.0.1:4433") && told("[::1]:4433"));
+    assert!(!told("192.0.2.1:4433") && !told("[2001:db8::1]:4433"));
+}
+
+#[test]
+fn a_name_is_tried_at_its_ipv4_addresses_first_each_once() {
+    let of = |words: &[&str]| -> Vec<SocketAddr> {
+        words.iter().map(|word| word.parse().unwrap()).collect()
+    };
+    let found = of(&["[::1]:1", "127.0.0.1:1", "[::1]:1", "127.0.0.2:1"]);
+    assert_eq!(
+        in_order(found),
+        of(&["127.0.0.1:1", "127.0.0.2:1", "[::1]:1"])
+    );
+}
+
 #[tokio::test]
 async fn garbage_on_the_port_does_not_disturb_a_handshake() {
     let (slave, endpoint) = (slave(), client_endpoint(open()).unwrap());
