@@ -7,7 +7,7 @@ use mmt_lab::check::{CheckError, Invariant, Judged, RecordChecks, Verdict, Viola
 use mmt_shared::io::record::{Ended, RecordError};
 use serde::Serialize;
 
-use super::records::read_run;
+use super::records::{RECORDS, read_run};
 use crate::args::CheckArguments;
 use crate::failure::Failure;
 use crate::output::{print, print_json};
@@ -79,7 +79,7 @@ pub(super) fn judge(files: &[PathBuf]) -> Result<(RecordChecks, bool), Failure> 
                 Error::Check(CheckError::Again(AgainError::OtherProgram { .. })) => {
                     "take the version that made it"
                 }
-                _ => "give files of one run that mmt made with --record",
+                _ => RECORDS,
             };
             Failure::usage(what).remedy(remedy)
         },
@@ -161,8 +161,7 @@ pub(super) fn show_rows(rows: &[Row]) -> Result<(), Failure> {
 /// Succeeds if all holds.
 fn judged(document: &Document) -> Result<(), Failure> {
     if document.sessions.is_empty() {
-        return Err(Failure::usage("there is no session in these records")
-            .remedy("give files that mmt made with --record"));
+        return Err(Failure::usage("there is no session in these records").remedy(RECORDS));
     }
     let broken = document.invariants.iter();
     let broken: Vec<_> = broken.filter(|row| row.judged.broken > 0).collect();

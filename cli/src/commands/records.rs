@@ -7,6 +7,9 @@ use mmt_shared::io::record::{Ended, RecordError, read};
 
 use crate::failure::Failure;
 
+/// What the commands take that read records of sessions.
+pub(super) const RECORDS: &str = "give an MCAP file, made with --record of demo, slave or master; for a record of packets: mmt netem report";
+
 /// Why a record was not read: it is none, or what takes its messages fails.
 enum Error<E> {
     Record(RecordError),
@@ -35,8 +38,7 @@ impl Read {
     /// There is none.
     pub(super) fn with_sessions(self) -> Result<Vec<Ended>, Failure> {
         if self.is_empty {
-            return Err(Failure::usage("there is no session in these records")
-                .remedy("give files that mmt made with --record"));
+            return Err(Failure::usage("there is no session in these records").remedy(RECORDS));
         }
         Ok(self.ended)
     }

@@ -8,7 +8,7 @@ use mmt_shared::io::record::{Ended, RecordError};
 use serde::Serialize;
 use serde_json::{Map, Value};
 
-use super::records::read_run;
+use super::records::{RECORDS, read_run};
 use crate::args::ReportArguments;
 use crate::failure::Failure;
 use crate::output::{make_folder, note, print, print_json, take_away, unwritten};
@@ -34,8 +34,7 @@ pub(crate) fn run(arguments: &ReportArguments) -> Result<(), Failure> {
         &arguments.files,
         |topic, message| take(&mut report, topic, message),
         |path, error: RecordError| {
-            Failure::usage(format!("the record {}: {error}", path.display()))
-                .remedy("give a file that mmt made with --record")
+            Failure::usage(format!("the record {}: {error}", path.display())).remedy(RECORDS)
         },
     )?;
     for (path, ended) in arguments.files.iter().zip(read.with_sessions()?) {

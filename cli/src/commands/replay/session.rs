@@ -10,7 +10,7 @@ use mmt_shared::recording::Recording;
 use serde::Serialize;
 
 use crate::args::ReplayArguments;
-use crate::commands::records::read_run;
+use crate::commands::records::{RECORDS, read_run};
 use crate::failure::Failure;
 use crate::input::read_text;
 use crate::output::{print, print_json};
@@ -214,6 +214,6 @@ fn failure(path: &Path, error: &Error) -> Failure {
         Error::Again(AgainError::OtherProgram { .. }) => {
             Failure::usage(what).remedy("take the version that made it; mmt export reads it anyway")
         }
-        _ => Failure::usage(what).remedy("give a file that mmt made with --record"),
+        _ => Failure::usage(what).remedy(RECORDS),
     }
 }
