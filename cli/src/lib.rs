@@ -27,7 +27,7 @@ use std::time::Duration;
 
 use clap::Parser;
 
-use args::{Arguments, Command};
+use args::{Arguments, Command, hinted};
 use failure::Failure;
 use log::Messages;
 use panics::PANICS;
@@ -41,7 +41,7 @@ pub fn run() -> ExitCode {
     let ended = match Arguments::try_parse() {
         Ok(arguments) => execute(arguments.command),
         Err(_) if lacks_live() => Err(no_live()),
-        Err(error) => return answer(&error),
+        Err(error) => return answer(&hinted(error, &words())),
     };
     let outcomes = [ended, PANICS.judge()];
     let mut code = ExitCode::SUCCESS;
@@ -82,6 +82,14 @@ fn execute(command: Command) -> Result<(), Failure> {
         Command::Man(arguments) => commands::manual::pages(&arguments),
         Command::Bench(arguments) => commands::bench::run(&arguments),
     }
+}
+
+/// The command line, for what is said of it.
+fn words() -> Vec<String> {
+    let words = std::env::args_os();
+    words
+        .map(|word| word.to_string_lossy().into_owned())
+        .collect()
 }
 
 /// Whether `mmt live` is asked for and this build has none.

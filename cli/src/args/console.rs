@@ -4,6 +4,8 @@ use std::net::SocketAddr;
 use std::path::PathBuf;
 
 use clap::Args;
+use clap::builder::StyledStr;
+use clap::error::{ContextKind, ContextValue};
 use mmt_client::io::console::ConsoleOptions;
 
 use super::values;
@@ -12,7 +14,8 @@ use crate::failure::Failure;
 /// Arguments of every command with a hand.
 #[derive(Clone, Debug, Default, Args)]
 pub(crate) struct ConsoleArguments {
-    /// Serve the console for a browser here, and print its address [default of --console alone: 127.0.0.1:0]
+    /// Serve the console for a browser here (with =, without a space), and print its address [default of --console
+    /// alone: 127.0.0.1:0]
     #[arg(long, value_name = "ADDR:PORT", value_parser = values::listen, num_args = 0..=1, require_equals = true, default_missing_value = "127.0.0.1:0")]
     console: Option<SocketAddr>,
     /// Serve no console
@@ -46,9 +49,21 @@ impl ConsoleArguments {
         }
         Ok(Some(ConsoleOptions {
             listen,
+            for_others: None,
             assets: self.assets.clone(),
         }))
     }
+}
+
+/// What clap refuses of `words`; where that is the address of a console behind a space, with how it is written.
+pub(crate) fn hinted(mut error: clap::Error, words: &[String]) -> clap::Error {
+    let mut pairs = words.iter().zip(words.iter().skip(1));
+    let apart = pairs.find(|(option, at)| *option == "--console" && values::listen(at).is_ok());
+    if let Some((option, at)) = apart {
+        let tip = StyledStr::from(format!("write {option}={at}, without a space"));
+        error.insert(ContextKind::Suggested, ContextValue::StyledStrs(vec![tip]));
+    }
+    error
 }
 
 #[cfg(test)]

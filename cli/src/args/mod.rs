@@ -32,7 +32,7 @@ pub(crate) use bench::{
     BenchArguments, BenchSubject, PlantBenchArguments, TransportBenchArguments,
 };
 pub(crate) use config::{ConfigArguments, ConfigCommand, ShowArguments};
-pub(crate) use console::ConsoleArguments;
+pub(crate) use console::{ConsoleArguments, hinted};
 pub(crate) use demo::DemoArguments;
 pub(crate) use device::{
     DeviceArguments, DeviceListArguments, DeviceTestArguments, DeviceWords, DevicesArguments,

@@ -232,3 +232,22 @@ fn an_observer_takes_nothing_over_and_has_no_hand() {
             .contains("0 to 64")
     );
 }
+
+#[test]
+fn an_address_behind_a_space_is_told_how_it_is_written() {
+    let told = |words: &[&str]| {
+        let words: Vec<String> = words.iter().map(|&word| word.to_owned()).collect();
+        let error = Arguments::try_parse_from(&words).unwrap_err();
+        hinted(error, &words).to_string()
+    };
+    for words in [
+        &["mmt", "demo", "--console", "127.0.0.1:8080"][..],
+        &["mmt", "master", "-", "--console", "127.0.0.1:8080"],
+        &["mmt", "master", "--console", "127.0.0.1:8080", "-"],
+    ] {
+        let text = told(words);
+        assert!(text.contains("write --console=127.0.0.1:8080"), "{text}");
+    }
+    let other = told(&["mmt", "demo", "--console", "--nonsense"]);
+    assert!(!other.contains("write --console"), "{other}");
+}

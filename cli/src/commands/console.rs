@@ -8,7 +8,7 @@ use mmt_client::operator::pointer::HandEvent;
 use mmt_netem::Direction;
 use mmt_netem::LinkConfig;
 use mmt_netem::presets::PRESETS;
-use mmt_server::io::SlaveLive;
+use mmt_server::io::{SlaveLive, address_for_others};
 use mmt_shared::io::emergency::EmergencyStop;
 use mmt_shared::model::update::Cause;
 use serde::Serialize;
@@ -82,9 +82,12 @@ impl SessionConsole {
         wanted: bool,
         emergency: &EmergencyStop,
     ) -> Result<Option<Self>, Failure> {
-        let Some(options) = arguments.options(wanted)? else {
+        let Some(mut options) = arguments.options(wanted)? else {
             return Ok(None);
         };
+        if options.listen.ip().is_unspecified() {
+            options.for_others = address_for_others();
+        }
         let console = Console::start(options, emergency.clone()).map_err(failure)?;
         note(format_args!("console: {}", console.address()));
         let causes: Vec<&str> = Cause::ALL.into_iter().map(Cause::name).collect();

@@ -18,7 +18,7 @@ use mmt_shared::pairing::Token;
 pub(super) enum Refusal {
     /// The Host is no name of this console.
     #[error(
-        "this console is not called so: open the address as mmt printed it, or through localhost"
+        "this console is not called so: open the address as mmt printed it, through localhost, or by the host's IP address"
     )]
     Host,
     /// The page is another's.

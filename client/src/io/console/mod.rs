@@ -11,7 +11,7 @@ mod shared;
 mod viewer;
 
 use std::io;
-use std::net::SocketAddr;
+use std::net::{IpAddr, Ipv4Addr, SocketAddr};
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
@@ -52,6 +52,8 @@ const VIEWERS_MAX: usize = 32;
 pub struct ConsoleOptions {
     /// Where it listens; port 0 lets the system choose.
     pub listen: SocketAddr,
+    /// The address by which other hosts reach this one, named where it listens at every address.
+    pub for_others: Option<IpAddr>,
     /// Where the page's files come from while somebody works on them; the program's own if absent.
     pub assets: Option<PathBuf>,
 }
@@ -117,7 +119,8 @@ impl Console {
             .name("mmt-console".to_owned())
             .spawn(move || runtime.block_on(serve(listener, served)))
             .map_err(ConsoleError::Thread)?;
-        let address = format!("http://{local}/?token={}", ticket.reveal());
+        let reached = reached(local, options.for_others);
+        let address = format!("http://{reached}/?token={}", ticket.reveal());
         Ok(Self {
             address,
             shared,
@@ -171,6 +174,15 @@ impl Console {
     pub fn viewers(&self) -> usize {
         self.shared.stage().viewers
     }
+}
+
+/// Where a console that listens at `local` is reached, also by others if they can: nobody opens a wildcard.
+fn reached(local: SocketAddr, for_others: Option<IpAddr>) -> SocketAddr {
+    if !local.ip().is_unspecified() {
+        return local;
+    }
+    let own = for_others.unwrap_or(Ipv4Addr::LOCALHOST.into());
+    (own, local.port()).into()
 }
 
 async fn serve(listener: tokio::net::TcpListener, shared: Arc<Shared>) {

@@ -42,6 +42,7 @@ fn next_frame(viewer: &mut WebSocket<TcpStream>) -> u64 {
 fn a_viewer_that_never_reads_costs_nobody_else_anything() {
     let options = ConsoleOptions {
         listen: ([127, 0, 0, 1], 0).into(),
+        for_others: None,
         assets: None,
     };
     let emergency = EmergencyStop::default();
@@ -79,4 +80,18 @@ fn a_viewer_that_never_reads_costs_nobody_else_anything() {
     };
     assert!(gap.1 >= seen, "{gap:?} of {seen}");
     assert!(made.load(Ordering::Relaxed) >= seen);
+}
+
+#[test]
+fn a_console_that_listens_everywhere_is_named_by_an_address_that_others_open() {
+    let told = |local: &str, others: Option<&str>| {
+        let others = others.map(|address| address.parse().unwrap());
+        reached(local.parse().unwrap(), others).to_string()
+    };
+    let others = Some("192.0.2.7");
+    assert_eq!(told("0.0.0.0:8080", others), "192.0.2.7:8080");
+    assert_eq!(told("[::]:8080", others), "192.0.2.7:8080");
+    assert_eq!(told("0.0.0.0:8080", None), "127.0.0.1:8080");
+    assert_eq!(told("127.0.0.1:8080", others), "127.0.0.1:8080");
+    assert_eq!(told("192.0.2.8:8080", others), "192.0.2.8:8080");
 }
