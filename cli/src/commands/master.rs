@@ -270,6 +270,10 @@ fn operator(
             Err(Failure::usage("--push goes with recorded pushes only")
                 .remedy("add --operator trace:FILE, or leave --push out"))
         }
+        OperatorWords::Pointer if arguments.console.options(true)?.is_none() => {
+            let what = "--operator pointer with --no-console: nobody could take the hand";
+            Err(Failure::usage(what).remedy("leave one of the two out"))
+        }
         OperatorWords::Pointer => Ok(person(Driver::Pointer)),
         OperatorWords::Scripted if arguments.console.options(false)?.is_some() => {
             Ok(person(Driver::Scripted))

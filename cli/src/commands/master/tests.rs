@@ -88,6 +88,16 @@ fn each_wrong_input_is_named_with_what_to_do() {
 }
 
 #[test]
+fn a_pointer_without_a_console_is_refused_as_a_hand_that_nobody_can_take() {
+    let words = [&pairing_string(), "--operator", "pointer", "--no-console"];
+    let nobody = complaint(&words);
+    assert!(
+        nobody.contains("--no-console") && nobody.contains("what to do"),
+        "{nobody}"
+    );
+}
+
+#[test]
 fn a_session_that_broke_is_a_failure_and_one_that_was_ended_is_not() {
     assert!(judge(Some(SessionEnd::LinkSilent)).is_err());
     assert!(judge(Some(SessionEnd::SlaveEnded(Ending::Failed))).is_err());
