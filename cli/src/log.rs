@@ -20,8 +20,9 @@ use crate::output::note;
 
 /// The environment variable that chooses what is logged.
 pub(crate) const VARIABLE: &str = "MMT_LOG";
-/// What is logged without it: our own messages and everybody's warnings.
-const DEFAULT: &str = "warn,mmt_cli=info,mmt_client=info,mmt_server=info,mmt_netem=info";
+/// What is logged without it: our own messages and everybody's warnings. A right that a loop was granted is no news.
+const DEFAULT: &str = "warn,mmt_cli=info,mmt_client=info,mmt_server=info,mmt_netem=info,\
+     mmt_shared::io::identity_file=info";
 /// Messages kept while the live view is shown; older ones are dropped.
 const KEPT_MAX: usize = 100;
 /// Messages of one cause, a line of the program, that are shown in a window of time: a stranger's thousand attempts are
@@ -265,6 +266,20 @@ mod tests {
         assert_eq!(shown.count(), 10);
         assert_eq!(cause.admit(start + WINDOW), Some(990));
         assert_eq!(cause.admit(start + WINDOW), Some(0));
+    }
+
+    #[test]
+    fn by_default_changed_tokens_are_shown_and_rights_that_were_granted_are_not() {
+        let subscriber = tracing_subscriber::fmt().with_env_filter(filter(DEFAULT).unwrap());
+        let _guard = tracing::subscriber::set_default(subscriber.finish());
+        assert!(tracing::enabled!(
+            target: "mmt_shared::io::identity_file::token_list",
+            tracing::Level::INFO
+        ));
+        assert!(!tracing::enabled!(
+            target: "mmt_shared::io::loop_thread::spawn",
+            tracing::Level::INFO
+        ));
     }
 
     #[test]
