@@ -47,8 +47,10 @@ pub(crate) fn run(arguments: &LiveArguments) -> Result<(), Failure> {
         }
         Ok(false) => {
             let what = format!("{shown} is whole: the session that it holds has ended");
-            Err(Failure::usage(what)
-                .remedy("open the file itself in the viewer, or see mmt report"))
+            Err(Failure::usage(what).remedy(
+                "open the file itself in the viewer, or see mmt report; \
+                 for a session that is to begin, remove the file or start mmt live after it",
+            ))
         }
         Err(_) if stop.asked() => Ok(()),
         Err(error) => Err(Failure::usage(format!("{shown}: {error}"))),

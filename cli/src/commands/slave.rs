@@ -116,6 +116,9 @@ fn judge<C>(once: bool, report: Option<&RunReport<C>>) -> Result<(), Failure> {
 fn plugged_in(listen: SocketAddr, stop: &Stop) -> Result<Option<PlantHost>, Failure> {
     let plant = PlantHost::start(listen).map_err(plant_failure)?;
     note(format_args!("plant: {}", plant.address()));
+    note(
+        "waiting for a plant: until it comes, the slave does not listen and prints no pairing string",
+    );
     while !plant.wait(PLANT_WAIT) {
         if stop.asked() {
             return Ok(None);

@@ -93,6 +93,7 @@ fn plugged_in(arguments: &PlantBenchArguments, stop: &Stop) -> Result<Option<Loc
     let plant = LockStep::start(arguments.plant.listen()?);
     let mut plant = plant.map_err(plant_failure)?;
     note(format_args!("plant: {}", plant.address()));
+    note("waiting for a plant");
     while !plant.wait() {
         if stop.asked() {
             return Ok(None);
