@@ -41,7 +41,7 @@ pub(crate) struct PlantBenchArguments {
     /// Emulated network in each direction
     #[arg(long, value_name = "WORDS", default_value = "delay 50ms 5ms loss 1%", value_parser = values::netem)]
     pub(crate) netem: LinkConfig,
-    /// Configuration of the slave, TOML
+    /// Configuration, TOML, of which the slave's keys alone count
     #[arg(long, value_name = "FILE")]
     pub(crate) config: Option<PathBuf>,
     /// When updates are sent [default: the file's, else the mode's]

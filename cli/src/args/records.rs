@@ -12,7 +12,8 @@ use super::values::{self, Period};
 /// Arguments of `mmt replay`.
 #[derive(Debug, Args)]
 pub(crate) struct ReplayArguments {
-    /// Recorded pushes, or records of sessions (MCAP), of which the options below change nothing
+    /// Recorded pushes; or records of sessions (MCAP), of which --deadband, --t-update, --splits and --seed change
+    /// nothing
     #[arg(value_name = "FILE", required = true)]
     pub(crate) files: Vec<PathBuf>,
     /// Delta of (12): the force error that calls for an update

@@ -151,7 +151,7 @@ pub(super) fn period(text: &str) -> Result<Period, String> {
 pub(super) fn listen(text: &str) -> Result<SocketAddr, String> {
     text.parse().map_err(|_| {
         "write address and port: 0.0.0.0:4433 for all of this host's IPv4 addresses, [::]:4433 for \
-         IPv6, 127.0.0.1:0 for this host alone and any free port"
+         IPv6, and IPv4 as well, 127.0.0.1:0 for this host alone and any free port"
             .to_owned()
     })
 }
