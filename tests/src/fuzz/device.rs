@@ -25,7 +25,7 @@ pub(super) fn inverse3(input: &[u8]) -> Outcome {
         held.at(now);
         match std::str::from_utf8(line) {
             Ok(text) => device.handle(now, text, |event| held.judge(event)),
-            Err(_) => device.handle_other(now, |event| held.judge(event)),
+            Err(_) => device.handle_other(|event| held.judge(event)),
         }
         let counts = *device.counts();
         assert_eq!(counts.taken + counts.malformed, frames, "{counts:?}");
