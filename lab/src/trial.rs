@@ -168,8 +168,8 @@ impl Trial {
 #[derive(Clone, Debug, Default)]
 struct Counters {
     contact_s: f64,
-    /// Contact in the current push, s.
-    push_contact_s: f64,
+    /// Contact in the push that the change is to come in, s; none before it, and while the push before is still let go.
+    push_contact_s: Option<f64>,
     opening_updates: u64,
     later_updates: u64,
     watch: Option<Watch>,
@@ -189,7 +189,11 @@ impl Counters {
                 self.later_updates += sent;
             }
             self.contact_s += TICK_S;
-            self.push_contact_s += TICK_S;
+            if let Some(contact_s) = &mut self.push_contact_s {
+                *contact_s += TICK_S;
+            }
+        } else if self.push_contact_s.is_none() {
+            self.push_contact_s = Some(0.0);
         }
         if let Some(watch) = &mut self.watch {
             watch.take(slave);

@@ -19,7 +19,7 @@ use mmt_shared::rng::Substream;
 use crate::world::WorldConfig;
 
 /// Error of the size that images show, m r.m.s. per face: that of the position in one image.
-const SIZE_NOISE_M: f64 = 1e-3;
+pub(crate) const SIZE_NOISE_M: f64 = 1e-3;
 /// A second body is at least this far from where the hand begins, m.
 const HAND_ROOM_M: f64 = 0.02;
 /// The hand gives no more than this, N: what takes more does not move.

@@ -69,8 +69,9 @@ pub struct ObserverConfig {
     /// Largest coefficient of friction that the tool may have on the object; 0 of a smooth tool, whose force is normal to the
     /// face.
     pub tool_friction: f64,
-    /// Whether it takes images, learns the face offsets and reckons with how the box turns and slides. Otherwise vision
-    /// gives the first pose only, as in the paper.
+    /// Whether it takes images of the pose. Otherwise vision gives the first pose only, as in the paper.
+    pub images: bool,
+    /// Whether it learns the face offsets, and reckons with how the box turns and slides: recommended mode.
     pub learn: bool,
     /// Whether it is pushed so slowly that the push equals the ground's friction: then it is followed by the force alone.
     pub quasi_static: bool,
@@ -281,7 +282,7 @@ impl PoseObserver {
             self.angle.let_go(LET_GO.1 * LET_GO.1);
         }
         // without images the friction alone shows where the box stops
-        let coasts = self.config.learn && self.motion.twist != Twist::default();
+        let coasts = self.config.images && self.motion.twist != Twist::default();
         let (linear, angular) = if coasts { COAST } else { (0.0, 0.0) };
         self.centre.predict(linear);
         self.centre.widen(REST_DRIFT_M * REST_DRIFT_M * TICK_S);

@@ -110,9 +110,10 @@ impl Running {
         };
         let pushes = self.world.operator().pushes_completed().unwrap_or_default();
         if pushes != change.after_pushes {
-            self.run.push_contact_s = 0.0;
+            self.run.push_contact_s = None;
         }
-        if self.run.push_contact_s <= 0.0 || self.run.push_contact_s < change.contact_s {
+        let contact_s = self.run.push_contact_s.unwrap_or_default();
+        if contact_s <= 0.0 || contact_s < change.contact_s {
             return Ok(());
         }
         change.to.apply(self.world.environment_mut())?;

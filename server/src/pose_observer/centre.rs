@@ -32,7 +32,7 @@ impl PoseObserver {
     /// Moves the centre along the face until `surface`, where the tool touches it, lies between the face's ends: the model is
     /// to be where the tool has contact (III-A, case 2). Images do so where there are any.
     pub(super) fn reach_along(&mut self, face: Face, surface: Vec2) {
-        if self.config.learn {
+        if self.config.images {
             return;
         }
         let pose = &mut self.motion.pose;

@@ -126,6 +126,7 @@ mod tests {
             vision_noise_rad: 3e-3,
             size_noise_m: None,
             tool_friction: 0.0,
+            images: true,
             learn: true,
             quasi_static,
         };

@@ -22,6 +22,7 @@ fn observer(learn: bool) -> PoseObserver {
         vision_noise_rad: 5e-3,
         size_noise_m: None,
         tool_friction: 0.0,
+        images: learn,
         learn,
     };
     PoseObserver::new(config, Pose::default(), BoxFootprint::square(0.40))

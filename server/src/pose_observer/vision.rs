@@ -15,13 +15,13 @@ const CLEAR: (f64, f64) = (5e-3, 5.0);
 impl PoseObserver {
     /// Whether an image that this mode uses was taken before all that is remembered: it shows nothing that can be compared.
     pub(crate) fn is_too_old(&self, vision: &VisionSample) -> bool {
-        self.config.learn && self.past.at(vision.taken).is_none()
+        self.config.images && self.past.at(vision.taken).is_none()
     }
 
     /// Takes in an image that was taken some time ago, if this mode uses it.
     pub fn see(&mut self, vision: &VisionSample) {
         let then = self.past.at(vision.taken);
-        let Some(then) = then.filter(|_| self.config.learn) else {
+        let Some(then) = then.filter(|_| self.config.images) else {
             return;
         };
         self.seen = Some(vision.taken);
@@ -38,7 +38,7 @@ impl PoseObserver {
             slow.see(vision.pose);
             return;
         }
-        if self.refutes(turn, &then) {
+        if self.config.learn && self.refutes(turn, &then) {
             self.become_tangent(turn, error);
             return;
         }
@@ -90,6 +90,9 @@ impl PoseObserver {
         }
         let along = error - is.inward * is.inward.dot(&error);
         self.motion.pose.position += along * gain;
+        if !self.config.learn {
+            return;
+        }
         let known = self.faces.footprint.offset(is.face);
         let seen = was.inward.dot(&(vision.pose.position - was.surface)) + was.beyond_m;
         self.faces

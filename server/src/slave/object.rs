@@ -89,6 +89,7 @@ impl ObjectEstimate {
             .estimator
             .unwrap_or_else(|| EstimatorConfig::of_mode(config.mode, coupling))
             .starting_at(mbc);
+        let learn = config.mode == Mode::Recommended;
         let observer = ObserverConfig {
             coupling,
             quasi_static: matches!(estimator, EstimatorConfig::QuasiStatic(_)),
@@ -97,7 +98,8 @@ impl ObjectEstimate {
             vision_noise_rad: sensing.vision.angle_noise_rad,
             size_noise_m: sensing.vision.size_noise_m.filter(|_| !seen.is_empty()),
             tool_friction: config.plant.friction_in(config.mode),
-            learn: config.mode == Mode::Recommended || sensing.vision.rate_hz > 0.0,
+            images: learn || sensing.vision.rate_hz > 0.0,
+            learn,
         };
         let [m, b, c] = mbc;
         in_range("start model: side", "m", start.side_m, SIDE_M)?;

@@ -64,14 +64,14 @@ pub struct Tank {
 }
 
 impl Tank {
-    /// What it holds, J.
+    /// What it holds, J: less than nothing where friction of (5), which acts a tick too late, has driven the box.
     pub fn level_j(&self) -> f64 {
         self.level
     }
 
-    /// Puts in what the model has dissipated (J), up to [`TANK_MAX_J`].
+    /// Puts in what the model has dissipated (J, negative where the ground did work on it), up to [`TANK_MAX_J`].
     pub fn fill(&mut self, dissipated_j: f64) {
-        self.level = (self.level + dissipated_j.max(0.0)).min(TANK_MAX_J);
+        self.level = (self.level + dissipated_j).min(TANK_MAX_J);
     }
 
     /// Takes out `energy_j` if it is there, and returns whether it was.
@@ -129,12 +129,6 @@ impl Correction {
     pub fn snap(&mut self, pose: &mut Pose) {
         let all = self.remaining;
         self.apply(pose, all);
-    }
-
-    /// Turns the box at once about a fixed point of the world by all of the turn that remains.
-    pub fn snap_turn(&mut self, pose: &mut Pose, pivot: Vec2) {
-        let change = turn_about(pose, pivot, self.remaining.turn);
-        self.apply(pose, change);
     }
 
     /// Bleeds one tick's worth of what remains into `pose`. `touch` is what the HIP touches now,

@@ -46,23 +46,40 @@ impl Motion {
         Self { pose, twist }
     }
 
-    /// Power (W, never negative) that the ground takes from this motion by friction and damping.
-    pub fn dissipation(&self, law: FrictionLaw, params: &ModelParams) -> f64 {
-        let speed2 = self.twist.linear.norm_squared();
-        let friction = match law {
-            FrictionLaw::Sign => params.c() * speed2.sqrt() + params.e() * self.twist.angular.abs(),
-            FrictionLaw::LimitSurface => {
-                let turning = params.e() * self.twist.angular;
-                (params.c() * params.c() * speed2 + turning * turning).sqrt()
+    /// Power (W) that the ground took by friction and damping in the step to this motion, from the velocity `before` it. A step
+    /// takes at least this from the energy. It is negative where (5) and (11) act along a velocity that the step has reversed.
+    pub fn dissipation(&self, law: FrictionLaw, params: &ModelParams, before: &Twist) -> f64 {
+        let Twist { linear, angular } = self.twist;
+        match law {
+            FrictionLaw::Sign => {
+                let (friction, moment) = sign_friction(before, params);
+                (friction + before.linear * params.b()).dot(&linear) + moment * angular
             }
-        };
-        friction + params.b() * speed2
+            FrictionLaw::LimitSurface => {
+                let (speed2, turning) = (linear.norm_squared(), params.e() * angular);
+                let friction = (params.c() * params.c() * speed2 + turning * turning).sqrt();
+                friction + params.b() * speed2
+            }
+        }
     }
 }
 
-/// (5) and (11): explicit friction, decoupled. In the plane `sign(v)` is the direction v/|v|, which is
-/// the only reading of the paper's scalar equation that does not depend on the choice of axes.
+/// (5) and (11): explicit friction, decoupled.
 fn sign_step(twist: &Twist, params: &ModelParams, force: Vec2, moment: f64) -> Twist {
+    let (friction, turning) = sign_friction(twist, params);
+    // (5), which is (1) solved for the acceleration
+    let a = (force - twist.linear * params.b() - friction) / params.m();
+    // (11), which is (7) solved likewise
+    let alpha = (moment - turning) / params.inertia();
+    Twist {
+        linear: twist.linear + a * TICK_S,
+        angular: twist.angular + alpha * TICK_S,
+    }
+}
+
+/// c sign(v) (N) and e sign(omega) (N m). In the plane `sign(v)` is the direction v/|v|, which is the only reading of the
+/// paper's scalar equation that does not depend on the choice of axes.
+fn sign_friction(twist: &Twist, params: &ModelParams) -> (Vec2, f64) {
     let v = twist.linear;
     let speed = v.norm();
     let direction = if speed > 0.0 {
@@ -71,9 +88,7 @@ fn sign_step(twist: &Twist, params: &ModelParams, force: Vec2, moment: f64) -> T
         Vec2::zeros()
     };
     let c = explicit(params.c(), params.m(), speed, EXPLICIT_MOST.0);
-    // (5), which is (1) solved for the acceleration
-    let a = (force - v * params.b() - direction * c) / params.m();
-    // (11), which is (7) solved likewise; signum of a float is ±1 at zero, the equation's is 0
+    // signum of a float is ±1 at zero, the equation's is 0
     let sign = if twist.angular == 0.0 {
         0.0
     } else {
@@ -81,11 +96,7 @@ fn sign_step(twist: &Twist, params: &ModelParams, force: Vec2, moment: f64) -> T
     };
     let rate = twist.angular.abs();
     let e = explicit(params.e(), params.inertia(), rate, EXPLICIT_MOST.1);
-    let alpha = (moment - e * sign) / params.inertia();
-    Twist {
-        linear: v + a * TICK_S,
-        angular: twist.angular + alpha * TICK_S,
-    }
+    (direction * c, e * sign)
 }
 
 /// Friction (N or N m) on a body of this inertia (kg or kg m²) at this speed, as far as an explicit step can have it.

@@ -106,7 +106,7 @@ impl LocalModel {
 
     /// All that the hand could get back, J: what spring and box hold, and what the tank has for corrections.
     pub fn returnable_j(&self) -> f64 {
-        self.energy_now() + self.correction.tank.level_j()
+        self.energy_now() + self.correction.tank.level_j().max(0.0)
     }
 
     /// Times that a number of the box was none, so that it went back to where it last was good.

@@ -11,6 +11,7 @@ use crate::experiment::findings::ExperimentError;
 use crate::experiment::grid;
 use crate::experiments::loss::{Loss, link};
 use crate::world::WorldConfig;
+use crate::worlds::SIZE_NOISE_M;
 
 /// One-way delays, ms.
 const DELAYS_MS: [u64; 13] = [0, 1, 2, 5, 10, 14, 20, 50, 100, 250, 500, 1000, 2000];
@@ -32,7 +33,7 @@ pub(super) enum Size {
     Unknown,
     /// Nothing, and the operator nudges each new face and rests until the answer must have come.
     Nudged,
-    /// All of it, by vision.
+    /// What images show of it.
     Known,
 }
 
@@ -89,7 +90,7 @@ impl GridPoint {
             Size::Unknown => {}
             // a round trip, and a second to see what it did
             Size::Nudged => config.operator.dwell_s = 2e-3 * self.one_way_ms as f64 + 1.0,
-            Size::Known => config.slave.start.side_m = config.slave.environment.side_m,
+            Size::Known => config.slave.sensing.vision.size_noise_m = Some(SIZE_NOISE_M),
         }
         // what the other architectures do not have either
         config.slave.repeats_ms = Repeats::NONE;

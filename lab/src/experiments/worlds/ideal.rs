@@ -9,7 +9,7 @@ use mmt_server::trigger::Scheme;
 use mmt_shared::stats::values::quantile;
 
 use super::row::Row;
-use super::run::{Truth, reach};
+use super::run::reach;
 use super::tables::share_above;
 use crate::experiment::findings::Extent;
 use crate::experiment::grid::Group;
@@ -20,7 +20,7 @@ use crate::worlds::RandomWorld;
 struct Ideal {
     name: &'static str,
     make: fn(&mut RandomWorld),
-    /// From how much contact on the slave's estimator is given the true m, b and c.
+    /// From how much contact on the slave's estimator is given the true m, b and c of the body that is touched.
     truth: Option<Duration>,
 }
 
@@ -91,20 +91,15 @@ const IDEALS: [Ideal; 12] = [
 
 /// The local model begins with the object's m, b and c.
 fn known(world: &mut RandomWorld) {
-    let [mass_kg, damping_ns_per_m, friction_n] = params(world);
+    let object = &world.config.slave.environment;
+    let (mass_kg, damping_ns_per_m) = (object.mass_kg, object.damping_ns_per_m);
     let start = &mut world.config.slave.start;
     *start = StartModel {
         mass_kg,
         damping_ns_per_m,
-        friction_n,
+        friction_n: world.friction_n,
         ..*start
     };
-}
-
-/// m (kg), b (N s/m), c (N) of the object.
-fn params(world: &RandomWorld) -> [f64; 3] {
-    let object = &world.config.slave.environment;
-    [object.mass_kg, object.damping_ns_per_m, world.friction_n]
 }
 
 /// The relative errors of the movable worlds and their packets a second, each rising.
@@ -125,11 +120,7 @@ pub(super) fn compare(
     let groups = runner.grid_from(first, "worlds", extent.seeds, cases, |ideal: &&Ideal, n| {
         let mut world = RandomWorld::new(n);
         (ideal.make)(&mut world);
-        let truth = ideal.truth.map(|from| Truth {
-            params: params(&world),
-            from,
-        });
-        let reached = reach(&world.config, truth, extent.duration)?;
+        let reached = reach(&world.config, ideal.truth, extent.duration)?;
         Ok(Row { world, reached })
     })?;
     let runs = groups.iter().flat_map(|group| &group.runs);

@@ -48,19 +48,11 @@ pub(super) struct Measured {
     pub(super) digest: String,
 }
 
-/// What stands in the place of the slave's estimate.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Truth {
-    /// m (kg), b (N s/m) and c (N).
-    pub(super) params: [f64; 3],
-    /// From so much contact on.
-    pub(super) from: Duration,
-}
-
-/// Runs a world, with the estimates of its slave or with the `truth`.
+/// Runs a world, with the estimates of its slave, or from so much contact on with the true m, b and c of the body that is touched.
+/// That something holds the body is no number of its own: this remains the slave's to find.
 pub(super) fn reach(
     config: &WorldConfig,
-    truth: Option<Truth>,
+    truth_from: Option<Duration>,
     duration: Duration,
 ) -> Result<Measured, ExperimentError> {
     let mut world = World::try_new(config).map_err(TrialError::from)?.judged();
@@ -71,13 +63,16 @@ pub(super) fn reach(
     let mut seen = Seen::new(TwoPorts::new(path_s), body);
     let mut contact = Duration::ZERO;
     for _ in 0..duration.as_millis() {
+        let slave = world.slave();
+        let free = slave.estimate().holding.is_none();
+        let body = slave.environment().truth();
         let mut known = |_, sensed: &Sensed| {
             if sensed.normal.is_some() {
                 contact += TICK;
             }
-            truth
-                .filter(|truth| contact >= truth.from)
-                .map(|truth| truth.params)
+            truth_from
+                .filter(|from| free && contact >= *from)
+                .map(|_| [body.m(), body.b(), body.c()])
         };
         let tick = world.step_given(Given {
             slave: Substitutes {

@@ -28,6 +28,7 @@ fn experiment(seed: u64) -> WorldConfig {
     config.slave.trigger.scheme = "useful 10% 150ms".parse().unwrap();
     config.slave.playout = PlayoutConfig {
         delay_ms: 0.0,
+        delay_max_ms: 0.0,
         ..PlayoutConfig::default()
     };
     config.seeded(seed)

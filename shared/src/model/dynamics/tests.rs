@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::fixtures::COUPLING;
+use crate::rng::Substream;
 
 fn params(b: f64) -> ModelParams {
     ModelParams::of_square(0.7, b, 2.06, 0.36, &COUPLING).unwrap()
@@ -160,6 +161,59 @@ fn sliding_weakens_the_resistance_to_turning() {
 }
 
 #[test]
+fn no_step_loses_less_than_its_dissipation_and_what_was_pushed_in() {
+    let mut draw = Substream::new(1, "test/dissipation", 0);
+    for law in [FrictionLaw::Sign, FrictionLaw::LimitSurface] {
+        for _ in 0..20_000 {
+            // fast, slow, and so slow that (5) reverses it
+            let size = libm::exp10(draw.uniform_in(-6.0, 0.0));
+            let mut part = || draw.uniform_in(-size, size);
+            let twist = Twist::new(part(), part(), 5.0 * part());
+            let (m, b, c) = (
+                draw.uniform_in(0.2, 5.0),
+                draw.uniform_in(0.0, 10.0),
+                draw.uniform_in(0.0, 6.0),
+            );
+            let p = ModelParams::of_square(m, b, c, 0.36, &COUPLING).unwrap();
+            let force = Vec2::new(draw.uniform_in(-3.0, 3.0), draw.uniform_in(-3.0, 3.0));
+            let lever = Vec2::new(draw.uniform_in(-0.2, 0.2), 0.18);
+            let before = Motion {
+                twist,
+                ..Motion::default()
+            };
+            let after = before.step(law, &p, force, lever);
+            let pushed = force.dot(&after.twist.linear) + cross(lever, force) * after.twist.angular;
+            let lost = energy(&before, &p) + pushed * TICK_S - energy(&after, &p);
+            let taken = after.dissipation(law, &p, &twist) * TICK_S;
+            assert!(
+                taken <= lost + 1e-12,
+                "{law:?} {twist:?}: {taken} J of {lost} J"
+            );
+        }
+    }
+}
+
+#[test]
+fn a_box_that_stands_dissipates_nothing_under_either_law() {
+    for (law, m, c, held) in [
+        (FrictionLaw::Sign, 0.7, 2.06, 0.0),
+        (FrictionLaw::Sign, 0.2, 6.0, 0.5),
+        (FrictionLaw::LimitSurface, 0.2, 6.0, 0.5),
+    ] {
+        let p = ModelParams::of_square(m, 3.0, c, 0.36, &COUPLING).unwrap();
+        let (mut motion, mut taken, mut put_in) = (Motion::default(), 0.0, 0.0);
+        for tick in 0..10_000 {
+            let force = Vec2::new(if tick == 0 { c + 0.5 } else { held }, 0.0);
+            let after = motion.step(law, &p, force, Vec2::zeros());
+            taken += after.dissipation(law, &p, &motion.twist) * TICK_S;
+            put_in += force.dot(&after.twist.linear) * TICK_S;
+            motion = after;
+        }
+        assert!(taken <= put_in + 1e-9, "{law:?}: {taken} J of {put_in} J");
+    }
+}
+
+#[test]
 fn dissipation_is_the_energy_that_a_coasting_step_loses() {
     let p = params(3.0);
     let motion = Motion {
@@ -168,7 +222,7 @@ fn dissipation_is_the_energy_that_a_coasting_step_loses() {
     };
     let next = motion.step(FrictionLaw::LimitSurface, &p, Vec2::zeros(), Vec2::zeros());
     let lost = energy(&motion, &p) - energy(&next, &p);
-    let power = next.dissipation(FrictionLaw::LimitSurface, &p);
+    let power = next.dissipation(FrictionLaw::LimitSurface, &p, &motion.twist);
     assert!(
         (lost / (power * TICK_S) - 1.0).abs() < 0.02,
         "first order in T"

@@ -167,7 +167,7 @@ impl Body {
         let params = state.params.steadied(&state.footprint, &settings.coupling);
         let after = before.step(settings.friction, &params, force, lever);
         (state.pose, state.twist) = (after.pose, after.twist);
-        let dissipated_w = after.dissipation(settings.friction, &params);
+        let dissipated_w = after.dissipation(settings.friction, &params, &before.twist);
         (Rendered { force, touch }, dissipated_w)
     }
 }

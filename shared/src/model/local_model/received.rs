@@ -16,26 +16,21 @@ impl LocalModel {
         }
     }
 
-    /// The paper's way. Cases 1 and 2 of III-A and a lost contact set position and orientation, a force
-    /// mismatch or the timer the orientation alone (a timer packet may carry the model's own).
+    /// The paper's way: an update carries "both geometry and impedance" (IV-A), and the geometry is set, whatever caused the
+    /// update. A velocity is neither: the box goes on with its own, but where a contact of one side only sets it elsewhere.
     pub(super) fn snap(&mut self, update: &Update) {
         self.aim(update);
         let state = &mut self.body.state;
+        state.footprint = update.state.footprint();
+        self.correction.snap(&mut state.pose);
+        self.correction.remaining = Default::default();
         match update.cause {
             Cause::MasterOnlyContact
             | Cause::SlaveOnlyContact
             | Cause::ContactLost
-            | Cause::Elsewhere => {
-                state.footprint = update.state.footprint();
-                self.correction.snap(&mut state.pose);
-                state.twist = update.state.twist();
-            }
-            Cause::Deadband | Cause::EverySample | Cause::Timer => {
-                let pivot = self.rendered.touch.map_or(state.pose.position, |t| t.proxy);
-                self.correction.snap_turn(&mut state.pose, pivot);
-            }
+            | Cause::Elsewhere => state.twist = update.state.twist(),
+            Cause::Deadband | Cause::EverySample | Cause::Timer => {}
         }
-        self.correction.remaining = Default::default();
         if let Some((_, hip)) = self.previous {
             let state = &self.body.state;
             self.body.god.after_jump(&state.footprint, &state.pose, hip);

@@ -177,6 +177,26 @@ fn mismatch_case_2_brings_the_model_to_the_hand() {
 }
 
 #[test]
+fn a_snapped_update_sets_the_whole_pose_whatever_caused_it() {
+    for cause in Cause::ALL {
+        let mut model = model(Mode::Paper, PoseCorrection::Snap);
+        push(&mut model, 1..=50);
+        let before = *model.state();
+        let mut elsewhere = before;
+        elsewhere.pose.position += Vec2::new(0.013, -0.007);
+        elsewhere.pose.angle += 0.05;
+        model.apply(&update(cause, 50, elsewhere));
+        let (is, was) = (model.state().pose, before.pose);
+        let shift = is.position - was.position;
+        assert!(
+            (shift - Vec2::new(0.013, -0.007)).norm() < 1e-12,
+            "{cause:?} {shift:?}"
+        );
+        assert!((is.angle - was.angle - 0.05).abs() < 1e-12, "{cause:?}");
+    }
+}
+
+#[test]
 fn in_free_space_the_box_comes_up_to_the_hip_and_not_over_it() {
     let mut model = model(Mode::Recommended, PoseCorrection::MatchedStamps);
     // not a whole number of the bleed's steps away
