@@ -69,9 +69,10 @@ pub struct ObserverConfig {
     /// Largest coefficient of friction that the tool may have on the object; 0 of a smooth tool, whose force is normal to the
     /// face.
     pub tool_friction: f64,
-    /// Whether it takes images of the pose. Otherwise vision gives the first pose only, as in the paper.
+    /// Whether it takes images: they show the pose, and the faces that are touched. Otherwise vision gives the first pose only,
+    /// as in the paper.
     pub images: bool,
-    /// Whether it learns the face offsets, and reckons with how the box turns and slides: recommended mode.
+    /// Whether touch teaches it the face offsets too, and it reckons with how the box turns and slides: recommended mode.
     pub learn: bool,
     /// Whether it is pushed so slowly that the push equals the ground's friction: then it is followed by the force alone.
     pub quasi_static: bool,

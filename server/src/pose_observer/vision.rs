@@ -90,9 +90,6 @@ impl PoseObserver {
         }
         let along = error - is.inward * is.inward.dot(&error);
         self.motion.pose.position += along * gain;
-        if !self.config.learn {
-            return;
-        }
         let known = self.faces.footprint.offset(is.face);
         let seen = was.inward.dot(&(vision.pose.position - was.surface)) + was.beyond_m;
         self.faces

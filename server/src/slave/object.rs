@@ -250,7 +250,7 @@ impl ObjectEstimate {
             self.images_too_old += u64::from(observer.is_too_old(&vision));
             observer.see(&vision);
         }
-        // as wide as the learned faces; the paper's never change
+        // as wide as the learned faces; without images the paper's never change
         let side = observer.footprint().mean_side();
         let measured = Measured {
             tool: self.tool.step(contact.tool),
