@@ -210,7 +210,6 @@ pub fn paper_world(mode: Mode, scheme: Scheme) -> WorldConfig {
         slave: SlaveConfig {
             playout: PlayoutConfig {
                 delay_ms: 0.0,
-                delay_max_ms: 0.0,
                 ..PlayoutConfig::default()
             },
             trigger: TriggerConfig {
