@@ -355,5 +355,5 @@ fn a_node_of_ros_2_has_its_topics_and_packets() {
     command.env("PYTHONDONTWRITEBYTECODE", "1");
     let ended = Running::start(command).unwrap().end(GENEROUS).unwrap();
     assert!(ended.status.success(), "{:?} {}", ended.out, ended.err);
-    assert_eq!(ended.out.len(), 6, "{:?}", ended.out);
+    assert_eq!(ended.out.len(), 7, "{:?}", ended.out);
 }
