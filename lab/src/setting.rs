@@ -1,4 +1,4 @@
-//! The paper's experiment as a world: no delay, one sample a packet, and the choices the paper leaves open.
+//! The paper's experiment as a world: no network, one sample a packet, and the choices the paper leaves open.
 //!
 //! Literal where the paper is literal: a received pose is set on arrival, which is sound without delay. The same hand pushes
 //! in both modes. It sees the real object, because the local model is not displayed (IV-A), and draws back as soon as a
@@ -188,7 +188,7 @@ pub fn mode_name(mode: Mode) -> &'static str {
     }
 }
 
-/// The default scenario without a network: every sample is its own packet, is played at once, and an update is
+/// The default scenario without a network: every sample is its own packet, is played with the least delay, and an update is
 /// applied in the next tick.
 #[must_use]
 pub fn paper_world(mode: Mode, scheme: Scheme) -> WorldConfig {
