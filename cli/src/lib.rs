@@ -84,7 +84,7 @@ fn execute(command: Command) -> Result<(), Failure> {
     }
 }
 
-/// The command line, for what is said of it.
+/// The words of the command line.
 fn words() -> Vec<String> {
     let words = std::env::args_os();
     words

@@ -168,7 +168,7 @@ impl Trial {
 #[derive(Clone, Debug, Default)]
 struct Counters {
     contact_s: f64,
-    /// Contact in the push that the change is to come in, s; none before it, and while the push before is still let go.
+    /// Contact in the push that the change is to come in, s; none until the tool has let go after the push before.
     push_contact_s: Option<f64>,
     opening_updates: u64,
     later_updates: u64,

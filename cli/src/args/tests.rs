@@ -234,8 +234,8 @@ fn an_observer_takes_nothing_over_and_has_no_hand() {
 }
 
 #[test]
-fn an_address_behind_a_space_is_told_how_it_is_written() {
-    let told = |words: &[&str]| {
+fn an_address_behind_a_space_is_refused_with_how_it_is_written() {
+    let refusal = |words: &[&str]| {
         let words: Vec<String> = words.iter().map(|&word| word.to_owned()).collect();
         let error = Arguments::try_parse_from(&words).unwrap_err();
         hinted(error, &words).to_string()
@@ -245,9 +245,9 @@ fn an_address_behind_a_space_is_told_how_it_is_written() {
         &["mmt", "master", "-", "--console", "127.0.0.1:8080"],
         &["mmt", "master", "--console", "127.0.0.1:8080", "-"],
     ] {
-        let text = told(words);
+        let text = refusal(words);
         assert!(text.contains("write --console=127.0.0.1:8080"), "{text}");
     }
-    let other = told(&["mmt", "demo", "--console", "--nonsense"]);
+    let other = refusal(&["mmt", "demo", "--console", "--nonsense"]);
     assert!(!other.contains("write --console"), "{other}");
 }

@@ -8,12 +8,14 @@ use mmt_client::operator::pointer::HandEvent;
 use mmt_netem::Direction;
 use mmt_netem::LinkConfig;
 use mmt_netem::presets::PRESETS;
+use mmt_netem::words::ParseError;
 use mmt_server::io::{SlaveLive, address_for_others};
 use mmt_shared::io::emergency::EmergencyStop;
 use mmt_shared::model::update::Cause;
 use serde::Serialize;
 use serde_json::{Map, Value, json};
 
+use super::netem::control::without_seed;
 use super::netem::wrap::Emulation;
 use crate::args::ConsoleArguments;
 use crate::failure::{Exit, Failure};
@@ -85,9 +87,7 @@ impl SessionConsole {
         let Some(mut options) = arguments.options(wanted)? else {
             return Ok(None);
         };
-        if options.listen.ip().is_unspecified() {
-            options.for_others = address_for_others();
-        }
+        options.for_others = address_for_others();
         let console = Console::start(options, emergency.clone()).map_err(failure)?;
         note(format_args!("console: {}", console.address()));
         let causes: Vec<&str> = Cause::ALL.into_iter().map(Cause::name).collect();
@@ -220,15 +220,30 @@ impl SessionConsole {
             let (Some(words), Some(now)) = (words, now) else {
                 continue;
             };
-            // files can be named on the command line only
-            let link = words
-                .parse::<LinkConfig>()
-                .map_err(|error| error.to_string());
+            let link = wished(words);
             match link.and_then(|link| emulation.reconfigure(direction, &link).map(|()| link)) {
                 Ok(link) => *now = link,
                 Err(error) => wrong = Some(error),
             }
         }
         self.show_about([("note", json!(wrong))]);
+    }
+}
+
+/// What the words of a page ask of a link at work: files can be named on the command line only.
+fn wished(words: &str) -> Result<LinkConfig, String> {
+    let link = words.parse().map_err(|error: ParseError| error.to_string());
+    link.and_then(without_seed)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_page_asks_a_link_at_work_for_no_seed() {
+        assert!(wished("delay 5ms").is_ok());
+        assert!(wished("delay 5ms seed 7").unwrap_err().contains("seed"));
+        assert!(wished("delay 5").unwrap_err().contains("unit"));
     }
 }

@@ -50,6 +50,28 @@ fn a_change_of_friction_in_mid_push_is_followed() {
 }
 
 #[test]
+fn a_change_waits_until_the_tool_has_let_go_after_the_push_before() {
+    let changed = Trial {
+        change: Some(Change {
+            after_pushes: 1,
+            contact_s: 0.0,
+            to: Alteration::FrictionCoefficient(0.45),
+        }),
+        ..trial(20)
+    };
+    let mut running = Running::try_new(&changed).unwrap();
+    let friction_n = |running: &Running| running.world().slave().environment().truth().c();
+    let (first, mut has_let_go) = (friction_n(&running), false);
+    while friction_n(&running) == first && !running.is_over() {
+        let tick = running.step(Given::default()).unwrap();
+        let pushes = running.world().operator().pushes_completed();
+        let is_free = tick.slave.is_some_and(|slave| !slave.in_contact);
+        has_let_go |= pushes == Some(1) && is_free;
+    }
+    assert!(!running.is_over() && has_let_go);
+}
+
+#[test]
 fn a_change_to_an_impossible_object_is_an_error() {
     let impossible = Trial {
         change: Some(Change {

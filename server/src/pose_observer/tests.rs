@@ -14,6 +14,10 @@ use mmt_shared::time::TICK;
 const HALF: f64 = 0.18;
 
 fn observer(learn: bool) -> PoseObserver {
+    observer_of(learn, learn)
+}
+
+fn observer_of(images: bool, learn: bool) -> PoseObserver {
     let config = ObserverConfig {
         quasi_static: false,
         coupling: COUPLING,
@@ -22,7 +26,7 @@ fn observer(learn: bool) -> PoseObserver {
         vision_noise_rad: 5e-3,
         size_noise_m: None,
         tool_friction: 0.0,
-        images: learn,
+        images,
         learn,
     };
     PoseObserver::new(config, Pose::default(), BoxFootprint::square(0.40))
@@ -63,8 +67,7 @@ fn push_beyond(observer: &mut PoseObserver, ticks: u32, angle: f64, beyond_m: f6
 }
 
 /// How far from the true centre a box is taken to be that is pushed off its middle, turns and is never seen, m.
-fn off_after_turning(learn: bool) -> f64 {
-    let mut observer = observer(learn);
+fn off_after_turning(mut observer: PoseObserver) -> f64 {
     observer.faces = FaceMap::new(BoxFootprint::square(2.0 * HALF), None);
     let mut truth = Motion::default();
     for n in 1..=3000 {
@@ -82,9 +85,20 @@ fn off_after_turning(learn: bool) -> f64 {
 
 #[test]
 fn a_box_that_turns_slides_along_its_face_and_is_followed_unseen() {
-    let (stiff, sliding) = (off_after_turning(false), off_after_turning(true));
+    let [stiff, sliding] = [false, true].map(|learn| off_after_turning(observer(learn)));
     assert!(stiff > 3e-3, "{stiff} m");
     assert!(sliding < 0.2 * stiff, "{sliding} m of {stiff} m");
+}
+
+#[test]
+fn images_alone_show_the_touched_face_and_how_the_box_turns_is_not_reckoned_with() {
+    let mut seeing = observer_of(true, false);
+    let truth = push(&mut seeing, 1000, 0.0);
+    let west = seeing.footprint().west;
+    assert!((west - HALF).abs() < 2e-3, "{west} m");
+    assert!((seeing.pose().position - truth.position).norm() < 2e-3);
+    let unseen = off_after_turning(observer_of(true, false));
+    assert_eq!(unseen, off_after_turning(observer(false)));
 }
 
 #[test]

@@ -64,7 +64,7 @@ pub struct Tank {
 }
 
 impl Tank {
-    /// What it holds, J: less than nothing where friction of (5), which acts a tick too late, has driven the box.
+    /// What it holds, J: less than nothing where the explicit friction of (5) has driven the box.
     pub fn level_j(&self) -> f64 {
         self.level
     }

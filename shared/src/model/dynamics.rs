@@ -46,14 +46,16 @@ impl Motion {
         Self { pose, twist }
     }
 
-    /// Power (W) that the ground took by friction and damping in the step to this motion, from the velocity `before` it. A step
-    /// takes at least this from the energy. It is negative where (5) and (11) act along a velocity that the step has reversed.
+    /// Power (W) that the ground took by friction and damping in the step to this motion, from the velocity `before` it. An
+    /// implicit step takes at least this from the energy. The explicit one takes just this, at the mean of both velocities: less than
+    /// nothing where (5) and (11) drive the box, which they do where they reverse it.
     pub fn dissipation(&self, law: FrictionLaw, params: &ModelParams, before: &Twist) -> f64 {
         let Twist { linear, angular } = self.twist;
         match law {
             FrictionLaw::Sign => {
                 let (friction, moment) = sign_friction(before, params);
-                (friction + before.linear * params.b()).dot(&linear) + moment * angular
+                let shift = (friction + before.linear * params.b()).dot(&(before.linear + linear));
+                0.5 * (shift + moment * (before.angular + angular))
             }
             FrictionLaw::LimitSurface => {
                 let (speed2, turning) = (linear.norm_squared(), params.e() * angular);

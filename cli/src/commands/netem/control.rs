@@ -27,8 +27,14 @@ impl Command {
         let (command, words) = line.split_once(' ').unwrap_or((line, ""));
         match command {
             "" => Ok(None),
-            "up" => Ok(Some(Self::Link(Direction::Up, running(words)?))),
-            "down" => Ok(Some(Self::Link(Direction::Down, running(words)?))),
+            "up" => Ok(Some(Self::Link(
+                Direction::Up,
+                Box::new(of_running(words)?),
+            ))),
+            "down" => Ok(Some(Self::Link(
+                Direction::Down,
+                Box::new(of_running(words)?),
+            ))),
             "rebind" if words.is_empty() => Ok(Some(Self::Rebind)),
             _ => Err(format!(
                 "no command {line:?}: up WORDS, down WORDS or rebind"
@@ -38,14 +44,16 @@ impl Command {
 }
 
 /// New settings of a link at work.
-fn running(words: &str) -> Result<Box<LinkConfig>, String> {
-    let link = network(words)?;
+fn of_running(words: &str) -> Result<LinkConfig, String> {
+    network(words).and_then(without_seed)
+}
+
+/// New settings of a link at work, if they have no seed: it would change nothing.
+pub(crate) fn without_seed(link: LinkConfig) -> Result<LinkConfig, String> {
     if link.links().any(|link| link.seed.is_some()) {
-        return Err(format!(
-            "{words:?}: a link at work keeps its draws: leave the seed out"
-        ));
+        return Err("a link at work keeps its draws: leave the seed out".to_owned());
     }
-    Ok(Box::new(link))
+    Ok(link)
 }
 
 /// Hands the lines of stdin to `apply` on a thread of their own, until stdin ends or `apply` returns false.

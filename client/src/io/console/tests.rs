@@ -84,14 +84,14 @@ fn a_viewer_that_never_reads_costs_nobody_else_anything() {
 
 #[test]
 fn a_console_that_listens_everywhere_is_named_by_an_address_that_others_open() {
-    let told = |local: &str, others: Option<&str>| {
+    let named = |local: &str, others: Option<&str>| {
         let others = others.map(|address| address.parse().unwrap());
         reached(local.parse().unwrap(), others).to_string()
     };
     let others = Some("192.0.2.7");
-    assert_eq!(told("0.0.0.0:8080", others), "192.0.2.7:8080");
-    assert_eq!(told("[::]:8080", others), "192.0.2.7:8080");
-    assert_eq!(told("0.0.0.0:8080", None), "127.0.0.1:8080");
-    assert_eq!(told("127.0.0.1:8080", others), "127.0.0.1:8080");
-    assert_eq!(told("192.0.2.8:8080", others), "192.0.2.8:8080");
+    assert_eq!(named("0.0.0.0:8080", others), "192.0.2.7:8080");
+    assert_eq!(named("[::]:8080", others), "192.0.2.7:8080");
+    assert_eq!(named("0.0.0.0:8080", None), "127.0.0.1:8080");
+    assert_eq!(named("127.0.0.1:8080", others), "127.0.0.1:8080");
+    assert_eq!(named("192.0.2.8:8080", others), "192.0.2.8:8080");
 }

@@ -243,7 +243,7 @@ impl Person {
 }
 
 impl HandEvent {
-    /// Whether a console may say it beside a device, which is the one hand and works alone.
+    /// Whether a console may send it beside a device, which is the one hand and works alone.
     pub fn goes_beside_a_device(&self) -> bool {
         matches!(self, Self::Pause(_) | Self::Finish)
     }

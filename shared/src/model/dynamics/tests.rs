@@ -161,7 +161,7 @@ fn sliding_weakens_the_resistance_to_turning() {
 }
 
 #[test]
-fn no_step_loses_less_than_its_dissipation_and_what_was_pushed_in() {
+fn what_a_step_loses_besides_what_was_pushed_in_is_at_least_its_dissipation() {
     let mut draw = Substream::new(1, "test/dissipation", 0);
     for law in [FrictionLaw::Sign, FrictionLaw::LimitSurface] {
         for _ in 0..20_000 {
@@ -182,12 +182,24 @@ fn no_step_loses_less_than_its_dissipation_and_what_was_pushed_in() {
                 ..Motion::default()
             };
             let after = before.step(law, &p, force, lever);
-            let pushed = force.dot(&after.twist.linear) + cross(lever, force) * after.twist.angular;
+            let (linear, angular) = match law {
+                // explicit: the step goes at the mean of both velocities
+                FrictionLaw::Sign => (
+                    0.5 * (twist.linear + after.twist.linear),
+                    0.5 * (twist.angular + after.twist.angular),
+                ),
+                FrictionLaw::LimitSurface => (after.twist.linear, after.twist.angular),
+            };
+            let pushed = force.dot(&linear) + cross(lever, force) * angular;
             let lost = energy(&before, &p) + pushed * TICK_S - energy(&after, &p);
             let taken = after.dissipation(law, &p, &twist) * TICK_S;
             assert!(
                 taken <= lost + 1e-12,
                 "{law:?} {twist:?}: {taken} J of {lost} J"
+            );
+            assert!(
+                law == FrictionLaw::LimitSurface || taken >= lost - 1e-12,
+                "{twist:?}: {taken} J of {lost} J"
             );
         }
     }
@@ -195,21 +207,24 @@ fn no_step_loses_less_than_its_dissipation_and_what_was_pushed_in() {
 
 #[test]
 fn a_box_that_stands_dissipates_nothing_under_either_law() {
-    for (law, m, c, held) in [
-        (FrictionLaw::Sign, 0.7, 2.06, 0.0),
-        (FrictionLaw::Sign, 0.2, 6.0, 0.5),
-        (FrictionLaw::LimitSurface, 0.2, 6.0, 0.5),
+    for (law, m, c) in [
+        (FrictionLaw::Sign, 0.7, 2.06),
+        (FrictionLaw::Sign, 0.2, 6.0),
+        (FrictionLaw::LimitSurface, 0.2, 6.0),
     ] {
         let p = ModelParams::of_square(m, 3.0, c, 0.36, &COUPLING).unwrap();
-        let (mut motion, mut taken, mut put_in) = (Motion::default(), 0.0, 0.0);
+        let push = Vec2::new(c + 0.5, 0.0);
+        let mut motion = run(law, &p, Motion::default(), push, 1);
+        let mut taken = 0.0;
         for tick in 0..10_000 {
-            let force = Vec2::new(if tick == 0 { c + 0.5 } else { held }, 0.0);
-            let after = motion.step(law, &p, force, Vec2::zeros());
-            taken += after.dissipation(law, &p, &motion.twist) * TICK_S;
-            put_in += force.dot(&after.twist.linear) * TICK_S;
+            let after = motion.step(law, &p, Vec2::zeros(), Vec2::zeros());
+            if tick >= 1000 {
+                taken += after.dissipation(law, &p, &motion.twist) * TICK_S;
+            }
             motion = after;
         }
-        assert!(taken <= put_in + 1e-9, "{law:?}: {taken} J of {put_in} J");
+        // explicit friction makes it tremble: it takes and gives back what that holds
+        assert!(taken.abs() < 1e-4, "{law:?}: {taken} J in 9 s");
     }
 }
 
