@@ -9,7 +9,8 @@ use crate::experiments::delay::tuning::Tried;
 /// Error untuned and tuned, aligned by the delay, and the apparent mass; means with their intervals.
 pub(super) fn figure(judged: &[Judged<'_>]) -> Figure {
     type Measure = (&'static str, fn(&Judged<'_>) -> Option<Interval>, Axis);
-    let error = |label| Axis::log(label).over(0.001..10.0);
+    // below the curves there is room for the legend
+    let error = |label| Axis::log(label).over(0.0003..10.0);
     #[rustfmt::skip]
     let measures: [Measure; 4] = [
         ("as they are where nobody tunes them", |judged| force_error(judged.untuned), error("relative error")),
