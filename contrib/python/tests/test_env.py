@@ -35,7 +35,9 @@ def test_what_a_dict_leaves_out_is_mmts_own():
     assert steps[-1][4]["metrics"]["digest"] == run.digest
     seen = np.array([step[0] for step in steps])
     at = np.arange(99, 3000, 100)
-    for columns, array in [((0, 1), run.hip), ((2, 3), run.hand_force), ((4, 5, 6), run.pose_model), ((8, 9, 10), run.parameters_model)]:
+    # where the hand is; a run has what is sent of it, in steps of 0.1 um
+    assert np.abs(seen[:, :2] - run.hip[at]).max() <= 0.51e-7
+    for columns, array in [((2, 3), run.hand_force), ((4, 5, 6), run.pose_model), ((8, 9, 10), run.parameters_model)]:
         assert np.array_equal(seen[:, columns], array[at])
     assert np.array_equal(seen[:, 7], run.touching[at])
     for name in ["tool", "f_s", "f_shadow", "f_m_played", "pose_true"]:
