@@ -3,7 +3,8 @@
 
     viewers.py MMT
 
-Runs without and with viewers take turns. Of the ten one never reads. Ends with exit code 1 where the median tick costs more than 1.25 times as much.
+Runs without and with viewers take turns, many short ones: a host is now fast and now slow by more than viewers could cost. Of the ten one
+never reads. Ends with exit code 1 where the median tick with viewers costs more than 1.25 times that of the run before, by the median of all turns.
 """
 
 import json
@@ -15,7 +16,7 @@ import time
 from statistics import median
 from urllib.parse import urlsplit
 
-ROUNDS, LENGTH_S, VIEWERS, MOST = 3, 10, 10, 1.25
+ROUNDS, LENGTH_S, VIEWERS, MOST = 15, 4, 10, 1.25
 
 
 def join(address):
@@ -71,8 +72,8 @@ def main():
     for viewers, runs in found.items():
         p50, p99, read_bytes = (median(column) for column in zip(*runs))
         print(f"  viewers {viewers:2}    p50 {p50:5.1f} us   p99 {p99:5.1f} us   {read_bytes / 1e6 / LENGTH_S:4.2f} MB/s read")
-    ratio = median(p50 for p50, _, _ in found[VIEWERS]) / median(p50 for p50, _, _ in found[0])
-    print(f"  ratio of p50   {ratio:.2f}, at most {MOST}")
+    ratio = median(after[0] / before[0] for before, after in zip(found[0], found[VIEWERS]))
+    print(f"  ratio of p50   {ratio:.2f}, at most {MOST}; median over the turns")
     if not all(read_bytes > 1e6 for _, _, read_bytes in found[VIEWERS]) or ratio > MOST:
         sys.exit("BROKEN: ten viewers cost the tick nothing")
 
