@@ -15,12 +15,14 @@ pub(super) fn stage_weight(cutoff: f64) -> f64 {
 }
 
 /// One tick of (1) along the contact normal: `f = m a + b v + c s`.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Row {
     /// Regressor: acceleration a·n (m/s²), velocity v·n (m/s), s = sign(v·n).
     pub regressor: Vector3<f64>,
     /// Force f·n on the object, N.
     pub force: f64,
+    /// What a and v were multiplied by, and their noise with them: 1 for a push through the centre.
+    pub scale: f64,
 }
 
 impl Row {
@@ -64,6 +66,7 @@ impl StateVariableFilter {
         Row {
             regressor: signal.xyz(),
             force: signal.w,
+            scale: row.scale,
         }
     }
 }
@@ -84,7 +87,12 @@ mod tests {
             let regressor =
                 Vector3::new(libm::sin(t * 0.01), 0.2 + 0.1 * libm::cos(t * 0.017), 1.0);
             let force = theta.dot(&regressor);
-            let out = filter.step(Row { regressor, force });
+            let scale = 1.0;
+            let out = filter.step(Row {
+                regressor,
+                force,
+                scale,
+            });
             assert!((theta.dot(&out.regressor) - out.force).abs() < 1e-12);
         }
     }
@@ -95,8 +103,9 @@ mod tests {
         let (mut delay, mut last) = (0.0, 0.0);
         for _ in 0..400 {
             let row = Row {
+                regressor: Vector3::zeros(),
                 force: 1.0,
-                ..Row::default()
+                scale: 1.0,
             };
             last = filter.step(row).force;
             delay += (1.0 - last) * TICK_S;

@@ -39,9 +39,11 @@ pub(super) fn shared(motion: &SurfaceMotion, normal: Vec2, speed: f64, seen: &Se
     let per_moment = 6.0 * d / (side * side);
     let raw = motion.row.regressor;
     let s = force + per_moment * torque;
+    let scale = 1.0 / (1.0 + per_moment * d);
     Row {
-        regressor: Vector3::new(raw.x + carried, raw.y, s) / (1.0 + per_moment * d),
+        regressor: Vector3::new(raw.x + carried, raw.y, s) * scale,
         force: motion.row.force,
+        scale,
     }
 }
 
@@ -64,12 +66,13 @@ pub(super) fn slow_share(point: Vec2, normal: Vec2, seen: &Seen) -> f64 {
 #[must_use]
 pub(super) fn creeping(motion: &SurfaceMotion, normal: Vec2, seen: &Seen) -> Row {
     let d = lever_over_side(motion.point, normal, seen);
-    let share = 1.0 / (1.0 + 6.0 * d * d);
+    let scale = 1.0 / (1.0 + 6.0 * d * d);
     let raw = motion.row.regressor;
     let s = slow_share(motion.point, normal, seen);
     Row {
-        regressor: Vector3::new(raw.x * share, raw.y * share, s),
+        regressor: Vector3::new(raw.x * scale, raw.y * scale, s),
         force: motion.row.force,
+        scale,
     }
 }
 
@@ -79,6 +82,7 @@ mod tests {
     use crate::estimator::{Estimator, EstimatorConfig, Measured, RecommendedConfig, ToolGives};
     use mmt_shared::fixtures::COUPLING;
     use mmt_shared::model::geometry::{Pose, Twist, rotate};
+    use mmt_shared::rng::Substream;
     use mmt_shared::time::TICK_S;
 
     const SIDE: f64 = 0.36;
@@ -150,6 +154,20 @@ mod tests {
         }
     }
 
+    /// Pushes a box at rest for 2 s, `aside` m from its centre, and hands each tick on; the fastest turning, rad/s.
+    fn push_for_2_s(aside: f64, mut take: impl FnMut(Measured)) -> f64 {
+        let mut pushed = Box::at_rest();
+        let (mut tool, mut turned) = (Vec2::new(-SIDE / 2.0, aside), 0.0_f64);
+        for k in 0..2000 {
+            let t = f64::from(k) * TICK_S;
+            let modulation = 1.0 + 0.3 * libm::sin(5.0 * t) + 0.12 * libm::sin(14.0 * t);
+            tool.x += 0.15 * modulation * (t / 0.3).min(1.0) * TICK_S;
+            take(pushed.push(tool));
+            turned = turned.max(pushed.twist.angular.abs());
+        }
+        turned
+    }
+
     /// Largest relative error of m, b and c after a noise-free push of 2 s, `aside` m from the centre.
     fn worst_error(aside: f64, is_seen: bool) -> f64 {
         let mut config = RecommendedConfig::new(COUPLING);
@@ -160,17 +178,10 @@ mod tests {
             8.0,
             ToolGives::No,
         );
-        let mut pushed = Box::at_rest();
-        let (mut tool, mut turned) = (Vec2::new(-SIDE / 2.0, aside), 0.0_f64);
-        for k in 0..2000 {
-            let t = f64::from(k) * TICK_S;
-            let modulation = 1.0 + 0.3 * libm::sin(5.0 * t) + 0.12 * libm::sin(14.0 * t);
-            tool.x += 0.15 * modulation * (t / 0.3).min(1.0) * TICK_S;
-            let mut measured = pushed.push(tool);
+        let turned = push_for_2_s(aside, |mut measured| {
             measured.seen = measured.seen.filter(|_| is_seen);
             estimator.step(&measured);
-            turned = turned.max(pushed.twist.angular.abs());
-        }
+        });
         assert!(estimator.estimate().excited);
         assert!(aside == 0.0 || turned > 0.15, "{turned}");
         let e = estimator.estimate();
@@ -194,6 +205,36 @@ mod tests {
         }
     }
 
+    /// m over the true one, in the mean over forty pushes of 2 s `aside` m from the centre, with white noise of the force per axis, N.
+    fn mass_with_noise(aside: f64, noise_n: f64) -> f64 {
+        const PUSHES: u32 = 40;
+        let masses = (0..PUSHES).map(|push| {
+            let mut noise = Substream::new(1, "force noise", u64::from(push));
+            let config = EstimatorConfig::Recommended(RecommendedConfig::new(COUPLING));
+            let mut estimator = Estimator::new(&config, COUPLING, 8.0, ToolGives::No);
+            push_for_2_s(aside, |mut measured| {
+                let (x, y) = noise.normal_pair();
+                measured.force += Vec2::new(x, y) * noise_n;
+                measured.force_noise_n = noise_n;
+                estimator.step(&measured);
+            });
+            estimator.estimate().m / TRUTH[0]
+        });
+        masses.sum::<f64>() / f64::from(PUSHES)
+    }
+
+    #[test]
+    fn noise_makes_the_mass_no_heavier_beside_the_centre() {
+        for aside in [0.0, 0.04, 0.08, 0.12] {
+            let (noisy, quiet) = (mass_with_noise(aside, 0.1), mass_with_noise(aside, 0.0));
+            println!("{aside} m aside: m {noisy:.4} with noise, {quiet:.4} without");
+            assert!(
+                (noisy - quiet).abs() < 0.005,
+                "{aside} m aside: {noisy}, {quiet}"
+            );
+        }
+    }
+
     fn motion(velocity: Vec2) -> SurfaceMotion {
         SurfaceMotion {
             point: Vec2::new(-SIDE / 2.0, 0.0),
@@ -201,6 +242,7 @@ mod tests {
             row: Row {
                 regressor: Vector3::new(0.4, 0.1, 0.0),
                 force: 2.5,
+                scale: 1.0,
             },
         }
     }

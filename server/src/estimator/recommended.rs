@@ -114,7 +114,9 @@ impl RecommendedConfig {
         for tick in 0..RESPONSE_TICKS {
             let wrong = if tick == 2 { normal } else { Vec2::zeros() };
             if let Some(motion) = surface.step(Vec2::zeros(), wrong, normal) {
-                let Row { regressor, force } = filter.step(motion.row);
+                let Row {
+                    regressor, force, ..
+                } = filter.step(motion.row);
                 noise.gram += regressor * regressor.transpose();
                 noise.moment += regressor * force;
             }

@@ -138,6 +138,9 @@ pub(super) struct RecursiveLeastSquares {
     gram: Matrix3<f64>,
     moment: Vector3<f64>,
     weight: f64,
+    /// Sums of the rows' scales and of their squares: how often the noise is in `moment` and in `gram`.
+    scales: f64,
+    scale_squares: f64,
     squares: f64,
     /// Sum of the squares of the rows' forces in memory, N²: what [`RecursiveLeastSquares::misfit`] is taken of.
     force_squares: f64,
@@ -173,6 +176,8 @@ impl RecursiveLeastSquares {
             gram: Matrix3::zeros(),
             moment: Vector3::zeros(),
             weight: 0.0,
+            scales: 0.0,
+            scale_squares: 0.0,
             squares: 0.0,
             force_squares: 0.0,
             doubt_deviations: 0.0,
@@ -268,6 +273,8 @@ impl RecursiveLeastSquares {
         self.gram = self.gram * keep + row.regressor * row.regressor.transpose();
         self.moment = self.moment * keep + row.regressor * row.force;
         self.weight = self.weight * keep + 1.0;
+        self.scales = self.scales * keep + row.scale;
+        self.scale_squares = self.scale_squares * keep + row.scale * row.scale;
         self.squares = self.squares * keep + error * error;
         self.force_squares = self.force_squares * keep + row.force * row.force;
         self.samples = self.samples.saturating_add(1);
@@ -289,6 +296,8 @@ impl RecursiveLeastSquares {
         self.gram *= trust;
         self.moment *= trust;
         self.weight *= trust;
+        self.scales *= trust;
+        self.scale_squares *= trust;
         self.squares *= trust;
         self.force_squares *= trust;
     }
@@ -297,8 +306,8 @@ impl RecursiveLeastSquares {
         let variance = (self.squares / self.weight).max(ROW_VARIANCE_MIN);
         let pull = self.pull(variance);
         // noise in a regressor makes its parameter look smaller, 0.8 % of m at 10 µm and 3 to 5 % at 0.1 N: taken away, it does not
-        let matrix = self.gram - self.noise.gram * self.weight + pull;
-        let right = self.moment - self.noise.moment * self.weight + pull * self.held;
+        let matrix = self.gram - self.noise.gram * self.scale_squares + pull;
+        let right = self.moment - self.noise.moment * self.scales + pull * self.held;
         // (3), under the bounds
         let Some(estimate) = minimum_above(&matrix, &right, &LEAST) else {
             return self.hold();
@@ -327,7 +336,7 @@ impl RecursiveLeastSquares {
         } else {
             (PRIOR_PULL, self.config.prior_deviation)
         };
-        let m = self.weight * self.outweighs(excitation);
+        let m = self.scale_squares * self.outweighs(excitation);
         Matrix3::from_diagonal(&Vector3::new(m, variance / (b * b), variance / (c * c)))
     }
 
@@ -347,7 +356,7 @@ impl RecursiveLeastSquares {
             let b_force = (variance * inverse.m22).sqrt() * row.regressor.y.abs();
             self.condition.is_finite()
                 && row.regressor.y.abs() > TELLING_SPEED
-                && seen > self.weight * self.outweighs(self.config.excitation)
+                && seen > self.scale_squares * self.outweighs(self.config.excitation)
                 && b_force < self.config.damping_force_n
         });
     }

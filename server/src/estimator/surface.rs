@@ -87,6 +87,7 @@ impl Surface {
             row: Row {
                 regressor: Vector3::new(a.dot(&normal), v.dot(&normal), 0.0),
                 force: acted.dot(&normal),
+                scale: 1.0,
             },
         })
     }

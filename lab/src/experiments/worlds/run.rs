@@ -4,6 +4,7 @@ use std::time::Duration;
 
 use mmt_server::estimator::Measured as Sensed;
 use mmt_server::slave::Substitutes;
+use mmt_shared::metrics::F_MIN_N;
 use mmt_shared::model::geometry::Vec2;
 use mmt_shared::time::{TICK, TICK_S};
 
@@ -42,6 +43,8 @@ pub(super) struct Measured {
     pub(super) energy_held_s: f64,
     /// Share of the time in contact at both ends in which f_m opposes the true force.
     pub(super) opposed_share: Option<f64>,
+    /// Share of the time in contact in which f_m has no pair; none without contact.
+    pub(super) unpaired_share: Option<f64>,
     pub(super) force_peak_n: Option<f64>,
     /// Invariants of `mmt check` that did not hold.
     pub(super) broken: String,
@@ -101,6 +104,7 @@ pub(super) fn reach(
         work_excess_j: seen.ports.excess_j(),
         energy_held_s: world.slave().tool_energy().held_ticks() as f64 * TICK_S,
         opposed_share: seen.opposed_share(),
+        unpaired_share: seen.unpaired_share(),
         force_peak_n: outcome.on_hand.largest_n(),
         broken: broken.join(" "),
         digest: world.digest(),
@@ -112,8 +116,12 @@ struct Seen {
     ports: TwoPorts,
     body: TouchedBody,
     pose_excess_m: f64,
+    /// Ticks in which both forces have a direction, and those of them in which they point apart.
+    directed_ticks: u64,
     opposed_ticks: u64,
-    paired_ticks: u64,
+    /// Ticks in contact by the true force, and those of them in which f_m has no pair.
+    contact_ticks: u64,
+    unpaired_ticks: u64,
 }
 
 impl Seen {
@@ -122,8 +130,10 @@ impl Seen {
             ports,
             body,
             pose_excess_m: -POSE_M,
+            directed_ticks: 0,
             opposed_ticks: 0,
-            paired_ticks: 0,
+            contact_ticks: 0,
+            unpaired_ticks: 0,
         }
     }
 
@@ -138,18 +148,27 @@ impl Seen {
             let off = (then.motion.pose.position - slave.truth.position).norm();
             self.pose_excess_m = self.pose_excess_m.max(off - POSE_M - self.ports.way_m());
         }
-        let paired = slave
+        if slave.true_force.norm() > F_MIN_N {
+            self.contact_ticks += 1;
+            self.unpaired_ticks += u64::from(slave.f_m.is_none());
+        }
+        let directed = slave
             .f_m
             .filter(|f_m| f_m.norm().min(slave.true_force.norm()) > LEAST_N);
-        if let Some(f_m) = paired {
-            self.paired_ticks += 1;
+        if let Some(f_m) = directed {
+            self.directed_ticks += 1;
             self.opposed_ticks += u64::from(f_m.dot(&slave.true_force) < 0.0);
         }
     }
 
     fn opposed_share(&self) -> Option<f64> {
-        let share = self.opposed_ticks as f64 / self.paired_ticks as f64;
-        (self.paired_ticks > 0).then_some(share)
+        let share = self.opposed_ticks as f64 / self.directed_ticks as f64;
+        (self.directed_ticks > 0).then_some(share)
+    }
+
+    fn unpaired_share(&self) -> Option<f64> {
+        let share = self.unpaired_ticks as f64 / self.contact_ticks as f64;
+        (self.contact_ticks > 0).then_some(share)
     }
 }
 

@@ -33,6 +33,7 @@ pub(super) fn columns<'a>() -> Vec<Column<'a, Row>> {
         column("work_excess_j", "J", 3, |row| row.reached.work_excess_j),
         column("energy_held_s", "s", 3, |row| row.reached.energy_held_s),
         column("opposed_share", "", 4, |row| row.reached.opposed_share),
+        column("unpaired_share", "", 4, |row| row.reached.unpaired_share),
         column("force_peak_n", "N", 2, |row| row.reached.force_peak_n),
         column("broken", "", 0, |row| row.reached.broken.clone()),
     ]
@@ -63,7 +64,7 @@ const PARTS: [Choice; 4] = [
     ("immovable", |row| !row.world.is_movable()),
 ];
 
-const MEASURES: [Measure; 7] = [
+const MEASURES: [Measure; 8] = [
     ("relative_error_true", |row| row.reached.relative_error),
     ("packet_rate_hz", |row| row.reached.packets_hz),
     ("breaks_per_push", |row| row.reached.breaks_per_push),
@@ -71,6 +72,7 @@ const MEASURES: [Measure; 7] = [
     ("pose_max_mm", |row| Some(mm(row.reached.pose_max_m))),
     ("injected_j", |row| Some(row.reached.injected_j)),
     ("work_excess_j", |row| Some(row.reached.work_excess_j)),
+    ("unpaired_share", |row| row.reached.unpaired_share),
 ];
 
 fn sorted(rows: &[Row], chosen: fn(&Row) -> bool, of: fn(&Row) -> Option<f64>) -> Vec<f64> {
