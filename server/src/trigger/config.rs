@@ -57,7 +57,7 @@ pub struct TriggerConfig {
 impl TriggerConfig {
     /// The settings of a mode. Paper: hybrid at its best point (10 %, 150 ms), floor F_min = 0.04 N.
     /// Recommended: `useful` with the same numbers, floor 0.3 N, free space to 1.5 mm (at 1 mm twice
-    /// as many updates of untouched objects, and the force is no nearer).
+    /// as many updates of untouched objects, and the same relative error).
     #[must_use]
     pub fn of_mode(mode: Mode) -> Self {
         let (delta, t_update) = (0.10, Duration::from_millis(150));

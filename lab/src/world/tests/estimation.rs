@@ -320,10 +320,13 @@ fn behind_a_tool_that_gives_the_force_is_rendered_about_as_well_whatever_the_con
         world.run(Duration::from_secs(30), |_| {});
         world.slave().true_force().pmse_true.get().unwrap()
     };
-    let equal = SEEDS.map(|seed| pmse(seed, 1.0, None)).collect::<Vec<_>>();
+    // of ten seeds the mean still varies by a twentieth
+    let seeds = 1..=30;
+    let equal = (seeds.clone()).map(|seed| pmse(seed, 1.0, None));
+    let equal = equal.collect::<Vec<_>>();
     for times in [1.0, 1.5, 3.0, 10.0] {
         let spring = Some(spring_for(coupling));
-        let logs = SEEDS
+        let logs = (seeds.clone())
             .zip(&equal)
             .map(|(seed, equal)| libm::log(pmse(seed, times, spring) / equal));
         let logs = logs.collect::<Vec<_>>();
