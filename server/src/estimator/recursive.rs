@@ -336,7 +336,7 @@ impl RecursiveLeastSquares {
         } else {
             (PRIOR_PULL, self.config.prior_deviation)
         };
-        let m = self.scale_squares * self.outweighs(excitation);
+        let m = self.weight * self.outweighs(excitation);
         Matrix3::from_diagonal(&Vector3::new(m, variance / (b * b), variance / (c * c)))
     }
 
@@ -356,7 +356,7 @@ impl RecursiveLeastSquares {
             let b_force = (variance * inverse.m22).sqrt() * row.regressor.y.abs();
             self.condition.is_finite()
                 && row.regressor.y.abs() > TELLING_SPEED
-                && seen > self.scale_squares * self.outweighs(self.config.excitation)
+                && seen > self.weight * self.outweighs(self.config.excitation)
                 && b_force < self.config.damping_force_n
         });
     }

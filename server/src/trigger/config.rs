@@ -56,14 +56,13 @@ pub struct TriggerConfig {
 
 impl TriggerConfig {
     /// The settings of a mode. Paper: hybrid at its best point (10 %, 150 ms), floor F_min = 0.04 N.
-    /// Recommended: `useful` with the same numbers, floor 0.3 N, free space to 1.5 mm (at 1 mm twice
-    /// as many updates of untouched objects, and the same relative error).
+    /// Recommended: `useful` with the same numbers, floor 0.3 N, free space to 1 mm.
     #[must_use]
     pub fn of_mode(mode: Mode) -> Self {
         let (delta, t_update) = (0.10, Duration::from_millis(150));
         let (scheme, force_floor_n, judge_sticking, free_space_error_m) = match mode {
             Mode::Paper => (Scheme::Hybrid { delta, t_update }, 0.04, true, 0.0),
-            Mode::Recommended => (Scheme::Useful { delta, t_update }, 0.3, false, 1.5e-3),
+            Mode::Recommended => (Scheme::Useful { delta, t_update }, 0.3, false, 1e-3),
         };
         Self {
             scheme,

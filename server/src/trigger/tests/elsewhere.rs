@@ -25,9 +25,9 @@ fn an_untouched_object_that_is_elsewhere_is_sent_every_50_ms_until_it_is_not() {
             (from..from + 120).filter_map(step).collect()
         };
         let often = [0, 50, 100].map(|n| (n, Cause::Elsewhere));
-        assert_eq!(sent(1.6e-3, 0.5e-3, 100), often, "{scheme}");
-        assert_eq!(sent(1.4e-3, 0.0, 500), [], "{scheme}");
-        assert_eq!(sent(1.6e-3, 0.6e-3, 1000), [], "noise of the images");
+        assert_eq!(sent(1.1e-3, 0.3e-3, 100), often, "{scheme}");
+        assert_eq!(sent(0.9e-3, 0.0, 500), [], "{scheme}");
+        assert_eq!(sent(1.1e-3, 0.4e-3, 1000), [], "noise of the images");
     }
 }
 
