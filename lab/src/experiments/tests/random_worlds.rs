@@ -13,11 +13,11 @@ fn each_random_world_is_a_row_keeps_the_promises_and_is_the_same_by_its_number()
         assert_eq!(row["broken"], "", "{row:?}");
         assert!(number(row, "work_excess_j") <= 1e-6, "{row:?}");
         assert!(number(row, "injected_j") <= 1e-6, "{row:?}");
-        // the tool goes where the hand is, so that nearly all of the contact is judged
-        let moves = number(row, "friction_n") < 8.0 && row["obstacle"] == "none";
-        if moves && number(row, "contact_s") > 0.5 {
-            let unpaired = number(row, "unpaired_share");
-            assert!(unpaired > 0.0 && unpaired < 0.1, "{row:?}");
+        // the tool goes where the hand is, and is held back by what does not move only
+        if number(row, "contact_s") > 0.5 && row["obstacle"] == "none" {
+            let moves = number(row, "friction_n") < 8.0;
+            let held_back = number(row, "unpaired_share") > 0.1;
+            assert_ne!(held_back, moves, "{row:?}");
         }
     }
     let touched = rows.iter().filter(|row| number(row, "contact_s") > 0.5);
