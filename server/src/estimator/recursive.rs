@@ -341,7 +341,8 @@ impl RecursiveLeastSquares {
     }
 
     /// The power that outweighs the noise of an acceleration, (m/s²)²: `times` that of the noise which is in every row, and at least
-    /// `PRIOR_PULL` times that of the last row's.
+    /// `PRIOR_PULL` times that of the last row's. Of a whole row: beside the centre, where the noise is smaller, this is the stricter. An
+    /// object that does not move was taken to slide where it was scaled as well.
     fn outweighs(&self, times: f64) -> f64 {
         let always = times * self.least_noise.gram.m11;
         always.max(PRIOR_PULL * self.noise.gram.m11)
