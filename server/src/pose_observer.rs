@@ -302,8 +302,9 @@ impl PoseObserver {
         }
         let pose = &mut self.motion.pose;
         let tool = pose.point_to_object(tool);
-        if self.config.learn && !self.faces.footprint.within_ends(face, tool) {
-            // slipped past the end of the face: the box is not further away, but aside
+        let (nearest, gap) = self.faces.footprint.nearest(tool);
+        if nearest != face && gap > 0.0 {
+            // in front of another face: the box is not in the way of the tool
             return;
         }
         let depth = -self.faces.footprint.distance(face, tool);

@@ -146,6 +146,17 @@ impl Body {
         hip: Vec2,
         hip_velocity: Vec2,
     ) -> (Rendered, f64) {
+        self.step_within(settings, hip, hip_velocity, f64::INFINITY)
+    }
+
+    /// The same, pushed with no more than a force, N.
+    pub(super) fn step_within(
+        &mut self,
+        settings: &ModelSettings,
+        hip: Vec2,
+        hip_velocity: Vec2,
+        force_max_n: f64,
+    ) -> (Rendered, f64) {
         let state = &mut self.state;
         let touch = self.god.follow(&state.footprint, &state.pose, hip);
         let centre = state.pose.position;
@@ -158,6 +169,7 @@ impl Body {
                 &state.twist,
                 centre,
             )
+            .cap_magnitude(force_max_n)
         });
         let lever = touch.map_or(Vec2::zeros(), |touch| touch.proxy - centre);
         let before = Motion {

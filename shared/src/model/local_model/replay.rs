@@ -25,6 +25,10 @@ const JUMP_M: f64 = 0.01;
 /// A HIP no deeper than this, m, is hardly in a box.
 const FLAT_M: f64 = 0.005;
 
+/// No tool pushes harder, N, as slaves are configured by default. Before an update came, the hand may have gone where the box is,
+/// and the coupling alone would shoot it away.
+const PUSH_MAX_N: f64 = 15.0;
+
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Progress {
     /// No update yet.
@@ -122,7 +126,8 @@ impl Replay {
         };
         let until = history.len().min(from + REPLAYED_PER_TICK);
         for moment in (from..until).filter_map(|index| history.nth(index)) {
-            self.body.step(settings, moment.hip, moment.hip_velocity);
+            let (hip, velocity) = (moment.hip, moment.hip_velocity);
+            self.body.step_within(settings, hip, velocity, PUSH_MAX_N);
         }
         let next = history.nth(until).map(|moment| moment.stamp);
         let newest = history.newest().map(|moment| moment.stamp);

@@ -375,3 +375,17 @@ fn a_thin_box_that_goes_at_once_to_the_other_side_of_the_hip_is_not_pressed_thro
     assert!(injected < 1e-9, "{injected} J");
     assert!(model.body.touch(hip).is_none());
 }
+
+#[test]
+fn a_hand_that_was_let_into_what_no_tool_moves_does_not_move_it_in_the_replay() {
+    let mut model = replayed();
+    waver(&mut model, 1..=2000);
+    let held = update(Cause::Timer, 800, state(5.0, 0.0, 20.0));
+    model.apply(&held);
+    waver(&mut model, 2001..=2100);
+    assert!(model.is_replayed());
+    let (remaining, own) = (model.correction().remaining, model.state().pose);
+    assert!(own.position.norm() > 0.1, "the effect exists: {own:?}");
+    let place = own.position + remaining.shift;
+    assert!(place.norm() < 1e-3, "{place:?}");
+}
