@@ -17,6 +17,16 @@ const BESIDE_M: f64 = 0.01;
 const FASTEST_M_PER_S: f64 = 0.6;
 /// A place within 60° of the push lies ahead: the cosine of that.
 const AHEAD: f64 = 0.5;
+/// Faces that lie more than 45° apart, and less than that from opposite, are next to each other: the cosine of that.
+const NEXT_FACE: f64 = std::f64::consts::FRAC_1_SQRT_2;
+
+/// The box is touched by another face than the one that is felt.
+struct FaceChange {
+    /// Unit normal of that face, pointing into the box, world frame.
+    inward: Vec2,
+    /// How much deeper the HIP is behind that face, m.
+    deeper_m: f64,
+}
 
 impl LocalModel {
     /// An update whose place the object could not have been pushed to since the last one is of another object, unless the box
@@ -42,6 +52,10 @@ impl LocalModel {
             return;
         };
         let (touch, (face, gap)) = (self.body.touch(hip), self.body.gap(hip));
+        if let Some(there) = touch.and_then(|touch| self.by_another_face(&touch, hip)) {
+            self.go_to_face(hip, &there);
+            return;
+        }
         let goes = touch.map_or_else(
             || {
                 self.is_another
@@ -83,6 +97,30 @@ impl LocalModel {
     /// have to come round the HIP.
     fn is_beside(&self, hip: Vec2, face: Face) -> bool {
         self.correction.remaining.shift.norm() > BESIDE_M && self.replay.face(hip) != face
+    }
+
+    /// What the HIP touches of a box in its place, if that is the face next to the one that is felt.
+    fn by_another_face(&self, touch: &Touch, hip: Vec2) -> Option<FaceChange> {
+        if self.correction.remaining.shift.norm() <= BESIDE_M {
+            return None;
+        }
+        let there = self.replay.touch(hip)?;
+        let is_next = there.inward.dot(&touch.inward).abs() < NEXT_FACE;
+        is_next.then(|| FaceChange {
+            inward: there.inward,
+            deeper_m: there.penetration - touch.penetration,
+        })
+    }
+
+    /// The box goes to its place, but so far short of it that the HIP presses no deeper into the other face than it did into
+    /// the one that was felt. The rest is bled in.
+    fn go_to_face(&mut self, hip: Vec2, there: &FaceChange) {
+        let replay = self.replay;
+        self.changing(hip, |body, correction, _| {
+            replay.hand_over(body, correction);
+            let short = there.inward * there.deeper_m.max(0.0);
+            correction.back_off(&mut body.state.pose, short);
+        });
     }
 
     /// What the HIP (m, world) touches of the box in its place.

@@ -58,7 +58,7 @@ impl LocalModel {
     /// offset it would recede from a hand that it may not have to leave.
     pub(super) fn restart(&mut self, update: &Update) {
         self.take_footprint(update, false);
-        self.replay.begin(update, &self.history);
+        self.replay.begin(update, &self.settings, &self.history);
     }
 
     /// Takes over the face offsets. The face that the HIP touches, or is in front of, stays where it is:

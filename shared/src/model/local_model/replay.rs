@@ -6,8 +6,8 @@
 //! be corrected. It must never touch the box that is felt, and never take longer in a tick than its share.
 
 use super::body::{Body, BodyState};
-use crate::model::contact::GodObject;
-use crate::model::correction::ROOM_M;
+use crate::model::contact::{GodObject, Touch};
+use crate::model::correction::{Correction, ROOM_M};
 use crate::model::geometry::{Face, Pose, Vec2};
 use crate::model::history::History;
 use crate::model::params::ModelState;
@@ -76,6 +76,11 @@ impl Replay {
         self.body.gap(hip).1 > -FLAT_M
     }
 
+    /// What a HIP (m, world) touches of the box as it should be.
+    pub(super) fn touch(&self, hip: Vec2) -> Option<Touch> {
+        self.body.touch(hip)
+    }
+
     /// The face of the box as it should be that a HIP (m, world) is in front of.
     pub(super) fn face(&self, hip: Vec2) -> Face {
         self.body.gap(hip).0
@@ -84,6 +89,12 @@ impl Replay {
     /// Gives up what it replays.
     pub(super) fn stop(&mut self) {
         (self.progress, self.waiting) = (Progress::Idle, None);
+    }
+
+    /// Sets a box to where it should be, touched as it should be.
+    pub(super) fn hand_over(&self, body: &mut Body, correction: &mut Correction) {
+        correction.snap(&mut body.state.pose);
+        body.god = self.body.god;
     }
 
     /// Puts an update off until the replay has caught up; a newer one takes the place of an older one.
@@ -98,7 +109,7 @@ impl Replay {
 
     /// Restarts at the sample that an update answers. One that is older than the history shows nothing of
     /// where the box is now.
-    pub(super) fn begin(&mut self, update: &Update, history: &History) {
+    pub(super) fn begin(&mut self, update: &Update, settings: &ModelSettings, history: &History) {
         let Some(then) = history.nearest(update.answers) else {
             return;
         };
@@ -108,7 +119,13 @@ impl Replay {
             .footprint
             .nearest(state.pose.point_to_object(then.hip))
             .1;
-        if jump > JUMP_M && depth < FLAT_M && god.touched().is_none() {
+        // nothing presses so hard on the face that was touched; it is at another one
+        let is_beyond = |touch: Touch| settings.coupling.force(touch.penetration, 0.0) > PUSH_MAX_N;
+        let is_anew = match god.touched() {
+            Some(_) => (god.touch_at(&state.footprint, &state.pose, then.hip)).is_some_and(is_beyond),
+            None => true,
+        };
+        if jump > JUMP_M && depth < FLAT_M && is_anew {
             // where the HIP was seen from another place shows nothing of the face that it is at
             god = GodObject::default();
         }

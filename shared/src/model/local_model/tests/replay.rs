@@ -1,7 +1,7 @@
 //! Reconciliation by replay: exact, sliced, and without a jolt.
 
 use super::*;
-use crate::model::geometry::Face;
+use crate::model::geometry::{Face, rotate};
 
 /// Answers with what `model` was at a stamp.
 fn answer(model: &LocalModel, ms: u64) -> Update {
@@ -388,4 +388,48 @@ fn a_hand_that_was_let_into_what_no_tool_moves_does_not_move_it_in_the_replay() 
     assert!(own.position.norm() > 0.1, "the effect exists: {own:?}");
     let place = own.position + remaining.shift;
     assert!(place.norm() < 1e-3, "{place:?}");
+}
+
+/// Pushes the west face near its north end, then sends an update in which the HIP is `deep` (m) behind the north face and `aside`
+/// (m) behind the west one. What is rendered in the last tick before it is known, and 10 ms and half a second later; the model.
+fn by_the_north_face(deep: f64, aside: f64) -> ([Rendered; 3], LocalModel) {
+    let mut model = replayed();
+    let hip = |n: u64| Vec2::new(-0.21 + 1e-4 * n as f64, 0.19);
+    let run = |model: &mut LocalModel, ticks: std::ops::RangeInclusive<u64>| {
+        let mut last = Rendered::default();
+        for n in ticks {
+            last = model.step(Time::from_millis(n), hip(n.min(420)));
+        }
+        last
+    };
+    let felt = run(&mut model, 1..=400);
+    let other = with(answer(&model, 400), |of| {
+        let hip_in_object = Vec2::new(aside - 0.2, 0.2 - deep);
+        of.pose.position = hip(400) - rotate(of.pose.angle, hip_in_object);
+        of.twist = Twist::default();
+        of.params = state(5.0, 3.0, 20.0).params();
+    });
+    model.apply(&other);
+    let soon = run(&mut model, 401..=410);
+    let later = run(&mut model, 411..=900);
+    ([felt, soon, later], model)
+}
+
+#[test]
+fn a_hand_feels_the_face_that_the_object_is_touched_by() {
+    // behind the face that was felt, no farther than a soft contact goes, and much farther
+    for aside in [0.03, 0.12] {
+        for deep in [1e-3, 3e-3] {
+            let ([felt, soon, later], model) = by_the_north_face(deep, aside);
+            let pressed = |of: &Rendered| of.touch.map(|touch| (touch.face, touch.penetration));
+            let (face, before) = pressed(&felt).unwrap();
+            assert_eq!(face, Face::West);
+            let (face, now) = pressed(&soon).unwrap();
+            assert_eq!(face, Face::North, "{aside} m aside, {deep} m deep");
+            assert!(now < before + 5e-4, "{before} m, then {now} m: no jolt");
+            let (_, then) = pressed(&later).unwrap();
+            assert!((then - deep).abs() < 5e-4, "{then} m, not {deep}");
+            assert!(model.energy_injected_j() < 1e-12);
+        }
+    }
 }
