@@ -81,6 +81,7 @@ fn trigger(criterion: &mut Criterion) {
         acceleration: 0.2,
         force_deviation: 0.0,
         params,
+        only_friction_holds: false,
         shift: Vec2::zeros(),
         shift_deviation: 0.0,
         turn: 0.001,

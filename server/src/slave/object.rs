@@ -5,7 +5,7 @@
 use std::collections::BTreeMap;
 
 use mmt_shared::model::contact::Coupling;
-use mmt_shared::model::geometry::{BoxFootprint, Pose};
+use mmt_shared::model::geometry::{BoxFootprint, Pose, Vec2, rotate};
 use mmt_shared::model::params::{
     FRICTION_TORQUE_NM, ModelParams, friction_torque_of_square, inertia_of_square,
     least_stable_mass,
@@ -24,6 +24,12 @@ use crate::estimator::{
 };
 use crate::pose_observer::{ContactForce, ObserverConfig, PoseObserver};
 use crate::sensing::SensorLag;
+
+/// Pushes whose directions differ by less than 60° are against the same obstacle: the cosine of that.
+const SAME_PUSH: f64 = 0.5;
+
+/// An object that is this far from where it was, m, is none that no tool moves: images show its place better.
+const MOVED_M: f64 = 0.02;
 
 /// The pose observer and the estimator, which need each other.
 pub(super) struct ObjectEstimate {
@@ -49,6 +55,10 @@ pub(super) struct ObjectEstimate {
     back: SensorLag,
     observer_config: ObserverConfig,
     estimator_config: EstimatorConfig,
+    /// Inward normal, world frame, of the face that was touched last.
+    touched: Option<Vec2>,
+    /// Where the body was when it was taken up, m.
+    first: Vec2,
     /// What was met in the last tick.
     met: Option<Contact>,
     /// Number of the body.
@@ -129,6 +139,8 @@ impl ObjectEstimate {
             back: SensorLag::new(config.conditioning.lag_ms, None),
             observer_config: observer,
             estimator_config: estimator,
+            touched: None,
+            first: pose.position,
             met: None,
             body: 0,
             found: BTreeMap::new(),
@@ -202,6 +214,7 @@ impl ObjectEstimate {
         );
         self.observer = PoseObserver::new(self.observer_config, pose, found.footprint);
         self.predictor = predictor(&self.observer_config);
+        (self.touched, self.first) = (None, pose.position);
     }
 
     /// So many ticks, of which all but the last were missed; what the estimator was given. In those the tool and its force are
@@ -265,9 +278,20 @@ impl ObjectEstimate {
                 side,
             }),
         };
+        self.touched = measured.normal.or(self.touched);
         let estimate = self.estimator.step(&measured);
         self.take(self.accept(&estimate, side, held_back));
         measured
+    }
+
+    /// Whether friction alone is known to hold the object where the tool (m, world) is: it has been moved, and the tool is in front
+    /// of another face than it touched last, so that it would not push against what was behind the object then.
+    pub(super) fn only_friction_holds(&self, tool: Vec2) -> bool {
+        let (pose, footprint) = (self.observer.pose(), self.observer.footprint());
+        let (face, _) = footprint.nearest(pose.point_to_object(tool));
+        let inward = -rotate(pose.angle, face.outward());
+        let elsewhere = (self.touched).is_some_and(|touched| touched.dot(&inward) < SAME_PUSH);
+        elsewhere && (pose.position - self.first).norm() > MOVED_M
     }
 
     /// Takes m (kg), b (N s/m) and c (N) of somebody else's in the place of the estimator's, if they are accepted.

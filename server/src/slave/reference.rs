@@ -87,6 +87,7 @@ impl ForceReference {
                 _ => estimate.force_deviation(),
             },
             params: object.params,
+            only_friction_holds: object.only_friction_holds(contact.tool),
             shift,
             shift_deviation: object.observer.deviation(),
             turn,

@@ -28,6 +28,9 @@ pub struct TriggerInput {
     pub force_deviation: f64,
     /// The parameters that an update would carry now.
     pub params: ModelParams,
+    /// Whether friction alone is known to hold the object where the tool is: that is in front of another face than it touched last,
+    /// and the object has been moved before.
+    pub only_friction_holds: bool,
     /// By how much it would shift the shadow, m.
     pub shift: Vec2,
     /// Standard deviation of that per axis, m, where nobody touches the object; else 0.

@@ -50,6 +50,9 @@ const TURN_DEVIATIONS: f64 = 3.0;
 /// A place that is off by fewer standard deviations may be the noise of the images.
 const PLACE_DEVIATIONS: f64 = 3.0;
 
+/// A model that was sent more than this share of c, and this much more, N, is held by what is no friction.
+const HELD: (f64, f64) = (2.0, 0.3);
+
 /// A contact mismatch that lasts while the HIP stands is sent again ever more rarely, up to this: nobody feels it.
 const REPEAT_MAX: Duration = Duration::from_secs(1);
 
@@ -198,13 +201,23 @@ impl Trigger {
         }
     }
 
-    /// An object that nobody touches and that is not where the model has it: the hand would meet it elsewhere.
+    /// An object that nobody touches and that is not where the model has it, or that the model has held where nothing but friction
+    /// holds it: the hand would meet it elsewhere, or push against nothing.
     fn elsewhere(&self, now: Time, input: &TriggerInput) -> Option<Cause> {
         let least = self.config.free_space_error_m;
         let free = !input.slave_in_contact && !input.shadow_in_contact;
         let rested = (self.last).is_none_or(|(last, _)| now >= last + self.config.mismatch_repeat);
         let off = input.shift.norm() > least.max(PLACE_DEVIATIONS * input.shift_deviation);
-        (least > 0.0 && free && rested && off).then_some(Cause::Elsewhere)
+        let wrong = off || self.is_held_in_vain(input);
+        (least > 0.0 && free && rested && wrong).then_some(Cause::Elsewhere)
+    }
+
+    /// Whether the model has what an obstacle needed for friction, and the tool no more pushes the object against that.
+    fn is_held_in_vain(&self, input: &TriggerInput) -> bool {
+        let (share, more) = HELD;
+        let needs = share * input.params.c() + more;
+        let is_held = self.last.is_some_and(|(_, sent)| sent.c() > needs);
+        input.only_friction_holds && is_held
     }
 
     fn due(&self, now: Time, input: &TriggerInput) -> Option<Cause> {

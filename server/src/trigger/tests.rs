@@ -28,6 +28,7 @@ fn input(f_s: f64, f_m: f64) -> TriggerInput {
         acceleration: 0.1,
         force_deviation: 0.0,
         params: params(0.7, 2.06),
+        only_friction_holds: false,
         shift: Vec2::zeros(),
         shift_deviation: 0.0,
         turn: 0.0,

@@ -42,3 +42,33 @@ fn where_an_object_is_matters_only_while_nobody_touches_it_and_never_in_the_pape
     let mut paper = self::trigger("deadband 10%", Mode::Paper);
     assert_eq!(paper.step(Time::from_millis(1), &untouched(0.1, 0.0)), None);
 }
+
+#[test]
+fn a_model_that_an_obstacle_held_is_released_once_where_only_friction_holds_the_object() {
+    let mut trigger = trigger("useful 10% 150ms", Mode::Recommended);
+    let at = |c: f64, only_friction_holds: bool| TriggerInput {
+        params: params(0.7, c),
+        only_friction_holds,
+        ..untouched(0.0, 0.0)
+    };
+    let pushed = TriggerInput {
+        params: params(0.7, 150.0),
+        ..input(8.0, 4.0)
+    };
+    assert_eq!(
+        trigger.step(Time::from_millis(1), &pushed),
+        Some(Cause::Deadband)
+    );
+    let mut sent = |input: TriggerInput, from: u64| -> Vec<(u64, Cause)> {
+        let step = |n| (trigger.step(Time::from_millis(n), &input)).map(|cause| (n - from, cause));
+        (from..from + 200).filter_map(step).collect()
+    };
+    assert_eq!(
+        sent(at(2.0, false), 100),
+        [],
+        "it would push against that again"
+    );
+    assert_eq!(sent(at(2.0, true), 300), [(0, Cause::Elsewhere)]);
+    // what differs by less is an estimate that has changed
+    assert_eq!(sent(at(0.9, true), 500), []);
+}

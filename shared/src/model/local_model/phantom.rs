@@ -4,6 +4,7 @@
 
 use super::LocalModel;
 use super::body::Body;
+use super::replay::is_pressed;
 use crate::model::contact::Touch;
 use crate::model::correction::{Correction, ROOM_M};
 use crate::model::geometry::{Face, Vec2};
@@ -99,14 +100,15 @@ impl LocalModel {
         self.correction.remaining.shift.norm() > BESIDE_M && self.replay.face(hip) != face
     }
 
-    /// What the HIP touches of a box in its place, if that is the face next to the one that is felt.
+    /// What the HIP touches of a box in its place, if that is the face next to the one that is felt. A HIP that is deeper than a tool
+    /// presses has gone into an object that was not yet known to be there, by no face.
     fn by_another_face(&self, touch: &Touch, hip: Vec2) -> Option<FaceChange> {
         if self.correction.remaining.shift.norm() <= BESIDE_M {
             return None;
         }
         let there = self.replay.touch(hip)?;
         let is_next = there.inward.dot(&touch.inward).abs() < NEXT_FACE;
-        is_next.then(|| FaceChange {
+        (is_next && is_pressed(&self.settings.coupling, &there)).then(|| FaceChange {
             inward: there.inward,
             deeper_m: there.penetration - touch.penetration,
         })

@@ -6,7 +6,7 @@
 //! be corrected. It must never touch the box that is felt, and never take longer in a tick than its share.
 
 use super::body::{Body, BodyState};
-use crate::model::contact::{GodObject, Touch};
+use crate::model::contact::{Coupling, GodObject, Touch};
 use crate::model::correction::{Correction, ROOM_M};
 use crate::model::geometry::{Face, Pose, Vec2};
 use crate::model::history::History;
@@ -28,6 +28,11 @@ const FLAT_M: f64 = 0.005;
 /// No tool pushes harder, N, as slaves are configured by default. Before an update came, the hand may have gone where the box is,
 /// and the coupling alone would shoot it away.
 const PUSH_MAX_N: f64 = 15.0;
+
+/// Whether a tool can press as deep as this.
+pub(super) fn is_pressed(coupling: &Coupling, touch: &Touch) -> bool {
+    coupling.force(touch.penetration, 0.0) <= PUSH_MAX_N
+}
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Progress {
@@ -119,13 +124,10 @@ impl Replay {
             .footprint
             .nearest(state.pose.point_to_object(then.hip))
             .1;
-        // nothing presses so hard on the face that was touched; it is at another one
-        let is_beyond = |touch: Touch| settings.coupling.force(touch.penetration, 0.0) > PUSH_MAX_N;
-        let is_anew = match god.touched() {
-            Some(_) => (god.touch_at(&state.footprint, &state.pose, then.hip)).is_some_and(is_beyond),
-            None => true,
-        };
-        if jump > JUMP_M && depth < FLAT_M && is_anew {
+        let touch = god.touch_at(&state.footprint, &state.pose, then.hip);
+        let is_there = god.touched().is_some()
+            && touch.is_some_and(|touch| is_pressed(&settings.coupling, &touch));
+        if jump > JUMP_M && depth < FLAT_M && !is_there {
             // where the HIP was seen from another place shows nothing of the face that it is at
             god = GodObject::default();
         }
