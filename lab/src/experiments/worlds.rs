@@ -86,6 +86,7 @@ fn run(runner: &Runner, request: &Request) -> Result<Findings, ExperimentError> 
         tables: vec![
             tables::distribution(&rows, first, extent),
             tables::targets(&rows),
+            tables::poses(&rows),
             tables::worst(&rows, &options(request)),
         ],
         ..Findings::default()

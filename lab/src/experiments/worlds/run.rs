@@ -1,5 +1,6 @@
 //! One random world, run and measured.
 
+use std::collections::VecDeque;
 use std::time::Duration;
 
 use mmt_server::estimator::Measured as Sensed;
@@ -35,6 +36,10 @@ pub(super) struct Measured {
     pub(super) pose_max_m: f64,
     /// The most by which the pose was off beyond 0.1 m and the hand's way in a round trip, m; at most 0 if it never was.
     pub(super) pose_excess_m: f64,
+    /// For how long it was, s.
+    pub(super) pose_excess_s: f64,
+    /// The most by which it was, m, where the way of the object in a round trip counts if that is longer.
+    pub(super) pose_beyond_object_m: f64,
     /// Energy that updates added to the model and nothing paid, J.
     pub(super) injected_j: f64,
     /// The most by which the tool's work on the object exceeded the hand's work and the budget, J.
@@ -100,6 +105,8 @@ pub(super) fn reach(
         pose_rms_m: outcome.pose.position_rms_m(),
         pose_max_m: outcome.pose.position_max_m().unwrap_or_default(),
         pose_excess_m: seen.pose_excess_m,
+        pose_excess_s: seen.pose_excess_ticks as f64 * TICK_S,
+        pose_beyond_object_m: seen.pose_beyond_object_m,
         injected_j: outcome.energy_injected_j,
         work_excess_j: seen.ports.excess_j(),
         energy_held_s: world.slave().tool_energy().held_ticks() as f64 * TICK_S,
@@ -116,6 +123,8 @@ struct Seen {
     ports: TwoPorts,
     body: TouchedBody,
     pose_excess_m: f64,
+    pose_excess_ticks: u64,
+    pose_beyond_object_m: f64,
     /// Ticks in which both forces have a direction, and those of them in which they point apart.
     directed_ticks: u64,
     opposed_ticks: u64,
@@ -130,6 +139,8 @@ impl Seen {
             ports,
             body,
             pose_excess_m: -POSE_M,
+            pose_excess_ticks: 0,
+            pose_beyond_object_m: -POSE_M,
             directed_ticks: 0,
             opposed_ticks: 0,
             contact_ticks: 0,
@@ -146,7 +157,11 @@ impl Seen {
         let then = world.master().model().history().at(slave.stamp);
         if let Some(then) = then.filter(|_| known) {
             let off = (then.motion.pose.position - slave.truth.position).norm();
-            self.pose_excess_m = self.pose_excess_m.max(off - POSE_M - self.ports.way_m());
+            let (hand_m, object_m) = (self.ports.way_m(), self.body.way_m());
+            self.pose_excess_m = self.pose_excess_m.max(off - POSE_M - hand_m);
+            self.pose_excess_ticks += u64::from(off > POSE_M + hand_m);
+            let beyond_m = off - POSE_M - hand_m.max(object_m);
+            self.pose_beyond_object_m = self.pose_beyond_object_m.max(beyond_m);
         }
         if slave.true_force.norm() > F_MIN_N {
             self.contact_ticks += 1;
@@ -179,6 +194,8 @@ struct TouchedBody {
     /// A round trip of slow packets: play-out waits for these.
     round_trip_ticks: usize,
     unknown_ticks: usize,
+    /// Its way in each tick of the last such round trip, m.
+    ways: VecDeque<f64>,
 }
 
 impl TouchedBody {
@@ -188,18 +205,30 @@ impl TouchedBody {
             place,
             round_trip_ticks: (round_trip_s / TICK_S) as usize,
             unknown_ticks: 0,
+            ways: VecDeque::new(),
         }
     }
 
     /// Takes the body's place (m) in a tick. Whether the master can know which body it is.
     fn is_known(&mut self, place: Vec2) -> bool {
         let before = std::mem::replace(&mut self.place, place);
-        self.unknown_ticks = if (place - before).norm() > OTHER_BODY_M {
-            self.round_trip_ticks
+        let way = (place - before).norm();
+        self.ways.push_back(way);
+        if way > OTHER_BODY_M {
+            self.ways.clear();
+            self.unknown_ticks = self.round_trip_ticks;
         } else {
-            self.unknown_ticks.saturating_sub(1)
-        };
+            self.unknown_ticks = self.unknown_ticks.saturating_sub(1);
+        }
+        while self.ways.len() > self.round_trip_ticks {
+            self.ways.pop_front();
+        }
         self.unknown_ticks == 0
+    }
+
+    /// Its way in the last round trip, m.
+    fn way_m(&self) -> f64 {
+        self.ways.iter().sum()
     }
 }
 
@@ -219,6 +248,17 @@ mod tests {
             .collect();
         assert!(known.iter().take(50).all(|known| !known));
         assert!(known.iter().skip(50).all(|known| *known));
+    }
+
+    #[test]
+    fn the_way_of_a_body_is_that_of_the_last_round_trip_and_no_way_from_another_body() {
+        let mut body = TouchedBody::new(Vec2::zeros(), 0.05);
+        for n in 0..100 {
+            body.is_known(Vec2::new(1e-3 * f64::from(n), 0.0));
+        }
+        assert!((body.way_m() - 0.05).abs() < 1e-12, "{} m", body.way_m());
+        body.is_known(Vec2::new(0.5, 0.0));
+        assert_eq!(body.way_m(), 0.0);
     }
 
     #[test]

@@ -7,6 +7,8 @@ use crate::experiment::findings::Extent;
 use crate::experiment::prelude::*;
 use crate::table::Cell;
 
+/// A pose that is off for no longer, s, is that of another body, of which a packet came late.
+const LASTS_S: f64 = 0.05;
 /// The worst that are shown.
 const WORST: usize = 10;
 
@@ -29,6 +31,8 @@ pub(super) fn columns<'a>() -> Vec<Column<'a, Row>> {
         column("pose_rms_mm", "mm", 1, |row| row.reached.pose_rms_m.map(mm)),
         column("pose_max_mm", "mm", 1, |row| mm(row.reached.pose_max_m)),
         column("pose_excess_mm", "mm", 1, |row| mm(row.reached.pose_excess_m)),
+        column("pose_excess_s", "s", 3, |row| row.reached.pose_excess_s),
+        column("pose_beyond_object_mm", "mm", 1, |row| mm(row.reached.pose_beyond_object_m)),
         column("injected_j", "J", 6, |row| row.reached.injected_j),
         column("work_excess_j", "J", 3, |row| row.reached.work_excess_j),
         column("energy_held_s", "s", 3, |row| row.reached.energy_held_s),
@@ -168,6 +172,31 @@ pub(super) fn targets(rows: &[Row]) -> Table {
         }),
     ];
     Table::of("Targets", &targets, &columns)
+}
+
+/// A count of worlds.
+struct Count {
+    of: &'static str,
+    worlds: u64,
+}
+
+/// The worlds that break the target of pose, and what of them nobody could know sooner.
+pub(super) fn poses(rows: &[Row]) -> Table {
+    let broken = |row: &&Row| row.reached.pose_excess_m > 0.0;
+    let beyond = |row: &&Row| row.reached.pose_beyond_object_m > 0.0;
+    let lasts = |row: &&Row| row.reached.pose_excess_s > LASTS_S;
+    let worlds = |chosen: &dyn Fn(&&Row) -> bool| rows.iter().filter(chosen).count() as u64;
+    #[rustfmt::skip]
+    let counts = [
+        Count { of: "pose error above 0.1 m + the hand's way in a round trip", worlds: worlds(&broken) },
+        Count { of: "of these: above 0.1 m + the object's way in it, too", worlds: worlds(&|row| broken(row) && beyond(row)) },
+        Count { of: "of those: for more than 50 ms in all", worlds: worlds(&|row| broken(row) && beyond(row) && lasts(row)) },
+    ];
+    let columns: [Column<Count>; 2] = [
+        column("of", "", 0, |count: &Count| count.of),
+        column("worlds", "", 0, |count| count.worlds),
+    ];
+    Table::of("Poses that are off", &counts, &columns)
 }
 
 /// The ten movable worlds with the largest error, each with what runs it again with these `options`.
