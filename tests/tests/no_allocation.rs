@@ -317,6 +317,7 @@ impl Parts {
             acceleration: estimate.acceleration,
             force_deviation: 0.0,
             params: self.shadow.ahead().state().params,
+            only_friction_holds: false,
             shift: Vec2::zeros(),
             shift_deviation: 0.0,
             turn: 0.0,

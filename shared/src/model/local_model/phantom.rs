@@ -1,4 +1,5 @@
-//! When the box goes at once to where it should be: another object, a phantom, a box that the HIP keeps from its place.
+//! When the box goes at once to where it should be: another object, a phantom, a box that is touched by another face, one that
+//! the HIP keeps from its place.
 //!
 //! What the coupling holds is lost then. It must never give the hand energy.
 
@@ -21,14 +22,6 @@ const AHEAD: f64 = 0.5;
 /// Faces that lie more than 45° apart, and less than that from opposite, are next to each other: the cosine of that.
 const NEXT_FACE: f64 = std::f64::consts::FRAC_1_SQRT_2;
 
-/// The box is touched by another face than the one that is felt.
-struct FaceChange {
-    /// Unit normal of that face, pointing into the box, world frame.
-    inward: Vec2,
-    /// How much deeper the HIP is behind that face, m.
-    deeper_m: f64,
-}
-
 impl LocalModel {
     /// An update whose place the object could not have been pushed to since the last one is of another object, unless the box
     /// has run on to there by itself: then it has no way to go.
@@ -44,8 +37,8 @@ impl LocalModel {
         self.last_update = (then.touched, place);
     }
 
-    /// The box goes at once to a place that is [`PHANTOM_M`] and more away, or that the HIP keeps it from, where that costs
-    /// nothing.
+    /// The box goes at once to a place that is [`PHANTOM_M`] and more away, that the HIP keeps it from, or in which another face is
+    /// touched, where that costs nothing.
     pub(super) fn leave_phantom(&mut self) {
         let is_far = self.correction.remaining.shift.norm() >= PHANTOM_M;
         self.is_another &= is_far;
@@ -53,8 +46,12 @@ impl LocalModel {
             return;
         };
         let (touch, (face, gap)) = (self.body.touch(hip), self.body.gap(hip));
-        if let Some(there) = touch.and_then(|touch| self.by_another_face(&touch, hip)) {
-            self.go_to_face(hip, &there);
+        if let Some(short) = touch.and_then(|touch| self.short_of_next_face(&touch, hip)) {
+            let replay = self.replay;
+            self.changing(hip, |body, correction, _| {
+                replay.hand_over(body, correction);
+                correction.back_off(&mut body.state.pose, short);
+            });
             return;
         }
         let goes = touch.map_or_else(
@@ -100,29 +97,17 @@ impl LocalModel {
         self.correction.remaining.shift.norm() > BESIDE_M && self.replay.face(hip) != face
     }
 
-    /// What the HIP touches of a box in its place, if that is the face next to the one that is felt. A HIP that is deeper than a tool
-    /// presses has gone into an object that was not yet known to be there, by no face.
-    fn by_another_face(&self, touch: &Touch, hip: Vec2) -> Option<FaceChange> {
+    /// How far short of its place a box goes (m, world) that is touched there by the face next to the one that is felt: so far that
+    /// the HIP presses no deeper than it did; the rest is bled in. A HIP that is deeper there than a tool presses has gone into an
+    /// object that was not yet known to be there, by no face.
+    fn short_of_next_face(&self, touch: &Touch, hip: Vec2) -> Option<Vec2> {
         if self.correction.remaining.shift.norm() <= BESIDE_M {
             return None;
         }
         let there = self.replay.touch(hip)?;
         let is_next = there.inward.dot(&touch.inward).abs() < NEXT_FACE;
-        (is_next && is_pressed(&self.settings.coupling, &there)).then(|| FaceChange {
-            inward: there.inward,
-            deeper_m: there.penetration - touch.penetration,
-        })
-    }
-
-    /// The box goes to its place, but so far short of it that the HIP presses no deeper into the other face than it did into
-    /// the one that was felt. The rest is bled in.
-    fn go_to_face(&mut self, hip: Vec2, there: &FaceChange) {
-        let replay = self.replay;
-        self.changing(hip, |body, correction, _| {
-            replay.hand_over(body, correction);
-            let short = there.inward * there.deeper_m.max(0.0);
-            correction.back_off(&mut body.state.pose, short);
-        });
+        let short = there.inward * (there.penetration - touch.penetration).max(0.0);
+        (is_next && is_pressed(&self.settings.coupling, &there)).then_some(short)
     }
 
     /// What the HIP (m, world) touches of the box in its place.
