@@ -166,6 +166,9 @@ class TriggerInput:
     def parameters(self) -> _Triple:
         """m, b, c, kg, N s/m, N."""
     @property
+    def only_friction_holds(self) -> bool:
+        """The tool is in front of another face than it touched last, of an object that has been moved."""
+    @property
     def shift(self) -> _Pair:
         """Of the master's object by an update, m."""
     @property

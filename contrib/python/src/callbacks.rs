@@ -44,7 +44,8 @@ pub(crate) fn vector(given: &Bound<'_, PyAny>, what: &str) -> PyResult<Vec2> {
 /// slave_in_contact, shadow_in_contact: whether the tool touches the object, and the HIP the master's model. hip_stands:
 /// whether the HIP is where it was a sample before. sticking: whether the object stands although it is pushed. speed,
 /// acceleration: of the object along the push, m/s and m/s^2. force_deviation: standard deviation of the force that
-/// the estimate predicts, N. parameters: (m, b, c) that an update would carry, kg, N s/m, N. shift: by how much it
+/// the estimate predicts, N. parameters: (m, b, c) that an update would carry, kg, N s/m, N. only_friction_holds:
+/// whether the tool is in front of another face than it touched last, of an object that has been moved. shift: by how much it
 /// would move the master's object, (x, y), m. shift_deviation: its standard deviation per axis while nobody touches
 /// the object, else 0, m. turn: by how much it would turn the object, rad. turn_deviation: its standard deviation, rad.
 #[pyclass(frozen, get_all, module = "mmt")]
@@ -61,6 +62,7 @@ pub(crate) struct TriggerInput {
     acceleration: f64,
     force_deviation: f64,
     parameters: (f64, f64, f64),
+    only_friction_holds: bool,
     shift: Pair,
     shift_deviation: f64,
     turn: f64,
@@ -83,6 +85,7 @@ impl TriggerInput {
             acceleration: input.acceleration,
             force_deviation: input.force_deviation,
             parameters: (params.m(), params.b(), params.c()),
+            only_friction_holds: input.only_friction_holds,
             shift: pair(input.shift),
             shift_deviation: input.shift_deviation,
             turn: input.turn,

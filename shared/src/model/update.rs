@@ -21,7 +21,7 @@ pub enum Cause {
     ContactLost,
     /// The scheme sends every sample.
     EverySample,
-    /// Nobody touches the object, and it is not where the model has it.
+    /// Nobody touches the object, and it is not where the model has it, or not held as there.
     Elsewhere,
 }
 
