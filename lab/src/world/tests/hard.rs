@@ -303,6 +303,49 @@ fn a_box_that_slid_along_a_wall_can_be_pushed_elsewhere() {
     assert!(error < 1.0, "{error}");
 }
 
+/// A model with more friction is held by what is none, N.
+const HELD_N: f64 = 100.0;
+
+#[test]
+fn what_a_wall_held_is_not_felt_to_be_held_from_another_face_and_what_nothing_moves_is() {
+    // the model's friction, N, when the hand first pushes another face than the held one
+    let felt = |number: u64| {
+        let random = RandomWorld::new(number);
+        let mut world = World::try_new(&random.config).unwrap();
+        let (mut held, mut felt) = (None, None);
+        for _ in 0..20_000 {
+            world.step();
+            let slave = world.slave();
+            if let Some(contact) = slave.observer().contact() {
+                let is_held = slave.estimate().holding.is_some_and(|c| c > HELD_N);
+                held = is_held.then_some(contact.inward).or(held);
+            }
+            let model = world.master().model();
+            let touched = model.rendered().touch.map(|touch| touch.inward);
+            if held
+                .is_some_and(|held| touched.is_some_and(|touched| held.dot(&touched).abs() < 0.5))
+            {
+                felt.get_or_insert(model.state().params.c());
+            }
+        }
+        (felt.unwrap(), relative_error(&world), random)
+    };
+    let (c, error, random) = felt(20_951);
+    println!(
+        "held by a wall: c {c} N of {} N; relative error {error}",
+        random.friction_n
+    );
+    assert_eq!(random.obstacle, Obstacle::Wall);
+    assert!(c < 2.0 * random.friction_n && error < 1.0, "{c} N, {error}");
+    let (c, error, random) = felt(20_775);
+    println!(
+        "immovable: c {c} N of {} N; relative error {error}",
+        random.friction_n
+    );
+    assert!(!random.is_movable());
+    assert!(c > HELD_N, "{c} N");
+}
+
 #[test]
 fn a_box_that_is_spun_far_from_the_linear_range_is_felt_where_it_is() {
     // pushed up to 15 cm beside the middle of a face of 36 cm; from zero, and across the seam of the angle
