@@ -9,6 +9,7 @@ use crate::model::update::Cause;
 
 mod energy;
 mod hostile;
+mod phantom;
 mod replay;
 
 fn state(m: f64, b: f64, c: f64) -> ModelState {
@@ -37,6 +38,29 @@ fn accepted(state: impl Into<BodyState>) -> ModelState {
 
 fn update(cause: Cause, answers_ms: u64, state: impl Into<BodyState>) -> Update {
     fixtures::update(1, cause, answers_ms, accepted(state))
+}
+
+fn replayed() -> LocalModel {
+    model(Mode::Recommended, PoseCorrection::Replay)
+}
+
+/// Answers with what `model` was at a stamp.
+fn answer(model: &LocalModel, ms: u64) -> Update {
+    let then = model.history().at(Time::from_millis(ms)).unwrap();
+    let state = BodyState {
+        pose: then.motion.pose,
+        twist: then.motion.twist,
+        ..*model.state()
+    };
+    update(Cause::Deadband, ms, state)
+}
+
+/// The same update with another state.
+fn with(mut update: Update, change: impl FnOnce(&mut BodyState)) -> Update {
+    let mut state = update.state.into();
+    change(&mut state);
+    update.state = accepted(state);
+    update
 }
 
 /// Pushes the west face at 0.1 m/s from a stand-off of 1 cm; ticks from 1 to `until`.
