@@ -20,10 +20,11 @@ use mmt_client::operator::scripted::{Scripted, ScriptedConfig};
 use mmt_shared::channel::datagram_channel::DatagramChannel;
 use mmt_shared::fixtures::square_at_rest;
 use mmt_shared::io::loop_thread::Frame;
-use mmt_shared::model::geometry::Vec2;
+use mmt_shared::model::geometry::{Face, Vec2};
 use mmt_shared::model::local_model::BodyState;
 use mmt_shared::model::params::ModelState;
 use mmt_shared::model::settings::Mode;
+use mmt_shared::model::tool::TOOL_FORCE_MAX_N;
 use mmt_shared::model::update::{Cause, Update};
 use mmt_shared::pairing::Token;
 use mmt_shared::time::{TICK, Time};
@@ -55,6 +56,7 @@ impl Haptic {
             settings: mode.model_settings(coupling),
             state: square_at_rest(0.7, 3.0, 2.06, 0.36),
             tool: Vec2::new(-0.45, 0.0),
+            tool_force_max_n: TOOL_FORCE_MAX_N,
             resume: Token::new([0; 32]),
             scheme: Label::clipped("any"),
             program: Label::clipped("bench"),
@@ -155,7 +157,7 @@ fn apply(criterion: &mut Criterion) {
             sequence: 1,
             cause: Cause::Deadband,
             answers: haptic.now - Duration::from_millis(100),
-            slave_in_contact: true,
+            touched_face: Some(Face::West),
             state: haptic.state(),
         };
         assert!(haptic.is_held());
@@ -191,7 +193,7 @@ fn replay(criterion: &mut Criterion) {
                 sequence,
                 cause: Cause::Deadband,
                 answers: haptic.now - Duration::from_secs(1),
-                slave_in_contact: true,
+                touched_face: Some(Face::West),
                 state: haptic.state(),
             };
             haptic.receive(Message::Update(black_box(&update).into()));

@@ -80,7 +80,7 @@ impl Master {
     ) -> Self {
         limiter.engage();
         Self {
-            model: LocalModel::new(welcome.settings, welcome.state),
+            model: LocalModel::new(welcome.settings, welcome.state, welcome.tool_force_max_n),
             tdpa: architecture.feels_tool().then(TdpaHand::default),
             limiter,
             link: LinkState::Fresh,

@@ -143,7 +143,7 @@ impl ObserverEnd {
         if let Some(count) = self.updates.get_mut(update.cause.number()) {
             *count += 1;
         }
-        (self.state, self.in_contact) = (update.state, update.slave_in_contact);
+        (self.state, self.in_contact) = (update.state, update.slave_in_contact());
     }
 
     /// Writes the next datagram that is to be sent at `now` to `out` and returns its length; none if there is nothing

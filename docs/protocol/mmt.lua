@@ -41,10 +41,10 @@ declare("uint16", "flags", base.HEX)
 declare("uint32", "length number echo.number echo.received newest_update samples.ticks sequence")
 declare("uint64", "sent echo.sent echo.held_ns samples.stamp answers")
 declare("int32", "samples.x samples.y samples.force_x samples.force_y force.x force.y")
-declare("bool", "slave_in_contact in_contact stopped energy_holds")
-declare("string", "tool_state cause role claim architecture program friction smoothing correction scheme refusal ending")
+declare("bool", "in_contact stopped energy_holds")
+declare("string", "tool_state cause touched_face role claim architecture program friction smoothing correction scheme refusal ending")
 declare("bytes", "token resume report")
-declare("double", "object tool force in_j port.in_j hip stiffness_n_per_m damping_ns_per_m lambda tau_s")
+declare("double", "object tool force in_j port.in_j hip tool_force_max_n stiffness_n_per_m damping_ns_per_m lambda tau_s")
 
 local STATE = "m b c inertia e east north west south x y angle v_x v_y omega"
 for name in STATE:gmatch("%S+") do declare("double", "state." .. name) end
@@ -293,13 +293,14 @@ end
 
 local CAUSES = { "deadband", "timer", "master_only_contact", "slave_only_contact", "contact_lost", "every_sample",
   "elsewhere" }
+local FACES = { "nothing", "east", "north", "west", "south" }
 
 local function update(r)
     local info = envelope(r)
     local sequence = r:numbered("sequence")
     local cause = r:choice("cause", CAUSES)
     r:u64("answers")
-    r:bool("slave_in_contact")
+    r:choice("touched_face", FACES)
     state(r)
     return info .. ", update " .. sequence .. " " .. cause
 end
@@ -332,7 +333,7 @@ local function welcome(r)
     r:f64(smoothing == "per_packet" and "lambda" or "tau_s")
     r:choice("correction", { "snap", "matched_stamps", "replay" })
     state(r)
-    r:floats("", "tool tool")
+    r:floats("", "tool tool tool_force_max_n")
     r.tree:add(fields.resume, r:take(32))
     r:text("scheme")
     r:text("program")

@@ -36,7 +36,13 @@ const MODES: [(&str, Mode); 2] = [("recommended", Mode::Recommended), ("paper", 
 fn shadow(criterion: &mut Criterion) {
     for (name, mode) in MODES {
         let start = slave(mode);
-        let fresh = || LocalModel::new(*start.settings(), *start.state());
+        let fresh = || {
+            LocalModel::new(
+                *start.settings(),
+                *start.state(),
+                start.tool_force().max_n(),
+            )
+        };
         let (mut model, mut tick, mut contact) = (fresh(), 0, 0_u64);
         criterion.bench_function(&format!("shadow/tick/{name}"), |bencher| {
             bencher.iter(|| {

@@ -70,12 +70,13 @@ pub struct Shadow {
 }
 
 impl Shadow {
-    /// Copies of a model that starts in `start`.
+    /// Copies of a model that starts in `start`; the tool presses with `tool_force_max_n` (N) at the most.
     #[must_use]
-    pub fn new(settings: ModelSettings, start: ModelState) -> Self {
+    pub fn new(settings: ModelSettings, start: ModelState, tool_force_max_n: f64) -> Self {
+        let model = LocalModel::new(settings, start, tool_force_max_n);
         Self {
-            ahead: LocalModel::new(settings, start),
-            confirmed: LocalModel::new(settings, start),
+            confirmed: model.clone(),
+            ahead: model,
             sent: VecDeque::with_capacity(SENT_MAX),
             acknowledged: VecDeque::with_capacity(ACKNOWLEDGED_MAX),
             applied: (0, Time::ZERO),

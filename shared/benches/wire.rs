@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use mmt_shared::channel::peer::Peer;
 use mmt_shared::model::contact::Coupling;
-use mmt_shared::model::geometry::{BoxFootprint, Pose, Twist, Vec2};
+use mmt_shared::model::geometry::{BoxFootprint, Face, Pose, Twist, Vec2};
 use mmt_shared::model::params::{ModelParams, ModelState};
 use mmt_shared::model::sample::{ForceCounts, HipCounts, HipSample};
 use mmt_shared::model::update::{Cause, Update};
@@ -56,7 +56,7 @@ fn update() -> Option<Update> {
         sequence: 250,
         cause: Cause::Deadband,
         answers: Time::from_millis(30_000),
-        slave_in_contact: true,
+        touched_face: Some(Face::West),
         state: ModelState::try_new(params, BoxFootprint::square(0.36), pose, twist, &COUPLING)
             .ok()?,
     })

@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
 use crate::model::contact::Coupling;
-use crate::model::geometry::{BoxFootprint, Pose, Twist};
+use crate::model::geometry::{BoxFootprint, Face, Pose, Twist};
 use crate::model::params::{ModelParams, ModelState};
 use crate::model::update::{Cause, Update};
 use crate::time::Time;
@@ -30,13 +30,13 @@ pub fn square_at_rest(m: f64, b: f64, c: f64, side_m: f64) -> ModelState {
     .unwrap()
 }
 
-/// An update that answers the sample of so many milliseconds, while the slave's tool touches the object.
+/// An update that answers the sample of so many milliseconds, while the slave's tool touches the west face.
 pub fn update(sequence: u32, cause: Cause, answers_ms: u64, state: ModelState) -> Update {
     Update {
         sequence,
         cause,
         answers: Time::from_millis(answers_ms),
-        slave_in_contact: true,
+        touched_face: Some(Face::West),
         state,
     }
 }

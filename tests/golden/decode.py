@@ -166,8 +166,9 @@ def tool(r):
 def update(r):
     causes = ["deadband", "timer", "master_only_contact", "slave_only_contact", "contact_lost",
               "every_sample", "elsewhere"]
+    faces = ["nothing", "east", "north", "west", "south"]
     return {**envelope(r), "sequence": r.numbered("sequence"), "cause": r.choice(causes),
-            "answers": r.u64(), "slave_in_contact": r.boolean(), "state": state(r)}
+            "answers": r.u64(), "touched_face": r.choice(faces), "state": state(r)}
 
 
 def scene(r):
@@ -196,7 +197,7 @@ def welcome(r):
     name = "lambda" if fields["smoothing"] == "per_packet" else "tau_s"
     fields[name] = r.f64(name)
     return {**fields, "correction": r.choice(["snap", "matched_stamps", "replay"]), "state": state(r),
-            "tool": r.floats("tool", 2), "resume": r.take(32).hex(), "scheme": r.text(), "program": r.text()}
+            "tool": r.floats("tool", 2), "tool_force_max_n": r.f64("tool_force_max_n"), "resume": r.take(32).hex(), "scheme": r.text(), "program": r.text()}
 
 
 def refused(r):

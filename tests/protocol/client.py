@@ -320,7 +320,7 @@ class Session:
         return {"outcome": "finished", "welcome": self.welcome, "sent": self.sent,
                 "received": self.received, **self.drops, "updates_applied": len(self.applied),
                 "updates_dropped": self.updates, "causes": self.causes,
-                "touched": any(update["slave_in_contact"] for update in self.applied),
+                "touched": any(update["touched_face"] != "nothing" for update in self.applied),
                 "rtt_ms": min(self.rtt_ns) / 1e6 if self.rtt_ns else None,
                 "last_state": states[-1] if states else None, "slave_farewell": theirs}
 

@@ -316,7 +316,7 @@ fn a_vector_with_another_value_is_distinguished_from_what_is_shown() {
         ("/state/omega", Value::from(-0.5000000000000001)),
         ("/sequence", Value::from(2)),
         ("/cause", Value::from("timer")),
-        ("/slave_in_contact", Value::from(false)),
+        ("/touched_face", Value::from("nothing")),
         ("/echo", Value::Null),
     ] {
         let place = vector.fields.pointer_mut(path).unwrap();

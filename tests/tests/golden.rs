@@ -12,6 +12,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command as Process;
 
 use mmt_shared::model::contact::Coupling;
+use mmt_shared::model::geometry::Face;
 use mmt_shared::model::params::ModelState;
 use mmt_shared::model::settings::{FrictionLaw, PoseCorrection, Smoothing};
 use mmt_shared::model::update::Update;
@@ -92,6 +93,15 @@ fn reason(error: &DecodeError) -> String {
     name.to_owned()
 }
 
+fn face(face: Face) -> &'static str {
+    match face {
+        Face::East => "east",
+        Face::North => "north",
+        Face::West => "west",
+        Face::South => "south",
+    }
+}
+
 fn state(state: &ModelState) -> Value {
     let [m, b, c, inertia, e] = state.params().to_array();
     let (f, p, t) = (state.footprint(), state.pose(), state.twist());
@@ -122,7 +132,7 @@ fn of_datagram(read: &Datagram) -> Decoded {
             assert_eq!(Update::<RawState>::from(&update), *raw);
             json!({
                 "sequence": update.sequence, "cause": update.cause.name(),
-                "answers": update.answers, "slave_in_contact": update.slave_in_contact,
+                "answers": update.answers, "touched_face": update.touched_face.map_or("nothing", face),
                 "state": state(&update.state),
             })
         }
@@ -222,7 +232,8 @@ fn of_welcome(raw: &Welcome<RawState>) -> Value {
             PoseCorrection::Replay => "replay",
         },
         "state": state(&welcome.state),
-        "tool": [welcome.tool.x, welcome.tool.y], "resume": welcome.resume.reveal().to_string(),
+        "tool": [welcome.tool.x, welcome.tool.y],
+        "tool_force_max_n": welcome.tool_force_max_n, "resume": welcome.resume.reveal().to_string(),
         "scheme": welcome.scheme, "program": welcome.program,
     });
     let (name, number) = match settings.smoothing {

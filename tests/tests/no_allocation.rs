@@ -42,6 +42,7 @@ use mmt_shared::model::architecture::Architecture;
 use mmt_shared::model::geometry::Vec2;
 use mmt_shared::model::sample::HipSample;
 use mmt_shared::model::settings::Mode;
+use mmt_shared::model::tool::TOOL_FORCE_MAX_N;
 use mmt_shared::pairing::Token;
 use mmt_shared::time::{TICK, Time};
 use mmt_shared::wire::{DATAGRAM_MAX, Label, Message, Side, Welcome};
@@ -115,6 +116,7 @@ impl Loop {
             settings: *slave.settings(),
             state: *slave.state(),
             tool: Vec2::new(-0.45, 0.0),
+            tool_force_max_n: TOOL_FORCE_MAX_N,
             resume: Token::new([0; 32]),
             scheme: Label::clipped("any"),
             program: Label::clipped("test"),
@@ -281,7 +283,11 @@ impl Parts {
                 estimator(Mode::Recommended, ToolGives::No),
             ],
             trigger: Trigger::new(TriggerConfig::of_mode(Mode::Recommended)),
-            shadow: Shadow::new(*slave.settings(), *slave.state()),
+            shadow: Shadow::new(
+                *slave.settings(),
+                *slave.state(),
+                slave.tool_force().max_n(),
+            ),
             playout: PlayoutBuffer::try_new(PlayoutConfig::default()).unwrap(),
             channel: DatagramChannel::new(Side::Slave, Time::ZERO),
             decided: 0,

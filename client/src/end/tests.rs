@@ -6,10 +6,11 @@ use super::*;
 use crate::limiter::{ForceLimiter, Limits};
 use mmt_shared::model::architecture::Architecture;
 use mmt_shared::model::contact::Coupling;
-use mmt_shared::model::geometry::{BoxFootprint, Pose, Twist};
+use mmt_shared::model::geometry::{BoxFootprint, Face, Pose, Twist};
 use mmt_shared::model::params::{ModelParams, ModelState};
 use mmt_shared::model::sample::ForceCounts;
 use mmt_shared::model::settings::Mode;
+use mmt_shared::model::tool::TOOL_FORCE_MAX_N;
 use mmt_shared::model::tool::Tool;
 use mmt_shared::model::update::Cause;
 use mmt_shared::pairing::Token;
@@ -37,6 +38,7 @@ fn end(config: CommandConfig, architecture: Architecture) -> MasterEnd {
         settings: Mode::Recommended.model_settings(coupling),
         state: state(0.7, &coupling),
         tool: Vec2::new(-0.45, 0.0),
+        tool_force_max_n: TOOL_FORCE_MAX_N,
         resume: Token::new([0; 32]),
         scheme: Label::clipped("timer 150ms"),
         program: Label::clipped("test"),
@@ -55,7 +57,7 @@ fn update(sequence: u32, mass_kg: f64) -> Update {
         sequence,
         cause: Cause::Timer,
         answers: AT(1),
-        slave_in_contact: true,
+        touched_face: Some(Face::West),
         state: state(mass_kg, &soft),
     }
 }

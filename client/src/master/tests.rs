@@ -4,9 +4,10 @@ use super::*;
 use crate::failsafe::RELEASE;
 use crate::limiter::Limits;
 use mmt_shared::model::contact::Coupling;
-use mmt_shared::model::geometry::{BoxFootprint, Pose, Twist};
+use mmt_shared::model::geometry::{BoxFootprint, Face, Pose, Twist};
 use mmt_shared::model::params::{ModelParams, ModelState};
 use mmt_shared::model::settings::Mode;
+use mmt_shared::model::tool::TOOL_FORCE_MAX_N;
 use mmt_shared::model::update::Cause;
 use mmt_shared::pairing::Token;
 use mmt_shared::wire::Label;
@@ -19,6 +20,7 @@ fn welcome() -> Welcome {
         settings: Mode::Recommended.model_settings(coupling),
         state: ModelState::try_new(params, footprint, pose, Twist::default(), &coupling).unwrap(),
         tool: Vec2::new(-0.45, 0.0),
+        tool_force_max_n: TOOL_FORCE_MAX_N,
         resume: Token::new([0; 32]),
         scheme: Label::clipped("timer 150ms"),
         program: Label::clipped("test"),
@@ -53,7 +55,7 @@ fn update() -> Update {
         sequence: 1,
         cause: Cause::Timer,
         answers: Time::from_millis(1),
-        slave_in_contact: true,
+        touched_face: Some(Face::West),
         state,
     }
 }

@@ -6,6 +6,7 @@ use mmt_shared::fixtures::{square_at_rest, update};
 use mmt_shared::model::geometry::{Twist, Vec2};
 use mmt_shared::model::params::ModelParams;
 use mmt_shared::model::settings::{Mode, checked_coupling};
+use mmt_shared::model::tool::TOOL_FORCE_MAX_N;
 use mmt_shared::pairing::Token;
 use mmt_shared::wire::{DATAGRAM_MAX, Label};
 
@@ -22,6 +23,7 @@ fn observer() -> ObserverEnd {
         settings: Mode::Recommended.model_settings(COUPLING),
         state: state(0.4),
         tool: Vec2::zeros(),
+        tool_force_max_n: TOOL_FORCE_MAX_N,
         resume: Token::new([0; 32]),
         scheme: Label::clipped("none"),
         program: Label::clipped("test"),

@@ -6,7 +6,7 @@ use super::*;
 use crate::slave::SlaveConfig;
 use mmt_shared::fixtures::square_at_rest;
 use mmt_shared::model::contact::Coupling;
-use mmt_shared::model::geometry::Vec2;
+use mmt_shared::model::geometry::{Face, Vec2};
 use mmt_shared::model::sample::{HipCounts, HipSample};
 use mmt_shared::model::tool::HandPort;
 use mmt_shared::model::update::Cause;
@@ -19,7 +19,7 @@ fn update(sequence: u32, cause: Cause) -> Update {
         sequence,
         cause,
         answers: AT(1),
-        slave_in_contact: true,
+        touched_face: Some(Face::West),
         state: square_at_rest(0.7, 3.0, 2.06, 0.4),
     }
 }

@@ -4,6 +4,7 @@ use super::*;
 use mmt_shared::fixtures::{self, COUPLING, square_at_rest};
 use mmt_shared::model::sample::{ForceCounts, HipCounts};
 use mmt_shared::model::settings::Mode;
+use mmt_shared::model::tool::TOOL_FORCE_MAX_N;
 
 fn state(m: f64) -> ModelState {
     square_at_rest(m, 3.0, 2.06, 0.4)
@@ -11,12 +12,12 @@ fn state(m: f64) -> ModelState {
 
 fn shadow() -> Shadow {
     let settings = Mode::Recommended.model_settings(COUPLING);
-    Shadow::new(settings, state(0.7))
+    Shadow::new(settings, state(0.7), TOOL_FORCE_MAX_N)
 }
 
 fn update(sequence: u32, answers_ms: u64, m: f64) -> Update {
     Update {
-        slave_in_contact: false,
+        touched_face: None,
         ..fixtures::update(sequence, Cause::Deadband, answers_ms, state(m))
     }
 }

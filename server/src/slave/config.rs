@@ -5,6 +5,7 @@ use mmt_shared::model::architecture::Architecture;
 use mmt_shared::model::contact::Coupling;
 use mmt_shared::model::params::ParamsError;
 use mmt_shared::model::settings::Mode;
+use mmt_shared::model::tool::TOOL_FORCE_MAX_N;
 use mmt_shared::range::OutOfRange;
 use serde::{Deserialize, Serialize};
 
@@ -17,7 +18,6 @@ use crate::repeats::Repeats;
 use crate::sensing::{SensingConfig, SensingError, VisionConfig};
 use crate::shadow::TriggerReference;
 use crate::tool::energy::EnergyConfig;
-use crate::tool::force::TOOL_FORCE_MAX_N;
 use crate::trigger::TriggerConfig;
 
 /// What the local model starts from before anything is known of the object.

@@ -66,7 +66,7 @@ impl Slave {
         let params = slave.object.params;
         let footprint = slave.object.observer.footprint();
         slave.start = ModelState::nearest(params, footprint, pose, Twist::default(), &coupling)?;
-        slave.shadow = Shadow::new(slave.settings, slave.start);
+        slave.shadow = Shadow::new(slave.settings, slave.start, slave.tool_force().max_n());
         slave.place_tool(memory.tool);
         // what a plant's tool touches the plant will report
         if slave.contact.plant_mut().linked_mut().is_none() {

@@ -2,12 +2,12 @@
 
 use crate::environment::{BodyConfig, Shape};
 use crate::estimator::Measured;
-use crate::tool::force::TOOL_FORCE_MAX_N;
 use crate::trigger::TriggerInput;
 use mmt_shared::model::geometry::Face;
 use mmt_shared::model::sample::HipCounts;
 use mmt_shared::model::sample::HipSample;
 use mmt_shared::model::settings::Mode;
+use mmt_shared::model::tool::TOOL_FORCE_MAX_N;
 use mmt_shared::time::TICK;
 
 use super::*;

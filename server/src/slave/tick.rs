@@ -132,10 +132,7 @@ impl Slave {
         }
         self.reference.take_update(contact.force);
         let model = self.shadow.ahead();
-        let (stamp, in_contact) = (played.stamp, contact.in_contact);
-        let update = self
-            .updates
-            .step(cause, stamp, in_contact, &self.object, model)?;
+        let update = (self.updates).step(cause, played.stamp, &self.object, model)?;
         self.shadow.send(&update);
         Some(update)
     }

@@ -48,7 +48,6 @@ impl UpdateBuilder {
         &mut self,
         cause: Cause,
         stamp: Time,
-        in_contact: bool,
         object: &ObjectEstimate,
         model: &LocalModel,
     ) -> Option<Update> {
@@ -76,7 +75,7 @@ impl UpdateBuilder {
             sequence: self.sequence,
             cause,
             answers: stamp,
-            slave_in_contact: in_contact,
+            touched_face: object.observer.contact().map(|contact| contact.face),
             state,
         })
     }

@@ -9,12 +9,10 @@ mod tests;
 
 use mmt_shared::model::contact::Coupling;
 use mmt_shared::model::geometry::Vec2;
+use mmt_shared::model::tool::TOOL_FORCE_N;
 use mmt_shared::range::{OutOfRange, in_range};
 use mmt_shared::time::TICK_S;
 
-/// Default of the limit, N. The hand presses with 8 N at the most (`device`'s profiles), so a tool that does what is felt
-/// stays below it; and it is the bound that outages are held to (15 N after 60 ms, `lab/src/world/tests/hard.rs`).
-pub const TOOL_FORCE_MAX_N: f64 = 15.0;
 /// Share of the limit that is left for what the prediction of a tick's force cannot have: an object that moves within the tick,
 /// a sensor's noise. Found by `mmt reproduce touch`, whose greatest force without it was less than so much above the limit.
 const MARGIN: f64 = 0.04;
@@ -23,8 +21,6 @@ const APPROACH_NAME: &str =
     "tool: speed of approach, limit of the force / (contact damping + 2 stiffness T)";
 /// Accepted speed at which the tool may touch, m/s: a slower tool follows no hand.
 const APPROACH_M_PER_S: (f64, f64) = (0.1, f64::MAX);
-/// Accepted limits, N: from twice the force that counts as noise up to what no tabletop arm exerts.
-const LIMIT_N: (f64, f64) = (0.1, 1000.0);
 
 /// The limit, and what came of it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -43,7 +39,7 @@ impl ToolForce {
     /// # Errors
     /// When the limit is not within its range.
     pub fn try_new(max_n: f64, coupling: Coupling) -> Result<Self, OutOfRange> {
-        in_range("tool force: limit", "N", max_n, LIMIT_N)?;
+        in_range("tool force: limit", "N", max_n, TOOL_FORCE_N)?;
         Ok(Self {
             max_n,
             coupling,
@@ -51,6 +47,12 @@ impl ToolForce {
             held_ticks: 0,
             peak_n: 0.0,
         })
+    }
+
+    /// The limit, N.
+    #[must_use]
+    pub fn max_n(&self) -> f64 {
+        self.max_n
     }
 
     /// The force that no predicted one exceeds where this is the limit, N.

@@ -82,6 +82,11 @@ impl GodObject {
         self.touched
     }
 
+    /// This face is touched, however deep the HIP is behind it.
+    pub fn enter_by(&mut self, face: Face) {
+        self.touched = Some(face);
+    }
+
     /// Follows the HIP and returns what it touches.
     ///
     /// The face entered by is kept until the HIP leaves its half-plane or passes its end.

@@ -54,15 +54,15 @@ pub struct LocalModel {
 }
 
 impl LocalModel {
-    /// A model at rest in `start`, with an empty history.
-    pub fn new(settings: ModelSettings, start: ModelState) -> Self {
+    /// A model at rest in `start`, with an empty history. The slave's tool presses with `tool_force_max_n` (N) at the most.
+    pub fn new(settings: ModelSettings, start: ModelState, tool_force_max_n: f64) -> Self {
         Self {
             settings,
             body: Body::new(start),
             target: start.params(),
             correction: Correction::default(),
             history: History::with_capacity(HISTORY_TICKS),
-            replay: Replay::new(start),
+            replay: Replay::new(start, tool_force_max_n),
             previous: None,
             rendered: Rendered::default(),
             touched: Duration::ZERO,

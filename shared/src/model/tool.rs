@@ -6,6 +6,13 @@ use crate::model::geometry::{Pose, Vec2};
 use crate::model::sample::ForceCounts;
 use crate::time::Time;
 
+/// Default of the greatest force with which the tool presses, N. The hand presses with 8 N at the most (`device`'s profiles), so a
+/// tool that does what is felt stays below it; and it is the bound that outages are held to (15 N after 60 ms,
+/// `lab/src/world/tests/hard.rs`).
+pub const TOOL_FORCE_MAX_N: f64 = 15.0;
+/// Accepted greatest forces, N: from twice the force that counts as noise up to what no tabletop arm exerts.
+pub const TOOL_FORCE_N: (f64, f64) = (0.1, 1000.0);
+
 /// What the hand's port sends to the tool's: time-domain passivity control (TDPA) holds each side to what went in at
 /// the other (`docs/baselines.md`).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]

@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::model::geometry::Face;
 use crate::model::params::ModelState;
 use crate::time::Time;
 
@@ -67,21 +68,49 @@ pub struct Update<S = ModelState> {
     pub cause: Cause,
     /// The moment that it answers, by the master's clock: what the slave played, between two HIP samples as a rule.
     pub answers: Time,
-    /// Whether the slave's tool touches the object.
-    pub slave_in_contact: bool,
+    /// The face that the slave's tool touches; none where it touches nothing.
+    #[serde(with = "touched_face")]
+    pub touched_face: Option<Face>,
     /// Parameters, footprint, pose and velocity of the object at that moment.
     pub state: S,
 }
 
 impl<S> Update<S> {
+    /// Whether the slave's tool touches the object.
+    pub fn slave_in_contact(&self) -> bool {
+        self.touched_face.is_some()
+    }
+
     /// The same update with its state in another form.
     pub(crate) fn with_state<T>(&self, state: T) -> Update<T> {
         Update {
             sequence: self.sequence,
             cause: self.cause,
             answers: self.answers,
-            slave_in_contact: self.slave_in_contact,
+            touched_face: self.touched_face,
             state,
         }
+    }
+}
+
+/// On the wire a choice: 0 nothing, 1 and on the faces in the order of [`Face::ALL`].
+mod touched_face {
+    use serde::de::Error;
+    use serde::{Deserialize, Deserializer, Serializer};
+
+    use crate::model::geometry::Face;
+
+    pub(super) fn serialize<S: Serializer>(face: &Option<Face>, to: S) -> Result<S::Ok, S::Error> {
+        to.serialize_u8(face.map_or(0, |face| face as u8 + 1))
+    }
+
+    pub(super) fn deserialize<'de, D: Deserializer<'de>>(
+        from: D,
+    ) -> Result<Option<Face>, D::Error> {
+        let Some(place) = u8::deserialize(from)?.checked_sub(1) else {
+            return Ok(None);
+        };
+        let face = Face::ALL.get(usize::from(place));
+        Ok(Some(*face.ok_or_else(|| D::Error::custom("no such face"))?))
     }
 }

@@ -144,6 +144,7 @@ impl<'a> StreamMessage<'a> {
                     Smoothing::InTime { tau_s } => finite("tau_s", &[tau_s])?,
                 }
                 finite("tool", welcome.tool.as_slice())?;
+                finite("tool_force_max_n", &[welcome.tool_force_max_n])?;
                 welcome.state.check()
             }
             Self::Refused(_) | Self::Farewell(_) => Ok(()),

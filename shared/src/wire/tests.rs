@@ -10,11 +10,11 @@ use proptest::prelude::*;
 
 use super::*;
 use crate::model::contact::Coupling;
-use crate::model::geometry::{BoxFootprint, Pose, Twist, Vec2};
+use crate::model::geometry::{BoxFootprint, Face, Pose, Twist, Vec2};
 use crate::model::params::{ModelParams, ModelState, ParamsError};
 use crate::model::sample::{ForceCounts, HipCounts, HipSample};
 use crate::model::settings::{FrictionLaw, Mode, ModelSettings, PoseCorrection, Smoothing};
-use crate::model::tool::{HandPort, Scene, Tool};
+use crate::model::tool::{HandPort, Scene, TOOL_FORCE_MAX_N, Tool};
 use crate::model::update::{Cause, Update};
 use crate::pairing::Token;
 use crate::time::Time;
@@ -41,7 +41,7 @@ fn update() -> Update {
         sequence: 1,
         cause: Cause::Deadband,
         answers: Time::ZERO,
-        slave_in_contact: false,
+        touched_face: None,
         state: state(),
     }
 }
@@ -74,6 +74,7 @@ fn welcome() -> Welcome {
         settings: Mode::Recommended.model_settings(COUPLING),
         state: state(),
         tool: Vec2::new(-0.45, 0.1),
+        tool_force_max_n: TOOL_FORCE_MAX_N,
         resume: Token::new([9; 32]),
         scheme: Label::clipped("hybrid"),
         program: Label::clipped("mmt test"),

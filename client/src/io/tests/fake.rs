@@ -14,6 +14,7 @@ use mmt_shared::io::stream::{read_frame, write_frame};
 use mmt_shared::io::transport::{Connection, Listener, RecvStream, SendStream};
 use mmt_shared::model::geometry::{BoxFootprint, Pose};
 use mmt_shared::model::settings::Mode;
+use mmt_shared::model::tool::TOOL_FORCE_MAX_N;
 use mmt_shared::model::update::Update;
 use mmt_shared::report::MasterHalf;
 use mmt_shared::time::Time;
@@ -83,6 +84,7 @@ pub(super) fn welcome_for(coupling: Coupling) -> Welcome {
         settings: Mode::Recommended.model_settings(coupling),
         state: state(&coupling),
         tool: Vec2::new(-0.45, 0.0),
+        tool_force_max_n: TOOL_FORCE_MAX_N,
         resume: Token::new([0; 32]),
         scheme: Label::clipped("none"),
         program: Label::clipped("fake"),
@@ -202,7 +204,7 @@ impl Session {
             sequence: self.sequence,
             cause: Cause::Timer,
             answers: Time::from_nanos(self.stamps.last().copied().unwrap_or(0)),
-            slave_in_contact: false,
+            touched_face: None,
             state: state(&self.hello.coupling),
         };
         self.tell(Message::Update((&update).into()));

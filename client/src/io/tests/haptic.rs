@@ -12,7 +12,7 @@ use mmt_shared::io::record::{RecordError, Recorder, read};
 use mmt_shared::io::schedule::Tick;
 use mmt_shared::io::truth::{self, TruthReceiver};
 use mmt_shared::metrics::PoseError;
-use mmt_shared::model::geometry::Pose;
+use mmt_shared::model::geometry::{Face, Pose};
 use mmt_shared::model::update::Update;
 use mmt_shared::record::messages::{Message as _, Reading};
 use mmt_shared::time::Time;
@@ -111,7 +111,7 @@ fn update(sequence: u32) -> Update {
         sequence,
         cause: Cause::Timer,
         answers: Time::from_millis(1),
-        slave_in_contact: true,
+        touched_face: Some(Face::West),
         state: state(&COUPLING),
     }
 }

@@ -83,7 +83,7 @@ impl SlaveChecks {
                 Cause::Timer | Cause::EverySample => true,
             };
         let holds =
-            (fits || again) && update.slave_in_contact == touches && update.answers == done.stamp;
+            (fits || again) && update.slave_in_contact() == touches && update.answers == done.stamp;
         self.verdict.judge(Invariant::UpdateCause, now, holds, || {
             format!(
                 "{:?} with contact {touches} at {:?}, answering {:?}",

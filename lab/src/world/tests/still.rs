@@ -130,22 +130,20 @@ fn a_light_box_that_a_wall_holds_is_felt_where_it_is_as_well() {
     }
 }
 
-/// Force at which an object starts to move that an ordinary hand cannot push, N; and that of a hand and a device that can.
-const HEAVY_N: f64 = 12.0;
-const STRONG_N: f64 = 16.0;
-
-#[test]
-fn what_starts_to_move_at_12_n_is_pushed_by_a_hand_and_a_device_that_can() {
+/// An object of 3 kg that starts to move at `heavy_n` (N) is pushed by a hand and a device that can, `strong_n` (N), with a tool that
+/// presses with `tool_n` (N) at the most: the relative error of the force is at most `error_most`.
+fn heavy([heavy_n, strong_n, tool_n]: [f64; 3], error_most: f64) {
     for one_way_ms in [0, 50, 125] {
         for seed in 21..=23 {
             let mut config = over(&format!("delay {one_way_ms}ms"), seed);
             let environment = &mut config.slave.environment;
             environment.mass_kg = 3.0;
-            environment.friction_coefficient = HEAVY_N / (3.0 * 9.81);
-            config.operator.press_max_n = STRONG_N;
-            config.slave.tool_energy.hand_force_max_n = STRONG_N;
+            environment.friction_coefficient = heavy_n / (3.0 * 9.81);
+            config.operator.press_max_n = strong_n;
+            config.slave.tool_force_max_n = tool_n;
+            config.slave.tool_energy.hand_force_max_n = strong_n;
             let device = DeviceLinkConfig {
-                force_max_n: STRONG_N,
+                force_max_n: strong_n,
                 stiffness_n_per_m: 1000.0,
                 ..DeviceLinkConfig::default()
             };
@@ -159,17 +157,29 @@ fn what_starts_to_move_at_12_n_is_pushed_by_a_hand_and_a_device_that_can() {
                     last = slave.truth.position;
                 }
             });
-            let (outcome, at) = (world.outcome(), (one_way_ms, seed));
+            let (outcome, at) = (world.outcome(), (heavy_n, one_way_ms, seed));
+            let error = relative_error(&world);
+            let pose_m = outcome.pose.position_max_m().unwrap();
+            let c = world.slave().estimate().c;
+            println!("{at:?}: over {way_m:.2} m, error {error:.4}, pose {pose_m:.4} m, c {c:.2} N");
             assert!(way_m > 1.0, "{at:?}: pushed over {way_m} m");
             assert_eq!(world.slave().tool_energy().held_ticks(), 0, "{at:?}");
-            let error = relative_error(&world);
-            assert!(error <= 0.15, "{at:?}: {error}");
-            let pose_m = outcome.pose.position_max_m().unwrap();
+            assert!(error <= error_most, "{at:?}: {error}");
             let round_trip_s = (2 * one_way_ms + PLAYOUT_MS) as f64 * 1e-3;
             assert!(pose_m <= 0.010 + 0.1 * round_trip_s, "{at:?}: {pose_m} m");
-            let c = world.slave().estimate().c;
-            assert!((c - HEAVY_N).abs() < 0.1, "{at:?}: {c} N");
+            assert!((c - heavy_n).abs() < 0.01 * heavy_n, "{at:?}: {c} N");
             assert!(outcome.energy_injected_j <= 1e-9, "{at:?}");
         }
     }
+}
+
+#[test]
+fn what_starts_to_move_at_12_n_is_pushed_by_a_hand_and_a_device_that_can() {
+    heavy([12.0, 16.0, 15.0], 0.15);
+}
+
+#[test]
+fn what_starts_to_move_at_17_n_is_pushed_by_a_tool_that_can() {
+    // with a replay that pushes with 15 N 0.19
+    heavy([17.0, 20.0, 30.0], 0.16);
 }

@@ -5,7 +5,6 @@
 
 use super::LocalModel;
 use super::body::Body;
-use super::replay::is_pressed;
 use crate::model::contact::Touch;
 use crate::model::correction::{Correction, ROOM_M};
 use crate::model::geometry::{Face, Vec2};
@@ -98,8 +97,7 @@ impl LocalModel {
     }
 
     /// How far short of its place a box goes (m, world) that is touched there by the face next to the one that is felt: so far that
-    /// the HIP presses no deeper than it did; the rest is bled in. A HIP that is deeper there than a tool presses has gone into an
-    /// object that was not yet known to be there, by no face.
+    /// the HIP presses no deeper than it did; the rest is bled in.
     fn short_of_next_face(&self, touch: &Touch, hip: Vec2) -> Option<Vec2> {
         if self.correction.remaining.shift.norm() <= BESIDE_M {
             return None;
@@ -107,7 +105,7 @@ impl LocalModel {
         let there = self.replay.touch(hip)?;
         let is_next = there.inward.dot(&touch.inward).abs() < NEXT_FACE;
         let short = there.inward * (there.penetration - touch.penetration).max(0.0);
-        (is_next && is_pressed(&self.settings.coupling, &there)).then_some(short)
+        is_next.then_some(short)
     }
 
     /// What the HIP (m, world) touches of the box in its place.

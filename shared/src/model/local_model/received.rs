@@ -39,7 +39,7 @@ impl LocalModel {
 
     /// Compares at the stamp that the update answers; the ticks bleed the difference in.
     pub(super) fn match_stamps(&mut self, update: &Update) {
-        let retracted = !update.slave_in_contact;
+        let retracted = !update.slave_in_contact();
         let shift = self.take_footprint(update, retracted);
         self.correction.count(shift);
         self.aim(update);
@@ -58,7 +58,7 @@ impl LocalModel {
     /// offset it would recede from a hand that it may not have to leave.
     pub(super) fn restart(&mut self, update: &Update) {
         self.take_footprint(update, false);
-        self.replay.begin(update, &self.settings, &self.history);
+        self.replay.begin(update, &self.history);
     }
 
     /// Takes over the face offsets. The face that the HIP touches, or is in front of, stays where it is:

@@ -6,7 +6,7 @@
 //! be corrected. It must never touch the box that is felt, and never take longer in a tick than its share.
 
 use super::body::{Body, BodyState};
-use crate::model::contact::{Coupling, GodObject, Touch};
+use crate::model::contact::{GodObject, Touch};
 use crate::model::correction::{Correction, ROOM_M};
 use crate::model::geometry::{Face, Pose, Vec2};
 use crate::model::history::History;
@@ -25,15 +25,6 @@ const JUMP_M: f64 = 0.01;
 /// A HIP no deeper than this, m, is hardly in a box.
 const FLAT_M: f64 = 0.005;
 
-/// No tool pushes harder, N, as slaves are configured by default. Before an update came, the hand may have gone where the box is,
-/// and the coupling alone would shoot it away.
-const PUSH_MAX_N: f64 = 15.0;
-
-/// Whether a tool can press as deep as this.
-pub(super) fn is_pressed(coupling: &Coupling, touch: &Touch) -> bool {
-    coupling.force(touch.penetration, 0.0) <= PUSH_MAX_N
-}
-
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Progress {
     /// No update yet.
@@ -48,14 +39,18 @@ enum Progress {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Replay {
     body: Body,
+    /// No tool pushes harder, N. Before an update came, the hand may have gone where the box is, and the coupling alone would shoot
+    /// it away.
+    tool_force_max_n: f64,
     progress: Progress,
     waiting: Option<Update>,
 }
 
 impl Replay {
-    pub(super) fn new(start: ModelState) -> Self {
+    pub(super) fn new(start: ModelState, tool_force_max_n: f64) -> Self {
         Self {
             body: Body::new(start),
+            tool_force_max_n,
             progress: Progress::Idle,
             waiting: None,
         }
@@ -114,7 +109,7 @@ impl Replay {
 
     /// Restarts at the sample that an update answers. One that is older than the history shows nothing of
     /// where the box is now.
-    pub(super) fn begin(&mut self, update: &Update, settings: &ModelSettings, history: &History) {
+    pub(super) fn begin(&mut self, update: &Update, history: &History) {
         let Some(then) = history.nearest(update.answers) else {
             return;
         };
@@ -124,14 +119,15 @@ impl Replay {
             .footprint
             .nearest(state.pose.point_to_object(then.hip))
             .1;
-        let touch = god.touch_at(&state.footprint, &state.pose, then.hip);
-        let is_there = god.touched().is_some()
-            && touch.is_some_and(|touch| is_pressed(&settings.coupling, &touch));
-        if jump > JUMP_M && depth < FLAT_M && !is_there {
-            // where the HIP was seen from another place shows nothing of the face that it is at
-            god = GodObject::default();
+        if let Some(face) = update.touched_face {
+            god.enter_by(face);
+        } else {
+            if jump > JUMP_M && depth < FLAT_M && god.touched().is_none() {
+                // where the HIP was seen from another place shows nothing of the face that it is at
+                god = GodObject::default();
+            }
+            god.after_jump(&state.footprint, &state.pose, then.hip);
         }
-        god.after_jump(&state.footprint, &state.pose, then.hip);
         self.body = Body { state, god };
         self.progress = Progress::Behind(then.stamp);
     }
@@ -146,7 +142,8 @@ impl Replay {
         let until = history.len().min(from + REPLAYED_PER_TICK);
         for moment in (from..until).filter_map(|index| history.nth(index)) {
             let (hip, velocity) = (moment.hip, moment.hip_velocity);
-            self.body.step_within(settings, hip, velocity, PUSH_MAX_N);
+            self.body
+                .step_within(settings, hip, velocity, self.tool_force_max_n);
         }
         let next = history.nth(until).map(|moment| moment.stamp);
         let newest = history.newest().map(|moment| moment.stamp);

@@ -5,6 +5,7 @@ use crate::fixtures::{self, COUPLING, square_at_rest};
 use crate::model::correction::ROOM_M;
 use crate::model::geometry::{BoxFootprint, Pose};
 use crate::model::settings::Mode;
+use crate::model::tool::TOOL_FORCE_MAX_N;
 use crate::model::update::Cause;
 
 mod energy;
@@ -21,7 +22,7 @@ fn model(mode: Mode, correction: PoseCorrection) -> LocalModel {
         correction,
         ..mode.model_settings(COUPLING)
     };
-    LocalModel::new(settings, state(0.7, 3.0, 2.06))
+    LocalModel::new(settings, state(0.7, 3.0, 2.06), TOOL_FORCE_MAX_N)
 }
 
 fn accepted(state: impl Into<BodyState>) -> ModelState {
@@ -52,7 +53,10 @@ fn answer(model: &LocalModel, ms: u64) -> Update {
         twist: then.motion.twist,
         ..*model.state()
     };
-    update(Cause::Deadband, ms, state)
+    Update {
+        touched_face: then.god.touched(),
+        ..update(Cause::Deadband, ms, state)
+    }
 }
 
 /// The same update with another state.
@@ -182,7 +186,7 @@ fn mismatch_case_1_releases_the_master() {
         .pose;
     carved.footprint.west -= 0.005;
     let free = Update {
-        slave_in_contact: false,
+        touched_face: None,
         ..update(Cause::MasterOnlyContact, 105, carved)
     };
     model.apply(&free);

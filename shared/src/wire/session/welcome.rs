@@ -6,6 +6,7 @@ use crate::model::contact::Coupling;
 use crate::model::geometry::Vec2;
 use crate::model::params::{ModelState, ParamsError, WORKSPACE_M, in_range};
 use crate::model::settings::ModelSettings;
+use crate::model::tool::TOOL_FORCE_N;
 use crate::pairing::Token;
 use crate::wire::label::Label;
 use crate::wire::state::RawState;
@@ -19,6 +20,8 @@ pub struct Welcome<S = ModelState> {
     pub state: S,
     /// Where the tool is, m: the HIP starts there.
     pub tool: Vec2,
+    /// With no more than this, N, the tool presses on what it touches.
+    pub tool_force_max_n: f64,
     /// With this the same master resumes the session after it was started again.
     pub resume: Token,
     /// Name of the update scheme, for the screen.
@@ -52,6 +55,7 @@ impl<S> Welcome<S> {
             settings: self.settings,
             state,
             tool: self.tool,
+            tool_force_max_n: self.tool_force_max_n,
             resume: self.resume,
             scheme: self.scheme,
             program: self.program,
@@ -80,6 +84,7 @@ impl Welcome<RawState> {
         }
         in_range("tool x", "m", self.tool.x, (-WORKSPACE_M, WORKSPACE_M))?;
         in_range("tool y", "m", self.tool.y, (-WORKSPACE_M, WORKSPACE_M))?;
+        in_range("tool force", "N", self.tool_force_max_n, TOOL_FORCE_N)?;
         Ok(self.with_state(self.state.accept(asked)?))
     }
 }

@@ -104,6 +104,9 @@ fn what_the_other_side_would_refuse_is_not_written() {
     let mut bad = welcome();
     bad.settings.smoothing = Smoothing::InTime { tau_s: f64::NAN };
     refused(StreamMessage::Welcome((&bad).into()).encode(&mut out));
+    let mut bad = welcome();
+    bad.tool_force_max_n = f64::INFINITY;
+    refused(StreamMessage::Welcome((&bad).into()).encode(&mut out));
 }
 
 #[test]
@@ -134,6 +137,12 @@ fn a_hello_or_welcome_with_a_number_out_of_range_is_not_accepted() {
     let mut far = welcome();
     far.tool.x = -5.1;
     assert!(Welcome::<RawState>::from(&far).accept(&COUPLING).is_err());
+    for newtons in [0.0, -15.0, 1000.1] {
+        let mut bad = welcome();
+        bad.tool_force_max_n = newtons;
+        let refused = Welcome::<RawState>::from(&bad).accept(&COUPLING);
+        assert!(matches!(refused, Err(WelcomeError::Number(_))));
+    }
     let bytes = on_stream(&stream_messages()[1]);
     let at = |value: f64| bytes.windows(8).position(|w| w == value.to_le_bytes());
     let place = at(0.1).unwrap();

@@ -85,11 +85,11 @@ proptest! {
     fn any_update_reads_back(
         envelope in any_envelope(),
         sequence in 1_u32..,
-        (cause, slave_in_contact) in (0..6_usize, any::<bool>()),
+        (cause, face) in (0..Cause::ALL.len(), prop::option::of(0..Face::ALL.len())),
         (answers, state) in (any::<u64>(), any_state()),
     ) {
         let (cause, answers) = (Cause::ALL[cause], Time::from_nanos(answers));
-        let update = Update { sequence, cause, answers, slave_in_contact, state };
+        let update = Update { sequence, cause, answers, touched_face: face.map(|face| Face::ALL[face]), state };
         let bytes = datagram(envelope, Message::Update((&update).into()));
         let read = Datagram::decode(&bytes, Side::Slave).unwrap();
         prop_assert_eq!(read.envelope, envelope);

@@ -56,7 +56,7 @@ fn jump(draw: &mut Substream, model: &LocalModel, now: u64, size: f64) -> Update
     );
     let params = ModelParams::of_square(m, b, c, side, &COUPLING).unwrap();
     Update {
-        slave_in_contact: draw.uniform_in(0.0, 1.0) < 0.7,
+        touched_face: Face::ALL.get(draw.uniform_in(0.0, 6.0) as usize).copied(),
         ..update(
             Cause::Deadband,
             answers,

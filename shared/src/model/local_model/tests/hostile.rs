@@ -9,6 +9,7 @@ use crate::model::params::{
     least_stable_inertia, least_stable_mass,
 };
 use crate::model::settings::{CONTACT_DAMPING_NS_PER_M, FrictionLaw, Mode, STIFFNESS_N_PER_M};
+use crate::model::tool::TOOL_FORCE_MAX_N;
 use crate::rng::Substream;
 use proptest::prelude::*;
 
@@ -94,7 +95,7 @@ proptest! {
     fn any_accepted_state_stays_finite_under_ten_seconds_of_a_hostile_hand(seed in any::<u64>()) {
         let mut draw = Substream::new(seed, "test/hostile", 0);
         let (settings, start) = any_accepted(&mut draw);
-        let mut model = LocalModel::new(settings, start);
+        let mut model = LocalModel::new(settings, start, TOOL_FORCE_MAX_N);
         let mut hip = Vec2::new(-start.footprint().west - 0.01, 0.0);
         for n in 1..=10_000 {
             hip = hostile(&mut draw, &model, hip);
@@ -123,7 +124,7 @@ proptest! {
     fn any_accepted_box_dissipates_what_a_shaking_hand_puts_in(seed in any::<u64>()) {
         let mut draw = Substream::new(seed, "test/dissipates", 0);
         let (settings, start) = any_accepted(&mut draw);
-        let mut model = LocalModel::new(settings, start);
+        let mut model = LocalModel::new(settings, start, TOOL_FORCE_MAX_N);
         let depth = 0.2 * start.footprint().west.min(0.02);
         let lateral = draw.uniform_in(-0.9, 0.9);
         let lateral = lateral * start.footprint().north.min(start.footprint().south);
@@ -179,7 +180,7 @@ fn a_light_turntable_and_a_friction_next_to_nothing_are_no_danger() {
     );
     let settings = Mode::Recommended.model_settings(COUPLING);
     assert_eq!(settings.friction, FrictionLaw::LimitSurface);
-    let mut model = LocalModel::new(settings, state(0.0187, 5e-324).unwrap());
+    let mut model = LocalModel::new(settings, state(0.0187, 5e-324).unwrap(), TOOL_FORCE_MAX_N);
     push(&mut model, 1..=2000);
     assert!(finite(&model) && model.not_finite() == 0);
 }

@@ -3,15 +3,16 @@
 use super::*;
 use crate::model::geometry::{Face, rotate};
 
-/// Pushes a model, then sends it an update in which the box has gone so far, m. Returns the model, how far off it is in the next
-/// tick and 50 ticks on (m), and what it renders then.
-fn after_going(x: f64, y: f64) -> (LocalModel, [f64; 2], Rendered) {
+/// Pushes a model, then sends it an update in which the box has gone so far, m, and is touched so. Returns the model, how far off it
+/// is in the next tick and 50 ticks on (m), and what it renders then.
+fn after_going(x: f64, y: f64, touched: Option<Face>) -> (LocalModel, [f64; 2], Rendered) {
     let mut model = replayed();
     push(&mut model, 1..=400);
-    let gone = with(answer(&model, 400), |of| {
+    let mut gone = with(answer(&model, 400), |of| {
         of.pose.position += Vec2::new(x, y);
         of.twist = Twist::default();
     });
+    gone.touched_face = touched;
     let wanted = gone.state.pose().position;
     model.apply(&gone);
     let off = |model: &LocalModel| (model.state().pose.position - wanted).norm();
@@ -26,14 +27,15 @@ fn after_going(x: f64, y: f64) -> (LocalModel, [f64; 2], Rendered) {
 fn what_has_slipped_from_the_hand_is_no_longer_felt_and_the_hand_does_not_hold_it_up() {
     // to the side, clear of the HIP; and back past the HIP
     for (x, y) in [(0.0, 0.25), (-0.45, 0.0), (0.05, -0.3)] {
-        let (model, [at_once, _], felt) = after_going(x, y);
+        let (model, [at_once, _], felt) = after_going(x, y, None);
         assert!(at_once < 1e-9, "{x}, {y}: {at_once}");
         assert!(!felt.in_contact(), "{x}, {y}");
         assert_eq!(model.energy_injected_j(), 0.0);
     }
     // nearer than that, ahead of the push, or with the HIP in it
-    for (x, y) in [(0.0, 0.09), (0.15, 0.0), (0.0, 0.12)] {
-        let (model, [at_once, later], _) = after_going(x, y);
+    let west = Some(Face::West);
+    for (x, y, touched) in [(0.0, 0.09, west), (0.15, 0.0, None), (0.0, 0.12, west)] {
+        let (model, [at_once, later], _) = after_going(x, y, touched);
         let way = Vec2::new(x, y).norm();
         assert!(
             at_once > 0.9 * way && later > 0.5 * way,
@@ -53,10 +55,11 @@ fn after_another(deep: f64, last_ms: Option<u64>) -> (f64, LocalModel) {
     }
     push(&mut model, 1201..=1220);
     let (_, hip) = model.previous.unwrap();
-    let another = with(answer(&model, 1220), |of| {
+    let mut another = with(answer(&model, 1220), |of| {
         of.pose.position = Vec2::new(hip.x + deep - 0.2, 0.05);
         of.twist = Twist::default();
     });
+    another.touched_face = Some(Face::East);
     model.apply(&another);
     push(&mut model, 1221..=1221);
     let off = (model.state().pose.position - another.state.pose().position).norm();
@@ -209,8 +212,9 @@ fn a_thin_box_that_goes_at_once_to_the_other_side_of_the_hip_is_not_pressed_thro
 }
 
 /// Pushes the west face near its north end, then sends an update in which the HIP is `deep` (m) behind the north face and `aside`
-/// (m) behind the west one. What is rendered in the last tick before it is known, and 10 ms and half a second later; the model.
-fn by_the_north_face(deep: f64, aside: f64) -> ([Rendered; 3], LocalModel) {
+/// (m) behind the west one, and the tool at one of them. What is rendered in the last tick before it is known, and 10 ms and half a
+/// second later; the model.
+fn near_the_corner(touched: Face, deep: f64, aside: f64) -> ([Rendered; 3], LocalModel) {
     let mut model = replayed();
     let hip = |n: u64| Vec2::new(-0.21 + 1e-4 * n as f64, 0.19);
     let run = |model: &mut LocalModel, ticks: std::ops::RangeInclusive<u64>| {
@@ -221,12 +225,13 @@ fn by_the_north_face(deep: f64, aside: f64) -> ([Rendered; 3], LocalModel) {
         last
     };
     let felt = run(&mut model, 1..=400);
-    let other = with(answer(&model, 400), |of| {
+    let mut other = with(answer(&model, 400), |of| {
         let hip_in_object = Vec2::new(aside - 0.2, 0.2 - deep);
         of.pose.position = hip(400) - rotate(of.pose.angle, hip_in_object);
         of.twist = Twist::default();
         of.params = state(5.0, 3.0, 20.0).params();
     });
+    other.touched_face = Some(touched);
     model.apply(&other);
     let soon = run(&mut model, 401..=410);
     let later = run(&mut model, 411..=900);
@@ -238,7 +243,7 @@ fn a_hand_feels_the_face_that_the_object_is_touched_by() {
     // behind the face that was felt, no farther than a soft contact goes, and much farther
     for aside in [0.03, 0.12] {
         for deep in [1e-3, 3e-3] {
-            let ([felt, soon, later], model) = by_the_north_face(deep, aside);
+            let ([felt, soon, later], model) = near_the_corner(Face::North, deep, aside);
             let pressed = |of: &Rendered| of.touch.map(|touch| (touch.face, touch.penetration));
             let (face, before) = pressed(&felt).unwrap();
             assert_eq!(face, Face::West);
@@ -249,5 +254,16 @@ fn a_hand_feels_the_face_that_the_object_is_touched_by() {
             assert!((then - deep).abs() < 5e-4, "{then} m, not {deep}");
             assert!(model.energy_injected_j() < 1e-12);
         }
+    }
+}
+
+#[test]
+fn a_hand_that_has_run_into_what_is_held_goes_on_feeling_the_face_that_the_tool_presses_on() {
+    // hardly behind the face that is nearer, deep behind both, and deeper behind the one that is pressed on
+    for (deep, aside) in [(0.009, 0.1), (0.04, 0.045), (0.058, 0.074)] {
+        let ([felt, soon, later], model) = near_the_corner(Face::West, deep, aside);
+        let faces = [felt, soon, later].map(|of| of.touch.map(|touch| touch.face));
+        assert_eq!(faces, [Some(Face::West); 3], "{deep} m, {aside} m");
+        assert!(model.energy_injected_j() < 1e-12);
     }
 }

@@ -107,7 +107,7 @@ fn a_face_that_is_not_there_goes_away_from_the_hand_without_letting_go_at_once()
     let mut model = replayed();
     let before = push(&mut model, 1..=200);
     let mut carved = with(answer(&model, 200), |of| of.footprint.west -= 0.01);
-    carved.slave_in_contact = false;
+    carved.touched_face = None;
     carved.cause = Cause::MasterOnlyContact;
     model.apply(&carved);
     let after = push(&mut model, 201..=201);
