@@ -197,7 +197,8 @@ def welcome(r):
     name = "lambda" if fields["smoothing"] == "per_packet" else "tau_s"
     fields[name] = r.f64(name)
     return {**fields, "correction": r.choice(["snap", "matched_stamps", "replay"]), "state": state(r),
-            "tool": r.floats("tool", 2), "tool_force_max_n": r.f64("tool_force_max_n"), "resume": r.take(32).hex(), "scheme": r.text(), "program": r.text()}
+            "tool": r.floats("tool", 2), "tool_force_max_n": r.f64("tool_force_max_n"),
+            "resume": r.take(32).hex(), "scheme": r.text(), "program": r.text()}
 
 
 def refused(r):

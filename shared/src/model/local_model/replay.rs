@@ -114,15 +114,13 @@ impl Replay {
             return;
         };
         let (state, mut god) = (BodyState::from(update.state), then.god);
-        let jump = (state.pose.position - then.motion.pose.position).norm();
-        let depth = -state
-            .footprint
-            .nearest(state.pose.point_to_object(then.hip))
-            .1;
         if let Some(face) = update.touched_face {
             god.enter_by(face);
         } else {
-            if jump > JUMP_M && depth < FLAT_M && god.touched().is_none() {
+            let jump = (state.pose.position - then.motion.pose.position).norm();
+            let hip_in_object = state.pose.point_to_object(then.hip);
+            let (_, gap) = state.footprint.nearest(hip_in_object);
+            if jump > JUMP_M && gap > -FLAT_M && god.touched().is_none() {
                 // where the HIP was seen from another place shows nothing of the face that it is at
                 god = GodObject::default();
             }
