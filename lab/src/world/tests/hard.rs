@@ -372,3 +372,31 @@ fn a_box_that_is_spun_far_from_the_linear_range_is_felt_where_it_is() {
         );
     }
 }
+
+/// Forces below this have no direction, N.
+const LEAST_N: f64 = 0.5;
+
+#[test]
+fn a_hand_that_has_run_into_what_the_tool_does_not_move_is_not_pushed_across_or_on() {
+    // worlds in which it went on past a corner of that, and then felt another face than the one that the tool presses on
+    for number in [9721, 11_048, 11_259] {
+        let random = RandomWorld::new(number);
+        let mut world = World::try_new(&random.config).unwrap();
+        let (mut directed, mut opposed) = (0, 0);
+        world.run(Duration::from_secs(20), |tick| {
+            let Some(slave) = &tick.slave else {
+                return;
+            };
+            let has_direction = |f_m: &Vec2| f_m.norm().min(slave.true_force.norm()) > LEAST_N;
+            if let Some(f_m) = slave.f_m.filter(has_direction) {
+                directed += 1;
+                opposed += u32::from(f_m.dot(&slave.true_force) < 0.0);
+            }
+        });
+        println!("world {number}: {opposed} of {directed} ticks");
+        assert!(
+            directed > 200 && 100 * opposed <= directed,
+            "world {number}"
+        );
+    }
+}
