@@ -180,6 +180,6 @@ fn what_starts_to_move_at_12_n_is_pushed_by_a_hand_and_a_device_that_can() {
 
 #[test]
 fn what_starts_to_move_at_17_n_is_pushed_by_a_tool_that_can() {
-    // with a replay that pushes with 15 N 0.19
+    // where the replay pushes with 15 N the error is 0.19
     heavy([17.0, 20.0, 30.0], 0.16);
 }
