@@ -199,6 +199,9 @@ class Measured:
     def force_noise_n(self) -> float:
         """N."""
     @property
+    def held_back(self) -> bool:
+        """Whether the limit of the tool's force keeps the tool from the HIP."""
+    @property
     def normal(self) -> _Pair | None:
         """Inward unit normal of the touched face."""
     @property

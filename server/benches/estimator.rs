@@ -37,6 +37,7 @@ fn push() -> Vec<Measured> {
         measured.push(Measured {
             back: Vec2::zeros(),
             force_noise_n: 0.0,
+            held_back: false,
             tool: Vec2::new(position + force / 1000.0, 0.0),
             force: Vec2::new(force, 0.0),
             normal: Some(Vec2::new(1.0, 0.0)),

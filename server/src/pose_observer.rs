@@ -303,7 +303,7 @@ impl PoseObserver {
         let pose = &mut self.motion.pose;
         let tool = pose.point_to_object(tool);
         let (nearest, gap) = self.faces.footprint.nearest(tool);
-        if self.config.learn && nearest != face && gap > 0.0 {
+        if nearest != face && gap > 0.0 {
             // in front of another face: the box is not in the way of the tool
             return;
         }

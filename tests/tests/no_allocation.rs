@@ -368,6 +368,7 @@ fn the_slaves_own_parts_never_allocate() {
                 force: met.f_s,
                 back: Vec2::zeros(),
                 force_noise_n: 0.0,
+                held_back: false,
                 normal: observer.contact().map(|t| t.inward),
                 seen: Some(seen),
             };

@@ -34,6 +34,7 @@ pub fn estimator_tick_ms(mode: Mode) -> f64 {
         estimator.step(&Measured {
             back: Vec2::zeros(),
             force_noise_n: 0.0,
+            held_back: false,
             tool: Vec2::new(0.16 * t + 0.0125 * (1.0 - libm::cos(4.0 * t)), 0.0),
             force: Vec2::new(0.7 * 0.2 * libm::cos(4.0 * t) + 3.0 * v + 2.06, 0.0),
             normal: Some(Vec2::new(1.0, 0.0)),

@@ -20,6 +20,8 @@ pub struct Measured {
     pub force: Vec2,
     /// Noise of the force per axis, N, where it is more than the settings are made for; else 0.
     pub force_noise_n: f64,
+    /// Whether the limit of the tool's force keeps the tool from the HIP: what it touches withstands all that it presses with.
+    pub held_back: bool,
     /// Inward unit normal of the touched face as the pose observer has it; none when not in contact. It
     /// serves until the direction of the force is known.
     pub normal: Option<Vec2>,

@@ -207,6 +207,7 @@ mod tests {
                 back,
                 force: Vec2::new(force + 0.03 * noise, 0.0),
                 force_noise_n: 0.03,
+                held_back: false,
                 normal: (depth > 0.0).then_some(Vec2::new(1.0, 0.0)),
                 seen: None,
             }

@@ -123,12 +123,12 @@ impl Obstacle {
         }
     }
 
-    /// Takes the force (N), the share m a + b v of it that is `needed` to move the object so (N), how it moves, for how many
-    /// ticks it `stayed` where it is ([`Stays`]), and the friction as it was estimated before. True in the tick in which the
-    /// object is found to stand against an obstacle.
+    /// Takes the force (N) and whether the tool is `held_back`, presses with all that it may; the share m a + b v of the force
+    /// that is `needed` to move the object so (N), how it moves, for how many ticks it `stayed` where it is ([`Stays`]), and
+    /// the friction as it was estimated before. True in the tick in which the object is found to stand against an obstacle.
     pub(super) fn step(
         &mut self,
-        force: f64,
+        (force, held_back): (f64, bool),
         needed: f64,
         motion: MotionState,
         stayed: u32,
@@ -149,7 +149,8 @@ impl Obstacle {
             self.holding = self.holding.map(|holding| holding.min(most));
         }
         self.stands = false;
-        let pressed = beyond(force, FRICTION_HOLDS, friction.c);
+        // no force of the tool would be beyond a friction that a contact which gave way was taken for
+        let pressed = held_back || beyond(force, FRICTION_HOLDS, friction.c);
         let held = pressed && motion == MotionState::Sticks;
         self.held_ticks = if held { self.held_ticks + 1 } else { 0 };
         self.pressed_ticks = if pressed { self.pressed_ticks + 1 } else { 0 };
@@ -226,7 +227,7 @@ mod tests {
         let rise = (most / rate) as u32;
         for n in 0..rise + 100 {
             obstacle.step(
-                (rate * f64::from(n)).min(most),
+                ((rate * f64::from(n)).min(most), false),
                 0.0,
                 MotionState::Sticks,
                 0,
@@ -249,7 +250,7 @@ mod tests {
         let mut obstacle = Obstacle::new(HAND_N);
         let mut press = |force, motion, friction| {
             (0..20).for_each(|_| {
-                obstacle.step(force, 0.0, motion, 0, friction);
+                obstacle.step((force, false), 0.0, motion, 0, friction);
             });
             obstacle.holding()
         };
@@ -271,7 +272,7 @@ mod tests {
     fn what_broke_away_was_held_by_no_more_than_the_force_before_that_could_be_seen() {
         let mut obstacle = Obstacle::new(HAND_N);
         let mut press = |n: u32, motion| {
-            obstacle.step(0.1 * f64::from(n), 0.0, motion, 0, UNKNOWN);
+            obstacle.step((0.1 * f64::from(n), false), 0.0, motion, 0, UNKNOWN);
             obstacle.holding()
         };
         for n in 0..60 {
@@ -294,18 +295,18 @@ mod tests {
             _ => MotionState::Slides,
         };
         for n in 0..250 {
-            obstacle.step(5.0, 0.0, trembles(n), n, C);
+            obstacle.step((5.0, false), 0.0, trembles(n), n, C);
             assert_eq!(obstacle.holding(), None, "{n}");
         }
         for n in 250..300 {
-            obstacle.step(5.0, 0.0, trembles(n), n, C);
+            obstacle.step((5.0, false), 0.0, trembles(n), n, C);
             assert!(obstacle.holding().is_some(), "{n}");
         }
-        obstacle.step(5.0, 0.0, MotionState::Slides, 0, C);
+        obstacle.step((5.0, false), 0.0, MotionState::Slides, 0, C);
         assert_eq!(obstacle.holding(), None);
         // one that friction holds may tremble as long as it likes
         for n in 0..1000 {
-            obstacle.step(1.25 * C.c, 0.0, trembles(n), n, C);
+            obstacle.step((1.25 * C.c, false), 0.0, trembles(n), n, C);
             assert_eq!(obstacle.holding(), None);
         }
     }
@@ -329,19 +330,33 @@ mod tests {
     fn static_friction_that_gives_way_within_20_ms_is_no_obstacle() {
         let mut obstacle = Obstacle::new(HAND_N);
         for _ in 0..19 {
-            assert!(!obstacle.step(1.5 * C.c, 0.0, MotionState::Sticks, 0, C));
+            assert!(!obstacle.step((1.5 * C.c, false), 0.0, MotionState::Sticks, 0, C));
         }
-        obstacle.step(1.5 * C.c, 0.0, MotionState::Slides, 0, C);
-        assert!(!obstacle.step(1.5 * C.c, 0.0, MotionState::Sticks, 0, C));
+        obstacle.step((1.5 * C.c, false), 0.0, MotionState::Slides, 0, C);
+        assert!(!obstacle.step((1.5 * C.c, false), 0.0, MotionState::Sticks, 0, C));
         assert_eq!(obstacle.holding(), None);
+    }
+
+    #[test]
+    fn what_stands_under_all_that_the_tool_presses_with_is_held_whatever_its_friction_is_taken_for()
+    {
+        let taken_for = Friction { c: 14.0, ..C };
+        for (held_back, holding) in [(false, None), (true, Some(OBSTACLE_N))] {
+            let mut obstacle = Obstacle::new(HAND_N);
+            for _ in 0..HOLD_TICKS {
+                let pressed = (14.4, held_back);
+                obstacle.step(pressed, 0.0, MotionState::Sticks, 0, taken_for);
+            }
+            assert_eq!(obstacle.holding(), holding);
+        }
     }
 
     #[test]
     fn a_noisy_speed_does_not_end_it_and_sliding_does() {
         let mut obstacle = press(0.02, 5.0);
-        obstacle.step(5.0, 0.0, MotionState::Slowly, 0, C);
+        obstacle.step((5.0, false), 0.0, MotionState::Slowly, 0, C);
         assert!(obstacle.holding().is_some());
-        obstacle.step(5.0, 0.0, MotionState::Slides, 0, C);
+        obstacle.step((5.0, false), 0.0, MotionState::Slides, 0, C);
         assert_eq!(obstacle.holding(), None);
     }
 
@@ -350,15 +365,15 @@ mod tests {
         let mut obstacle = Obstacle::new(HAND_N);
         for (force, sent) in [(3.0 * C.c + 1.0, None), (10.0, Some(10.0))] {
             for _ in 0..5 {
-                assert!(!obstacle.step(force, 0.0, MotionState::SlidesOn, 0, C));
+                assert!(!obstacle.step((force, false), 0.0, MotionState::SlidesOn, 0, C));
             }
             assert_eq!(obstacle.holding(), sent);
         }
-        obstacle.step(2.0, 0.0, MotionState::SlidesOn, 0, C);
+        obstacle.step((2.0, false), 0.0, MotionState::SlidesOn, 0, C);
         assert_eq!(obstacle.holding(), None);
         for _ in 0..5 {
-            obstacle.step(10.0, 5.0, MotionState::SlidesOn, 0, C);
-            obstacle.step(10.0, 0.0, MotionState::Slides, 0, C);
+            obstacle.step((10.0, false), 5.0, MotionState::SlidesOn, 0, C);
+            obstacle.step((10.0, false), 0.0, MotionState::Slides, 0, C);
         }
         assert_eq!(obstacle.holding(), None, "a quick hand is no obstacle");
     }

@@ -146,6 +146,7 @@ mod tests {
             Measured {
                 back: Vec2::zeros(),
                 force_noise_n: 0.0,
+                held_back: false,
                 tool,
                 force: push,
                 normal: Some(normal),

@@ -122,6 +122,7 @@ mod tests {
             force: Vec2::new(force, 0.0),
             back: Vec2::zeros(),
             force_noise_n: 0.0,
+            held_back: false,
             normal: Some(Vec2::new(1.0, 0.0)),
             seen: None,
         }

@@ -260,13 +260,14 @@ impl RecommendedEstimator {
             off_centre::slow_share(motion.point, normal, seen)
         });
         let slides_on = gate == GateState::Open;
-        self.stand(motion.row.force, slides_on, way, stayed, share);
+        let pressed = (motion.row.force, measured.held_back);
+        self.stand(pressed, slides_on, way, stayed, share);
     }
 
-    /// Whether something beyond friction holds the object against this force, N.
+    /// Whether something beyond friction holds the object where it is `pressed`, as [`Obstacle::step`] takes that.
     /// `way` (m) is how far its surface seems to have gone in this contact, `stayed` for how many ticks it has stayed where
     /// it is, `share` that of c which a slow push meets there.
-    fn stand(&mut self, force: f64, slides_on: bool, way: f64, stayed: u32, share: f64) {
+    fn stand(&mut self, pressed: (f64, bool), slides_on: bool, way: f64, stayed: u32, share: f64) {
         let [older, _] = self.copies;
         let known = older.samples > 0;
         let moves = self.gate.moves(self.estimate.speed);
@@ -288,7 +289,8 @@ impl RecommendedEstimator {
             seen: self.recursive.samples > 0,
             share,
         };
-        if self.obstacle.step(force, needed, motion, stayed, friction) && known {
+        let stands = (self.obstacle).step(pressed, needed, motion, stayed, friction);
+        if stands && known {
             self.go_back_to(older);
         }
         if self.obstacle.is_hit() {

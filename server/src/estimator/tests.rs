@@ -409,6 +409,7 @@ proptest! {
                 let measured = Measured {
                     back: Vec2::new(fy, x),
                     force_noise_n: 0.0,
+                    held_back: false,
                     tool: Vec2::new(x, y),
                     force: Vec2::new(fx, fy),
                     normal: touching.then_some(Vec2::new(1.0, 0.0)),

@@ -270,6 +270,7 @@ impl ObjectEstimate {
             back: self.back.step(contact.back),
             force: contact.force,
             force_noise_n: contact.noise_n,
+            held_back,
             normal: observer.contact().map(|frame| frame.inward),
             seen: Some(Seen {
                 centre: observer.pose().position,

@@ -9,6 +9,7 @@ fn pressed(force_n: f64, times: f64) -> Measured {
         force: Vec2::new(force_n, 0.0),
         back: Vec2::zeros(),
         force_noise_n: 0.0,
+        held_back: false,
         normal: Some(Vec2::new(1.0, 0.0)),
         seen: None,
     }

@@ -142,6 +142,7 @@ impl Plant {
         Measured {
             back: Vec2::zeros(),
             force_noise_n: self.expected_force_noise_n,
+            held_back: false,
             tool: tool + Vec2::new(px, py) * self.noise.0,
             force: ahead * force + Vec2::new(fx, fy) * self.noise.1,
             normal: touching.then_some(ahead),

@@ -116,13 +116,15 @@ fn an_unknown_face_is_retracted_in_growing_steps_and_a_known_one_stays() {
 
 #[test]
 fn a_box_that_the_tool_has_left_by_another_face_is_neither_moved_nor_changed() {
-    let mut left = observer(true);
-    let truth = push(&mut left, 1000, 0.0);
-    let (pose, footprint) = (left.pose(), left.footprint());
-    for beyond in [Vec2::new(0.25, 0.0), Vec2::new(0.0, 0.25)] {
-        left.retract_face(truth.position + beyond, Face::West);
+    for learn in [true, false] {
+        let mut left = observer_of(true, learn);
+        let truth = push(&mut left, 1000, 0.0);
+        let (pose, footprint) = (left.pose(), left.footprint());
+        for beyond in [Vec2::new(0.25, 0.0), Vec2::new(0.0, 0.25)] {
+            left.retract_face(truth.position + beyond, Face::West);
+        }
+        assert_eq!((left.pose(), left.footprint()), (pose, footprint));
     }
-    assert_eq!((left.pose(), left.footprint()), (pose, footprint));
 }
 
 #[test]
