@@ -21,9 +21,12 @@ pub(super) fn log(range: &Range<f64>) -> Vec<f64> {
     all.filter(|mark| shown.contains(mark)).collect()
 }
 
+/// A mark nearer to zero than this is zero, give or take a binary fraction.
+const DUST: f64 = 5e-10;
+
 /// The shortest way to write a mark without the dust of binary fractions.
 pub(super) fn written(value: f64) -> String {
-    if value == 0.0 {
+    if value.abs() < DUST {
         return "0".to_owned();
     }
     let digits = (3.0 - libm::floor(libm::log10(value.abs()))).clamp(0.0, 9.0) as usize;
@@ -46,5 +49,11 @@ mod tests {
         };
         assert_eq!(ticks(1.0, 100.0), ["1", "2", "5", "10", "20", "50", "100"]);
         assert_eq!(ticks(0.5, 400.0), ["1", "10", "100"]);
+    }
+
+    #[test]
+    fn a_mark_that_is_nearly_zero_is_written_as_zero() {
+        let marks = [0.3 - 0.1 - 0.2, -0.0, 0.2, -1e-3, 1e-8].map(written);
+        assert_eq!(marks, ["0", "0", "0.2", "-0.001", "0.00000001"]);
     }
 }
