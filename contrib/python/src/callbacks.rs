@@ -98,9 +98,9 @@ impl TriggerInput {
 ///
 /// time: stamp of the HIP sample, s. tool: (x, y), m. back: how far the tool stands back from there by a spring of its own,
 /// (x, y), m. force: f_s on the object, (x, y), N. force_noise_n: its noise per axis where it is more than the default
-/// sensor's, else 0, N. held_back: whether the limit of the tool's force keeps it from the HIP. normal: inward unit normal of the touched face, (x, y), or None without contact. centre: of the object
-/// as it is seen, (x, y), m, or None. side: of the object as the model has it, m, or None. turning: rate of the touched face,
-/// rad/s, or None.
+/// sensor's, else 0, N. held_back: whether the limit of the tool's force keeps it from the HIP. normal: inward unit normal of
+/// the touched face, (x, y), or None without contact. centre: of the object as it is seen, (x, y), m, or None. side: of the
+/// object as the model has it, m, or None. turning: rate of the touched face, rad/s, or None.
 #[pyclass(frozen, get_all, module = "mmt")]
 pub(crate) struct Measured {
     time: f64,
