@@ -400,18 +400,3 @@ fn a_hand_that_has_run_into_what_the_tool_does_not_move_is_not_pushed_across_or_
         );
     }
 }
-
-#[test]
-fn what_the_tool_does_not_move_is_held_although_its_contact_gave_way() {
-    // as long as it did, the object seemed to slide under nearly all that the tool may press with
-    let random = RandomWorld::new(11_048);
-    let mut world = World::try_new(&random.config).unwrap();
-    world.run(Duration::from_secs(20), |_| {});
-    let outcome = world.outcome();
-    let (rate_hz, error) = (
-        outcome.updates.rate_hz().unwrap(),
-        world.force().relative_error.unwrap(),
-    );
-    println!("{rate_hz} updates/s, a relative error of {error}");
-    assert!(rate_hz < 8.0 && error < 0.25);
-}
