@@ -16,6 +16,9 @@ use mmt_shared::time::TICK_S;
 /// Share of the limit that is left for what the prediction of a tick's force cannot have: an object that moves within the tick,
 /// a sensor's noise. Found by `mmt reproduce touch`, whose greatest force without it was less than so much above the limit.
 const MARGIN: f64 = 0.04;
+/// Least share of the way to the limit that the tool goes in a tick: a contact of ten times k_p comes to rest with it, behind a
+/// sensor that lags by 20 ms.
+const GAIN_LEAST: f64 = 1.0 / 8.0;
 /// What is too slow, in messages.
 const APPROACH_NAME: &str =
     "tool: speed of approach, limit of the force / (contact damping + 2 stiffness T)";
@@ -31,6 +34,10 @@ pub struct ToolForce {
     velocity: Vec2,
     held_ticks: u64,
     peak_n: f64,
+    /// Share of the way to the limit that the tool goes in a tick, in this contact.
+    gain: f64,
+    /// Whether the force has been beyond the limit since it was last below the aim.
+    beyond: bool,
 }
 
 impl ToolForce {
@@ -46,6 +53,8 @@ impl ToolForce {
             velocity: Vec2::zeros(),
             held_ticks: 0,
             peak_n: 0.0,
+            gain: 1.0,
+            beyond: false,
         })
     }
 
@@ -100,7 +109,7 @@ impl ToolForce {
     ///
     /// The next force follows from the law of contact with an object that keeps its velocity (an object at rest is the
     /// worst case but for one that comes towards the tool), so the gain on the sensor's noise is 1: the force is as
-    /// steady as it is measured, and the tool does not chatter.
+    /// steady as it is measured, and the tool does not chatter. Forces that it did not foresee make it less, see `measured`.
     #[must_use]
     pub fn allowed(&self, way: Vec2, period_s: f64, force: Vec2) -> Vec2 {
         // a force that is measured is no sign of all that the tool may touch: it may be the sensor's bias
@@ -116,7 +125,7 @@ impl ToolForce {
         } = self.coupling;
         // f(k+1) = f(k) + (k_p + k_d/T) n·way − k_d n·v(k) ≤ f_max less the margin
         let at_rest = size - k_d * n.dot(&self.velocity);
-        let most = (Self::aim_n(self.max_n) - at_rest) / (k_p + k_d / period_s);
+        let most = self.gain * (Self::aim_n(self.max_n) - at_rest) / (k_p + k_d / period_s);
         let along = n.dot(&way);
         if along <= most {
             return way;
@@ -152,7 +161,21 @@ impl ToolForce {
     }
 
     /// Takes the force that is measured there, N.
+    ///
+    /// A force half-way between the aim and the limit was not foreseen: the contact is stiffer than k_p, or the sensor later
+    /// than a tick. The tool would swing about the limit. So from then on it goes half as far in a tick, until the force is
+    /// below half of the aim: in front of an object that gives way a smaller share would cost force.
     pub fn measured(&mut self, force: Vec2) {
-        self.peak_n = self.peak_n.max(force.norm());
+        let size = force.norm();
+        self.peak_n = self.peak_n.max(size);
+        let aim = Self::aim_n(self.max_n);
+        if size < 0.5 * aim {
+            self.gain = 1.0;
+        }
+        if size > 0.5 * (self.max_n + aim) && !self.beyond {
+            self.beyond = true;
+            self.gain = (0.5 * self.gain).max(GAIN_LEAST);
+        }
+        self.beyond &= size > aim;
     }
 }

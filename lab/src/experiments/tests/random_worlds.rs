@@ -60,3 +60,12 @@ fn with_one_thing_ideal_the_worlds_are_the_same_ones_and_the_whole_truth_is_best
         assert!(others.iter().all(|error| error > best), "{errors:?}");
     }
 }
+
+#[test]
+fn a_tool_that_trembles_at_its_limit_does_not_spend_more_than_the_budget() {
+    // a contact of ten times k_p behind a sensor that lags by 5 ms: the force swung by 9 N, and took 0.5 J
+    let one = BTreeMap::from([("world", 70_958.0)]);
+    let rows = Done::given(&worlds::EXPERIMENT, 1, 20_000, one).rows("worlds.csv", &[]);
+    println!("{:?}", rows[0]);
+    assert!(number(&rows[0], "work_excess_j") <= 1e-6);
+}

@@ -81,6 +81,71 @@ fn a_press_on_a_wall_comes_to_the_limit_and_stays_there() {
     assert_eq!(press.limit.held_ticks(), 0, "14.2 N are allowed");
 }
 
+/// Spread of the true force (N) in the last of 3 s in which a tool presses on a wall with all it may: the contact is so many
+/// times as stiff as k_p (N/m), and the sensor lags.
+fn swing(times: f64, k_p: f64, lag_s: f64) -> f64 {
+    let coupling = Coupling::for_stiffness(k_p);
+    let real = Coupling {
+        stiffness_n_per_m: times * k_p,
+        ..coupling
+    };
+    let mut limit = ToolForce::try_new(15.0, coupling).unwrap();
+    let (mut x, mut measured) = (-1e-3, 0.0);
+    let (mut least, mut most) = (f64::MAX, f64::MIN);
+    for tick in 0..3000 {
+        let wanted = Vec2::new(1e-4, 0.0);
+        let way = limit.allowed(wanted, TICK_S, Vec2::new(measured, 0.0));
+        x += way.x;
+        limit.moved(way / TICK_S, way != wanted);
+        let force = if x > 0.0 {
+            real.force(x, way.x / TICK_S)
+        } else {
+            0.0
+        };
+        measured += (force - measured) * TICK_S / lag_s;
+        limit.measured(Vec2::new(measured, 0.0));
+        if tick >= 2000 {
+            (least, most) = (least.min(force), most.max(force));
+        }
+    }
+    assert!(most > 14.0, "pressed with {most} N");
+    most - least
+}
+
+#[test]
+fn a_tool_that_presses_through_a_stiffer_contact_than_its_own_comes_to_rest_though_the_sensor_lags()
+{
+    for k_p in [300.0, 1000.0, 2000.0, 3000.0] {
+        for times in [1.0, 3.0, 10.0] {
+            for lag_s in [TICK_S, 2e-3, 5e-3, 10e-3, 20e-3] {
+                let swing = swing(times, k_p, lag_s);
+                println!("{times} times {k_p} N/m, {lag_s} s: {swing} N");
+                assert!(swing < 0.1);
+            }
+        }
+    }
+}
+
+#[test]
+fn forces_that_were_not_foreseen_cost_none_in_front_of_an_object_that_gives_way() {
+    let mut press = Press::new(15.0, SOFT, None);
+    for _ in 0..5 {
+        press.limit.measured(Vec2::new(14.9, 0.0));
+        press.limit.measured(Vec2::new(14.0, 0.0));
+    }
+    // an object that resists with 10 N and goes as fast as it is pushed
+    let way = Vec2::new(QUICK, 0.0);
+    let mut force = 10.0;
+    let mut last = Vec2::zeros();
+    for _ in 0..1000 {
+        last = press.limit.allowed(way, TICK_S, Vec2::new(force, 0.0));
+        press.limit.moved(last / TICK_S, last != way);
+        force += (10.0 * last.x / QUICK - force) * 0.1;
+        press.limit.measured(Vec2::new(force, 0.0));
+    }
+    assert_eq!(last, way);
+}
+
 #[test]
 fn a_first_touch_at_full_speed_cannot_be_foreseen() {
     for (k_p, most_n) in [(1000.0, 6.6), (3000.0, 13.8)] {
