@@ -19,6 +19,8 @@ const MARGIN: f64 = 0.04;
 /// Least share of the way to the limit that the tool goes in a tick: a contact of ten times k_p comes to rest with it, behind a
 /// sensor that lags by 20 ms.
 const GAIN_LEAST: f64 = 1.0 / 8.0;
+/// Over this time the tool's velocity is averaged, s: longer than a tremor's period.
+const MEAN_S: f64 = 0.05;
 /// What is too slow, in messages.
 const APPROACH_NAME: &str =
     "tool: speed of approach, limit of the force / (contact damping + 2 stiffness T)";
@@ -36,6 +38,8 @@ pub struct ToolForce {
     peak_n: f64,
     /// Share of the way to the limit that the tool goes in a tick, in this contact.
     gain: f64,
+    /// The tool's mean velocity of late, m/s: with it goes an object that gives way.
+    mean_velocity: Vec2,
     /// Whether the force has been beyond the limit since it was last below the aim.
     beyond: bool,
 }
@@ -54,6 +58,7 @@ impl ToolForce {
             held_ticks: 0,
             peak_n: 0.0,
             gain: 1.0,
+            mean_velocity: Vec2::zeros(),
             beyond: false,
         })
     }
@@ -125,7 +130,9 @@ impl ToolForce {
         } = self.coupling;
         // f(k+1) = f(k) + (k_p + k_d/T) n·way − k_d n·v(k) ≤ f_max less the margin
         let at_rest = size - k_d * n.dot(&self.velocity);
-        let most = self.gain * (Self::aim_n(self.max_n) - at_rest) / (k_p + k_d / period_s);
+        let all = (Self::aim_n(self.max_n) - at_rest) / (k_p + k_d / period_s);
+        let along_object = n.dot(&self.mean_velocity) * period_s;
+        let most = all - (1.0 - self.gain) * (all - along_object);
         let along = n.dot(&way);
         if along <= most {
             return way;
@@ -157,6 +164,7 @@ impl ToolForce {
     /// Takes the velocity that the tool has gone at in this tick (m/s), and whether the limit shortened its way.
     pub fn moved(&mut self, velocity: Vec2, held: bool) {
         self.velocity = velocity;
+        self.mean_velocity += (velocity - self.mean_velocity) * (TICK_S / MEAN_S);
         self.held_ticks += u64::from(held);
     }
 
@@ -164,7 +172,8 @@ impl ToolForce {
     ///
     /// A force half-way between the aim and the limit was not foreseen: the contact is stiffer than k_p, or the sensor later
     /// than a tick. The tool would swing about the limit. So from then on it goes half as far in a tick, until the force is
-    /// below half of the aim: in front of an object that gives way a smaller share would cost force.
+    /// below half of the aim. What counts is how far it goes beyond the way of the object, for which stands the tool's mean
+    /// velocity since: an object that gives way is pushed as hard as before.
     pub fn measured(&mut self, force: Vec2) {
         let size = force.norm();
         self.peak_n = self.peak_n.max(size);
@@ -175,6 +184,7 @@ impl ToolForce {
         if size > 0.5 * (self.max_n + aim) && !self.beyond {
             self.beyond = true;
             self.gain = (0.5 * self.gain).max(GAIN_LEAST);
+            self.mean_velocity = Vec2::zeros();
         }
         self.beyond &= size > aim;
     }
