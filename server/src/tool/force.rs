@@ -19,7 +19,7 @@ const MARGIN: f64 = 0.04;
 /// Least share of the way to the limit that the tool goes in a tick: a contact of ten times k_p comes to rest with it, behind a
 /// sensor that lags by 20 ms.
 const GAIN_LEAST: f64 = 1.0 / 8.0;
-/// Over this time the tool's velocity is averaged, s: longer than a tremor's period.
+/// Over this time the tool's velocity is averaged, s: longer than a swing about the limit takes.
 const MEAN_S: f64 = 0.05;
 /// What is too slow, in messages.
 const APPROACH_NAME: &str =
@@ -40,7 +40,7 @@ pub struct ToolForce {
     gain: f64,
     /// The tool's mean velocity of late, m/s: with it goes an object that gives way.
     mean_velocity: Vec2,
-    /// Whether the force has been beyond the limit since it was last below the aim.
+    /// Whether the force has not been foreseen since it was last within the aim.
     beyond: bool,
 }
 
