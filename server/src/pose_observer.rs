@@ -28,7 +28,7 @@ use mmt_shared::model::dynamics::Motion;
 use mmt_shared::model::geometry::{BoxFootprint, Face, Pose, Twist, Vec2, rotate, wrap_angle};
 use mmt_shared::model::params::{ModelParams, friction_torque_of_square};
 use mmt_shared::model::settings::FrictionLaw;
-use mmt_shared::time::{TICK_S, Time};
+use mmt_shared::time::{TICK, TICK_S, Time};
 
 use angle_track::AngleTrack;
 use face_map::FaceMap;
@@ -47,6 +47,8 @@ const REST_DRIFT_M: f64 = 1e-5;
 const LET_GO: (f64, f64) = (0.02, 0.02);
 /// Unknown acceleration of a box that coasts, m/s² and rad/s²: how well its friction is known.
 const COAST: (f64, f64) = (0.5, 2.5);
+/// So long after it is let go a box may still move, whatever its friction is taken for: it settles.
+const SETTLES: Duration = Duration::from_millis(200);
 /// Images in a row that show the tool clear of the object.
 const CLEAR_IMAGES: u32 = 5;
 
@@ -91,6 +93,8 @@ pub struct PoseObserver {
     penetration: Penetration,
     tracker: Tracker,
     past: PastPoses,
+    /// For how long nobody has touched the object, or no image has shown that it moves although it was taken to rest.
+    untouched: Duration,
     /// Images in a row that show a tool in contact clear of the object.
     clear_images: u32,
     /// When the newest image was taken.
@@ -119,6 +123,7 @@ impl PoseObserver {
             penetration: Penetration::new(config.coupling),
             tracker,
             past: PastPoses::default(),
+            untouched: Duration::MAX,
             clear_images: 0,
             seen: None,
         }
@@ -279,8 +284,12 @@ impl PoseObserver {
                     }
                 }
             }
-            self.centre.let_go(LET_GO.0 * LET_GO.0);
-            self.angle.let_go(LET_GO.1 * LET_GO.1);
+            self.may_move();
+        }
+        self.untouched = self.untouched.saturating_add(TICK);
+        if self.rests() {
+            self.centre.stop();
+            self.angle.stop();
         }
         // without images the friction alone shows where the box stops
         let coasts = self.config.images && self.motion.twist != Twist::default();
@@ -290,6 +299,18 @@ impl PoseObserver {
         self.angle.predict(angular, 0.0);
         let law = FrictionLaw::LimitSurface;
         self.motion = self.motion.step(law, params, Vec2::zeros(), Vec2::zeros());
+    }
+
+    /// From now on the box may move, as one that was just let go.
+    fn may_move(&mut self) {
+        self.centre.let_go(LET_GO.0 * LET_GO.0);
+        self.angle.let_go(LET_GO.1 * LET_GO.1);
+        self.untouched = Duration::ZERO;
+    }
+
+    /// Whether friction holds a box that nobody touches, once it has settled: no image shows how fast it is.
+    fn rests(&self) -> bool {
+        self.untouched > SETTLES && self.motion.twist == Twist::default()
     }
 
     /// Section III-A, case 1: the tool is inside the model and touches nothing. A face that has never

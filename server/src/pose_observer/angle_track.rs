@@ -64,6 +64,11 @@ impl AngleTrack {
         self.forget_error();
     }
 
+    /// The rate is 0.
+    pub(super) fn stop(&mut self) {
+        self.track.stop();
+    }
+
     /// The force is normal to what it touches.
     pub(super) fn forget_error(&mut self) {
         *self = Self::of(self.track);

@@ -50,6 +50,11 @@ impl Track {
         self.covariance = [self.variance(), 0.0, variance];
     }
 
+    /// The rate is 0.
+    pub(super) fn stop(&mut self) {
+        *self = Self::at_rest(self.variance());
+    }
+
     /// One tick under an acceleration that is unknown but of this size.
     pub(super) fn predict(&mut self, acceleration: f64) {
         let [p, pc, q] = self.covariance;

@@ -11,6 +11,8 @@ use crate::sensing::VisionSample;
 
 /// A tool is seen clear of the object at this distance, m, and so many standard deviations of what is known of it.
 const CLEAR: (f64, f64) = (5e-3, 5.0);
+/// An image that is off by more standard deviations shows that a box moves which was taken to rest.
+const MOVES_DEVIATIONS: f64 = 5.0;
 
 impl PoseObserver {
     /// Whether an image that this mode uses was taken before all that is remembered: it shows nothing that can be compared.
@@ -50,8 +52,17 @@ impl PoseObserver {
 
     /// An image of an object that nobody touches shows where it is and how it moves, then and since.
     fn see_free(&mut self, vision: &VisionSample, error: Vec2, turn: f64) {
-        let (place, velocity) = self.centre.measure(self.config.vision_noise_m.powi(2));
-        let (angle, omega) = self.angle.see(self.config.vision_noise_rad.powi(2), turn);
+        let noise_m2 = self.config.vision_noise_m.powi(2);
+        let noise_rad2 = self.config.vision_noise_rad.powi(2);
+        let place = (self.centre.variance() + noise_m2).sqrt();
+        let angle = (self.angle.variance() + noise_rad2).sqrt();
+        let moves =
+            error.norm() > MOVES_DEVIATIONS * place || turn.abs() > MOVES_DEVIATIONS * angle;
+        if moves && self.rests() {
+            self.may_move();
+        }
+        let (place, velocity) = self.centre.measure(noise_m2);
+        let (angle, omega) = self.angle.see(noise_rad2, turn);
         let off = Pose {
             position: error * place,
             angle,
