@@ -68,7 +68,8 @@ impl ForceReference {
         let [f_s, f_m] = self.average([contact.force, f_m], contact.averaged);
         let estimate = object.estimator.estimate();
         let model = shadow.ahead().state();
-        let (shift, turn) = object.observer.off(&model.pose);
+        // what was sent is brought in over some ticks, and need not be sent again
+        let (shift, turn) = object.observer.off(&shadow.ahead().pose_to_come());
         TriggerInput {
             f_s,
             f_m,

@@ -14,7 +14,7 @@ use std::time::Duration;
 
 use crate::model::correction::{Correction, IN_CONTACT, IN_CONTACT_REPLAYED, Tank};
 use crate::model::dynamics::Motion;
-use crate::model::geometry::{Twist, Vec2};
+use crate::model::geometry::{Pose, Twist, Vec2};
 use crate::model::history::{HISTORY_TICKS, History, Moment};
 use crate::model::params::{ModelParams, ModelState};
 use crate::model::settings::{ModelSettings, PoseCorrection, Smoothing};
@@ -91,6 +91,15 @@ impl LocalModel {
     /// What remains of the pose correction, and its tank.
     pub fn correction(&self) -> &Correction {
         &self.correction
+    }
+
+    /// The pose that the model is on its way to: what it was sent, with the HIP since.
+    pub fn pose_to_come(&self) -> Pose {
+        let (pose, remaining) = (&self.body.state.pose, &self.correction.remaining);
+        Pose {
+            position: pose.position + remaining.shift,
+            angle: pose.angle + remaining.turn,
+        }
     }
 
     /// What the model was at each sample.
