@@ -170,7 +170,7 @@ class TriggerInput:
         """The tool is in front of another face than it touched last, of an object that has been moved."""
     @property
     def shift(self) -> _Pair:
-        """Of the master's object by an update, m."""
+        """From the pose that the master's object is on its way to, by an update, m."""
     @property
     def shift_deviation(self) -> float:
         """Of the shift per axis while nobody touches the object, m; else 0."""

@@ -31,11 +31,11 @@ pub struct TriggerInput {
     /// Whether friction alone is known to hold the object where the tool is: that is in front of another face than it touched last,
     /// and the object has been moved before.
     pub only_friction_holds: bool,
-    /// By how much it would shift the shadow beyond what that is still on its way, m.
+    /// By how much it would shift the shadow from the pose that this is on its way to, m.
     pub shift: Vec2,
     /// Standard deviation of that per axis, m, where nobody touches the object; else 0.
     pub shift_deviation: f64,
-    /// By how much it would turn the shadow beyond what that is still on its way, rad.
+    /// By how much it would turn the shadow from that pose, rad.
     pub turn: f64,
     /// Standard deviation of that, rad.
     pub turn_deviation: f64,
