@@ -116,11 +116,17 @@ impl GodObject {
     }
 
     /// The box was set to another pose. What was touched by the old one stays touched if the HIP is inside the new
-    /// one and at most [`DEEPEST_M`] behind that face; else the memory begins anew.
+    /// one and at most [`DEEPEST_M`] behind that face; else the memory begins anew, with a HIP that is outside.
     pub fn after_jump(&mut self, footprint: &BoxFootprint, pose: &Pose, hip: Vec2) {
-        let is_inside = footprint.nearest(pose.point_to_object(hip)).1 <= 0.0;
+        let hip_in_object = pose.point_to_object(hip);
+        let is_inside = footprint.nearest(hip_in_object).1 <= 0.0;
         let touch = self.touch_at(footprint, pose, hip);
-        if touch.is_some_and(|touch| !is_inside || touch.penetration > DEEPEST_M) {
+        if !is_inside {
+            *self = Self {
+                touched: None,
+                outside: Some(hip_in_object),
+            };
+        } else if touch.is_none_or(|touch| touch.penetration > DEEPEST_M) {
             *self = Self::default();
         }
     }
@@ -230,6 +236,21 @@ mod tests {
         // in front of the opposite face, and just inside of it
         assert_eq!(touched(Pose::new(-0.4, 0.0, 0.0)), None);
         assert_eq!(touched(Pose::new(-0.396, 0.0, 0.0)), Some(Face::East));
+    }
+
+    #[test]
+    fn a_box_that_was_set_clear_of_the_hip_is_entered_anew_when_its_faces_grow() {
+        let pose = Pose::default();
+        let mut god = GodObject::default();
+        for x in [-0.3, -0.19] {
+            god.follow(&BoxFootprint::square(0.4), &pose, Vec2::new(x, 0.0));
+        }
+        // the HIP has come to lie in front of the next face, which then grows over it
+        let hip = Vec2::new(0.1, 0.21);
+        god.after_jump(&BoxFootprint::square(0.4), &pose, hip);
+        let touch = god.follow(&BoxFootprint::square(0.44), &pose, hip).unwrap();
+        assert_eq!(touch.face, Face::North);
+        assert!((touch.penetration - 0.01).abs() < 1e-12);
     }
 
     #[test]

@@ -131,6 +131,12 @@ fn a_box_that_goes_over_to_another_place_forgets_which_face_was_touched() {
         (16_430, 0.733_373_185_605_959_5),
         (18_921, 0.821_721_980_050_043_6),
         (21_136, 0.995_986_195_377_540_5),
+        // it has left the box, and the faces of an update that waited bring it inside again
+        (12_844_042_133_525_830_469, 0.127_199_678_987_2),
+        (113, 0.7),
+        (457, 0.3),
+        (12_704, 0.6),
+        (14_511, 0.9),
     ] {
         let (model, port) = shaken(PoseCorrection::Replay, seed, size);
         assert!(model.energy_injected_j() < 1e-9, "{seed}");
