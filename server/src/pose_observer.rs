@@ -93,7 +93,7 @@ pub struct PoseObserver {
     penetration: Penetration,
     tracker: Tracker,
     past: PastPoses,
-    /// For how long nobody has touched the object, or no image has shown that it moves although it was taken to rest.
+    /// For how long the object may have come to rest: since it was let go, or an image showed that it moves after all.
     untouched: Duration,
     /// Images in a row that show a tool in contact clear of the object.
     clear_images: u32,

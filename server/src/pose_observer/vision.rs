@@ -54,11 +54,9 @@ impl PoseObserver {
     fn see_free(&mut self, vision: &VisionSample, error: Vec2, turn: f64) {
         let noise_m2 = self.config.vision_noise_m.powi(2);
         let noise_rad2 = self.config.vision_noise_rad.powi(2);
-        let place = (self.centre.variance() + noise_m2).sqrt();
-        let angle = (self.angle.variance() + noise_rad2).sqrt();
-        let moves =
-            error.norm() > MOVES_DEVIATIONS * place || turn.abs() > MOVES_DEVIATIONS * angle;
-        if moves && self.rests() {
+        let most_m = MOVES_DEVIATIONS * (self.centre.variance() + noise_m2).sqrt();
+        let most_rad = MOVES_DEVIATIONS * (self.angle.variance() + noise_rad2).sqrt();
+        if self.rests() && (error.norm() > most_m || turn.abs() > most_rad) {
             self.may_move();
         }
         let (place, velocity) = self.centre.measure(noise_m2);
