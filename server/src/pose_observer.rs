@@ -275,7 +275,7 @@ impl PoseObserver {
         self.clear_images = 0;
         if let Some(was) = self.contact.take() {
             match &mut self.tracker {
-                Tracker::Box(_) => {}
+                Tracker::Box(tracker) => tracker.let_go(),
                 Tracker::Tangent(tangent) => self.faces.guess(tangent, was.face),
                 Tracker::Slow(slow) => {
                     if let Some(pose) = slow.take_seen() {

@@ -14,6 +14,8 @@ pub struct ContactForce {
     /// How much farther the tool is behind the surface than a contact of k_p would let it under this force, m: a tool that gives
     /// on a contact that gives, until its spring is suited to that.
     pub beyond_m: f64,
+    /// Whether an obstacle holds the object, which may turn it as well as the push does.
+    pub obstacle: bool,
 }
 
 impl From<Vec2> for ContactForce {
@@ -23,6 +25,7 @@ impl From<Vec2> for ContactForce {
             steady: force,
             noise_n: 0.0,
             beyond_m: 0.0,
+            obstacle: false,
         }
     }
 }

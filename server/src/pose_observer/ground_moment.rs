@@ -70,6 +70,16 @@ impl Turning {
         self.radius_ratio
     }
 
+    /// Whether the box has slid for long enough to be reckoned with.
+    pub(super) fn is_learned(&self) -> bool {
+        self.slid >= TICKS_TO_LEARN
+    }
+
+    /// A tick in which more than the push may turn the box.
+    pub(super) fn skip(&mut self) {
+        self.before = None;
+    }
+
     /// omega (rad/s) after this tick's push, if it can be reckoned.
     pub(super) fn step(&mut self, params: &ModelParams, push: &Push) -> Option<f64> {
         let before = self.before.take();
@@ -78,7 +88,7 @@ impl Turning {
         }
         self.before = Some(push.omega);
         self.slid = self.slid.saturating_add(1);
-        if self.slid < TICKS_TO_LEARN {
+        if !self.is_learned() {
             return None;
         }
         let Push {

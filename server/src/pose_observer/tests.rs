@@ -2,6 +2,7 @@
 
 mod direction;
 mod faces;
+mod turned;
 mod untouched;
 
 use super::*;

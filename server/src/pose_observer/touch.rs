@@ -24,6 +24,8 @@ const TURN_ACCELERATION: (f64, f64) = (20.0, 2.5);
 const CORNER_SHARE: f64 = 0.5;
 /// A jump of the normal beyond this, rad, is a new contact with such a body.
 const JUMP_RAD: f64 = 0.2;
+/// So does no force below this, N: where the body is let go, what is left of the sensor's bias turns it.
+const JUMP_N: f64 = 0.5;
 
 impl PoseObserver {
     /// One tick of touch.
@@ -34,7 +36,7 @@ impl PoseObserver {
             Some(contact) => contact.face,
             None => self.begin_contact(tool, contact.steady),
         };
-        let unknown = self.turn(force, params);
+        let unknown = self.turn(contact, params);
         self.follow_angle(face, contact, unknown);
         let inward = -rotate(self.motion.pose.angle, face.outward());
         self.penetration.follow(force.dot(&inward));
@@ -104,7 +106,7 @@ impl PoseObserver {
 
     /// Turns the box by the moment of the push, where that can be reckoned, and returns the turning
     /// acceleration that remains unknown, rad/s².
-    fn turn(&mut self, force: Vec2, params: &ModelParams) -> f64 {
+    fn turn(&mut self, force: &ContactForce, params: &ModelParams) -> f64 {
         let (all, rest) = TURN_ACCELERATION;
         let (Some(contact), Tracker::Box(tracker)) = (self.contact, &mut self.tracker) else {
             return all;
@@ -117,9 +119,9 @@ impl PoseObserver {
             side: self.faces.footprint.mean_side(),
             speed: twist.linear.dot(&contact.inward),
             omega: twist.angular,
-            moment: cross(contact.surface - pose.position, force),
+            moment: cross(contact.surface - pose.position, force.force),
         };
-        let Some(omega) = tracker.turning.step(params, &push) else {
+        let Some(omega) = tracker.turned(params, &push, force.obstacle) else {
             return all;
         };
         twist.angular = omega;
@@ -138,7 +140,8 @@ impl PoseObserver {
         let direction = libm::atan2(-force.y, -force.x) - face.outward_angle();
         let innovation = wrap_angle(direction - self.motion.pose.angle - self.angle.error());
         let tangent = matches!(self.tracker, Tracker::Tangent(_));
-        if tangent && !self.tracker.is_settling() && innovation.abs() > JUMP_RAD {
+        let jumps = size > JUMP_N && innovation.abs() > JUMP_RAD;
+        if tangent && !self.tracker.is_settling() && jumps {
             self.begin_tangent();
         }
         let spread = self.config.force_noise_n.max(contact.noise_n) / size;

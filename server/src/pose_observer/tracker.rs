@@ -1,7 +1,9 @@
 //! How the object is followed: as a box with faces; once vision has shown that it is none, by its tangent; pushed slowly,
 //! by the force alone.
 
-use super::ground_moment::Turning;
+use mmt_shared::model::params::ModelParams;
+
+use super::ground_moment::{Push, Turning};
 use super::slow::{DIRECTION_RAD, SlowTracker};
 use super::tangent_tracker::TangentTracker;
 
@@ -69,14 +71,44 @@ pub(super) struct BoxTracker {
     pub(super) turning: Turning,
     /// Images in a row that disagree with touch about theta.
     disagreeing: u32,
+    /// Something else turns the box in this contact: a wall that it slides along.
+    other_moment: bool,
 }
 
 impl BoxTracker {
+    /// omega (rad/s) after this tick's push, if that is known to be all that turns the box; `obstacle`: something holds it.
+    pub(super) fn turned(
+        &mut self,
+        params: &ModelParams,
+        push: &Push,
+        obstacle: bool,
+    ) -> Option<f64> {
+        if obstacle || self.other_moment {
+            self.turning.skip();
+            return None;
+        }
+        self.turning.step(params, push)
+    }
+
+    /// Whether the moment of the push is reckoned with.
+    pub(super) fn reckons(&self) -> bool {
+        self.turning.is_learned() && !self.other_moment
+    }
+
+    /// What turned the box besides the push may be gone in the next contact.
+    pub(super) fn let_go(&mut self) {
+        self.other_moment = false;
+    }
+
     /// Takes the angle (rad) by which an image of the touched box differs from the direction of the force; `noise` is vision's, rad
     /// r.m.s., and the tool's friction turns the force by up to `friction_angle` (rad). True if the images show that the body is no
-    /// box: one bad image does not.
+    /// box: one bad image does not, and where the moment of the push was reckoned with, the first shows that something else turns it.
     pub(super) fn is_refuted(&mut self, turn: f64, noise: f64, friction_angle: f64) -> bool {
         let disagrees = turn.abs() > friction_angle + DISAGREEMENT_RAD.max(6.0 * noise);
+        if disagrees && self.reckons() {
+            self.other_moment = true;
+            return false;
+        }
         self.disagreeing = if disagrees { self.disagreeing + 1 } else { 0 };
         self.disagreeing >= IMAGES
     }

@@ -241,6 +241,7 @@ impl ObjectEstimate {
             self.estimator.rescale(contact.rescaled);
         }
         let beyond_m = self.estimator.beyond_m(contact.back, contact.force);
+        let obstacle = self.estimator.estimate().holding.is_some();
         let observer = &mut self.observer;
         observer.step(
             now,
@@ -250,6 +251,7 @@ impl ObjectEstimate {
                 steady: contact.steady,
                 noise_n: contact.noise_n,
                 beyond_m,
+                obstacle,
             },
             contact.in_contact,
             &self.params,

@@ -35,6 +35,9 @@ const USEFUL_SHARE: f64 = 0.01;
 const USEFUL_FLOOR_N: f64 = 0.3;
 /// A change of the face's direction above this is felt, rad (`useful`).
 const USEFUL_TURN_RAD: f64 = 0.010;
+/// An object that is farther than this from where the model has it is seen there, m, though along the face no force shows it
+/// (`useful`).
+const USEFUL_SHIFT_M: f64 = 0.020;
 
 /// An error of fewer standard deviations of the force per axis may be noise.
 const NOISE_DEVIATIONS: f64 = 4.5;
@@ -314,8 +317,8 @@ impl Trigger {
     }
 
     /// Whether the hand would feel what an update corrects: by the force that the changed parameters would
-    /// give in the present motion if that changes by so many standard `deviations` of it, by the direction of the face, or by
-    /// its place while the object is held.
+    /// give in the present motion if that changes by so many standard `deviations` of it, by the direction of the face, by
+    /// its place while the object is held, or by where the object is seen.
     fn is_perceptible(&self, now: Time, input: &TriggerInput, delta: f64, deviations: f64) -> bool {
         let Some((time, sent)) = self.last else {
             return true;
@@ -327,7 +330,10 @@ impl Trigger {
         let felt_n = (USEFUL_SHARE * input.f_s.norm().max(USEFUL_FLOOR_N))
             .max(deviations * input.force_deviation);
         let felt_rad = USEFUL_TURN_RAD.max(TURN_DEVIATIONS * input.turn_deviation);
-        change > felt_n || input.turn.abs() > felt_rad || self.is_held_wrongly(input, delta)
+        change > felt_n
+            || input.turn.abs() > felt_rad
+            || input.shift.norm() > USEFUL_SHIFT_M
+            || self.is_held_wrongly(input, delta)
     }
 
     /// What friction holds is pushed back by the depth of the HIP alone: a force that is off by more than Delta

@@ -119,6 +119,22 @@ fn useful_sends_a_turn_that_is_more_than_what_is_known_of_the_angle() {
 }
 
 #[test]
+fn useful_sends_an_object_that_is_touched_and_20_mm_from_where_the_model_has_it() {
+    let first_after = |shift_m: f64| {
+        let mut trigger = trigger("useful 10% 150ms", Mode::Recommended);
+        assert!(trigger.step(Time::ZERO, &input(2.0, 3.0)).is_some());
+        // along the face: the force is right
+        let slipped = TriggerInput {
+            shift: Vec2::new(0.0, shift_m),
+            ..input(2.0, 2.0)
+        };
+        first_sent(&mut trigger, &slipped)
+    };
+    assert_eq!(first_after(0.019), None);
+    assert_eq!(first_after(0.021), Some(150));
+}
+
+#[test]
 fn adaptive_sends_where_a_held_face_is_the_sooner_the_more_the_force_is_wrong() {
     let first_after = |f_m: f64| {
         let mut trigger = trigger("adaptive 10% 50ms", Mode::Recommended);
