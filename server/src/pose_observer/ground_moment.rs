@@ -75,19 +75,22 @@ impl Turning {
         self.slid >= TICKS_TO_LEARN
     }
 
-    /// A tick in which more than the push may turn the box.
-    pub(super) fn skip(&mut self) {
-        self.before = None;
-    }
-
-    /// omega (rad/s) after this tick's push, if it can be reckoned.
-    pub(super) fn step(&mut self, params: &ModelParams, push: &Push) -> Option<f64> {
+    /// omega (rad/s) after this tick's push, if it can be reckoned: not where more than the push may turn the box.
+    pub(super) fn step(
+        &mut self,
+        params: &ModelParams,
+        push: &Push,
+        push_is_all: bool,
+    ) -> Option<f64> {
         let before = self.before.take();
         if push.speed < SLIDES_M_PER_S {
             return None;
         }
-        self.before = Some(push.omega);
         self.slid = self.slid.saturating_add(1);
+        if !push_is_all {
+            return None;
+        }
+        self.before = Some(push.omega);
         if !self.is_learned() {
             return None;
         }

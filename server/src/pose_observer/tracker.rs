@@ -83,11 +83,8 @@ impl BoxTracker {
         push: &Push,
         obstacle: bool,
     ) -> Option<f64> {
-        if obstacle || self.other_moment {
-            self.turning.skip();
-            return None;
-        }
-        self.turning.step(params, push)
+        let push_is_all = !obstacle && !self.other_moment;
+        self.turning.step(params, push, push_is_all)
     }
 
     /// Whether the moment of the push is reckoned with.

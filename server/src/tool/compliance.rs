@@ -17,7 +17,7 @@ const OVER_DEVICE: f64 = 1.2;
 /// Stiffest contact over k_p that [`spring_for`] is meant for, and stiffest spring over k_p.
 const STIFFEST: f64 = 10.0;
 /// Least damping of such a spring, N s/m.
-const DAMPING_LEAST_NS_PER_M: f64 = 20.0;
+const DAMPING_LEAST_NS_PER_M: f64 = 18.0;
 /// Damping over what just keeps the stiffest contact steady.
 const DAMPING_SHARE: f64 = 1.25;
 
@@ -190,7 +190,7 @@ mod tests {
             damping_ns_per_m: d,
         } = advised;
         assert!(
-            (k - 1200.0).abs() < 1e-9 && (d - 20.0).abs() < 1e-9,
+            (k - 1200.0).abs() < 1e-9 && (d - 18.0).abs() < 1e-9,
             "{advised:?}"
         );
     }
