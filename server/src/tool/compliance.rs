@@ -17,9 +17,9 @@ const OVER_DEVICE: f64 = 1.2;
 /// Stiffest contact over k_p that [`spring_for`] is meant for, and stiffest spring over k_p.
 const STIFFEST: f64 = 10.0;
 /// Least damping of such a spring, N s/m.
-const DAMPING_LEAST_NS_PER_M: f64 = 18.0;
+const DAMPING_LEAST_NS_PER_M: f64 = 20.0;
 /// Damping over what just keeps the stiffest contact steady.
-const DAMPING_SHARE: f64 = 1.25;
+const DAMPING_SHARE: f64 = 1.5;
 
 /// The spring for contacts of unknown stiffness, up to ten times that of the master's `device`, whose k_d they have.
 ///
@@ -190,7 +190,7 @@ mod tests {
             damping_ns_per_m: d,
         } = advised;
         assert!(
-            (k - 1200.0).abs() < 1e-9 && (d - 18.0).abs() < 1e-9,
+            (k - 1200.0).abs() < 1e-9 && (d - 21.6).abs() < 1e-9,
             "{advised:?}"
         );
     }
