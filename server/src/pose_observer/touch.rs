@@ -24,7 +24,7 @@ const TURN_ACCELERATION: (f64, f64) = (20.0, 2.5);
 const CORNER_SHARE: f64 = 0.5;
 /// A jump of the normal beyond this, rad, is a new contact with such a body.
 const JUMP_RAD: f64 = 0.2;
-/// So does no force below this, N: where the body is let go, what is left of the sensor's bias turns it.
+/// A force below this, N, shows no jump: where the body is let go, what is left of the sensor's bias turns it.
 const JUMP_N: f64 = 0.5;
 
 impl PoseObserver {
