@@ -154,7 +154,7 @@ impl Slave {
                 playout.limits(),
                 config.playout.reach_m,
             ),
-            compliance: Compliance::try_new(config.tool_compliance)?,
+            compliance: Compliance::try_new(config.tool_compliance, config.plant.link)?,
             contact: ContactStage::at(plant, config.conditioner(&coupling)),
             object,
             shadow: Shadow::new(settings, start, config.tool_force_max_n),

@@ -107,7 +107,7 @@ fn the_work_of_a_tool_that_shakes_is_about_what_the_object_takes() {
     // with so little damping the force is zero in every second tick
     let mut config = RandomWorld::new(11_150).config;
     let spring = config.slave.tool_compliance.as_mut().unwrap();
-    spring.damping_ns_per_m = 30.0;
+    spring.damping_ns_per_m = 16.0;
     let mut world = World::try_new(&config).unwrap();
     let mut ports = TwoPorts::new(0.0);
     let (mut taken_j, mut losses) = (0.0, 0);

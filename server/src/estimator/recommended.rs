@@ -15,7 +15,7 @@ use super::estimate::{Estimate, STICK_SPEED};
 use super::filter::{Row, StateVariableFilter, stage_weight};
 use super::gate::{Gate, GateConfig, GateState};
 use super::measured::{Measured, Seen};
-use super::obstacle::{Friction, MotionState, Obstacle, Stays};
+use super::obstacle::{Friction, MotionState, OBSTACLE_N, Obstacle, Stays};
 use super::off_centre;
 use super::recursive::{RecursiveConfig, RecursiveLeastSquares, RowNoise, Verdict};
 use super::surface::{Surface, SurfaceMotion};
@@ -30,6 +30,9 @@ const RESPONSE_TICKS: u32 = 500;
 /// On the first press the surface may seem to move by so much, m, and by this share of the depth, although the object stands: the
 /// stiffness of the contact is known that badly.
 const SEEMS: (f64, f64) = (0.3e-3, 0.5);
+
+/// An object that is seen no farther than this from where it was first touched, m, has not been moved.
+const UNMOVED_M: f64 = 5e-3;
 
 /// The way of the surface along the normal since a contact began.
 #[derive(Clone, Copy, Debug)]
@@ -143,6 +146,10 @@ pub(super) struct RecommendedEstimator {
     before_hit: Option<RecursiveLeastSquares>,
     /// The way of the surface in this contact.
     way: Option<Way>,
+    /// Where the object was seen when it was first touched, m.
+    first: Option<Vec2>,
+    /// Whether it has stood under all that a hand has, and nothing has moved it so far: the next touch then meets it as it is.
+    immovable: bool,
     pub(super) estimate: Estimate,
 }
 
@@ -175,6 +182,8 @@ impl RecommendedEstimator {
             stays: Stays::default(),
             before_hit: None,
             way: None,
+            first: None,
+            immovable: false,
             estimate,
         }
     }
@@ -225,14 +234,22 @@ impl RecommendedEstimator {
             Vec2::zeros()
         };
         let angle = self.direction.step(force, measured.force_noise_n);
-        match measured.normal.filter(|_| usable) {
-            Some(normal) => self.touch(measured, angle, normal),
+        let normal = measured.normal.filter(|_| usable);
+        let seen = measured.seen.filter(|_| usable);
+        if normal.is_some() {
+            self.first = self.first.or(seen.map(|seen| seen.centre));
+        }
+        let stays = |(first, seen): (Vec2, Seen)| (seen.centre - first).norm() <= UNMOVED_M;
+        let unmoved = self.first.zip(seen).is_some_and(stays);
+        self.immovable &= unmoved;
+        match normal {
+            Some(normal) => self.touch(measured, angle, normal, unmoved),
             None => self.release(),
         }
         self.publish();
     }
 
-    fn touch(&mut self, measured: &Measured, angle: Option<f64>, normal: Vec2) {
+    fn touch(&mut self, measured: &Measured, angle: Option<f64>, normal: Vec2, unmoved: bool) {
         let normal = angle.map_or(normal, |angle| rotate(angle, Vec2::new(1.0, 0.0)));
         self.estimate.heading = angle;
         let motion = self.surface.step(measured.tool, measured.force, normal);
@@ -261,13 +278,29 @@ impl RecommendedEstimator {
         });
         let slides_on = gate == GateState::Open;
         let pressed = (motion.row.force, measured.held_back);
-        self.stand(pressed, slides_on, way, stayed, share);
+        let slides = self.stand(pressed, slides_on, way, stayed, share);
+        let holding = self.obstacle.holding();
+        let withstands = holding == Some(OBSTACLE_N) || self.immovable && !slides;
+        self.immovable = unmoved && withstands;
+        self.estimate.holding = self.held().or(holding);
+    }
+
+    /// The friction (N) of what nothing has moved.
+    fn held(&self) -> Option<f64> {
+        self.immovable.then_some(OBSTACLE_N)
     }
 
     /// Whether something beyond friction holds the object where it is `pressed`, as [`Obstacle::step`] takes that.
     /// `way` (m) is how far its surface seems to have gone in this contact, `stayed` for how many ticks it has stayed where
-    /// it is, `share` that of c which a slow push meets there.
-    fn stand(&mut self, pressed: (f64, bool), slides_on: bool, way: f64, stayed: u32, share: f64) {
+    /// it is, `share` that of c which a slow push meets there. Whether it slides for certain.
+    fn stand(
+        &mut self,
+        pressed: (f64, bool),
+        slides_on: bool,
+        way: f64,
+        stayed: u32,
+        share: f64,
+    ) -> bool {
         let [older, _] = self.copies;
         let known = older.samples > 0;
         let moves = self.gate.moves(self.estimate.speed);
@@ -296,7 +329,7 @@ impl RecommendedEstimator {
         if self.obstacle.is_hit() {
             self.before_hit.get_or_insert(older);
         }
-        self.estimate.holding = self.obstacle.holding();
+        moves
     }
 
     /// Forgets what was learned since `copy` was the regression.
@@ -359,6 +392,7 @@ impl RecommendedEstimator {
         self.way = None;
         self.recursive.hold();
         self.estimate.release();
+        self.estimate.holding = self.held();
     }
 
     fn publish(&mut self) {

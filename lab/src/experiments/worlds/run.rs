@@ -125,7 +125,7 @@ struct Seen {
     pose_excess_m: f64,
     pose_excess_ticks: u64,
     pose_beyond_object_m: f64,
-    /// Ticks in which both forces have a direction, and those of them in which they point apart.
+    /// Ticks in which both forces have a direction and the master can know the body, and those of them in which they point apart.
     directed_ticks: u64,
     opposed_ticks: u64,
     /// Ticks in contact by the true force, and those of them in which f_m has no pair.
@@ -169,7 +169,7 @@ impl Seen {
         }
         let directed = slave
             .f_m
-            .filter(|f_m| f_m.norm().min(slave.true_force.norm()) > LEAST_N);
+            .filter(|f_m| known && f_m.norm().min(slave.true_force.norm()) > LEAST_N);
         if let Some(f_m) = directed {
             self.directed_ticks += 1;
             self.opposed_ticks += u64::from(f_m.dot(&slave.true_force) < 0.0);

@@ -61,3 +61,51 @@ fn an_object_that_stands_under_a_trembling_press_stands_although_it_was_seen_to_
     let moved = errors(values(estimator.estimate()), known);
     assert!(moved.iter().all(|moved| *moved < 0.01), "{moved:?}");
 }
+
+#[test]
+fn what_stood_under_all_that_a_hand_has_is_met_as_it_is_until_it_slides_or_is_seen_elsewhere() {
+    let seen_at = |x: f64| {
+        let centre = Vec2::new(x, 0.0);
+        Some(Seen {
+            centre,
+            turning: 0.0,
+            body_turning: 0.0,
+            side: 0.4,
+        })
+    };
+    let press = |force: f64, x: f64| Measured {
+        seen: seen_at(x),
+        ..pressed(force, 1.0)
+    };
+    let free = |x: f64| Measured {
+        normal: None,
+        ..press(0.0, x)
+    };
+    let mut stood = recommended(|_| ());
+    for k in 0..300 {
+        stood.step(&press(0.04 * f64::from(k), 0.2));
+    }
+    assert_eq!(stood.step(&free(0.2)).holding, Some(OBSTACLE_N));
+    assert_eq!(stood.step(&press(0.1, 0.2)).holding, Some(OBSTACLE_N));
+    // images show it a little beside
+    assert_eq!(stood.step(&free(0.203)).holding, Some(OBSTACLE_N));
+    let mut carried_off = stood.clone();
+    assert_eq!(carried_off.step(&free(0.21)).holding, None);
+    assert_eq!(carried_off.step(&press(0.1, 0.21)).holding, None);
+    // at 0.1 m/s under 2 N: only another face was held
+    let slides = |k: i32| {
+        let way = 1e-4 * f64::from(k);
+        let mut tick = press(2.0, 0.2);
+        tick.tool.x += way;
+        tick
+    };
+    let found = (0..100).find(|k| stood.step(&slides(*k)).holding.is_none());
+    assert!(found.is_some_and(|k| k < 50), "{found:?}");
+    // pressed by less than a hand has
+    let mut weakly = recommended(|_| ());
+    for k in 0..150 {
+        weakly.step(&press(0.04 * f64::from(k), 0.2));
+    }
+    assert!(weakly.estimate().holding.is_some());
+    assert_eq!(weakly.step(&free(0.2)).holding, None);
+}
