@@ -44,6 +44,7 @@ pub use windowed::Rows;
 pub use estimate::{Estimate, STICK_SPEED};
 pub use measured::{Measured, Seen};
 use multiple_model::MultipleModel;
+use obstacle::Hand;
 use paper::PaperEstimator;
 use quasi_static::QuasiStaticEstimator;
 use recommended::RecommendedEstimator;
@@ -125,17 +126,17 @@ impl Estimator {
         hand_force_max_n: f64,
         gives: ToolGives,
     ) -> Self {
+        let hand = Hand {
+            force_max_n: hand_force_max_n,
+            device_n_per_m: coupling.stiffness_n_per_m,
+        };
         Self(Box::new(match config {
             EstimatorConfig::Paper(config) => Kind::Paper(PaperEstimator::new(config, coupling)),
             EstimatorConfig::Recommended(config) => match gives {
-                ToolGives::BySlave => {
-                    Kind::MultipleModel(MultipleModel::new(config, hand_force_max_n))
-                }
-                ToolGives::No => {
-                    Kind::Recommended(RecommendedEstimator::new(config, hand_force_max_n))
-                }
+                ToolGives::BySlave => Kind::MultipleModel(MultipleModel::new(config, hand)),
+                ToolGives::No => Kind::Recommended(RecommendedEstimator::new(config, hand)),
                 ToolGives::ByPlant => {
-                    let through_force = RecommendedEstimator::new(config, hand_force_max_n);
+                    let through_force = RecommendedEstimator::new(config, hand);
                     Kind::Recommended(through_force.at_the_surface())
                 }
             },

@@ -11,6 +11,7 @@ use mmt_shared::model::geometry::Vec2;
 
 use super::estimate::Estimate;
 use super::measured::Measured;
+use super::obstacle::Hand;
 use super::recommended::{RecommendedConfig, RecommendedEstimator};
 
 /// Stiffnesses of the contact over k_p, equal ratios apart: 10^0.1 to 10^0.9.
@@ -41,9 +42,9 @@ pub(super) struct MultipleModel {
 }
 
 impl MultipleModel {
-    /// At the prior. `config` has k_p; no hand presses with more than `hand_force_max_n`, N.
+    /// At the prior. `config` has k_p.
     #[must_use]
-    pub(super) fn new(config: &RecommendedConfig, hand_force_max_n: f64) -> Self {
+    pub(super) fn new(config: &RecommendedConfig, hand: Hand) -> Self {
         let of = |times: f64| {
             let coupling = Coupling {
                 stiffness_n_per_m: times * config.coupling.stiffness_n_per_m,
@@ -53,7 +54,7 @@ impl MultipleModel {
                 coupling,
                 ..*config
             };
-            RecommendedEstimator::new(&config, hand_force_max_n).doubting_from(DOUBT_DEVIATIONS)
+            RecommendedEstimator::new(&config, hand).doubting_from(DOUBT_DEVIATIONS)
         };
         Self {
             estimators: TIMES.map(of),
@@ -215,13 +216,18 @@ mod tests {
         (1..4000).map(&mut tick).collect()
     }
 
+    const HAND: Hand = Hand {
+        force_max_n: 8.0,
+        device_n_per_m: COUPLING.stiffness_n_per_m,
+    };
+
     #[test]
     fn a_mass_behind_a_contact_of_unknown_stiffness_is_found_although_the_hand_trembles() {
         let mut off = [0.0, 0.0];
         for (seed, times) in [(1, 1.2), (2, 2.5), (3, 5.0), (4, 9.0)] {
             let measured = push(seed, times, TRUTH);
             let config = RecommendedConfig::new(COUPLING);
-            let mut many = MultipleModel::new(&config, 8.0);
+            let mut many = MultipleModel::new(&config, HAND);
             let mut single = Estimator::new(
                 &EstimatorConfig::Recommended(config),
                 COUPLING,
@@ -250,7 +256,7 @@ mod tests {
     #[test]
     fn an_object_that_stands_while_it_is_pressed_shows_how_far_the_contact_gives() {
         for (seed, times) in [(1, 1.2), (2, 1.9), (3, 3.0), (4, 8.5)] {
-            let mut many = MultipleModel::new(&RecommendedConfig::new(COUPLING), 8.0);
+            let mut many = MultipleModel::new(&RecommendedConfig::new(COUPLING), HAND);
             let pressed = push(seed, times, [2.0, 3.0, 6.0]);
             let stands = pressed.iter().take_while(|tick| tick.force.x < 5.0);
             let last = stands.inspect(|tick| many.step(tick)).last().unwrap();

@@ -30,6 +30,27 @@ const ENOUGH: f64 = 0.8;
 /// went on for a round trip presses its model with all that its stiffness gives.
 pub const OBSTACLE_N: f64 = 150.0;
 
+/// Stiffness k_p of a device, N/m, below which a hand that presses with all it has is far in the model. An object that nobody has moved
+/// is then taken for one that the hand does not move under the share of that force which k_p is of this.
+const SOFT_N_PER_M: f64 = 650.0;
+
+/// The hand, as far as it decides what it can move.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Hand {
+    /// It presses with no more, N.
+    pub(super) force_max_n: f64,
+    /// Stiffness k_p that its device renders, N/m.
+    pub(super) device_n_per_m: f64,
+}
+
+impl Hand {
+    /// What stands against more than this is held by something that the hand does not move, N.
+    fn moves_with_n(&self, known: bool) -> f64 {
+        let share = self.device_n_per_m / SOFT_N_PER_M;
+        self.force_max_n * if known { 1.0 } else { share.min(1.0) }
+    }
+}
+
 /// What a tick of contact is like, as [`Obstacle`] takes it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum MotionState {
@@ -96,8 +117,7 @@ impl Forces {
 /// Watches for an obstacle.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Obstacle {
-    /// An object that this force does not move is held by something that the hand does not move, N.
-    hand_force_max_n: f64,
+    hand: Hand,
     held_ticks: u32,
     pressed_ticks: u32,
     hard_ticks: u32,
@@ -109,10 +129,10 @@ pub(super) struct Obstacle {
 }
 
 impl Obstacle {
-    /// Nothing is known; no hand presses with more than this, N.
-    pub(super) fn new(hand_force_max_n: f64) -> Self {
+    /// Nothing is known.
+    pub(super) fn new(hand: Hand) -> Self {
         Self {
-            hand_force_max_n,
+            hand,
             held_ticks: 0,
             pressed_ticks: 0,
             hard_ticks: 0,
@@ -176,7 +196,7 @@ impl Obstacle {
     fn stand(&mut self, force: f64, known: bool) {
         let (margin, enough) = if known { (MARGIN, ENOUGH) } else { (1.0, 1.0) };
         if self.holding.is_none_or(|holding| force > enough * holding) {
-            let held = force > self.hand_force_max_n;
+            let held = force > self.hand.moves_with_n(known);
             self.holding = Some(if held { OBSTACLE_N } else { margin * force });
         }
     }
@@ -195,7 +215,7 @@ impl Obstacle {
 
     /// Contact was lost.
     pub(super) fn clear(&mut self) {
-        *self = Self::new(self.hand_force_max_n);
+        *self = Self::new(self.hand);
     }
 }
 
@@ -213,7 +233,10 @@ mod tests {
         seen: true,
         share: 1.0,
     };
-    const HAND_N: f64 = 8.0;
+    const HAND: Hand = Hand {
+        force_max_n: 8.0,
+        device_n_per_m: 1000.0,
+    };
     const UNKNOWN: Friction = Friction {
         c: 1.0,
         known: false,
@@ -223,7 +246,7 @@ mod tests {
 
     /// Presses from 0 to `most` N at a rate in N/ms, then holds it for 100 ticks.
     fn press(rate: f64, most: f64) -> Obstacle {
-        let mut obstacle = Obstacle::new(HAND_N);
+        let mut obstacle = Obstacle::new(HAND);
         let rise = (most / rate) as u32;
         for n in 0..rise + 100 {
             obstacle.step(
@@ -247,7 +270,7 @@ mod tests {
 
     #[test]
     fn friction_that_is_not_known_is_at_least_the_force_and_what_no_hand_moves_is_held() {
-        let mut obstacle = Obstacle::new(HAND_N);
+        let mut obstacle = Obstacle::new(HAND);
         let mut press = |force, motion, friction| {
             (0..20).for_each(|_| {
                 obstacle.step((force, false), 0.0, motion, 0, friction);
@@ -269,8 +292,27 @@ mod tests {
     }
 
     #[test]
+    fn what_stands_12_mm_deep_in_front_of_a_soft_device_is_held_unless_its_friction_is_known() {
+        let soft = Hand {
+            device_n_per_m: 300.0,
+            ..HAND
+        };
+        for (friction, force, held) in [
+            (UNKNOWN, 3.5, Some(3.5)),
+            (UNKNOWN, 3.8, Some(OBSTACLE_N)),
+            (C, 3.8, Some(2.0 * 3.8)),
+        ] {
+            let mut obstacle = Obstacle::new(soft);
+            for _ in 0..20 {
+                obstacle.step((force, false), 0.0, MotionState::Sticks, 0, friction);
+            }
+            assert_eq!(obstacle.holding(), held);
+        }
+    }
+
+    #[test]
     fn what_broke_away_was_held_by_no_more_than_the_force_before_that_could_be_seen() {
-        let mut obstacle = Obstacle::new(HAND_N);
+        let mut obstacle = Obstacle::new(HAND);
         let mut press = |n: u32, motion| {
             obstacle.step((0.1 * f64::from(n), false), 0.0, motion, 0, UNKNOWN);
             obstacle.holding()
@@ -289,7 +331,7 @@ mod tests {
     #[test]
     fn what_is_pressed_and_has_not_gone_on_for_250_ms_stands_however_it_trembles_until_it_goes_on()
     {
-        let mut obstacle = Obstacle::new(HAND_N);
+        let mut obstacle = Obstacle::new(HAND);
         let trembles = |n: u32| match n % 10 {
             0..5 => MotionState::Sticks,
             _ => MotionState::Slides,
@@ -328,7 +370,7 @@ mod tests {
 
     #[test]
     fn static_friction_that_gives_way_within_20_ms_is_no_obstacle() {
-        let mut obstacle = Obstacle::new(HAND_N);
+        let mut obstacle = Obstacle::new(HAND);
         for _ in 0..19 {
             assert!(!obstacle.step((1.5 * C.c, false), 0.0, MotionState::Sticks, 0, C));
         }
@@ -342,7 +384,7 @@ mod tests {
     {
         let taken_for = Friction { c: 14.0, ..C };
         for (held_back, holding) in [(false, None), (true, Some(OBSTACLE_N))] {
-            let mut obstacle = Obstacle::new(HAND_N);
+            let mut obstacle = Obstacle::new(HAND);
             for _ in 0..HOLD_TICKS {
                 let pressed = (14.4, held_back);
                 obstacle.step(pressed, 0.0, MotionState::Sticks, 0, taken_for);
@@ -362,7 +404,7 @@ mod tests {
 
     #[test]
     fn an_object_that_moves_on_under_a_force_beyond_any_push_has_hit_something() {
-        let mut obstacle = Obstacle::new(HAND_N);
+        let mut obstacle = Obstacle::new(HAND);
         for (force, sent) in [(3.0 * C.c + 1.0, None), (10.0, Some(10.0))] {
             for _ in 0..5 {
                 assert!(!obstacle.step((force, false), 0.0, MotionState::SlidesOn, 0, C));

@@ -15,7 +15,7 @@ use super::estimate::{Estimate, STICK_SPEED};
 use super::filter::{Row, StateVariableFilter, stage_weight};
 use super::gate::{Gate, GateConfig, GateState};
 use super::measured::{Measured, Seen};
-use super::obstacle::{Friction, MotionState, OBSTACLE_N, Obstacle, Stays};
+use super::obstacle::{Friction, Hand, MotionState, OBSTACLE_N, Obstacle, Stays};
 use super::off_centre;
 use super::recursive::{RecursiveConfig, RecursiveLeastSquares, RowNoise, Verdict};
 use super::surface::{Surface, SurfaceMotion};
@@ -154,9 +154,9 @@ pub(super) struct RecommendedEstimator {
 }
 
 impl RecommendedEstimator {
-    /// At the prior; no hand presses with more than `hand_force_max_n`, N.
+    /// At the prior.
     #[must_use]
-    pub(super) fn new(config: &RecommendedConfig, hand_force_max_n: f64) -> Self {
+    pub(super) fn new(config: &RecommendedConfig, hand: Hand) -> Self {
         let speed_min = config
             .gate
             .speed_min_m_per_s
@@ -178,7 +178,7 @@ impl RecommendedEstimator {
             filter: StateVariableFilter::new(config.cutoff_rad_per_s),
             recursive,
             copies: [recursive; 2],
-            obstacle: Obstacle::new(hand_force_max_n),
+            obstacle: Obstacle::new(hand),
             stays: Stays::default(),
             before_hit: None,
             way: None,

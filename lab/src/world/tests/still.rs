@@ -76,12 +76,12 @@ fn felt(config: &WorldConfig, round_trip_ms: u64) -> Felt {
 #[test]
 fn what_does_not_move_is_felt_to_give_way_for_a_round_trip_and_then_where_it_is() {
     for one_way_ms in [0, 25, 50, 125, 250, 500] {
-        // a soft spring shows later what it meets
-        for (friction_n, k_p, soon_mm) in [
-            (18.0, 1000.0, 10.0),
-            (160.0, 1000.0, 10.0),
-            (40.0, 300.0, 25.0),
-            (40.0, 3000.0, 10.0),
+        for (friction_n, k_p) in [
+            (18.0, 1000.0),
+            (160.0, 1000.0),
+            (40.0, 300.0),
+            (40.0, 500.0),
+            (40.0, 3000.0),
         ] {
             for seed in 11..=13 {
                 let mut config = over(&format!("delay {one_way_ms}ms"), seed);
@@ -95,14 +95,8 @@ fn what_does_not_move_is_felt_to_give_way_for_a_round_trip_and_then_where_it_is(
                     "{one_way_ms:4} ms, {friction_n:5} N, {k_p:4} N/m, seed {seed}: {felt:.4?}"
                 );
                 felt.is_harmless(round_trip_ms);
-                assert!(
-                    k_p != 1000.0 || one_way_ms > 250 || felt.most_m <= 0.1,
-                    "{felt:?}"
-                );
-                assert!(
-                    one_way_ms > 50 || felt.after_one_m <= soon_mm * 1e-3,
-                    "{felt:?}"
-                );
+                assert!(one_way_ms > 250 || felt.most_m <= 0.1, "{felt:?}");
+                assert!(felt.after_one_m <= 0.010, "{felt:?}");
                 assert!(felt.after_two_m <= 0.005, "{felt:?}");
             }
         }
