@@ -70,8 +70,8 @@ fn steady_damping(spring_n_per_m: f64, device: Coupling) -> f64 {
 pub(crate) struct Compliance {
     /// As configured.
     spring: Option<Coupling>,
-    /// Least damping of the suited one, N s/m.
-    least: f64,
+    /// Whether the tool is that of a plant, whose force may be later than a tick.
+    of_plant: bool,
     /// In place of the configured one, where the contact is known.
     suited: Option<Coupling>,
     /// How far, m, world frame, and how fast it grows, m/s.
@@ -91,10 +91,9 @@ impl Compliance {
             in_range("tool compliance: stiffness", "N/m", k, STIFFNESS_N_PER_M)?;
             in_range("tool compliance: damping", "N s/m", d, DAMPING_NS_PER_M)?;
         }
-        let share = if of_plant { 1.0 } else { DAMPING_KNOWN };
         Ok(Self {
             spring,
-            least: spring.map_or(0.0, |spring| share * spring.damping_ns_per_m),
+            of_plant,
             suited: None,
             back: (Vec2::zeros(), Vec2::zeros()),
             force: Vec2::zeros(),
@@ -104,8 +103,11 @@ impl Compliance {
     /// From now on the tool gives so that a contact of `contact_n_per_m` feels like the one that the master renders, with
     /// `rendered`; as configured where nobody knows the contact. Not for a tool that touches something: it would jump.
     pub(crate) fn suit(&mut self, contact_n_per_m: Option<f64>, rendered: &Coupling) {
-        let known = self.spring.and(contact_n_per_m);
-        self.suited = known.map(|k_e| suited_to(k_e, rendered, self.least));
+        let share = if self.of_plant { 1.0 } else { DAMPING_KNOWN };
+        self.suited = self
+            .spring
+            .zip(contact_n_per_m)
+            .map(|(spring, k_e)| suited_to(k_e, rendered, share * spring.damping_ns_per_m));
     }
 
     /// One tick under the force that was measured last (N, on the object): how far the tool stands back (m), and the
@@ -117,9 +119,10 @@ impl Compliance {
                 damping_ns_per_m: d,
             } = self.suited.unwrap_or(spring);
             let (before, _) = self.back;
-            // K y + D dy/dt = f, implicit in y, with the mean of f over the tick
-            let mean = 0.5 * (self.force + force);
-            self.force = force;
+            // K y + D dy/dt = f, implicit in y, with the mean of f over the tick; that would be later still with a plant
+            let before_this = std::mem::replace(&mut self.force, force);
+            let earlier = if self.of_plant { force } else { before_this };
+            let mean = 0.5 * (earlier + force);
             let back = (before * d + mean * TICK_S) / (d + k * TICK_S);
             self.back = (back, (back - before) / period_s);
         }
@@ -272,6 +275,15 @@ mod tests {
                 assert!(left_n(with(0.95 * least), contact) > 1.0, "{k} of {k_p}");
             }
         }
+    }
+
+    #[test]
+    fn the_force_of_a_plant_is_late_enough_as_it_is() {
+        let given_m = |of_plant| {
+            let mut tool = Compliance::try_new(spring(1200.0, 30.0), of_plant).unwrap();
+            tool.step(Vec2::new(3.0, 0.0), TICK_S).0.x
+        };
+        assert!((given_m(true) - 2.0 * given_m(false)).abs() < 1e-12);
     }
 
     #[test]
