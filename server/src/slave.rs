@@ -144,6 +144,7 @@ impl Slave {
         let port = ToolPort::new(noise_n, speed_max_m_per_s);
         let plant = plant::of_config(config, environment, coupling, speed_max_m_per_s)?;
         let timer_carries_pose = config.trigger.timer_carries_pose;
+        let compliance = Compliance::try_new(config.tool_compliance)?;
         Ok(Self {
             settings,
             playout: PlayoutBuffer::try_new(playout)?,
@@ -154,7 +155,11 @@ impl Slave {
                 playout.limits(),
                 config.playout.reach_m,
             ),
-            compliance: Compliance::try_new(config.tool_compliance, config.plant.link)?,
+            compliance: if config.plant.link {
+                compliance.of_plant()
+            } else {
+                compliance
+            },
             contact: ContactStage::at(plant, config.conditioner(&coupling)),
             object,
             shadow: Shadow::new(settings, start, config.tool_force_max_n),

@@ -15,6 +15,7 @@ mod direction;
 mod estimate;
 mod filter;
 mod gate;
+mod immovable;
 mod kalman;
 mod limits;
 mod measured;
@@ -29,6 +30,7 @@ mod recursive;
 mod surface;
 #[cfg(test)]
 mod tests;
+mod way;
 mod windowed;
 
 pub use direction::DirectionConfig;

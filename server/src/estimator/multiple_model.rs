@@ -185,7 +185,7 @@ mod tests {
             ..COUPLING
         };
         let mut random = Substream::new(seed, "multiple model", 0);
-        let mut spring = Compliance::try_new(Some(spring_for(COUPLING)), false).unwrap();
+        let mut spring = Compliance::try_new(Some(spring_for(COUPLING))).unwrap();
         let (mut position, mut velocity, mut force, mut depth) = (0.0, 0.0_f64, 0.0, 0.0);
         let mut tick = |k: u32| {
             let t = f64::from(k) * TICK_S;

@@ -14,11 +14,13 @@ use super::direction::{DirectionConfig, ForceDirection};
 use super::estimate::{Estimate, STICK_SPEED};
 use super::filter::{Row, StateVariableFilter, stage_weight};
 use super::gate::{Gate, GateConfig, GateState};
+use super::immovable::Immovable;
 use super::measured::{Measured, Seen};
-use super::obstacle::{Friction, Hand, MotionState, OBSTACLE_N, Obstacle, Stays};
+use super::obstacle::{Friction, Hand, MotionState, Obstacle, Stays};
 use super::off_centre;
 use super::recursive::{RecursiveConfig, RecursiveLeastSquares, RowNoise, Verdict};
 use super::surface::{Surface, SurfaceMotion};
+use super::way::Way;
 
 /// Rows between two copies of the regression. On an obstacle the older copy returns: what was learned while
 /// the object ran up against it is no friction.
@@ -30,37 +32,6 @@ const RESPONSE_TICKS: u32 = 500;
 /// On the first press the surface may seem to move by so much, m, and by this share of the depth, although the object stands: the
 /// stiffness of the contact is known that badly.
 const SEEMS: (f64, f64) = (0.3e-3, 0.5);
-
-/// An object that is seen no farther than this from where it was first touched, m, has not been moved.
-const UNMOVED_M: f64 = 5e-3;
-
-/// The way of the surface along the normal since a contact began.
-#[derive(Clone, Copy, Debug)]
-struct Way {
-    began: Vec2,
-    /// Low-passed, m.
-    smooth: f64,
-    /// The most of that, in or out, m.
-    farthest: f64,
-}
-
-impl Way {
-    fn new(began: Vec2) -> Self {
-        Self {
-            began,
-            smooth: 0.0,
-            farthest: 0.0,
-        }
-    }
-
-    /// Takes the surface point (m) of a tick, the inward normal, and the weight of a tick in the low-pass; the way, m.
-    fn step(&mut self, point: Vec2, normal: Vec2, weight: f64) -> f64 {
-        let way = normal.dot(&(point - self.began));
-        self.smooth += (way - self.smooth) * weight;
-        self.farthest = self.farthest.max(self.smooth.abs());
-        way
-    }
-}
 
 /// Settings of `RecommendedEstimator`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -146,10 +117,7 @@ pub(super) struct RecommendedEstimator {
     before_hit: Option<RecursiveLeastSquares>,
     /// The way of the surface in this contact.
     way: Option<Way>,
-    /// Where the object was seen when it was first touched, m.
-    first: Option<Vec2>,
-    /// Whether it has stood under all that a hand has, and nothing has moved it so far: the next touch then meets it as it is.
-    immovable: bool,
+    immovable: Immovable,
     pub(super) estimate: Estimate,
 }
 
@@ -182,8 +150,7 @@ impl RecommendedEstimator {
             stays: Stays::default(),
             before_hit: None,
             way: None,
-            first: None,
-            immovable: false,
+            immovable: Immovable::default(),
             estimate,
         }
     }
@@ -213,7 +180,7 @@ impl RecommendedEstimator {
     /// How far the surface has been from where this contact began, m; none without contact.
     #[must_use]
     pub(super) fn strayed(&self) -> Option<f64> {
-        self.way.map(|way| way.farthest)
+        self.way.map(|way| way.farthest())
     }
 
     /// The forces of all ticks so far were this many times as large.
@@ -236,20 +203,16 @@ impl RecommendedEstimator {
         let angle = self.direction.step(force, measured.force_noise_n);
         let normal = measured.normal.filter(|_| usable);
         let seen = measured.seen.filter(|_| usable);
-        if normal.is_some() {
-            self.first = self.first.or(seen.map(|seen| seen.centre));
-        }
-        let stays = |(first, seen): (Vec2, Seen)| (seen.centre - first).norm() <= UNMOVED_M;
-        let unmoved = self.first.zip(seen).is_some_and(stays);
-        self.immovable &= unmoved;
+        self.immovable
+            .see(seen.map(|seen| seen.centre), normal.is_some());
         match normal {
-            Some(normal) => self.touch(measured, angle, normal, unmoved),
+            Some(normal) => self.touch(measured, angle, normal),
             None => self.release(),
         }
         self.publish();
     }
 
-    fn touch(&mut self, measured: &Measured, angle: Option<f64>, normal: Vec2, unmoved: bool) {
+    fn touch(&mut self, measured: &Measured, angle: Option<f64>, normal: Vec2) {
         let normal = angle.map_or(normal, |angle| rotate(angle, Vec2::new(1.0, 0.0)));
         self.estimate.heading = angle;
         let motion = self.surface.step(measured.tool, measured.force, normal);
@@ -280,14 +243,8 @@ impl RecommendedEstimator {
         let pressed = (motion.row.force, measured.held_back);
         let slides = self.stand(pressed, slides_on, way, stayed, share);
         let holding = self.obstacle.holding();
-        let withstands = holding == Some(OBSTACLE_N) || self.immovable && !slides;
-        self.immovable = unmoved && withstands;
-        self.estimate.holding = self.held().or(holding);
-    }
-
-    /// The friction (N) of what nothing has moved.
-    fn held(&self) -> Option<f64> {
-        self.immovable.then_some(OBSTACLE_N)
+        self.immovable.press(holding, slides);
+        self.estimate.holding = self.immovable.holding().or(holding);
     }
 
     /// Whether something beyond friction holds the object where it is `pressed`, as [`Obstacle::step`] takes that.
@@ -392,7 +349,7 @@ impl RecommendedEstimator {
         self.way = None;
         self.recursive.hold();
         self.estimate.release();
-        self.estimate.holding = self.held();
+        self.estimate.holding = self.immovable.holding();
     }
 
     fn publish(&mut self) {

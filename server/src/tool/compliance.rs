@@ -81,11 +81,11 @@ pub(crate) struct Compliance {
 }
 
 impl Compliance {
-    /// Without a spring the tool does not give. `of_plant`: whether the tool is that of a plant.
+    /// Without a spring the tool does not give.
     ///
     /// # Errors
     /// Names the number that is not within its range.
-    pub(crate) fn try_new(spring: Option<Coupling>, of_plant: bool) -> Result<Self, OutOfRange> {
+    pub(crate) fn try_new(spring: Option<Coupling>) -> Result<Self, OutOfRange> {
         if let Some(spring) = spring {
             let (k, d) = (spring.stiffness_n_per_m, spring.damping_ns_per_m);
             in_range("tool compliance: stiffness", "N/m", k, STIFFNESS_N_PER_M)?;
@@ -93,11 +93,19 @@ impl Compliance {
         }
         Ok(Self {
             spring,
-            of_plant,
+            of_plant: false,
             suited: None,
             back: (Vec2::zeros(), Vec2::zeros()),
             force: Vec2::zeros(),
         })
+    }
+
+    /// The same of the tool of a plant.
+    pub(crate) fn of_plant(self) -> Self {
+        Self {
+            of_plant: true,
+            ..self
+        }
     }
 
     /// From now on the tool gives so that a contact of `contact_n_per_m` feels like the one that the master renders, with
@@ -143,14 +151,14 @@ mod tests {
 
     #[test]
     fn it_gives_by_the_force_over_its_stiffness_with_its_time_constant() {
-        let mut tool = Compliance::try_new(spring(1200.0, 30.0), false).unwrap();
+        let mut tool = Compliance::try_new(spring(1200.0, 30.0)).unwrap();
         let force = Vec2::new(2.4, -1.2);
         let given: Vec<Vec2> = (0..1000).map(|_| tool.step(force, TICK_S).0).collect();
         assert!((given[999] - force / 1200.0).norm() < 1e-12);
         // 30/1200 s, half a tick later: 1 − exp(−24.5/25) within what a step of 1 ms leaves
         let share = given[24].x / 2e-3;
         assert!((share - 0.625).abs() < 0.01, "{share}");
-        let mut stiff = Compliance::try_new(None, false).unwrap();
+        let mut stiff = Compliance::try_new(None).unwrap();
         assert_eq!(stiff.step(force, TICK_S), (Vec2::zeros(), Vec2::zeros()));
     }
 
@@ -173,7 +181,7 @@ mod tests {
         for k_e in [1000.0, 300.0] {
             assert!((suited(k_e).stiffness_n_per_m - 10_000.0).abs() < 1e-9);
         }
-        let mut tool = Compliance::try_new(Some(spring_for(device)), false).unwrap();
+        let mut tool = Compliance::try_new(Some(spring_for(device))).unwrap();
         let mut given_m = |k_e: Option<f64>| {
             tool.suit(k_e, &device);
             (0..1000)
@@ -183,7 +191,7 @@ mod tests {
         };
         assert!((given_m(Some(2000.0)) - 1.5e-3).abs() < 1e-9);
         assert!((given_m(None) - 2.5e-3).abs() < 1e-9, "as configured");
-        let mut stiff = Compliance::try_new(None, false).unwrap();
+        let mut stiff = Compliance::try_new(None).unwrap();
         stiff.suit(Some(2000.0), &device);
         assert_eq!(stiff.step(Vec2::new(3.0, 0.0), TICK_S).0, Vec2::zeros());
     }
@@ -192,24 +200,24 @@ mod tests {
     fn a_contact_that_is_known_to_be_stiff_takes_the_damping_that_is_rendered_but_not_less_than_keeps_it_steady()
      {
         let device = Coupling::for_stiffness(1000.0);
-        let damping_of = |of_plant, k_e: f64, configured: f64| {
-            let mut tool = Compliance::try_new(spring(1200.0, configured), of_plant).unwrap();
+        let suited = |mut tool: Compliance, k_e| {
             tool.suit(Some(k_e), &device);
             tool.suited.unwrap().damping_ns_per_m
         };
-        let damping = |k_e, configured| damping_of(false, k_e, configured);
+        let tool = |configured| Compliance::try_new(spring(1200.0, configured)).unwrap();
+        let damping = |k_e, configured| suited(tool(configured), k_e);
         let advised = spring_for(device).damping_ns_per_m;
         // k_d (k_e + k_p)/(k_e − k_p)
         assert!((damping(5000.0, advised) - 15.0).abs() < 1e-9);
         assert!((damping(2000.0, advised) - 30.0).abs() < 1e-9);
         assert!((damping(100_000.0, advised) - 0.6 * advised).abs() < 1e-9);
         assert!((damping(100_000.0, 50.0) - 30.0).abs() < 1e-9);
-        assert!((damping_of(true, 100_000.0, 50.0) - 50.0).abs() < 1e-9);
+        assert!((suited(tool(50.0).of_plant(), 100_000.0) - 50.0).abs() < 1e-9);
     }
 
     /// The largest force on a contact that does not move, N, in the last of 1000 ticks after a blow of 1 N.
     fn left_n(spring: Coupling, contact: Coupling) -> f64 {
-        let mut tool = Compliance::try_new(Some(spring), false).unwrap();
+        let mut tool = Compliance::try_new(Some(spring)).unwrap();
         let mut force = Vec2::new(1.0, 0.0);
         let mut left = 0.0;
         for tick in 0..1000 {
@@ -229,7 +237,7 @@ mod tests {
         for k_p in [300.0, 1000.0, 2000.0, 3000.0] {
             let device = Coupling::for_stiffness(k_p);
             let advised = spring_for(device);
-            assert!(Compliance::try_new(Some(advised), false).is_ok());
+            assert!(Compliance::try_new(Some(advised)).is_ok());
             let least = DAMPING_KNOWN * advised.damping_ns_per_m;
             // as it is, or suited to another contact than the one that it meets
             let suited =
@@ -279,17 +287,15 @@ mod tests {
 
     #[test]
     fn the_force_of_a_plant_is_late_enough_as_it_is() {
-        let given_m = |of_plant| {
-            let mut tool = Compliance::try_new(spring(1200.0, 30.0), of_plant).unwrap();
-            tool.step(Vec2::new(3.0, 0.0), TICK_S).0.x
-        };
-        assert!((given_m(true) - 2.0 * given_m(false)).abs() < 1e-12);
+        let tool = Compliance::try_new(spring(1200.0, 30.0)).unwrap();
+        let given_m = |mut tool: Compliance| tool.step(Vec2::new(3.0, 0.0), TICK_S).0.x;
+        assert!((given_m(tool.of_plant()) - 2.0 * given_m(tool)).abs() < 1e-12);
     }
 
     #[test]
     fn numbers_that_would_shake_are_refused() {
         for (k, d) in [(10.0, 30.0), (1200.0, 1.0), (f64::NAN, 30.0)] {
-            assert!(Compliance::try_new(spring(k, d), false).is_err());
+            assert!(Compliance::try_new(spring(k, d)).is_err());
         }
     }
 }

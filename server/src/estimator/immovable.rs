@@ -1,0 +1,43 @@
+//! What a press that moved nothing has shown, for the touches that follow.
+//!
+//! It must never outlast the first motion of the object: what a wall held is free at another face.
+
+use mmt_shared::model::geometry::Vec2;
+
+use super::obstacle::OBSTACLE_N;
+
+/// An object that is seen no farther than this from where it was first touched, m, has not been moved.
+const UNMOVED_M: f64 = 5e-3;
+
+/// Whether an object has stood under all that a hand has, and nothing has moved it so far.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Immovable {
+    /// Where the object was seen when it was first touched, m.
+    first: Option<Vec2>,
+    unmoved: bool,
+    stood: bool,
+}
+
+impl Immovable {
+    /// Takes where the centre of the object is `seen`, m, and whether it is touched.
+    pub(super) fn see(&mut self, seen: Option<Vec2>, touched: bool) {
+        if touched {
+            self.first = self.first.or(seen);
+        }
+        let both = self.first.zip(seen);
+        self.unmoved = both.is_some_and(|(first, seen)| (seen - first).norm() <= UNMOVED_M);
+        self.stood &= self.unmoved;
+    }
+
+    /// Takes a tick of contact after [`Self::see`]: the friction that holds the object as this contact shows it, N, and whether it
+    /// slides for certain.
+    pub(super) fn press(&mut self, holding: Option<f64>, slides: bool) {
+        let withstands = holding == Some(OBSTACLE_N) || self.stood && !slides;
+        self.stood = self.unmoved && withstands;
+    }
+
+    /// The friction that holds the object, N; none where it may move.
+    pub(super) fn holding(&self) -> Option<f64> {
+        self.stood.then_some(OBSTACLE_N)
+    }
+}
