@@ -14,7 +14,6 @@ const UNMOVED_M: f64 = 5e-3;
 pub(super) struct Immovable {
     /// Where the object was seen when it was first touched, m.
     first: Option<Vec2>,
-    unmoved: bool,
     stood: bool,
 }
 
@@ -25,15 +24,13 @@ impl Immovable {
             self.first = self.first.or(seen);
         }
         let both = self.first.zip(seen);
-        self.unmoved = both.is_some_and(|(first, seen)| (seen - first).norm() <= UNMOVED_M);
-        self.stood &= self.unmoved;
+        self.stood &= both.is_some_and(|(first, seen)| (seen - first).norm() <= UNMOVED_M);
     }
 
     /// Takes a tick of contact after [`Self::see`]: the friction that holds the object as this contact shows it, N, and whether it
     /// slides for certain.
     pub(super) fn press(&mut self, holding: Option<f64>, slides: bool) {
-        let withstands = holding == Some(OBSTACLE_N) || self.stood && !slides;
-        self.stood = self.unmoved && withstands;
+        self.stood = holding == Some(OBSTACLE_N) || self.stood && !slides;
     }
 
     /// The friction that holds the object, N; none where it may move.

@@ -7,7 +7,7 @@ use mmt_shared::model::sample::HipCounts;
 use mmt_shared::model::sample::HipSample;
 use mmt_shared::model::settings::Mode;
 use mmt_shared::model::tool::TOOL_FORCE_MAX_N;
-use mmt_shared::time::TICK;
+use mmt_shared::time::{TICK, TICK_S};
 
 use super::*;
 
@@ -353,4 +353,16 @@ fn an_estimator_of_somebody_else_is_what_the_master_gets_if_it_is_accepted() {
             "{wrong:?}"
         );
     }
+}
+
+#[test]
+fn the_spring_of_a_plants_tool_takes_the_newest_force() {
+    let given_m = |link| {
+        let mut config = SlaveConfig::of_mode(Mode::Recommended);
+        config.tool_compliance = Some(Coupling::for_stiffness(1200.0));
+        config.plant.link = link;
+        let mut slave = Slave::try_new(&config, Coupling::for_stiffness(1000.0)).unwrap();
+        slave.compliance.step(Vec2::new(3.0, 0.0), TICK_S).0.x
+    };
+    assert!((given_m(true) - 2.0 * given_m(false)).abs() < 1e-12);
 }

@@ -69,3 +69,12 @@ fn a_tool_that_trembles_at_its_limit_does_not_spend_more_than_the_budget() {
     println!("{:?}", rows[0]);
     assert!(number(&rows[0], "work_excess_j") <= 1e-6);
 }
+
+#[test]
+fn the_sign_of_the_force_is_not_judged_for_a_round_trip_after_another_body_is_touched() {
+    // the tool goes straight from one body to another, and for 0.35 s the hand feels the first
+    let one = BTreeMap::from([("world", 92_907.0)]);
+    let rows = Done::given(&worlds::EXPERIMENT, 1, 20_000, one).rows("worlds.csv", &[]);
+    println!("{:?}", rows[0]);
+    assert!(number(&rows[0], "opposed_share") < 0.01);
+}
