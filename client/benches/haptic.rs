@@ -173,7 +173,7 @@ fn apply(criterion: &mut Criterion) {
 }
 
 /// An update that answers a sample of a second ago, and the ticks until its replay has caught up: what a
-/// round trip of a second costs, sliced over 53 ticks.
+/// round trip of a second costs, sliced over 21 ticks.
 fn replay(criterion: &mut Criterion) {
     let mut out = [0; DATAGRAM_MAX];
     // over a shorter way an update that answers a sample of a second ago would be too old

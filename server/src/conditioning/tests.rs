@@ -198,6 +198,27 @@ fn a_contact_in_which_the_bias_drifts_beyond_the_threshold_ends_and_is_tared_aft
 }
 
 #[test]
+fn a_contact_that_was_pressed_hard_and_is_let_go_ends_a_few_millimetres_behind_it_all_the_same() {
+    let mut press = Press::new(0.01, Vec2::zeros(), Vec2::new(0.03, 0.0));
+    press.stay(FREE, 1000);
+    press.go(FREE, 8e-3);
+    assert!(press.stay(8e-3, 5000) > 4990, "8 N, and 0.15 of bias");
+    press.drift = Vec2::zeros();
+    press.go(8e-3, -6e-3);
+    assert_eq!(press.stay(-6e-3, 100), 0);
+}
+
+#[test]
+fn a_bias_that_is_left_between_the_two_thresholds_of_contact_is_followed_all_the_same() {
+    let mut press = Press::new(4e-3, Vec2::new(0.0, 0.2), Vec2::zeros());
+    press.stay(FREE, 2000);
+    press.bias.x += 0.07;
+    assert_eq!(press.stay(FREE, 5000), 0);
+    let left = press.bias - press.conditioner.bias.known();
+    assert!(left.norm() < 0.01, "{left}");
+}
+
+#[test]
 fn a_session_that_begins_with_a_bias_it_takes_for_contact_finds_out_when_the_tool_goes_back() {
     let mut press = Press::new(0.01, Vec2::new(0.2, 0.0), Vec2::zeros());
     press.conditioner.resume();

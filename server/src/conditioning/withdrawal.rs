@@ -9,7 +9,7 @@ pub(super) struct Withdrawal {
     tool: Option<Vec2>,
     direction: Vec2,
     back_m: f64,
-    /// Force where it began to go back, N.
+    /// Force where it began to go back, or where it last had fallen as that of a contact does, N.
     force_n: f64,
     /// Ticks for which the force has stayed although the tool is back, and its sum over them, N.
     stays: (u32, Vec2),
@@ -49,6 +49,10 @@ impl Withdrawal {
         self.back_m = (self.back_m - along).max(0.0);
         if self.back_m <= 0.0 {
             self.force_n = size;
+        }
+        if self.force_n - size > self.softest_n_per_m * self.back_m + doubt_n {
+            // so it touched until here, and from here on it is judged anew
+            (self.back_m, self.force_n) = (0.0, size);
         }
         let expected_n = self.softest_n_per_m * self.back_m;
         if self.back_m <= BACK_M || self.force_n - size + doubt_n >= expected_n {

@@ -15,10 +15,10 @@ use crate::model::settings::ModelSettings;
 use crate::model::update::Update;
 use crate::time::Time;
 
-/// Most samples replayed in a tick, each at the cost of the model's own step: well within a haptic tick's
-/// budget of 10 µs. A second of history, 1000 samples and one more a tick, is caught up with in 53 ticks.
-/// Counted, not timed, so that both sides replay alike.
-pub const REPLAYED_PER_TICK: usize = 20;
+/// Most samples replayed in a tick, each at the cost of the model's own step: half of a haptic tick's budget of 10 µs. A second of
+/// history, 1000 samples and one more a tick, is caught up with in 21 ticks; the hand feels an update only then. Counted, not timed,
+/// so that both sides replay alike.
+pub const REPLAYED_PER_TICK: usize = 50;
 
 /// A box that is found this far from where it was, m, with the HIP hardly in it, is met anew.
 const JUMP_M: f64 = 0.01;
