@@ -10,8 +10,6 @@ use super::noise::FIRST_SAMPLES;
 const LEFT_N: f64 = 0.02;
 /// No bias of an untouched tool is more, N: more is contact.
 pub(super) const MAX_N: f64 = 0.5;
-/// Time constant by which a bias that is left is followed in free space, s.
-const FOLLOW_S: f64 = 0.25;
 /// Standard deviation of the drift before it is measured, N/s: a good sensor's.
 const DRIFT_N_PER_S: f64 = 0.01;
 /// A bias may have drifted by so much since it was last measured, N/s: three times a good sensor's.
@@ -25,8 +23,8 @@ const SLOW_NOISE_N: f64 = 0.1;
 /// A drift of fewer of its standard deviations is none while nothing is seen of the bias.
 const KNOWN_DEVIATIONS: f64 = 3.0;
 
-/// The bias. One that is tared is followed together with its drift by a Kalman filter, and goes on as it drifts
-/// while the tool touches and nothing is seen of it.
+/// The bias. It is followed together with its drift by a Kalman filter, and goes on as it drifts while the tool touches and nothing
+/// is seen of it. It is tared once it is large enough.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Bias {
     value: Vec2,
@@ -48,7 +46,7 @@ impl Default for Bias {
         Self {
             value: Vec2::zeros(),
             drift: Vec2::zeros(),
-            covariance: Matrix2::zeros(),
+            covariance: unknown_drift(MAX_N),
             samples: 0,
             first: true,
             tared: false,
@@ -87,34 +85,25 @@ impl Bias {
         self.samples = self.samples.saturating_add(1);
         self.first &= self.samples < FIRST_SAMPLES;
         self.age_s = 0.0;
-        if self.tared {
-            self.predict(self.drift);
-            let noise_n = noise_n.max(SLOW_NOISE_N);
-            self.correct(measured, noise_n * noise_n);
-            return;
-        }
-        let weight = (1.0 / f64::from(self.samples)).max(TICK_S / FOLLOW_S);
-        self.value += (measured - self.value) * weight;
-        self.tare(weight * noise_n * noise_n);
+        self.predict(self.drift);
+        let noise_n = noise_n.max(SLOW_NOISE_N);
+        self.correct(measured, noise_n * noise_n);
+        self.tare();
     }
 
     /// Takes the force (N) that is left where the tool has turned out to touch nothing, with this standard deviation (N) per axis.
     /// It has not drifted as it seemed to.
     pub(super) fn find(&mut self, left: Vec2, deviation: f64) {
         self.value = self.known() + left;
+        self.drift = Vec2::zeros();
+        self.covariance = unknown_drift(deviation);
         self.age_s = 0.0;
-        self.tare(deviation * deviation);
+        self.tare();
     }
 
-    /// Takes it off from now on if it is large enough. `variance` is that of its value, N².
-    fn tare(&mut self, variance: f64) {
-        if self.first || !self.tared && self.value.norm() <= LEFT_N {
-            return;
-        }
-        self.tared = true;
-        self.drift = Vec2::zeros();
-        let drift = DRIFT_N_PER_S * DRIFT_N_PER_S;
-        self.covariance = Matrix2::from_diagonal(&Vector2::new(variance, drift));
+    /// Takes it off from now on if it is large enough.
+    fn tare(&mut self) {
+        self.tared |= !self.first && self.value.norm() > LEFT_N;
     }
 
     /// A tick in contact.
@@ -125,12 +114,10 @@ impl Bias {
 
     /// A tick in which nothing is seen of it.
     pub(super) fn go_on(&mut self) {
-        if self.tared {
-            let least = KNOWN_DEVIATIONS * self.covariance.m22.sqrt();
-            let size = self.drift.norm();
-            let known = size > least && size < DRIFT_MAX_N_PER_S;
-            self.predict(if known { self.drift } else { Vec2::zeros() });
-        }
+        let least = KNOWN_DEVIATIONS * self.covariance.m22.sqrt();
+        let size = self.drift.norm();
+        let known = size > least && size < DRIFT_MAX_N_PER_S;
+        self.predict(if known { self.drift } else { Vec2::zeros() });
     }
 
     /// A tick of this drift, N/s.
@@ -151,4 +138,11 @@ impl Bias {
         self.drift += off * gain.y;
         self.covariance -= gain * of_value.transpose();
     }
+}
+
+/// Covariance of a bias that is known to this standard deviation, N, and whose drift is not.
+fn unknown_drift(deviation: f64) -> Matrix2<f64> {
+    Matrix2::from_diagonal(
+        &Vector2::new(deviation, DRIFT_N_PER_S).map(|deviation| deviation * deviation),
+    )
 }

@@ -219,6 +219,21 @@ fn a_bias_that_is_left_between_the_two_thresholds_of_contact_is_followed_all_the
 }
 
 #[test]
+fn a_bias_that_is_first_seen_after_a_long_contact_is_found_in_a_second() {
+    let mut press = Press::new(0.01, Vec2::zeros(), Vec2::new(0.0, 0.008));
+    press.stay(FREE, 500);
+    press.go(FREE, 2e-3);
+    press.stay(2e-3, 5000);
+    press.go(2e-3, FREE);
+    press.stay(FREE, 1000);
+    for n in 0..3000 {
+        press.tick(FREE);
+        let left = press.bias - press.conditioner.bias.known();
+        assert!(left.norm() < 6e-3, "after {n} ticks more: {left}");
+    }
+}
+
+#[test]
 fn a_session_that_begins_with_a_bias_it_takes_for_contact_finds_out_when_the_tool_goes_back() {
     let mut press = Press::new(0.01, Vec2::new(0.2, 0.0), Vec2::zeros());
     press.conditioner.resume();
