@@ -78,3 +78,12 @@ fn the_sign_of_the_force_is_not_judged_for_a_round_trip_after_another_body_is_to
     println!("{:?}", rows[0]);
     assert!(number(&rows[0], "opposed_share") < 0.01);
 }
+
+#[test]
+fn a_bias_that_first_shows_after_a_contact_makes_no_contact_in_free_space_and_no_face_there() {
+    let one = BTreeMap::from([("world", 94_713.0)]);
+    let rows = Done::given(&worlds::EXPERIMENT, 1, 20_000, one).rows("worlds.csv", &[]);
+    println!("{:?}", rows[0]);
+    assert!(number(&rows[0], "breaks_per_push") < 2.0);
+    assert!(number(&rows[0], "pose_max_mm") < 10.0);
+}
