@@ -188,7 +188,7 @@ impl Conditioner {
     fn tare(&mut self, measured: Vec2, steady: Vec2, tool: Vec2, deviation: f64) {
         if !self.in_contact {
             self.withdrawal.reset();
-            let doubt = self.detector.config().on_n.max(DEVIATIONS * deviation);
+            let doubt = self.detector.config().off_n.max(DEVIATIONS * deviation);
             let clear = self.left.is_none_or(|left| (tool - left).norm() > CLEAR_M);
             if self.bias.first || (clear && steady.norm() < doubt) {
                 self.left = None;

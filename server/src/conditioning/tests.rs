@@ -209,16 +209,6 @@ fn a_contact_that_was_pressed_hard_and_is_let_go_ends_a_few_millimetres_behind_i
 }
 
 #[test]
-fn a_bias_that_is_left_between_the_two_thresholds_of_contact_is_followed_all_the_same() {
-    let mut press = Press::new(4e-3, Vec2::new(0.0, 0.2), Vec2::zeros());
-    press.stay(FREE, 2000);
-    press.bias.x += 0.07;
-    assert_eq!(press.stay(FREE, 5000), 0);
-    let left = press.bias - press.conditioner.bias.known();
-    assert!(left.norm() < 0.01, "{left}");
-}
-
-#[test]
 fn a_bias_that_is_first_seen_after_a_long_contact_is_found_in_a_second() {
     let mut press = Press::new(0.01, Vec2::zeros(), Vec2::new(0.0, 0.008));
     press.stay(FREE, 500);

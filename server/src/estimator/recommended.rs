@@ -241,7 +241,8 @@ impl RecommendedEstimator {
         });
         let slides_on = gate == GateState::Open;
         let pressed = (motion.row.force, measured.held_back);
-        let slides = self.stand(pressed, slides_on, way, stayed, share);
+        // no push draws an object towards the tool: that it seems to come is a force that is none
+        let slides = self.stand(pressed, slides_on, way, stayed, share) && v > 0.0;
         let holding = self.obstacle.holding();
         self.immovable.press(holding, slides);
         self.estimate.holding = self.immovable.holding().or(holding);

