@@ -94,6 +94,13 @@ fn what_stood_under_all_that_a_hand_has_is_met_as_it_is_until_it_slides_or_is_se
         assert_eq!(stood.step(&free(0.19)).holding, Some(OBSTACLE_N));
     }
     assert_eq!(stood.step(&free(0.2)).holding, Some(OBSTACLE_N));
+    // nor does it slide where a tool that goes back reads what a bias leaves of the force
+    for k in 0..100 {
+        let mut tick = press(0.2, 0.2);
+        tick.tool.x -= 1e-4 * f64::from(k);
+        assert_eq!(stood.step(&tick).holding, Some(OBSTACLE_N), "{k}");
+    }
+    assert_eq!(stood.step(&free(0.2)).holding, Some(OBSTACLE_N));
     let mut carried_off = stood.clone();
     for _ in 0..400 {
         carried_off.step(&free(0.21));
